@@ -222,7 +222,7 @@ def test_bad_snapshots(method: Callable[..., Any], snapshots: Any, message: str)
 @pytest.mark.parametrize(
     ("method", "options", "message"),
     [
-        (aoa.music, {"sources": 4}, "4 sources asked for, allowed are 1 to 3"),
+        (aoa.music, {"sources": 4}, "4 sources requested; allowed are 1 to 3"),
         (aoa.root_music, {"sources": 0}, "allowed are 1 to 3"),
         (aoa.maximum_likelihood, {"sources": 4}, "allowed are 1 to 3"),
         (aoa.esprit, {"spacing_wavelengths": 0.0}, "0.01 to 100 wavelengths, not 0"),
@@ -252,7 +252,7 @@ def test_other_bad_input() -> None:
         aoa.crb_rad(np.nan, 10)
     with pytest.raises(ValueError, match="cannot be told apart"):
         aoa.crb_rad([1.0, 1.0], 10, joint=True)
-    with pytest.raises(ValueError, match="sources asked for"):
+    with pytest.raises(ValueError, match="sources requested"):
         aoa.crb_rad([0.5, 1.0, 1.5, 2.0], 10, joint=True)
     with pytest.raises(ValueError, match="'stochastic', 'deterministic' or 'known'"):
         aoa.crb_rad(1.0, 10, model="best")  # type: ignore[arg-type]
@@ -427,11 +427,11 @@ def test_what_is_no_plane_wave_is_named() -> None:
     assert clean.p_value.mean() == pytest.approx(0.5, abs=0.1)
     named = aoa.maximum_likelihood((direct + 0.5j * echo) * waveform + noise)
     assert not named.reliable.any()
-    assert np.char.startswith(named.doubt, "no plane wave").mean() > 0.97
+    assert np.char.startswith(named.doubt, "not a plane wave").mean() > 0.97
     assert (named.phase_sigma_rad > 2 * named.phase_noise_sigma_rad).all()
     other = 10 * (rng.normal(size=(count, 1, 20, 2)) @ [1, 1j]) / np.sqrt(2)
     two = aoa.maximum_likelihood(direct * waveform + echo * other + noise)
-    assert np.char.startswith(two.doubt, "more than white noise is left").mean() > 0.9
+    assert np.char.startswith(two.doubt, "residual is not white noise").mean() > 0.9
     single = aoa.maximum_likelihood((direct + 0.5j * echo) * waveform[0] + noise[0])
     assert type(single.p_value) is float
     assert single.p_value < 0.01
@@ -483,7 +483,7 @@ def test_a_measured_manifold_and_several_sources() -> None:
     assert batch.azimuth_rad.shape == (3, 2)
     # Who leaves the coupling out is told so.
     assert not aoa.direction(received, CIRCLE, elevations_rad=(0, 0), sources=2).reliable.any()
-    with pytest.raises(ValueError, match="5 sources asked for, allowed are 1 to 4"):
+    with pytest.raises(ValueError, match="5 sources requested; allowed are 1 to 4"):
         aoa.direction(received, table, elevations_rad=(0, 0), sources=5)
     for responses, elevations in ((np.ones((3, 5)), None), (np.ones(5), None), (table, None)):
         with pytest.raises(ValueError, match=r"responses|four azimuths"):

@@ -1,18 +1,18 @@
-//! Times of estimates from four antennas and twenty snapshots, covariance included.
+//! Time per estimate from four antennas and twenty snapshots, including the covariance.
 
 #![allow(clippy::unwrap_used)]
 
 use aoa::{Array, Batch, Complex64, Covariance, Method, Smoothing};
 use divan::{Bencher, black_box, counter::ItemsCount};
 
-/// Items of a batch.
+/// Number of items of a batch.
 const ITEMS: usize = 1024;
 
 fn main() {
     divan::main();
 }
 
-/// Samples of a source at various angles with some deterministic noise, row-major.
+/// Returns samples of a source at various angles with deterministic noise, row-major.
 fn samples(items: usize) -> Vec<Complex64> {
     let mut state = 1_u64;
     let mut uniform = || {

@@ -1,17 +1,17 @@
-//! The same batch again and again, to be profiled or counted: `batches WHAT TIMES`, `WHAT` being
-//! `ml`, `music`, `root-music`, `esprit` or `covariance`, with `-f32` behind it for single precision.
+//! Repeated estimation of one batch, for profilers: `batches WHAT TIMES`. `WHAT` is `ml`, `music`,
+//! `root-music`, `esprit` or `covariance`, with the suffix `-f32` for single precision.
 
 use std::hint::black_box;
 
 use aoa::{AngleEstimate, Array, Batch, Method, Real, Smoothing};
 use num_complex::Complex;
 
-/// Four antennas and twenty snapshots, as in the benchmarks.
+/// Number of items of the batch; four antennas and twenty snapshots as in the benchmarks.
 const ITEMS: usize = 64;
 const SNAPSHOTS: usize = 20;
 
 fn repeat<T: Real>(what: &str, times: usize, narrow: impl Fn(f64) -> T) -> Result<(), String> {
-    // A source at another angle for every item, and something like noise.
+    // Each item has a source at another angle, and a deterministic disturbance.
     let samples: Vec<Complex<T>> = (0..ITEMS * 4 * SNAPSHOTS)
         .map(|i| {
             let (item, n, t) = (i / (4 * SNAPSHOTS), i / SNAPSHOTS % 4, i % SNAPSHOTS);
@@ -53,7 +53,7 @@ fn main() -> Result<(), String> {
     };
     let times = times
         .parse()
-        .map_err(|_| format!("{times} is no number of times"))?;
+        .map_err(|_| format!("TIMES must be a positive integer, not {times}"))?;
     match what.strip_suffix("-f32") {
         Some(what) => repeat(what, times, |it| it as f32),
         None => repeat(what, times, |it| it),

@@ -13,9 +13,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 fn main() -> Result<(), aoa::Error> {
-    // Neighbours are half a wavelength apart.
+    // Adjacent antennas are half a wavelength apart.
     let array = ArbitraryArray::<5>::circular(0.425)?;
-    // A circle does not tell above from below: look above.
+    // A horizontal circle cannot distinguish directions above and below; search above.
     let finder = DirectionFinder::new(array, [0.0, FRAC_PI_2])?;
 
     let truth = Direction::new(110_f64.to_radians(), 35_f64.to_radians());

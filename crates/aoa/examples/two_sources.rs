@@ -1,4 +1,4 @@
-//! Two sources in noise, told apart by every method that can: `cargo run --example two_sources`.
+//! Two sources in noise, separated by every method: `cargo run --example two_sources`.
 
 #![allow(clippy::print_stdout)]
 

@@ -1,7 +1,7 @@
-//! Cramér–Rao bounds: the standard deviation that no unbiased estimator can beat.
+//! Cramér–Rao bounds: the minimum standard deviation of an unbiased estimator.
 //!
-//! All bounds are for white noise; SNRs are linear, per antenna and snapshot. Electrical angles come
-//! first; [`angle_sigma_rad`] carries a bound over to the angle.
+//! All bounds are for white noise. SNRs are linear, per antenna and snapshot. Most functions bound
+//! the electrical angle; [`angle_sigma_rad`] converts to the angle.
 
 use num_complex::Complex64;
 
@@ -13,29 +13,31 @@ use crate::linalg::dense::{adjoint, inverse, product};
 use crate::linalg::matrix::{Matrix, zeros};
 use crate::list::List;
 
-/// One Gaussian source, unknown power: standard deviation of the electrical angle in rad,
-/// `sqrt((1 + 1 / (N snr)) / (2 L snr A))` with `A = N (N^2 - 1) / 12` (Stoica and Nehorai 1990,
-/// the stochastic bound). Maximum likelihood, MUSIC and Root-MUSIC attain it.
+/// Returns the bound for one Gaussian source of unknown power: standard deviation of the electrical
+/// angle in rad, `sqrt((1 + 1 / (N snr)) / (2 L snr A))` with `A = N (N^2 - 1) / 12` (Stoica and
+/// Nehorai 1990, stochastic bound). Maximum likelihood, MUSIC and Root-MUSIC attain it.
 pub fn stochastic<const N: usize>(snr: f64, snapshots: usize) -> f64 {
     ((1.0 + 1.0 / (N as f64 * snr)) / (2.0 * snapshots as f64 * snr * aperture::<N>())).sqrt()
 }
 
-/// One source with an unknown, non-random waveform: `sqrt(1 / (2 L snr A))` (Stoica and Nehorai
-/// 1989, the deterministic bound). Below about 0 dB no estimator attains it with few snapshots.
+/// Returns the bound for one source with an unknown deterministic waveform: `sqrt(1 / (2 L snr A))`
+/// in rad (Stoica and Nehorai 1989, deterministic bound). Below about 0 dB and with few snapshots,
+/// no estimator attains it.
 pub fn deterministic<const N: usize>(snr: f64, snapshots: usize) -> f64 {
     (2.0 * snapshots as f64 * snr * aperture::<N>())
         .sqrt()
         .recip()
 }
 
-/// One source whose waveform is known up to a complex gain (pilots): `sqrt(1 / (2 SNR A))`,
-/// `SNR` being the sum over all known samples, i.e. the SNR per antenna after despreading.
+/// Returns the bound for one source whose waveform is known up to a complex gain (pilots): `sqrt(1
+/// / (2 SNR A))` in rad. `total_snr` is the sum over all known samples, i.e. the SNR per antenna
+/// after despreading.
 pub fn known_signal<const N: usize>(total_snr: f64) -> f64 {
     (2.0 * total_snr * aperture::<N>()).sqrt().recip()
 }
 
-/// [`known_signal`] with another SNR `g_n` at each antenna (0 where a channel is dead):
-/// `sqrt(1 / (2 A))` with `A = sum g_n n^2 - (sum g_n n)^2 / sum g_n`.
+/// Returns the bound of [`known_signal`] for a different SNR `g_n` at each antenna (0 for a dead
+/// channel): `sqrt(1 / (2 A))` in rad with `A = sum g_n n^2 - (sum g_n n)^2 / sum g_n`.
 pub fn known_signal_unequal<const N: usize>(total_snrs: &[f64; N]) -> f64 {
     let moment = |power: i32| -> f64 {
         let terms = total_snrs.iter().enumerate();
@@ -45,8 +47,8 @@ pub fn known_signal_unequal<const N: usize>(total_snrs: &[f64; N]) -> f64 {
     (2.0 * aperture).sqrt().recip()
 }
 
-/// A bound on the angle from a bound on the electrical angle:
-/// `sigma_theta = sigma_omega / (2 pi (d / lambda) sin(theta))`. It diverges at end-fire.
+/// Converts a bound on the electrical angle to a bound on the angle: `sigma_theta = sigma_omega /
+/// (2 pi (d / lambda) sin(theta))`. The result diverges at end-fire.
 pub fn angle_sigma_rad<const N: usize>(
     phase_sigma_rad: f64,
     angle_rad: f64,
@@ -55,11 +57,11 @@ pub fn angle_sigma_rad<const N: usize>(
     phase_sigma_rad / (array.phase_at_end_fire_rad() * angle_rad.sin())
 }
 
-/// One Gaussian source of unknown power, received by any array: covariance of (azimuth, elevation) in
-/// rad^2, the inverse of `2 L q^2 / (1 + q) Re(D^H P D) / a^H a` with `q` = N snr, `D` the derivatives of
-/// the response `a` and `P` the projection on its complement (Stoica and Nehorai 1990). `snr` is the mean
-/// over the antennas. Infinite where the array does not tell directions apart, as in elevation at the
-/// horizon of a horizontal one.
+/// Returns the bound for one Gaussian source of unknown power and any array: covariance of
+/// (azimuth, elevation) in rad^2. It is the inverse of `2 L q^2 / (1 + q) Re(D^H P D) / a^H a`
+/// (Stoica and Nehorai 1990). `D` are the derivatives of the response `a`, `P` projects onto its
+/// complement, and `q` = N snr with the mean SNR over the antennas. The bound is infinite where the
+/// response is stationary, for example in elevation at the horizon of a horizontal array.
 pub fn azimuth_elevation<M: Manifold<N> + ?Sized, const N: usize>(
     manifold: &M,
     direction: Direction,
@@ -70,7 +72,7 @@ pub fn azimuth_elevation<M: Manifold<N> + ?Sized, const N: usize>(
     covariance_around(&around, direction, snr, snapshots, true)
 }
 
-/// [`azimuth_elevation`], or the azimuth alone where the elevation is given.
+/// [`azimuth_elevation`], or the variance of the azimuth only if the elevation is known.
 pub(crate) fn covariance_around<const N: usize>(
     around: &Neighbourhood<N>,
     direction: Direction,
@@ -81,7 +83,7 @@ pub(crate) fn covariance_around<const N: usize>(
     let ratio = N as f64 * snr;
     let factor = 2.0 * snapshots as f64 * ratio * ratio / ((1.0 + ratio) * around.power);
     let [[a, b], [_, c]] = around.metric.map(|row| row.map(|it| it * factor));
-    // From the great circle to the azimuth.
+    // Convert from the great circle to the azimuth.
     let stretch = direction.elevation_rad.cos().recip();
     if !elevation_too {
         return [[stretch * stretch / a, 0.0], [0.0, 0.0]];
@@ -97,23 +99,24 @@ pub(crate) fn covariance_around<const N: usize>(
     ]
 }
 
-/// The SNR per antenna and snapshot below which an estimate is called unresolved.
+/// Returns the SNR per antenna and snapshot below which an estimate is unresolved.
 ///
-/// Below it, noise in one of the N - 1 directions orthogonal to the source outweighs it with a
-/// probability that may exceed 1 %; estimators then leave the Cramér–Rao bound (the threshold
-/// region). By the Chernoff bound this probability is at most `(N - 1) (4 r / (1 + r)^2)^L`,
-/// `r = 1 + N snr` being the ratio of the two mean powers.
+/// Below this SNR, the noise in one of the N - 1 directions orthogonal to the source may exceed the
+/// source with a probability above 1 %. Estimators then deviate from the Cramér–Rao bound
+/// (threshold region). The Chernoff bound of this probability is `(N - 1) (4 r / (1 + r)^2)^L`,
+/// where `r = 1 + N snr` is the ratio of the mean powers.
 pub fn resolvable_snr<const N: usize>(snapshots: usize) -> f64 {
     const OUTLIERS: f64 = 0.01;
-    // 4 r / (1 + r)^2 = q, solved for the root above 1.
+    // Solve 4 r / (1 + r)^2 = q for the root above 1.
     let q = (OUTLIERS / (N - 1) as f64).powf(1.0 / snapshots as f64);
     let ratio = (2.0 - q + 2.0 * (1.0 - q).sqrt()) / q;
     (ratio - 1.0) / N as f64
 }
 
-/// Several uncorrelated Gaussian sources: standard deviation of each electrical angle in rad, from
-/// `C^-1 = 2 L Re[(D^H P D) * (S A^H R^-1 A S)^T]` (Stoica and Nehorai 1990), `P` projecting on the
-/// complement of the steering vectors `A`, `D` their derivatives, `S` the diagonal of the SNRs.
+/// Returns the bounds for several uncorrelated Gaussian sources: the standard deviation of each
+/// electrical angle in rad, from `C^-1 = 2 L Re[(D^H P D) * (S A^H R^-1 A S)^T]` (Stoica and
+/// Nehorai 1990). `P` projects onto the complement of the steering vectors `A`, `D` are their
+/// derivatives, and `S` is the diagonal matrix of the SNRs.
 ///
 /// # Errors
 /// [`Error::TooManySources`] for none or more than N - 1, [`Error::NotPositive`] for an SNR or
@@ -127,11 +130,11 @@ pub fn stochastic_several<const N: usize>(
     stochastic_of(phases_rad, &powers, 1.0, snapshots)
 }
 
-/// Several uncorrelated sources with unknown, non-random waveforms: as [`stochastic_several`] with
-/// `S` in place of `S A^H R^-1 A S` (Stoica and Nehorai 1989).
+/// Returns the bounds for several uncorrelated sources with unknown deterministic waveforms, in
+/// rad: [`stochastic_several`] with `S` in place of `S A^H R^-1 A S` (Stoica and Nehorai 1989).
 ///
 /// # Errors
-/// As [`stochastic_several`].
+/// See [`stochastic_several`].
 pub fn deterministic_several<const N: usize>(
     phases_rad: &[f64],
     snrs: &[f64],
@@ -141,11 +144,13 @@ pub fn deterministic_several<const N: usize>(
     from_information(phases_rad, &powers, 1.0, snapshots)
 }
 
-/// Several uncorrelated sources whose waveforms are known up to complex gains: each is bounded as if
-/// it were alone, [`known_signal`] with `snapshots` times its SNR (Li and Compton 1993).
+/// Returns the bounds for several uncorrelated sources whose waveforms are known up to complex
+/// gains, in rad. Each source has the bound of a single source, [`known_signal`] with `snapshots`
+/// times its SNR (Li and Compton 1993).
 ///
 /// # Errors
-/// As [`stochastic_several`], but for coinciding angles, which known waveforms tell apart.
+/// See [`stochastic_several`]. Coinciding angles are allowed, because known waveforms separate the
+/// sources.
 pub fn known_signal_several<const N: usize>(
     phases_rad: &[f64],
     snrs: &[f64],
@@ -189,7 +194,7 @@ fn checked_powers<const N: usize>(
     Ok(powers)
 }
 
-/// Steering vectors as the columns of a matrix.
+/// Returns the matrix whose columns are the steering vectors.
 pub(crate) fn steering_matrix<const N: usize>(phases_rad: &[f64]) -> Matrix<N> {
     let mut columns = zeros::<N>();
     for (k, &phase) in phases_rad.iter().enumerate() {
@@ -200,7 +205,7 @@ pub(crate) fn steering_matrix<const N: usize>(phases_rad: &[f64]) -> Matrix<N> {
     columns
 }
 
-/// The stochastic bound for any source covariance.
+/// Returns the stochastic bound for any source covariance.
 pub(crate) fn stochastic_of<const N: usize>(
     phases_rad: &[f64],
     source_covariance: &Matrix<N>,
@@ -209,7 +214,7 @@ pub(crate) fn stochastic_of<const N: usize>(
 ) -> Result<List<f64, N>, Error> {
     let sources = phases_rad.len();
     let steering = steering_matrix::<N>(phases_rad);
-    // A S, N by K.
+    // A S, an N by K matrix.
     let mixed = product(&steering, source_covariance, [N, sources, sources]);
     let mut covariance = product(&mixed, &adjoint(&steering), [N, sources, N]);
     for (n, row) in covariance.iter_mut().enumerate() {
@@ -221,7 +226,7 @@ pub(crate) fn stochastic_of<const N: usize>(
     from_information(phases_rad, &effective, noise_variance, snapshots)
 }
 
-/// `C^-1 = (2 L / sigma^2) Re[(D^H P D) * G^T]`.
+/// Returns the standard deviations from `C^-1 = (2 L / sigma^2) Re[(D^H P D) * G^T]`.
 fn from_information<const N: usize>(
     phases_rad: &[f64],
     effective: &Matrix<N>,

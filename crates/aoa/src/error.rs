@@ -1,102 +1,104 @@
-//! What can be wrong with the input of an estimator.
+//! Errors of the estimators' inputs.
 
-/// Why no estimate could be formed. Every variant is a fault of the input; an estimate that was
-/// formed but should not be trusted carries [`Verdict::Unresolved`](crate::Verdict) instead.
+/// Invalid input of an estimator. An estimate with a low reliability is not an error; it has the
+/// verdict [`Verdict::Unresolved`](crate::Verdict).
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// A sample, a weight or a matrix entry is NaN or infinite (or its power overflows).
+    /// A sample, weight or matrix entry is NaN or infinite, or its power overflows.
     #[error("samples must be finite: found NaN, infinity, or a power beyond the range of f64")]
     NotFinite,
-    /// All samples are zero: there is no direction in silence.
+    /// All samples are zero, so that no direction exists.
     #[error("samples must not all be zero")]
     Zero,
-    /// No snapshots at all.
+    /// There are no snapshots.
     #[error("at least one snapshot is needed")]
     NoSnapshots,
-    /// More sources than the method can resolve with this array.
-    #[error("{requested} sources asked for, allowed are 1 to {maximum} with this array and method")]
+    /// The method cannot resolve this number of sources with the array.
+    #[error("{requested} sources requested; allowed are 1 to {maximum} with this array and method")]
     TooManySources {
-        /// The number of sources asked for.
+        /// Requested number of sources.
         requested: usize,
-        /// The largest number allowed: one less than the antennas, or 1 for maximum likelihood.
+        /// Maximum number of sources.
         maximum: usize,
     },
-    /// An element of an array is too far away, or its place is not finite.
+    /// An element is too far from the origin, or its position is not finite.
     #[error("element {0} must be within 100 wavelengths of the origin on every axis")]
     ElementPlace(usize),
-    /// Two elements are in one place.
+    /// Two elements have equal positions.
     #[error("elements {0} and {1} are in the same place")]
     CoincidentElements(usize, usize),
-    /// All elements are on one line: only the angle from it shows.
+    /// All elements are collinear, so that only the angle from their line is measurable.
     #[error(
         "all elements are on one line, which shows only the angle from it: describe it as a linear array"
     )]
     ElementsInARow,
-    /// A table of responses that makes no manifold.
+    /// The table of responses does not define a manifold.
     #[error("table of responses: {0}")]
     ManifoldTable(&'static str),
-    /// A range of elevations that is none.
+    /// The range of elevations is invalid.
     #[error("elevations must ascend from -pi/2 or more to pi/2 or less, not {lowest} to {highest}")]
     Elevations {
-        /// Where the range begins.
+        /// Lowest elevation in rad.
         lowest: f64,
-        /// Where it ends.
+        /// Highest elevation in rad.
         highest: f64,
     },
-    /// The element spacing is outside what an array can have.
+    /// The element spacing is outside the valid range.
     #[error("spacing must be 0.01 to 100 wavelengths, not {0}")]
     Spacing(f64),
-    /// An angle from the array's axis is outside 0 to pi, or not finite.
+    /// The angle from the array's axis is outside 0 to pi, or not finite.
     #[error("an angle from the array's axis lies between 0 and pi rad, not {0}")]
     Angle(f64),
     /// A calibration gain is zero, NaN or infinite.
     #[error("calibration gain of channel {0} must be finite and not zero")]
     CalibrationGain(usize),
-    /// A weight or a noise variance is negative, NaN or infinite.
+    /// A weight or a noise variance is not positive, or is NaN or infinite.
     #[error("{name} must be finite and positive, not {value}")]
     NotPositive {
-        /// What is wrong.
+        /// Name of the quantity.
         name: &'static str,
-        /// Its value.
+        /// Value of the quantity.
         value: f64,
     },
     /// Fewer than two channels have a finite noise variance.
-    #[error("a direction needs two living channels, not {living}")]
+    #[error(
+        "a direction requires at least two channels with a finite noise variance, not {living}"
+    )]
     DeadChannels {
-        /// Channels with a finite noise variance.
+        /// Number of channels with a finite noise variance.
         living: usize,
     },
-    /// The matrix given as covariance is not Hermitian with a non-negative diagonal.
+    /// The given covariance matrix is not Hermitian or has a negative diagonal entry.
     #[error("a covariance matrix must be Hermitian with a non-negative diagonal")]
     NotHermitian,
-    /// The matrix given as covariance has a negative eigenvalue: no samples have such a covariance.
+    /// The given covariance matrix has a negative eigenvalue.
     #[error("a covariance matrix must have no negative eigenvalue")]
     Indefinite,
-    /// A batch's item has more samples than a memory can hold.
+    /// An item of a batch has more samples than the address space can hold.
     #[error("{snapshots} snapshots of {antennas} antennas are more than can be addressed")]
     TooManySnapshots {
-        /// Snapshots of an item.
+        /// Number of snapshots of an item.
         snapshots: usize,
-        /// Antennas of the array.
+        /// Number of antennas of the array.
         antennas: usize,
     },
-    /// So few snapshots that what is asked for cannot be told from noise.
+    /// The number of snapshots is too small for the estimate.
     #[error("{snapshots} snapshots are too few: at least {needed} are needed")]
     TooFewSnapshots {
-        /// Snapshots given.
+        /// Given number of snapshots.
         snapshots: usize,
-        /// The least number.
+        /// Minimum number of snapshots.
         needed: usize,
     },
-    /// A subarray larger than the array, or of a single antenna.
+    /// The subarray is larger than the array or has a single antenna.
     #[error("a subarray has 2 to {antennas} antennas, not {subarray}")]
     Subarray {
-        /// Antennas asked for.
+        /// Requested number of antennas.
         subarray: usize,
-        /// Antennas of the array.
+        /// Number of antennas of the array.
         antennas: usize,
     },
-    /// The sources are so close or so coherent that the equations have no unique solution.
+    /// The sources are too close or too coherent for a unique solution.
     #[error("the sources cannot be told apart: the equations are singular")]
     Singular,
 }

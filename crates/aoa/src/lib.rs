@@ -1,8 +1,8 @@
 //! Angle of arrival with antenna arrays.
 //!
-//! From the complex samples ("snapshots") of a few antennas in a row to the direction of a source: by
-//! maximum likelihood, MUSIC, Root-MUSIC or ESPRIT, with a standard deviation, an SNR and a verdict
-//! for every estimate. The number of antennas is a const generic; nothing is allocated.
+//! Estimates the direction of a source from complex samples ("snapshots") of an antenna array: by
+//! maximum likelihood, MUSIC, Root-MUSIC or ESPRIT. Every estimate has a standard deviation, an SNR
+//! and a verdict. The number of antennas is a const generic, and no memory is allocated.
 //!
 //! # One source
 //!
@@ -31,12 +31,13 @@
 //!
 //! # Conventions
 //!
-//! The angle is measured from the array's axis, 0 to pi. What is estimated is the electrical angle
-//! `omega = 2 pi (d / lambda) cos(theta)`, the phase step between neighbours: its noise is Gaussian
-//! with the same standard deviation in every direction. A filter should take
-//! [`phase_rad`](AngleEstimate::phase_rad) and [`phase_sigma_rad`](AngleEstimate::phase_sigma_rad);
-//! `angle_rad` and `sigma_rad` are for people. The SNR is per antenna and snapshot. The mean of the
-//! snapshots is signal and is never removed.
+//! The angle is measured from the array's axis, 0 to pi. The estimated quantity is the electrical
+//! angle `omega = 2 pi (d / lambda) cos(theta)`, the phase difference between adjacent antennas.
+//! Its noise is Gaussian with a standard deviation that does not depend on the direction. A filter
+//! should use [`phase_rad`](AngleEstimate::phase_rad) and
+//! [`phase_sigma_rad`](AngleEstimate::phase_sigma_rad); `angle_rad` and `sigma_rad` are for
+//! display. The SNR is per antenna and snapshot. The mean of the snapshots is signal and is never
+//! removed.
 //!
 //! # Which method
 //!
@@ -47,28 +48,28 @@
 //! | [`Method::RootMusic`] | N - 1 | yes; separates close sources best |
 //! | [`Method::EspritLs`], [`Method::EspritTls`] | N - 1 | 5 % above it with four antennas |
 //!
-//! Several sources: [`estimate_several`], and [`source_count`] for how many. Of coherent ones
-//! (reflections) all methods but maximum likelihood need [`estimate_several_smoothed`].
-//! Known pilots: [`maximum_likelihood_pilots`], and [`maximum_likelihood_pilots_unequal`] where the
-//! channels' noise differs or one is dead. Many estimates in one call: [`Batch`]. A picture of all
-//! directions: [`PseudoSpectrum`]. Real
-//! receivers: [`Calibration`]. Elements in a circle, a plane, anywhere: [`DirectionFinder`], in azimuth
-//! and elevation.
+//! Several sources: [`estimate_several`], and [`source_count`] for their number. Coherent sources
+//! (reflections) require [`estimate_several_smoothed`] with all methods except maximum likelihood.
+//! Known pilots: [`maximum_likelihood_pilots`], and [`maximum_likelihood_pilots_unequal`] for
+//! channels with different noise variances or dead channels. Many estimates in one call: [`Batch`].
+//! Spectrum over all directions: [`PseudoSpectrum`]. Gain and phase errors of the channels:
+//! [`Calibration`]. Circular, planar and other arrays, in azimuth and elevation:
+//! [`DirectionFinder`].
 //!
-//! # What an estimate knows of itself
+//! # Reliability of an estimate
 //!
-//! Whether plane waves and white noise explain what was received is tested ([`GoodnessOfFit`]): a model
-//! that holds is doubted once in a hundred times. Reflections, antennas unlike those described and sources
-//! that were not looked for are named [beside](AngleEstimate::doubt) the [`Verdict`], and the standard
-//! deviation then holds what they displace, as far as the residual shows it. One thing cannot be known from
-//! one look: a reflection from nearly the source's own direction, within about a twentieth of the beam's
-//! width at 20 dB, arrives as one plane wave from between the two.
+//! [`GoodnessOfFit`] tests whether plane waves and white noise explain the samples, with a
+//! false-alarm probability of 1 %. Reflections, deviations of the antennas and additional sources
+//! are reported by [`AngleEstimate::doubt`] next to the [`Verdict`]. The standard deviation then
+//! includes their effect, as far as the residual reveals it. One error is not detectable in a
+//! single estimate: a reflection from almost the direction of the source (within about a twentieth
+//! of the beam width at 20 dB) is received as one plane wave from an intermediate direction.
 
-// Loops over vector registers must be compiled into the function that was chosen for the processor.
+// Loops over vector registers must be inlined into the function that is compiled for the processor.
 #![allow(clippy::inline_always)]
 
-// Each folder uses only those before it: linalg, simd, array; spectrum; kernel; covariance; result;
-// method; estimate.
+// Dependencies of the modules, each on the previous ones only: linalg, simd, array; spectrum;
+// kernel; covariance; result; method; estimate.
 mod array;
 pub mod bound;
 mod covariance;

@@ -1,8 +1,8 @@
-//! A list that needs no heap.
+//! List of fixed capacity without heap allocation.
 
 use std::ops::{Deref, DerefMut};
 
-/// Up to `N` values, on the stack; use it as a slice.
+/// List of up to `N` values on the stack, which dereferences to a slice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct List<T, const N: usize> {
     items: [T; N],
@@ -10,7 +10,7 @@ pub struct List<T, const N: usize> {
 }
 
 impl<T: Copy, const N: usize> List<T, N> {
-    /// No values. `fill` occupies the unused places.
+    /// Creates an empty list. `fill` initialises the unused entries.
     pub(crate) const fn empty(fill: T) -> Self {
         Self {
             items: [fill; N],
@@ -18,7 +18,7 @@ impl<T: Copy, const N: usize> List<T, N> {
         }
     }
 
-    /// Adds a value, unless the list is full.
+    /// Appends a value; a full list is unchanged.
     pub(crate) fn push(&mut self, value: T) {
         if let Some(place) = self.items.get_mut(self.len) {
             *place = value;
@@ -26,7 +26,7 @@ impl<T: Copy, const N: usize> List<T, N> {
         }
     }
 
-    /// The values of an iterator, up to the capacity. `fill` occupies the unused places.
+    /// Collects an iterator up to the capacity. `fill` initialises the unused entries.
     pub(crate) fn collect(fill: T, values: impl IntoIterator<Item = T>) -> Self {
         let mut list = Self::empty(fill);
         for value in values.into_iter().take(N) {

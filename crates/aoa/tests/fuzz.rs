@@ -7,7 +7,7 @@ mod angles;
 mod short_run;
 
 #[test]
-fn no_samples_covariance_or_manifold_makes_an_estimator_panic() {
+fn samples_covariances_and_manifolds_never_cause_a_panic() {
     let seeds: Vec<Vec<u8>> = (0..=255_u8)
         .map(|settings| {
             let value = |i: u32| (f64::from(settings) + f64::from(i * i)).sin();

@@ -1,4 +1,4 @@
-//! Bindings of the crate `aoa`: `access_av._core.aoa`, which `access_av.aoa` shows to the user.
+//! Bindings of the crate `aoa` as `access_av._core.aoa`, which `access_av.aoa` re-exports.
 
 mod azimuth_elevation;
 mod bounds;
@@ -30,7 +30,7 @@ pub use statistics::{calibrate, covariance, estimate_sources, forward_backward};
 
 use crate::threads::at_most_one_per_core;
 
-/// What the caller asked for, besides the samples.
+/// Arguments of an estimator other than the samples.
 struct Request<'a, 'py> {
     method: Method,
     spacing_wavelengths: f64,
@@ -40,7 +40,7 @@ struct Request<'a, 'py> {
     threads: usize,
 }
 
-/// A function of Python that estimates by a method, which may depend on an option of its own.
+/// Defines a Python function that estimates with one method, which may depend on an option.
 macro_rules! estimator {
     ($(#[$doc:meta])* $name:ident($($option:ident: $type:ty = $default:tt)?) $method:expr) => {
         $(#[$doc])*
@@ -77,9 +77,9 @@ macro_rules! estimator {
 }
 
 estimator!(
-    /// Directions of arrival by MUSIC.
+    /// Estimate directions of arrival by MUSIC.
     ///
-    /// The peaks of the pseudo-spectrum are found to rounding: there is no grid to choose.
+    /// The peaks of the pseudo-spectrum are refined to machine precision; there is no grid setting.
     ///
     /// Parameters
     /// ----------
@@ -87,28 +87,28 @@ estimator!(
     ///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`; 2 to 16
     ///     antennas, complex64 or complex128, any strides. The mean is not removed.
     /// spacing_wavelengths : float
-    ///     Distance between neighbouring antennas in wavelengths.
+    ///     Distance between adjacent antennas in wavelengths.
     /// sources : int
     ///     Number of sources, 1 to antennas - 1.
     /// forward_backward : bool
     ///     Average the covariance forward and backward, which separates two coherent sources.
     /// subarray : int, optional
-    ///     Average the covariance over the subarrays of so many antennas, which separates up to
+    ///     Number of antennas of the subarrays for spatial smoothing, which separates up to
     ///     ``antennas - subarray + 1`` coherent sources.
     /// calibration : array_like, optional
-    ///     Complex gain of each channel, see `calibrate`. Every channel is divided by its own.
+    ///     Complex gain of each channel, see `calibrate`. Every channel is divided by its gain.
     /// threads : int
-    ///     Threads to spread a batch over; one per core at most.
+    ///     Number of threads for a batch, limited to one per core.
     ///
     /// Returns
     /// -------
     /// AngleEstimate
-    ///     Angles from the array's axis, standard deviations, SNRs, verdicts.
+    ///     Angles from the array's axis, standard deviations, SNRs and verdicts.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     Wrong shape or type; NaN, infinite or only zero samples; too many sources.
+    ///     Wrong shape or type; samples that are NaN, infinite or all zero; too many sources.
     ///
     /// Examples
     /// --------
@@ -125,9 +125,9 @@ estimator!(
     music() Method::Music
 );
 estimator!(
-    /// Directions of arrival by Root-MUSIC: the roots of the MUSIC polynomial.
+    /// Estimate directions of arrival by Root-MUSIC, the roots of the MUSIC polynomial.
     ///
-    /// Parameters, result and errors as for `music`.
+    /// Parameters, result and errors: see `music`.
     ///
     /// Examples
     /// --------
@@ -144,14 +144,15 @@ estimator!(
     root_music() Method::RootMusic
 );
 estimator!(
-    /// Directions of arrival by ESPRIT.
+    /// Estimate directions of arrival by ESPRIT.
     ///
-    /// Parameters, result and errors as for `music`, but for
+    /// Parameters, result and errors: see `music`. Additional parameter:
     ///
     /// Parameters
     /// ----------
     /// total_least_squares : bool
-    ///     Solve the rotation between the subarrays by total, not ordinary, least squares.
+    ///     Whether to solve the rotation between the subarrays by total instead of ordinary least
+    ///     squares.
     ///
     /// Examples
     /// --------
@@ -168,10 +169,11 @@ estimator!(
     }
 );
 estimator!(
-    /// Directions of arrival by maximum likelihood: optimal, the fastest for one source, and for several,
-    /// which may be coherent, the most exact and the slowest (alternating projection).
+    /// Estimate directions of arrival by maximum likelihood. The method is optimal, and the fastest
+    /// for one source. For several sources, which may be coherent, it is the most accurate and the
+    /// slowest (alternating projection).
     ///
-    /// Parameters, result and errors as for `music`.
+    /// Parameters, result and errors: see `music`.
     ///
     /// Examples
     /// --------
@@ -185,29 +187,31 @@ estimator!(
     maximum_likelihood() Method::MaximumLikelihood
 );
 
-/// Directions of arrival from despread pilots, by maximum likelihood.
+/// Estimate directions of arrival from despread pilots by maximum likelihood.
 ///
 /// Parameters
 /// ----------
 /// blocks : ndarray
-///     Complex, `(antennas, blocks)` or `(batch, antennas, blocks)`: per antenna and coherent piece of
-///     signal (an OFDM symbol) the sum of the received samples times the conjugated pilots, divided by
-///     the root of the pilots' energy. Neither carrier offset nor channel phase between blocks matters.
+///     Complex blocks, `(antennas, blocks)` or `(batch, antennas, blocks)`. A block is a coherent
+///     part of the signal (an OFDM symbol). For each antenna, it is the sum of the received samples
+///     times the conjugated pilots, divided by the square root of the pilots' energy. Carrier
+///     offset and channel phase between blocks do not matter.
 /// noise_variance : float or array_like, optional
-///     Variance of the noise of a block; one for each antenna where they differ, infinite where a channel
-///     is dead. Estimated without, which takes two blocks or more.
+///     Noise variance of a block; one value per antenna if they differ, infinite for a dead
+///     channel [default: estimated from at least two blocks].
 /// spacing_wavelengths, calibration
-///     As for `music`.
+///     See `music`.
 ///
 /// Returns
 /// -------
 /// AngleEstimate
-///     `snr_db` is per antenna and block.
+///     Angles with the SNR per antenna and block.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Wrong shape or type; NaN, infinite or only zero blocks; a variance that is not positive.
+///     Wrong shape or type; blocks that are NaN, infinite or all zero; a variance that is not
+///     positive.
 ///
 /// Examples
 /// --------
@@ -248,7 +252,7 @@ pub fn maximum_likelihood_pilots(
     Ok(AngleEstimate { estimates })
 }
 
-/// Noise variance of all antennas, or of each.
+/// Noise variance, common to all antennas or one per antenna.
 enum Noise<E> {
     Equal(f64),
     Unequal(E),
@@ -259,7 +263,7 @@ fn noise_of(variance: &Bound<'_, PyAny>) -> PyResult<Noise<Vec<f64>>> {
         return Ok(Noise::Equal(one));
     }
     let each: PyArrayLike1<'_, f64, AllowTypeChange> = variance.extract().map_err(|_| {
-        PyValueError::new_err("noise_variance must be a number, or one for each antenna")
+        PyValueError::new_err("noise_variance must be one number or one number per antenna")
     })?;
     Ok(Noise::Unequal(each.as_array().to_vec()))
 }
@@ -344,7 +348,7 @@ impl Request<'_, '_> {
         };
         let outcomes = py.detach(|| {
             thread::scope(|scope| {
-                // Where no thread is to be had, the others and this one do its share.
+                // If a thread cannot be created, the existing threads process its share.
                 let helpers: Vec<_> = (share..batch.len())
                     .step_by(share)
                     .filter_map(|_| thread::Builder::new().spawn_scoped(scope, work).ok())
@@ -371,7 +375,7 @@ impl Request<'_, '_> {
     }
 }
 
-/// The array that the user describes.
+/// Creates the array from the user's arguments.
 fn calibrated_array<const N: usize>(
     spacing_wavelengths: f64,
     calibration: Option<&Bound<'_, PyAny>>,
@@ -383,7 +387,7 @@ fn calibrated_array<const N: usize>(
     })
 }
 
-/// Channel gains given by the user.
+/// Creates the calibration from the user's channel gains.
 fn calibration_of<const N: usize>(gains: &Bound<'_, PyAny>) -> PyResult<Calibration<N>> {
     let gains: PyArrayLike1<'_, Complex64, AllowTypeChange> = gains
         .extract()

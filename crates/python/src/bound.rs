@@ -1,4 +1,4 @@
-//! The posterior Cramér–Rao bound along a route and over its site, as columns.
+//! Posterior Cramér–Rao bound along a route and over its site.
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use onboard::geometry::Point;
@@ -12,10 +12,10 @@ use simulate::bound::{Bound as CoreBound, BoundPoint};
 
 use crate::settings::{Scenario, settings_error};
 
-/// A column's name, and its value in a row.
+/// Name of a column, and its value in a row.
 type Column = (&'static str, fn(&BoundPoint) -> f64);
 
-/// How well any localizer can do in a scenario: the posterior Cramér–Rao bound.
+/// Posterior Cramér–Rao bound of the localization error in a scenario.
 #[pyclass(frozen, name = "Bound", module = "access_av._core")]
 pub struct ErrorBound {
     bound: CoreBound,
@@ -45,7 +45,7 @@ impl ErrorBound {
         })
     }
 
-    /// The bound at each SSB of the drive, every SSB being used: columns of equal length.
+    /// Return the bound at each SSB of the drive, with every SSB used, as columns of equal length.
     fn along_route(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
         let points = py.detach(|| self.bound.along_route());
         let table = PyDict::new(py);
@@ -67,9 +67,10 @@ impl ErrorBound {
         Ok(table.unbind())
     }
 
-    /// The bound in metres at each place from `looks` independent looks at every radio head, by a
-    /// vehicle that knows its heading to `heading_std_rad` and nothing of its place. NaN where
-    /// the radio heads leave a direction open.
+    /// Return the bound of the RMS position error in metres at each position for `looks`
+    /// independent angles of every radio head. The heading is known with the standard deviation
+    /// `heading_std_rad`, and the position has a flat prior. NaN if the radio heads leave a
+    /// direction unobservable.
     #[allow(clippy::needless_pass_by_value)] // as Python passes them
     fn at<'py>(
         &self,
@@ -100,8 +101,9 @@ impl ErrorBound {
         Ok(PyArray1::from_vec(py, bound_m))
     }
 
-    /// SNR per antenna and sample in dB by the link budget, of each radio head at each place:
-    /// shape (radio heads, places). Minus infinity where walls leave it out of sight.
+    /// Return the SNR per antenna and sample in dB according to the link budget for each radio head
+    /// and position, shape (radio heads, positions). Minus infinity for a radio head that walls
+    /// block.
     #[allow(clippy::needless_pass_by_value)] // as Python passes them
     fn snr_db<'py>(
         &self,

@@ -1,4 +1,4 @@
-//! Campaigns of simulated drives, as columns.
+//! Campaigns of simulated runs.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -27,42 +27,43 @@ use crate::plug_ins::{
 use crate::settings::{Platform, Scenario, settings_error};
 use crate::threads::at_most_one_per_core;
 
-/// A campaign of more is better made of several.
+/// Maximum number of runs of a campaign; larger campaigns must be split.
 const MOST_RUNS: usize = 1_000_000;
 
-/// What a campaign found, as columns of equal length.
+/// Result of a campaign as columns of equal length.
 #[pyclass(frozen, get_all, module = "access_av._core")]
 pub struct SimulationResult {
     /// Statistics over all runs, one row per SSB.
     steps: Py<PyDict>,
-    /// One row per run.
+    /// Summaries, one row per run.
     runs: Py<PyDict>,
-    /// Truth and estimate, one row per run and SSB; `None` unless kept.
+    /// True and estimated poses, one row per run and SSB; `None` unless requested.
     trajectories: Option<Py<PyDict>>,
-    /// How protection levels and errors went together: `(runs, median of level over error)`, where
-    /// `runs` is as `runs` above of the steps with a protection level. `None` where none was stated.
+    /// Integrity statistics `(runs, median ratio of protection level to error)`, where `runs`
+    /// contains the numbers of steps with a protection level, one row per run. `None` if no
+    /// protection levels were reported.
     integrity: Option<(Py<PyDict>, f64)>,
-    /// Estimated angles, one row each; `None` unless kept.
+    /// Angle estimates, one row each; `None` unless requested.
     executions: Option<Py<PyDict>>,
-    /// Quantiles of the horizontal error over all runs and SSBs, in metres, by probability; out of a
-    /// histogram whose bins are 5.9 % wide.
+    /// Quantiles of the horizontal error over all runs and SSBs in metres, by probability, from a
+    /// histogram with 5.9 % wide bins.
     error_quantiles_m: Py<PyDict>,
-    /// Errors in x and y in metres, of shape (runs, SSBs, 2), NaN as long as the first pose is not
-    /// known; `None` unless kept.
+    /// Errors in x and y in metres with the shape (runs, SSBs, 2), NaN until the first pose is
+    /// found; `None` unless requested.
     errors_m: Option<Py<PyArray3<f32>>>,
-    /// Protection levels in metres, of shape (runs, SSBs), NaN where the pose may not be relied on;
-    /// `None` unless errors are kept.
+    /// Protection levels in metres with the shape (runs, SSBs), NaN unless the state is `ok`;
+    /// `None` unless errors are requested.
     levels_m: Option<Py<PyArray2<f32>>>,
 }
 
-/// Drive a scenario many times.
+/// Simulate many runs of a scenario.
 ///
-/// The same seed gives the same bytes whatever the number of threads. `estimator`, `policy` and
-/// `localizer` are factories, called as `factory(site, vehicle, start)` at the start of each run; their
-/// objects stand in for the vehicle's own. `access_av.simulate` says how they are called. An
-/// estimator's factory has the attribute that states the energy or the time of one estimate.
-/// `progress` is called with the runs done and their total. Exceptions raised in any of them end
-/// the campaign and reach the caller.
+/// Equal seeds give equal bytes for any number of threads. `estimator`, `policy` and `localizer`
+/// are factories, called as `factory(site, vehicle, start)` at the start of each run; their objects
+/// replace the vehicle's components. `access_av.simulate` documents their interfaces. An
+/// estimator's factory has the attribute `energy_per_execution_j` or `time_per_execution_s`.
+/// `progress` is called with the number of finished runs and the total. Exceptions from any of
+/// these end the campaign and are raised.
 #[pyfunction]
 #[pyo3(signature = (
     scenario, runs = 100, seed = 1, *, platform = None, threads = None, first_run = 0,
@@ -125,7 +126,7 @@ pub fn simulate(
     result(py, &campaign, keep_trajectories, errors_every)
 }
 
-/// How many threads there will be, where it is for the caller to say.
+/// Checks the arguments.
 fn check(
     runs: usize,
     threads: Option<usize>,
@@ -141,7 +142,7 @@ fn check(
     threads.map(at_most_one_per_core).transpose()
 }
 
-/// A scenario on a platform, or on the one that it names.
+/// Prepares a scenario on a platform, by default the one that the scenario names.
 fn simulation(scenario: &Scenario, platform: Option<&Platform>) -> PyResult<Simulation> {
     match platform {
         Some(platform) => Simulation::new(&scenario.0, platform.0.clone()),
@@ -172,17 +173,17 @@ fn result(
     })
 }
 
-/// Runs of a scenario's world as measurement traces: what comes to the vehicle, with the angle of every SSB.
+/// Measurement traces of a scenario's runs, with the angle of every SSB.
 ///
-/// Driven again with another localizer or wake-up policy they give what a campaign of its own would,
-/// to the last bit, for a small part of its computing.
+/// The traces can be processed with another localizer or wake-up policy. The result equals that of
+/// a new campaign bit by bit, in a small fraction of the computing time.
 #[pyclass(frozen, module = "access_av._core")]
 pub struct Tapes(MeasurementTraces);
 
 #[pymethods]
 impl Tapes {
-    /// Record the first runs, with angles by each of these methods; `None` where what an SSB brings
-    /// depends on which others are listened to, or when.
+    /// Record the first runs with the angles of the given methods. Return `None` if an SSB depends
+    /// on the reception of other SSBs.
     #[staticmethod]
     #[pyo3(signature = (scenario, runs = 100, seed = 1, *, methods, platform = None, threads = None))]
     #[allow(clippy::needless_pass_by_value)] // as Python passes them
@@ -215,13 +216,15 @@ impl Tapes {
         Ok(tapes.map_err(python_error)?.map(Self))
     }
 
-    /// Whether a scenario is of the same world, and its method in the traces.
+    /// Whether the traces are valid for a scenario: the environment is equal, and its method is
+    /// recorded.
     #[pyo3(signature = (scenario, *, platform = None))]
     fn serve(&self, scenario: &Scenario, platform: Option<&Platform>) -> PyResult<bool> {
         Ok(self.0.serve(&simulation(scenario, platform)?))
     }
 
-    /// Drive the recorded runs under a scenario that they serve; quantiles are left out.
+    /// Process the recorded runs with a scenario for which they are valid. Quantiles are not
+    /// computed.
     #[pyo3(signature = (scenario, *, platform = None, threads = None, errors_every = None))]
     fn simulate(
         &self,
@@ -234,7 +237,9 @@ impl Tapes {
         let threads = check(1, threads, errors_every)?;
         let simulation = simulation(scenario, platform)?;
         if !self.0.serve(&simulation) {
-            return Err(PyValueError::new_err("the scenario is of another world"));
+            return Err(PyValueError::new_err(
+                "the scenario has another environment than the traces",
+            ));
         }
         let campaign = py.detach(|| {
             let options = CampaignOptions {
@@ -271,23 +276,24 @@ fn python_error(error: SimulationError) -> PyErr {
             Ok(raised) => *raised,
             Err(other) => PyRuntimeError::new_err(brief(other)),
         },
-        // As Python's own: what the system does not give.
+        // A lack of operating system resources is an OSError.
         error @ SimulationError::Threads(_) => PyOSError::new_err(brief(error)),
         other => PyRuntimeError::new_err(brief(other)),
     }
 }
 
-/// Factories of the user's own Python code in place of parts of the pipeline, called once per run.
+/// Factories of Python objects that replace parts of the pipeline, called once per run.
 struct PlugIns {
     estimator: Option<Py<PyAny>>,
     policy: Option<Py<PyAny>>,
     localizer: Option<Py<PyAny>>,
-    /// Whether it was said that an estimator without standard deviations gets the bound.
+    /// Whether the message was printed that an estimator without standard deviations gets the
+    /// bound.
     told_of_sigma: Arc<AtomicBool>,
 }
 
 impl PlugIns {
-    /// What an estimate costs: what the user's estimator states, if there is one.
+    /// Returns the cost of an estimate, as specified by the user's estimator if there is one.
     fn estimate_cost(&self, py: Python<'_>) -> PyResult<EstimateCost> {
         let Some(estimator) = &self.estimator else {
             return Ok(EstimateCost::OfMethod);
@@ -319,10 +325,10 @@ impl PlugIns {
     }
 }
 
-/// A column's name, and its value in a row.
+/// Name of a column, and its value in a row.
 type Column<R> = (&'static str, fn(&R) -> f64);
 
-/// A column from the rows of a table.
+/// Creates a column from the rows of a table.
 fn column<R, T: Element>(
     py: Python<'_>,
     rows: impl IntoIterator<Item = R>,
@@ -350,7 +356,7 @@ fn steps(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
     Ok(table.unbind())
 }
 
-/// Energies are NaN where the platform has no figure for the method.
+/// Creates the table of runs. Energies are NaN if the platform has no figure for the method.
 fn run_table(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
     let table = PyDict::new(py);
     let runs = &campaign.runs;
@@ -387,7 +393,8 @@ fn run_table(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
     Ok(table.unbind())
 }
 
-/// Epochs by state, and those beyond the level while ok, of each run; the median is the histogram's.
+/// Creates the integrity table: epochs by state and exceeded protection levels per run. The median
+/// is from the histogram.
 fn integrity(py: Python<'_>, campaign: &Campaign) -> PyResult<Option<(Py<PyDict>, f64)>> {
     let runs = &campaign.integrity;
     if runs.is_empty() {
@@ -409,8 +416,8 @@ fn integrity(py: Python<'_>, campaign: &Campaign) -> PyResult<Option<(Py<PyDict>
     Ok(Some((table.unbind(), median)))
 }
 
-/// Covariances and protection levels are NaN where the localizer does not know its own error, states
-/// of integrity `None`.
+/// Creates the table of poses. Covariances and protection levels are NaN and integrity states
+/// `None` if the localizer does not provide them.
 fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
     let table = PyDict::new(py);
     let rows = || records.iter().flat_map(|record| record.steps.iter());
@@ -454,7 +461,7 @@ fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
     Ok(table.unbind())
 }
 
-/// Angles are NaN where the snapshots carried none.
+/// Creates the table of angle estimates. Angles are NaN if the estimator found none.
 fn executions(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
     let table = PyDict::new(py);
     let rows = || records.iter().flat_map(|record| record.executions.iter());

@@ -1,4 +1,4 @@
-//! Channels: drops of TR 38.901, files of traced paths.
+//! Channels: drops of TR 38.901 and files of ray-traced paths.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use simulate::scenario::ChannelModel;
 
 use crate::settings::SettingsError;
 
-/// A column's name, and its value in a row.
+/// Name of a column, and its value in a row.
 type Column = (&'static str, fn(&Drop) -> f64);
 
 const COLUMNS: [Column; 8] = [
@@ -28,8 +28,8 @@ const COLUMNS: [Column; 8] = [
     }),
 ];
 
-/// One independent link of a TR 38.901 model at each horizontal distance, the radio head at its own
-/// height without `head_height_m`: columns of equal length.
+/// Draw one independent link of a TR 38.901 model at each horizontal distance, as columns of equal
+/// length. The default height of the radio head is the model's.
 #[pyfunction]
 #[pyo3(signature = (model, level_m, *, head_height_m = None, array_height_m, carrier_mhz, seed))]
 #[allow(clippy::needless_pass_by_value)] // as Python passes them
@@ -46,7 +46,7 @@ pub fn channel_drops(
     let environment = named.and_then(|it| Environment::of(it, 1e-3 * carrier_mhz, None));
     let environment = environment.ok_or_else(|| {
         PyValueError::new_err(format!(
-            "no drops of the model `{model}`; there are umi, inf-sl, inf-dl, inf-sh, inf-dh"
+            "the model `{model}` has no drops; allowed are umi, inf-sl, inf-dl, inf-sh, inf-dh"
         ))
     })?;
     let head_height_m = head_height_m.unwrap_or_else(|| {
@@ -80,7 +80,7 @@ pub fn channel_drops(
     Ok(table.unbind())
 }
 
-/// Refuse a file of traced paths that the simulator cannot use.
+/// Check that the simulator can use a file of ray-traced paths.
 #[pyfunction]
 pub fn check_paths(file: &str) -> PyResult<()> {
     match Paths::read(Path::new(file)) {

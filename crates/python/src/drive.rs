@@ -1,4 +1,4 @@
-//! Recorded drives: writing them from a scenario, locating them.
+//! Recorded drives: simulation and localization.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ use crate::own_error::{covariance, level};
 use crate::recording::{RecordingError, recording_error};
 use crate::settings::{Scenario, Site, Vehicle, settings_error};
 
-/// Record a scenario's drive as somebody on the vehicle would have.
+/// Simulate a recorded drive of a scenario.
 ///
 /// Writes `iq.sigmf-meta`, `iq.sigmf-data`, `odometry.csv`, `site.toml`, `vehicle.toml`,
 /// `scenario.toml` and `truth.tum`.
@@ -32,19 +32,20 @@ use crate::settings::{Scenario, Site, Vehicle, settings_error};
 /// Parameters
 /// ----------
 /// scenario : Scenario
-///     What is driven.
+///     Scenario to simulate.
 /// directory : path-like
-///     Where the files go; made if it is not there.
+///     Output directory, created if it does not exist.
 /// seed, run : int
-///     The random streams.
+///     Seed of the random streams and number of the run.
 /// duration_s : float, optional
-///     Seconds from the start on; the whole drive without.
+///     Duration in seconds from the start [default: the whole drive].
 /// continuous : bool
-///     Also the time between the SSB bursts, which makes the files many times larger.
+///     Whether to record the samples between the SSB bursts too, which makes the files many times
+///     larger.
 /// datatype : str
-///     `ci16_le` or `cf32_le`.
+///     Sample format, `ci16_le` or `cf32_le`.
 /// progress : callable, optional
-///     Called with the share of the drive that is recorded.
+///     Callback with the recorded fraction of the drive.
 ///
 /// Returns
 /// -------
@@ -108,7 +109,7 @@ fn synth_error(error: SynthError) -> PyErr {
     }
 }
 
-/// Record a scenario's drive as the angles that the vehicle's receiver finds.
+/// Simulate a log of the angles that the vehicle's receiver estimates in a scenario.
 ///
 /// Writes `angles.csv`, `odometry.csv`, `site.toml`, `vehicle.toml`, `scenario.toml` and
 /// `truth.tum`, and returns the number of angles.
@@ -128,12 +129,12 @@ pub fn log_angles(
         .map_err(synth_error)
 }
 
-/// Read a TUM trajectory, as columns `time_s`, `x_m`, `y_m`, `heading_rad`.
+/// Read a TUM trajectory as columns `time_s`, `x_m`, `y_m`, `heading_rad`.
 ///
 /// Raises
 /// ------
 /// RecordingError
-///     The line that is not eight numbers with a unit quaternion.
+///     A line is not eight numbers with a unit quaternion.
 #[pyfunction]
 #[allow(clippy::needless_pass_by_value)] // what extraction yields
 pub fn read_tum(py: Python<'_>, file: PathBuf) -> PyResult<Bound<'_, PyDict>> {
@@ -152,32 +153,31 @@ pub fn read_tum(py: Python<'_>, file: PathBuf) -> PyResult<Bound<'_, PyDict>> {
 /// Parameters
 /// ----------
 /// site : Site
-///     Radio heads and, where there is one, the road.
+///     Radio heads and, optionally, the road.
 /// vehicle : Vehicle
-///     Array, odometer, and how the vehicle locates itself.
+///     Array, odometer and localizer.
 /// odometry : path-like
-///     CSV with the columns `time_s`, `distance_m`, `speed_mps` and, with a gyroscope,
+///     CSV file with the columns `time_s`, `distance_m`, `speed_mps` and, with a gyroscope,
 ///     `yaw_rate_radps`; or an MCAP file or a rosbag2 folder with `nav_msgs/msg/Odometry`.
 /// recording : path-like
-///     SigMF recording of the array's samples, or a CSV log of angles.
+///     SigMF recording of the array's samples, or CSV log of angles.
 /// angles : dict of ndarray, optional
-///     The columns of a log of angles that was read from `recording`, float64, NaN where a value is
-///     missing.
+///     Columns of a log of angles that was read from `recording`, float64, NaN for missing values.
 /// topic, imu_topic : str, optional
-///     Topic of the odometry in a bag with several, and of the IMU that tells the yaw rate.
+///     Topic of the odometry in a bag with several, and topic of the IMU with the yaw rate.
 /// start_time_s : float
-///     Time of the recording's first sample by the odometry's clock.
+///     Time of the recording's first sample according to the odometry's clock.
 /// start : tuple of float, optional
-///     Initial pose (x in metres, y in metres, heading in radians) in place of the vehicle's.
+///     Initial pose (x in metres, y in metres, heading in radians) instead of the vehicle's.
 /// from_scratch : bool
-///     Whether to find the vehicle along the road, even if the vehicle has an initial pose.
+///     Whether to search for the initial pose along the road, even if the vehicle has one.
 /// smooth : bool
-///     Whether to look back from the end of the drive too, which fills `smoothed`.
+///     Whether to smooth the poses from the end of the drive, which fills `smoothed`.
 ///
 /// Raises
 /// ------
 /// RecordingError, SettingsError
-///     An unusable recording or odometry; a vehicle that cannot serve at the site.
+///     An unusable recording or odometry file; a vehicle that is incompatible with the site.
 #[pyfunction]
 #[pyo3(signature = (
     site, vehicle, odometry, recording, *, angles = None, topic = None, imu_topic = None,
@@ -243,11 +243,11 @@ pub fn locate(
         .map_err(replay_error)
 }
 
-/// Where a drive was recorded, and when and where it begins.
+/// Inputs of a recorded drive.
 struct RecordedDrive<'a> {
     odometry: &'a Path,
     recording: &'a Path,
-    /// Its columns where it is a log of angles that was read elsewhere.
+    /// Columns of a log of angles that was read elsewhere.
     angles: Option<BTreeMap<String, Vec<f64>>>,
     choice: OdometryChoice<'a>,
     start_time_s: f64,
@@ -289,31 +289,32 @@ fn is(path: &Path, extension: &str) -> bool {
         .is_some_and(|it| it.eq_ignore_ascii_case(extension))
 }
 
-/// Estimate the angles of a recording as the vehicle's receiver finds them.
+/// Estimate the angles of a recording with the vehicle's receiver.
 ///
 /// Parameters
 /// ----------
 /// site : Site
-///     Whose radio heads are listened to.
+///     Site with the radio heads to receive.
 /// vehicle : Vehicle
 ///     Array, receiver and estimator.
 /// recording : path-like
 ///     SigMF recording of the array's samples.
 /// start_time_s : float
-///     Time of its first sample.
+///     Time of the first sample in seconds.
 ///
 /// Returns
 /// -------
 /// tuple
-///     Columns `time_s`, `pci`, `ssb_index`, `snr_db`, `phase_rad`, `phase_sigma_rad` (receiver noise
-///     and the site's scatter), `phase_noise_sigma_rad` (receiver noise alone), `angle_rad` and
-///     `resolved` (1 or 0); the vehicle whose receiver takes these deviations for all of the error; and
-///     what is wrong with the recording.
+///     Columns `time_s`, `pci`, `ssb_index`, `snr_db`, `phase_rad`, `phase_sigma_rad` (receiver
+///     noise and the site's scatter), `phase_noise_sigma_rad` (receiver noise only), `angle_rad`
+///     and `resolved` (1 or 0); the vehicle with receiver settings for which these standard
+///     deviations are the total error; and the faults of the recording.
 ///
 /// Raises
 /// ------
 /// RecordingError, SettingsError
-///     An unusable recording, or one without an SSB of the site; a vehicle that cannot serve there.
+///     An unusable recording, or one without an SSB of the site; a vehicle that is incompatible
+///     with the site.
 #[pyfunction]
 #[pyo3(signature = (site, vehicle, recording, *, start_time_s = 0.0))]
 #[allow(clippy::needless_pass_by_value)] // what extraction yields
@@ -364,7 +365,7 @@ pub fn replay_error(error: ReplayError) -> PyErr {
     }
 }
 
-/// A located drive.
+/// Located drive.
 #[pyclass(frozen, module = "access_av._core")]
 pub struct LocatedDrive {
     core: replay::LocatedDrive,
@@ -372,15 +373,16 @@ pub struct LocatedDrive {
 
 #[pymethods]
 impl LocatedDrive {
-    /// What was wrong with single items of the input.
+    /// Errors of single items of the input.
     #[getter]
     fn remarks(&self) -> Vec<String> {
         let remarks = self.core.remarks.iter();
         remarks.map(|remark| remark.text.clone()).collect()
     }
 
-    /// What the drive showed of the vehicle by its end: columns `constant`,
-    /// `constant_unit`, `stated_value`, `found_value` and `found_value_std`; empty where the localizer does not look for it.
+    /// Constants of the vehicle that the localizer estimated by the end of the drive: columns
+    /// `constant`, `constant_unit`, `stated_value`, `found_value` and `found_value_std`; empty if
+    /// the localizer estimates none.
     #[getter]
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let rows: Vec<(&str, &str, EstimatedConstant)> =
@@ -409,49 +411,50 @@ impl LocatedDrive {
         Ok(columns)
     }
 
-    /// What is wrong with the input as it was given, harmful or not.
+    /// Errors of the input as a whole, harmful or not.
     #[getter]
     fn diagnoses(&self) -> Vec<String> {
         let texts = self.core.diagnoses.iter().map(|it| it.text.clone());
         texts.collect()
     }
 
-    /// Share of the time that it was lost; 1 where it was never found.
+    /// Fraction of the time in state `lost`; 1 if the vehicle was never located.
     #[getter]
     fn lost_share(&self) -> f64 {
         self.core.lost_share()
     }
 
-    /// Whether it was lost for more than a fifth of the time, lost at the end, or never found.
+    /// Whether the vehicle was lost for more than a fifth of the time, lost at the end, or never
+    /// located.
     #[getter]
     fn is_lost_for_long(&self) -> bool {
         self.core.is_lost_for_long()
     }
 
-    /// Those of the diagnoses that did harm.
+    /// Diagnoses that affected the result.
     #[getter]
     fn suspicions(&self) -> Vec<String> {
         let texts = self.core.suspicions().map(|it| it.text.clone());
         texts.collect()
     }
 
-    /// One pose per odometry sample: columns `time_s`, `x_m`, `y_m`, `heading_rad`, `speed_mps`,
+    /// Poses, one per odometry sample. Columns: `time_s`, `x_m`, `y_m`, `heading_rad`, `speed_mps`,
     /// `covariance_xx_m2`, `covariance_xy_m2`, `covariance_yy_m2`, `covariance_heading_rad2`,
-    /// `protection_level_m`, `protection_level_along_m` and `protection_level_across_m`, NaN where they are not known, `integrity`: `ok`, `degraded`,
-    /// `unavailable` or None, and `searching`: whether the first pose is not yet known, and this one
-    /// the mean of where the vehicle may be.
+    /// `protection_level_m`, `protection_level_along_m` and `protection_level_across_m` (NaN if
+    /// unknown), `integrity` (`ok`, `degraded`, `unavailable` or None) and `searching` (whether the
+    /// first pose is still unknown, so that the pose is the mean of the possible positions).
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         pose_columns(py, &self.core.poses)
     }
 
-    /// The same as seen from the end of the drive; empty unless asked for.
+    /// Smoothed poses with the columns of `poses`; empty unless requested.
     #[getter]
     fn smoothed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         pose_columns(py, &self.core.smoothed)
     }
 
-    /// One row per angle: columns `time_s`, `pci`, `ssb_index`, `snr_db`, `phase_rad`,
+    /// Angles, one row each: columns `time_s`, `pci`, `ssb_index`, `snr_db`, `phase_rad`,
     /// `phase_sigma_rad`, `angle_rad`, `accepted`, `reason`, `mahalanobis_squared`, `threshold`.
     #[getter]
     fn angles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -492,13 +495,13 @@ impl LocatedDrive {
         Ok(columns)
     }
 
-    /// Write poses, verdicts and diagnostics as MCAP (ROS 2).
+    /// Write poses, verdicts and diagnostics to an MCAP file (ROS 2).
     #[allow(clippy::needless_pass_by_value)] // what extraction yields
     fn write_mcap(&self, path: PathBuf) -> PyResult<()> {
         write_drive_mcap(&path, &self.core).map_err(recording_error)
     }
 
-    /// Write the poses, from the first that is known on, as a TUM trajectory.
+    /// Write the poses from the first known one as a TUM trajectory.
     #[allow(clippy::needless_pass_by_value)] // what extraction yields
     fn write_tum(&self, path: PathBuf) -> PyResult<()> {
         write_poses(&path, &self.core.poses)

@@ -1,5 +1,5 @@
-//! The end that Ctrl-C makes where Python cannot: a library may hold the interpreter for seconds, so
-//! a thread of its own cleans up and leaves.
+//! Program end by Ctrl-C. A library may hold the interpreter lock for seconds, so that a separate
+//! thread cleans up and exits.
 
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Read, Write};
@@ -12,19 +12,19 @@ use std::time::Duration;
 
 use pyo3::{PyResult, pyfunction};
 
-/// What shells expect of a program that Ctrl-C ended.
+/// Exit code of a program that Ctrl-C ended, by convention of shells.
 pub const INTERRUPTED: i32 = 130;
-/// The signal of Ctrl-C, as POSIX numbers it and Python's wakeup descriptor is told it.
+/// Signal number of Ctrl-C in POSIX, as written to Python's wakeup descriptor.
 const SIGINT: u8 = 2;
-/// How long an exception may take to come up and end the program first.
+/// Time for a KeyboardInterrupt to end the program first.
 const GRACE: Duration = Duration::from_millis(200);
 
 static CAME: AtomicBool = AtomicBool::new(false);
-/// Folders whose partial files are this program's.
+/// Folders with partial files of this program.
 static WRITING: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// From here on a signal's number written to the returned descriptor is known at once, and Ctrl-C's
-/// ends the program.
+/// Start the thread that watches for Ctrl-C. Signal numbers written to the returned descriptor are
+/// processed immediately, and SIGINT ends the program.
 #[pyfunction]
 pub fn watch() -> PyResult<i32> {
     let (mut told, tells) = std::io::pipe()?;
@@ -41,13 +41,13 @@ pub fn watch() -> PyResult<i32> {
     Ok(tells.into_raw_fd())
 }
 
-/// Whether Ctrl-C has come.
+/// Whether Ctrl-C was pressed.
 #[pyfunction]
 pub fn came() -> bool {
     CAME.load(Ordering::Acquire)
 }
 
-/// Remember a folder in which files are written beside their places.
+/// Register a folder in which partial files are written next to their final path.
 #[pyfunction]
 pub fn writing(folder: PathBuf) -> PyResult<()> {
     let folder = std::path::absolute(folder)?;
@@ -55,7 +55,7 @@ pub fn writing(folder: PathBuf) -> PyResult<()> {
     Ok(())
 }
 
-/// Leave no partial file behind, and no folder with nothing in it.
+/// Remove partial files and empty folders.
 #[pyfunction]
 pub fn clean() {
     for folder in &*folders() {
@@ -63,11 +63,11 @@ pub fn clean() {
             let name = entry.file_name();
             let name = name.to_string_lossy();
             if name.starts_with('.') && name.ends_with(".partial") {
-                // Somebody else may have been faster, and what cannot be removed stays.
+                // Another process may have removed the file; errors are ignored.
                 let _ = std::fs::remove_file(entry.path());
             }
         }
-        let _ = std::fs::remove_dir(folder); // only where it is empty
+        let _ = std::fs::remove_dir(folder); // fails unless the folder is empty
     }
 }
 
@@ -75,17 +75,17 @@ fn folders() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     WRITING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// End the program now, whoever holds the interpreter.
+/// End the program immediately, even if another thread holds the interpreter lock.
 #[pyfunction]
 pub fn end() {
     clean();
     let mut stderr = std::io::stderr();
     if stderr.is_terminal() {
-        let _ = write!(stderr, "\x1b[?25h"); // a bar has hidden the cursor
+        let _ = write!(stderr, "\x1b[?25h"); // show the cursor, which a progress bar hides
     }
     let _ = writeln!(stderr, "error: interrupted; what was finished is kept");
-    // SAFETY: ends the process and returns never; nothing of it is used afterwards. What is
-    // registered to run at exit is left out, for it may wait for a thread that is busy.
+    // SAFETY: the call ends the process and never returns. Exit handlers are skipped because they
+    // may wait for a busy thread.
     #[allow(unsafe_code)]
     unsafe {
         libc::_exit(INTERRUPTED)

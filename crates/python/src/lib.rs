@@ -1,4 +1,4 @@
-//! `access_av._core`: the bindings, nothing else. One file per room of the core.
+//! `access_av._core`: the Python bindings, one file per module of the core.
 mod aoa;
 mod arrays;
 mod bound;
@@ -18,7 +18,7 @@ mod threads;
 
 use pyo3::pymodule;
 
-/// The compiled core of `access_av`.
+/// Compiled core of `access_av`.
 #[pymodule]
 mod _core {
     use pyo3::prelude::*;
@@ -36,7 +36,8 @@ mod _core {
 
         #[pymodule_init]
         fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-            // Makes `import access_av._core.aoa` find the submodule of a compiled module.
+            // Register the submodule, so that `import access_av._core.aoa` works with a compiled
+            // module.
             let modules = module.py().import("sys")?.getattr("modules")?;
             modules.set_item("access_av._core.aoa", module)
         }

@@ -1,4 +1,4 @@
-//! The pipeline on a vehicle, fed as things come in.
+//! The pipeline on a vehicle, which processes inputs as they arrive.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -26,39 +26,40 @@ fn live_error(error: LiveError) -> PyErr {
     }
 }
 
-/// How the vehicle stands at a time.
+/// Status of the vehicle at one time.
 #[pyclass(frozen, get_all, module = "access_av._core")]
 pub struct LiveStatus {
-    /// Time of the pose in seconds: the time asked for, or the last one that odometry vouches for.
+    /// Time of the pose in seconds: the requested time, or the latest time for which the odometry
+    /// is valid.
     time_s: f64,
-    /// Place and heading, x and y in metres, radians counter-clockwise from +x; while it is searched for,
-    /// the mean of where it may be. `None` before any odometry.
+    /// Position (x and y in metres) and heading (radians counter-clockwise from +x); during the
+    /// search, the mean of the possible positions. `None` before any odometry.
     pose: Option<(f64, f64, f64)>,
     /// Covariance of (x, y, heading), row-major, in m², m·rad and rad².
     covariance: Option<[[f64; 3]; 3]>,
-    /// Speed by the odometer in m/s.
+    /// Speed of the odometer in m/s.
     speed_mps: f64,
-    /// Yaw rate in rad/s, counter-clockwise, where something tells it.
+    /// Yaw rate in rad/s, counter-clockwise; `None` if it is not measured.
     yaw_rate_radps: Option<f64>,
     /// `waiting`, `searching`, `lost`, `unavailable`, `degraded`, `ok` or `unmonitored`.
     state: &'static str,
-    /// Whether the pose is one place that was found and not refuted.
+    /// Whether the pose is a single confirmed position.
     is_localized: bool,
-    /// Why, in words.
+    /// Reason of the state.
     reason: String,
-    /// What to do about it, in words.
+    /// Recommended action.
     what_to_do: &'static str,
-    /// Horizontal protection level in metres, where there is one.
+    /// Horizontal protection level in metres; `None` without one.
     protection_level_m: Option<f64>,
-    /// Number of radio heads found faulty.
+    /// Number of radio heads identified as faulty.
     faulty: usize,
-    /// Time of the last angle accepted, in seconds.
+    /// Time of the last accepted angle in seconds.
     last_angle_s: Option<f64>,
     /// Age of the newest odometry in seconds.
     odometry_age_s: Option<f64>,
     /// Age of the newest sample in seconds.
     samples_age_s: Option<f64>,
-    /// SSBs that the receiver keeps to.
+    /// Number of SSBs that the receiver tracks.
     tracked: usize,
     /// Active faults: name, description, and time of detection in seconds.
     faults: Vec<(&'static str, String, f64)>,
@@ -89,7 +90,7 @@ impl From<CoreStatus> for LiveStatus {
     }
 }
 
-/// One angle and what became of it.
+/// Result of one angle.
 #[pyclass(frozen, get_all, module = "access_av._core")]
 pub struct LiveOutcome {
     /// Reception time in seconds.
@@ -100,17 +101,18 @@ pub struct LiveOutcome {
     ssb_index: u8,
     /// SNR per antenna and resource element in dB.
     snr_db: f64,
-    /// Electrical angle, or azimuth of an array that is no row, in radians; `None` where there is none.
+    /// Electrical angle, or azimuth for an array that is not linear, in radians; `None` without an
+    /// estimate.
     phase_rad: Option<f64>,
-    /// Its standard deviation in radians.
+    /// Standard deviation of `phase_rad` in radians.
     phase_sigma_rad: Option<f64>,
-    /// Whether it changed the pose.
+    /// Whether the angle was used for the pose.
     accepted: bool,
-    /// Why, or why not.
+    /// Reason of acceptance or rejection.
     reason: &'static str,
-    /// By how much it lies from where the radio head is seen from the pose after it, in radians.
+    /// Measured angle minus the angle expected from the pose after the update, in radians.
     residual_rad: Option<f64>,
-    /// The pose after it, as of the status.
+    /// Pose after the update: x and y in metres, heading in radians.
     pose: (f64, f64, f64),
 }
 
@@ -133,28 +135,28 @@ impl From<CoreOutcome> for LiveOutcome {
     }
 }
 
-/// What is known of the reception of one radio head.
+/// Reception of one radio head.
 #[pyclass(frozen, get_all, module = "access_av._core")]
 pub struct LiveHead {
     /// Physical cell identity.
     pci: u16,
-    /// Index of its SSB in the burst.
+    /// Index of the SSB in the burst.
     ssb_index: u8,
-    /// Whether it is left out by `exclude`.
+    /// Whether the radio head is excluded by `exclude`.
     is_excluded: bool,
-    /// Whether it was found faulty.
+    /// Whether the radio head is identified as faulty.
     is_faulty: bool,
-    /// SNR of its last SSB in dB.
+    /// SNR of the last SSB in dB.
     snr_db: Option<f64>,
-    /// Time of the last SSB an angle was estimated of, in seconds.
+    /// Time of the last SSB with an angle estimate in seconds.
     last_heard_s: Option<f64>,
-    /// Time of the last one whose angle was accepted, in seconds.
+    /// Time of the last SSB with an accepted angle in seconds.
     last_accepted_s: Option<f64>,
-    /// Residual of its last angle in radians.
+    /// Residual of the last angle in radians.
     residual_rad: Option<f64>,
-    /// Number of its angles that were accepted.
+    /// Number of accepted angles.
     accepted: u64,
-    /// Number of those that were not.
+    /// Number of rejected angles.
     refused: u64,
 }
 
@@ -175,48 +177,52 @@ impl From<&CoreHead> for LiveHead {
     }
 }
 
-/// What was done since the start, and the energy of it by the platform's model.
+/// Activity since the start and its energy according to the platform's model.
 #[pyclass(frozen, get_all, module = "access_av._core")]
 pub struct LiveEnergy {
-    /// Time since the first that came in, in seconds.
+    /// Time since the first input in seconds.
     duration_s: f64,
-    /// Angles estimated.
+    /// Number of angle estimates.
     executions: usize,
-    /// Bursts listened to.
+    /// Number of bursts received.
     listened: usize,
-    /// How long the receiver was to be on for those, in seconds.
+    /// Time for which the receiver was on for these bursts, in seconds.
     on_time_s: f64,
-    /// Joules of estimating, receiver and idle board together; `None` where the platform does not know.
+    /// Energy of angle estimates, receiver and idle board in joules; `None` if the platform has no
+    /// figures.
     total_j: Option<f64>,
 }
 
-/// The pipeline on a vehicle: samples, angles and odometry in as they come, a status at any time.
+/// Pipeline on a vehicle: accepts samples, angles and odometry as they arrive, and returns a status
+/// at any time.
 ///
-/// Times are of one clock, in seconds. Input that is rejected raises and changes nothing. Other threads run
-/// while samples are worked on.
+/// All times are in seconds of one clock. Rejected input raises an exception and changes nothing.
+/// Other threads run while samples are processed.
 ///
-/// Time stamps are validated against those before them and, where `arrival_s` is given, against the arrival of the
-/// message by a monotonic clock (`time.monotonic()`). One implausible stamp is rejected. A clock that has stepped for
-/// good is recognized by five consecutive consistent messages: the pose is resumed, and `clock_step` returns the step.
-/// A given or resumed pose is `unavailable` until five angles to two radio heads have confirmed it.
+/// Time stamps are compared with earlier ones and, if `arrival_s` is given, with the arrival of the
+/// message according to a monotonic clock (`time.monotonic()`). One implausible time stamp is
+/// rejected. Five consecutive consistent messages indicate a permanent clock step: the pose is
+/// resumed, and `clock_step` returns the step. A given or resumed pose is `unavailable` until five
+/// angles to two radio heads have confirmed it.
 ///
 /// Parameters
 /// ----------
 /// site : Site
 ///     Radio heads and road.
 /// vehicle : Vehicle
-///     Array, odometer, localizer, wake-up, platform.
+///     Array, odometer, localizer, wake-up policy and platform.
 /// start : tuple of (x_m, y_m, heading_rad), optional
-///     Initial pose; without it where the vehicle's file says, else it is searched for.
+///     Initial pose [default: the start in the vehicle file, otherwise a search].
 /// rate_hz, centre_hz : float, optional
-///     Rate of the samples and the absolute frequency at their 0 Hz; without them angles only.
+///     Sample rate, and absolute frequency at 0 Hz in the samples; without them, only angles are
+///     accepted.
 ///
 /// Raises
 /// ------
 /// SettingsError
-///     Site, vehicle and start do not go together.
+///     Site, vehicle and start are incompatible.
 /// ValueError
-///     A rate or frequency that does not suit.
+///     An unsupported rate or frequency.
 ///
 /// Examples
 /// --------
@@ -254,7 +260,7 @@ impl Live {
             (Some(rate_hz), Some(centre_hz)) => Some(StreamConfig { rate_hz, centre_hz }),
             (None, None) => None,
             _ => {
-                let said = "rate_hz and centre_hz must both be given, or neither";
+                let said = "rate_hz and centre_hz must be given together or both be omitted";
                 return Err(PyValueError::new_err(said));
             }
         };
@@ -271,22 +277,22 @@ impl Live {
         Ok(Self(Mutex::new(live.map_err(live_error)?)))
     }
 
-    /// Take the next samples, of any length.
+    /// Process the next samples, in blocks of any length.
     ///
     /// Parameters
     /// ----------
     /// time_s : float
-    ///     When the first of them was received, by the sample clock: by counting, or a radio's own time. What
-    ///     is missing, there twice, or of a stream that began anew, is told by it.
+    ///     Reception time of the first sample according to the sample clock: a sample counter or
+    ///     the radio's time. It reveals missing or repeated samples and a restarted stream.
     /// samples : ndarray
     ///     Complex samples, `(antennas, samples)`.
     /// arrival_s : float, optional
-    ///     Time of their arrival by a monotonic clock.
+    ///     Arrival time of the samples according to a monotonic clock, in seconds.
     ///
     /// Returns
     /// -------
     /// str
-    ///     How they go on: `first`, `contiguous`, `gap`, `overlap` or `restart`.
+    ///     Relation to the previous samples: `first`, `contiguous`, `gap`, `overlap` or `restart`.
     #[pyo3(signature = (time_s, samples, *, arrival_s = None))]
     fn samples(
         &self,
@@ -312,7 +318,7 @@ impl Live {
         })
     }
 
-    /// Take odometry; its speed alone is enough.
+    /// Process an odometry sample; the speed is sufficient.
     ///
     /// Parameters
     /// ----------
@@ -325,17 +331,18 @@ impl Live {
     /// yaw_rate_radps : float, optional
     ///     Yaw rate in rad/s, counter-clockwise.
     /// arrival_s : float, optional
-    ///     Time of its arrival by a monotonic clock, in seconds.
+    ///     Arrival time of the sample according to a monotonic clock, in seconds.
     ///
     /// Returns
     /// -------
     /// bool
-    ///     Whether all of it was used; a distance that jumps is not, nor a yaw rate that no vehicle has.
+    ///     Whether all values were used. A distance that jumps and an implausible yaw rate are
+    ///     ignored.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     A time that is not plausible, or a value that is not finite.
+    ///     An implausible time, or a value that is not finite.
     #[pyo3(signature = (time_s, speed_mps, *, distance_m = None, yaw_rate_radps = None, arrival_s = None))]
     fn odometry(
         &self,
@@ -365,26 +372,26 @@ impl Live {
         ))
     }
 
-    /// Take an angle that was estimated elsewhere. Those of a burst are heard together, once odometry, a
-    /// later angle or `settle` says that it is complete.
+    /// Add an angle that was estimated elsewhere. The angles of a burst are processed together as
+    /// soon as odometry, a later angle or `settle` shows that the burst is complete.
     ///
     /// Parameters
     /// ----------
     /// pci : int
     ///     Physical cell identity.
     /// time_s : float
-    ///     Reception time.
+    ///     Reception time in seconds.
     /// phase_rad, sigma_rad : float
-    ///     Electrical angle ω = 2π(d/λ)·cos θ of a row, or azimuth of any other array, and its standard
-    ///     deviation.
+    ///     Electrical angle ω = 2π(d/λ)·cos θ of a linear array, or azimuth of any other array, and
+    ///     its standard deviation, in radians.
     /// ssb_index : int
     ///     Index of the SSB in its burst.
     /// snr_db : float, optional
-    ///     SNR per antenna.
+    ///     SNR per antenna in dB.
     /// resolved : bool
-    ///     Whether the estimator vouches for it.
+    ///     Whether the estimator reports the angle as resolved.
     /// arrival_s : float, optional
-    ///     Time of its arrival by a monotonic clock, in seconds.
+    ///     Arrival time of the angle according to a monotonic clock, in seconds.
     #[pyo3(signature = (pci, time_s, phase_rad, sigma_rad, *, ssb_index = 0, snr_db = None, resolved = true, arrival_s = None))]
     #[allow(clippy::too_many_arguments)] // Python's keywords
     fn angle(
@@ -417,30 +424,32 @@ impl Live {
         .map_err(live_error)
     }
 
-    /// Step of the odometry's clock, in seconds, that was recognized since the last call; the pose was resumed then.
+    /// Return the clock step of the odometry in seconds that was detected since the last call; the
+    /// pose was resumed.
     fn clock_step(&self) -> Option<f64> {
         self.core().take_odometry_step().map(|it| it.step_s)
     }
 
-    /// Time of angles minus that of odometry, in seconds, if their clocks differ; the state is `unavailable` then.
+    /// Return the time of angles minus that of odometry in seconds if their clocks differ; the
+    /// state is then `unavailable`.
     fn clock_disagreement_s(&self) -> Option<f64> {
         self.core().clock_disagreement_s()
     }
 
-    /// Hear what has come of a burst without waiting for more of it.
+    /// Process the received part of a burst without waiting for the rest.
     fn settle(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| self.core().settle()).map_err(live_error)
     }
 
-    /// What became of the angles since this was asked last, oldest first; the last 256 at most.
+    /// Return the results of the angles since the last call, oldest first, at most 256.
     fn outcomes(&self) -> Vec<LiveOutcome> {
         let mut core = self.core();
         let next = std::iter::from_fn(|| core.next_outcome());
         next.map(LiveOutcome::from).collect()
     }
 
-    /// The pose at a time near the newest odometry's, with the covariance of (x, y, heading), or as
-    /// uncertain as the vehicle's file says of a start. What was learnt is forgotten.
+    /// Set the pose at a time near the newest odometry, with the covariance of (x, y, heading)
+    /// [default: the start covariance of the vehicle file]. Estimated constants are reset.
     #[pyo3(signature = (time_s, pose, covariance = None))]
     fn set_pose(
         &self,
@@ -454,47 +463,48 @@ impl Live {
         set.map_err(live_error)
     }
 
-    /// Forget pose, odometry and all that was learnt, and search for the pose; times may be earlier from now
-    /// on.
+    /// Reset pose, odometry and estimated constants, and search for the pose. Earlier times are
+    /// allowed afterwards.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| self.core().reset()).map_err(live_error)
     }
 
-    /// Leave a cell out from now on.
+    /// Exclude a cell.
     fn exclude(&self, pci: u16) -> PyResult<()> {
         self.core().exclude(pci).map_err(live_error)
     }
 
-    /// Take a cell in again that was left out.
+    /// Include an excluded cell again.
     fn readmit(&self, pci: u16) -> PyResult<()> {
         self.core().readmit(pci).map_err(live_error)
     }
 
-    /// How the vehicle stands at a time.
+    /// Return the status at a time.
     fn status(&self, py: Python<'_>, now_s: f64) -> PyResult<LiveStatus> {
         let status = py.detach(|| self.core().status(now_s));
         status.map(LiveStatus::from).map_err(live_error)
     }
 
-    /// What is known of each radio head that the vehicle listens to.
+    /// Return the reception of each radio head that the vehicle uses.
     fn heads(&self) -> Vec<LiveHead> {
         self.core().heads().iter().map(LiveHead::from).collect()
     }
 
-    /// Whether the burst at a time is wanted, as things stand now.
+    /// Whether the burst at a time is required according to the current state.
     fn listens(&self, py: Python<'_>, time_s: f64) -> PyResult<bool> {
         py.detach(|| self.core().listens(time_s))
             .map_err(live_error)
     }
 
-    /// When the receiver has to be on next: the next burst that is wanted, `now_s` itself while nothing is
-    /// tracked or the place is searched for; where none is wanted within a second, when to ask again.
+    /// Return the time at which the receiver must be on next. This is the next required burst, or
+    /// `now_s` while no SSB is tracked or the pose is searched for. If no burst is required within
+    /// a second, it is the time of the next query.
     fn next_wake_up_s(&self, py: Python<'_>, now_s: f64) -> PyResult<f64> {
         let next_s = py.detach(|| self.core().next_wake_up_s(now_s));
         next_s.map_err(live_error)
     }
 
-    /// What was done since the start or the last reset, and the energy of it.
+    /// Return the activity since the start or the last reset, and its energy.
     fn energy(&self) -> LiveEnergy {
         let energy = self.core().energy();
         LiveEnergy {

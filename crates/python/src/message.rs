@@ -1,19 +1,19 @@
-//! What errors say, of bounded length: a file may hold anything, also in the place of a name.
+//! Limited length of error messages, because a file may contain a name of any length.
 
 use std::fmt::Display;
 
 use pyo3::pyfunction;
 
-/// Longest message, in characters.
+/// Maximum length of a message in characters.
 const MOST: usize = 500;
 
-/// [`brief`] for messages that Python makes.
+/// [`brief`] for messages that Python creates.
 #[pyfunction(name = "brief")]
 pub fn brief_text(message: &str) -> String {
     brief(message)
 }
 
-/// A message with its middle left out where it is long.
+/// Returns the message, with its middle removed if it is too long.
 pub fn brief(message: impl Display) -> String {
     let text = message.to_string();
     let length = text.chars().count();

@@ -1,4 +1,4 @@
-//! SSBs: finding them in samples and recordings, building them. `access_av._core.nr`.
+//! SSBs: search in samples and recordings, and generation. `access_av._core.nr`.
 
 mod burst;
 mod channel;
@@ -31,65 +31,68 @@ use crate::aoa::name_of;
 use crate::message::brief;
 use crate::recording::{Recording, RecordingError};
 
-/// One SSB of a cell, as it was received.
+/// One received SSB of a cell.
 ///
 /// Attributes
 /// ----------
 /// pci : int
 ///     Physical cell identity, 0 to 1007.
 /// ssb_index : int
-///     Index of the SSB in its burst, that is its beam.
+///     Index of the SSB in its burst, which identifies the beam.
 /// ssb_index_is_guess : bool
 ///     Whether `ssb_index` comes from the DM-RS and the more probable `lmax` because the PBCH was not decoded.
 /// lmax : int or None
-///     SSB indices that the cell has, 4, 8 or 64, where frequency or PBCH tell.
+///     Number of SSB indices of the cell, 4, 8 or 64; None if neither frequency nor PBCH determine
+///     it.
 /// half_frame : int or None
-///     1 in the second half of a frame; unknown without a decoded PBCH.
+///     1 in the second half of a frame; None without a decoded PBCH.
 /// sfn : int or None
-///     System frame number, if the PBCH's checksum held.
+///     System frame number; None unless the CRC of the PBCH is correct.
 /// mib_bits : str or None
-///     The 24 bits of the master information block, `0` and `1`, the first sent first.
+///     The 24 bits of the master information block as `0` and `1` in order of transmission.
 /// cfo_hz : float
-///     Carrier frequency offset.
+///     Carrier frequency offset in Hz.
 /// snr_db : float
-///     Per resource element, mean over the antennas.
+///     SNR per resource element in dB, mean over the antennas.
 /// sample_start : float
-///     First sample of the SSB, its cyclic prefix included, at the recording's own rate.
+///     First sample of the SSB including its cyclic prefix, at the recording's sample rate.
 /// sample_count : float
-///     Its length at that rate.
+///     Length of the SSB at the recording's sample rate.
 /// ssb_freq_hz, scs_khz : float, int
-///     Frequency of its centre, and its subcarrier spacing.
+///     Centre frequency of the SSB in Hz and its subcarrier spacing in kHz.
 /// rsrp_dbfs, rsrq_db, sinr_db : list of float
 ///     SS-RSRP, SS-RSRQ and SS-SINR of each antenna (TS 38.215).
 /// angle_rad, sigma_rad : float or None
-///     Angle of arrival from the array's axis and its standard deviation; with 2 antennas and more. Where
-///     the antennas are not in a row, the deviation is that of `azimuth_rad`.
+///     Angle of arrival from the array's axis and its standard deviation in rad; requires at least
+///     2 antennas. For an array that is not linear, the standard deviation is that of
+///     `azimuth_rad`.
 /// phase_rad, phase_sigma_rad : float or None
-///     The electrical angle behind it, of antennas in a row.
+///     Electrical angle of a linear array and its standard deviation in rad.
 /// azimuth_rad : float or None
-///     Counter-clockwise from broadside, for an array numbered from right to left:
-///     a quarter turn less `angle_rad`. Where the antennas are not in a row, from their x axis.
+///     Azimuth in rad, counter-clockwise from broadside of a linear array numbered from right to
+///     left: pi / 2 - `angle_rad`. For other arrays, the azimuth from their x axis.
 /// elevation_rad, elevation_sigma_rad : float or None
-///     From the horizontal upwards, of antennas that are not in a row.
+///     Elevation above the horizontal and its standard deviation in rad, for an array that is not
+///     linear.
 /// verdict : str or None
-///     `resolved`, or why noise and geometry leave it in doubt.
+///     `resolved`, or the reason of an unresolved angle with respect to noise and geometry.
 /// doubt : str or None
-///     Why the angle may not be relied on: of the verdict, or of the fit; empty where it may.
+///     Reason why the angle is unreliable, from the verdict or the fit; empty for a reliable angle.
 /// p_value : float or None
-///     Probability that a plane wave in white noise fits as badly as this or worse.
+///     Probability of a fit that is equal or worse if the signal is a plane wave in white noise.
 /// channel : ndarray
-///     complex64, `(antennas, 240)`: the channel on the SSB's subcarriers as it was received, delay
-///     and frequency offset taken out. A tone of amplitude one has 256.
+///     complex64, `(antennas, 240)`: received channel on the SSB's subcarriers without delay and
+///     frequency offset. A tone of amplitude one has the value 256.
 /// channel_covariance : ndarray
-///     complex64, `(240, 240)`: how the noise of `channel`, which is smoothed, hangs together from subcarrier
-///     to subcarrier on each antenna, over `noise_variance`: ``aoa.whiten(cell.channel, cell.channel_covariance)``
-///     is as good as snapshots.
+///     complex64, `(240, 240)`: correlation of the noise of `channel` between subcarriers of one
+///     antenna due to smoothing, as covariance divided by `noise_variance`. The result of
+///     ``aoa.whiten(cell.channel, cell.channel_covariance)`` can be used as snapshots.
 /// blocks : ndarray
-///     complex128, `(antennas, 4)`: what the pilots of each symbol say together, calibrated, in noise of
-///     variance one that is independent from block to block, which that of `channel` is not:
-///     ``aoa.maximum_likelihood_pilots(cell.blocks, noise_variance=1.0)``. Empty of one antenna.
+///     complex128, `(antennas, 4)`: calibrated despread pilots of each symbol with unit noise
+///     variance that is independent between blocks, unlike the noise of `channel`:
+///     ``aoa.maximum_likelihood_pilots(cell.blocks, noise_variance=1.0)``. Empty for one antenna.
 /// noise_variance : list of float
-///     Variance of the noise on a resource element, for each antenna, in that scale squared.
+///     Noise variance on a resource element for each antenna, in the squared scale of `channel`.
 #[pyclass(frozen, get_all, module = "access_av._core.nr")]
 pub struct Cell {
     pci: u16,
@@ -124,7 +127,8 @@ pub struct Cell {
     noise_variance: Vec<f64>,
 }
 
-/// A cell without angle, of what a search or a receiver says of an SSB; both by the same names.
+/// Creates a cell without an angle from an SSB of a search or a receiver, whose fields have equal
+/// names.
 macro_rules! cell {
     ($ssb:expr, $measurements:expr, $($given:tt)*) => {{
         let (ssb, measured) = ($ssb, $measurements);
@@ -157,7 +161,7 @@ macro_rules! cell {
 }
 
 impl Cell {
-    /// What a receiver on a frequency hears, at so many input samples per sample at the base rate.
+    /// Returns the SSB of a receiver as a cell; the ratio converts samples to the input rate.
     fn heard(
         ssb: &HeardSsb,
         ssb_freq_hz: f64,
@@ -222,7 +226,7 @@ impl From<&FoundSsb> for Cell {
     }
 }
 
-/// The array that the user describes.
+/// Creates the array from the user's arguments.
 fn array_setup(
     spacing_wavelengths: f64,
     places_wavelengths: Option<Vec<[f64; 2]>>,
@@ -257,16 +261,18 @@ impl Cell {
     }
 }
 
-/// What a scan of a recording found.
+/// Result of a scan of a recording.
 ///
 /// Attributes
 /// ----------
 /// cells : list of Cell
-///     The SSBs in order of time.
+///     SSBs in order of time.
 /// faults : list of str
-///     What is wrong with the channels: clipped, silent, exchanged; DC offset and tones, which were removed.
+///     Faults of the channels: clipped, silent or exchanged channels; DC offset and tones, which
+///     were removed.
 /// looked : list of str
-///     Where was looked: spacings, frequencies, how much of the recording.
+///     Scope of the search: subcarrier spacings, frequencies, and the searched part of the
+///     recording.
 #[pyclass(frozen, get_all, module = "access_av._core.nr")]
 pub struct Scan {
     cells: Vec<Py<Cell>>,
@@ -305,23 +311,23 @@ impl Scan {
 /// Parameters
 /// ----------
 /// recording : Recording
-///     The recording, at any usual rate that holds an SSB: 3.84 Msps at least.
+///     Recording with any common sample rate of at least 3.84 Msps.
 /// centre_frequency_hz : float, optional
-///     In place of what the recording states.
+///     Centre frequency in Hz instead of the one in the recording.
 /// ssb_freq_hz : float, optional
-///     Absolute frequency of the SSB's centre; the synchronization raster is searched without.
+///     Absolute centre frequency of the SSB in Hz [default: search of the synchronization raster].
 /// scs_khz : int, optional
-///     Subcarrier spacing, 15 or 30, above 24.25 GHz 120 or 240; both are tried without.
+///     Subcarrier spacing, 15 or 30, above 24.25 GHz 120 or 240 [default: both are searched].
 /// cfo_ppm : float, optional
-///     Largest offset of the oscillators where `ssb_freq_hz` is given, up to five subcarriers;
-///     half a subcarrier without.
+///     Maximum frequency offset of the oscillators if `ssb_freq_hz` is given, up to five
+///     subcarriers [default: half a subcarrier].
 /// spacing_wavelengths : float
-///     Distance between neighbouring antennas.
+///     Distance between adjacent antennas in wavelengths.
 /// places_wavelengths : list of (float, float), optional
-///     Where the antennas are in a horizontal plane, in wavelengths, if they are not in a row; the
-///     azimuth is then from the x axis.
+///     Antenna positions in a horizontal plane in wavelengths, for an array that is not linear. The
+///     azimuth is then measured from the x axis.
 /// calibration : array_like, optional
-///     Complex gain of each channel, by which it is divided.
+///     Complex gain of each channel, by which its samples are divided.
 ///
 /// Raises
 /// ------
@@ -354,23 +360,23 @@ pub fn scan(
     Scan::of(py, &found)
 }
 
-/// Find every SSB in samples. Plans are made anew; a `Searcher` keeps them.
+/// Find every SSB in samples. FFT plans are created in each call; a `Searcher` keeps them.
 ///
 /// Parameters
 /// ----------
 /// samples : ndarray
 ///     Complex samples, `(samples,)` or `(antennas, samples)`.
 /// sample_rate_hz : float
-///     Any usual rate that holds an SSB: 3.84 Msps at least.
+///     Any common sample rate of at least 3.84 Msps.
 /// centre_frequency_hz : float
-///     Frequency that stands at 0 Hz in the samples.
+///     Absolute frequency at 0 Hz in the samples.
 /// ssb_freq_hz, scs_khz, cfo_ppm, spacing_wavelengths, places_wavelengths, calibration
-///     As for `scan`.
+///     See `scan`.
 ///
 /// Returns
 /// -------
 /// Scan
-///     `access_av.nr.search` makes a list of its cells.
+///     Result of the scan; `access_av.nr.search` returns its list of cells.
 ///
 /// Examples
 /// --------
@@ -425,7 +431,7 @@ fn scan_error(error: ScanError) -> PyErr {
     RecordingError::new_err(brief(error))
 }
 
-/// One or two axes of complex64, row by row; what is already so is not copied.
+/// Converts one or two axes to row-major complex64, without a copy if possible.
 pub fn complex_samples<'py>(
     samples: &Bound<'py, PyAny>,
 ) -> PyResult<PyReadonlyArrayDyn<'py, Complex32>> {
@@ -444,7 +450,7 @@ pub fn complex_samples<'py>(
     Ok(array)
 }
 
-/// The antennas' samples.
+/// Returns the samples of each antenna.
 pub fn rows<'a>(samples: &'a PyReadonlyArrayDyn<'_, Complex32>) -> PyResult<Vec<&'a [Complex32]>> {
     let length = samples.shape().last().copied().unwrap_or(0);
     Ok(samples.as_slice()?.chunks_exact(length.max(1)).collect())

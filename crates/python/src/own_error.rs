@@ -1,14 +1,14 @@
-//! What a localizer says of its own error, as numbers: NaN where it says nothing.
+//! Covariance and protection level of a localizer as numbers; NaN if it does not provide them.
 
 use onboard::localize::Integrity;
 use recording::replay::LocatedPose;
 use simulate::Step;
 
-/// A pose with what its localizer says of its error.
+/// Pose with the uncertainty that its localizer reports.
 pub trait OwnError {
-    /// Covariance of x, y and heading.
+    /// Returns the covariance of x, y and heading.
     fn covariance(&self) -> Option<&[[f64; 3]; 3]>;
-    /// Protection levels.
+    /// Returns the protection levels.
     fn integrity(&self) -> Option<&Integrity>;
 }
 
@@ -32,12 +32,12 @@ impl OwnError for LocatedPose {
     }
 }
 
-/// A protection level.
+/// Returns a protection level in metres; NaN without one.
 pub fn level(of: &impl OwnError, which: fn(&Integrity) -> f64) -> f64 {
     of.integrity().map_or(f64::NAN, which)
 }
 
-/// An element of the covariance.
+/// Returns an element of the covariance; NaN without one.
 pub fn covariance(of: &impl OwnError, row: usize, column: usize) -> f64 {
     let element = of.covariance().and_then(|it| it.get(row)?.get(column));
     element.copied().unwrap_or(f64::NAN)

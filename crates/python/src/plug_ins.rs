@@ -1,4 +1,4 @@
-//! Python code in place of parts of the pipeline: what it is given, and what it returns, checked.
+//! Python objects that replace parts of the pipeline, with validation of their results.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -22,18 +22,18 @@ use simulate::scenario::Scenario;
 
 use crate::message::brief;
 
-/// A radio head where the site has it.
+/// Radio head at its nominal position.
 #[pyclass(frozen, get_all, module = "access_av._core")]
 pub struct RadioHead {
     /// Physical cell identity.
     pci: u16,
-    /// Index of its SSB in the burst.
+    /// Index of the SSB in the burst.
     ssb_index: u8,
-    /// Place in the map's frame, x in metres.
+    /// Position x in the map frame in metres.
     x_m: f64,
-    /// Place in the map's frame, y in metres.
+    /// Position y in the map frame in metres.
     y_m: f64,
-    /// Height in metres, counted as the array's is.
+    /// Height in metres above the reference of the array's height.
     z_m: f64,
 }
 
@@ -49,38 +49,38 @@ impl From<&CoreHead> for RadioHead {
     }
 }
 
-/// An SSB whose angle has not been estimated yet.
+/// Detected SSB whose angle is not yet estimated.
 #[pyclass(frozen, get_all, module = "access_av._core")]
 pub struct SensedSsb {
     /// Physical cell identity.
     pci: u16,
     /// Index of the SSB in the burst.
     ssb_index: u8,
-    /// SNR that was sensed, in dB.
+    /// Measured SNR in dB.
     snr_db: f64,
-    /// SNR that the link budget promises at the estimated place, in dB; `None` where no radio head
-    /// of the site sends this SSB.
+    /// SNR according to the link budget at the estimated position in dB; `None` if no radio head of
+    /// the site sends this SSB.
     expected_snr_db: Option<f64>,
 }
 
-/// What a wake-up policy may base its decision on.
+/// Inputs of a wake-up policy.
 #[pyclass(frozen, get_all, module = "access_av._core")]
 pub struct Situation {
     /// Time of the burst in seconds.
     time_s: f64,
-    /// Speed by the odometer in m/s.
+    /// Speed of the odometer in m/s.
     speed_mps: f64,
-    /// Where the vehicle believes to be, x in metres.
+    /// Estimated position x in metres.
     x_m: f64,
-    /// Where the vehicle believes to be, y in metres.
+    /// Estimated position y in metres.
     y_m: f64,
-    /// The heading that it believes to have, in radians, counter-clockwise from +x.
+    /// Estimated heading in radians, counter-clockwise from +x.
     heading_rad: f64,
-    /// Covariance of (x, y, heading), where the localizer has one.
+    /// Covariance of (x, y, heading); `None` if the localizer has none.
     covariance: Option<[[f64; 3]; 3]>,
-    /// The site's radio heads.
+    /// Radio heads of the site.
     heads: Vec<Py<RadioHead>>,
-    /// What was sensed of the burst; empty as long as the receiver sleeps.
+    /// Detected SSBs of the burst; empty while the receiver is off.
     sensed: Vec<Py<SensedSsb>>,
 }
 
@@ -115,7 +115,7 @@ impl Situation {
     }
 }
 
-/// An error that passed through the core; it comes out as it went in.
+/// Error that is passed through the core unchanged.
 struct PlugInError(BoxError);
 
 impl From<PlugInError> for PyErr {
@@ -127,12 +127,12 @@ impl From<PlugInError> for PyErr {
     }
 }
 
-/// Attributes by which an estimator states what one estimate takes: joules above idle ...
+/// Attribute of an estimator with the energy of one estimate above idle in joules.
 const ENERGY: &str = "energy_per_execution_j";
-/// ... or seconds of one busy core.
+/// Attribute of an estimator with the time of one estimate on one busy core in seconds.
 const TIME: &str = "time_per_execution_s";
 
-/// A Python callable in place of the angle estimator, of one run.
+/// Python callable that replaces the angle estimator of one run.
 pub struct PythonEstimator {
     call: Py<PyAny>,
     measurand: Measurand,
@@ -140,7 +140,8 @@ pub struct PythonEstimator {
 }
 
 impl PythonEstimator {
-    /// `call` for an array that measures this; `told_of_sigma` is shared by all runs.
+    /// Creates the estimator for an array with the given measurand; `told_of_sigma` is shared by
+    /// all runs.
     pub const fn new(
         call: Py<PyAny>,
         measurand: Measurand,
@@ -189,7 +190,7 @@ impl PythonEstimator {
                 spacing_wavelengths,
                 ..
             } => {
-                // To the second order, for end-fire.
+                // Second-order expansion, which is finite at end-fire.
                 let sin = angle_rad.sin();
                 TAU * spacing_wavelengths * (sin * sigma + 0.5 * sigma * sigma)
             }
@@ -227,7 +228,7 @@ impl PythonEstimator {
                 .any(|value| value.is_nan() || *value == f64::INFINITY)
             {
                 return Err(refused(
-                    "estimator returned a log-likelihood that is no number",
+                    "estimator returned a log-likelihood that is not a number",
                 ));
             }
             return Ok(Some(EstimatedAngle::LogLikelihood(log)));
@@ -240,7 +241,7 @@ impl PythonEstimator {
     }
 }
 
-/// What an estimator states of the energy or the time of one estimate.
+/// Returns the energy or the time of one estimate from the estimator's attributes.
 pub fn estimate_cost(estimator: &Bound<'_, PyAny>) -> PyResult<EstimateCost> {
     let stated = |name: &str| -> PyResult<Option<f64>> {
         let Some(value) = estimator.getattr_opt(name)?.filter(|it| !it.is_none()) else {
@@ -268,9 +269,9 @@ fn refused(message: &str) -> PyErr {
     PyValueError::new_err(brief(message))
 }
 
-/// Says at which SSB a plug-in failed, and keeps the exception's type.
+/// Adds the SSB at which a custom component failed to the exception, and keeps its type.
 fn at(py: Python<'_>, error: PyErr, what: &str) -> PyErr {
-    // A note leaves the exception what it is (Python 3.11 and later).
+    // A note does not change the exception (Python 3.11 and later).
     let _ = error.value(py).call_method1("add_note", (what,));
     error
 }
@@ -308,11 +309,11 @@ impl AngleEstimator for PythonEstimator {
     }
 }
 
-/// A Python callable in place of the wake-up policy, of one run.
+/// Python callable that replaces the wake-up policy of one run.
 pub struct PythonPolicy(Py<PyAny>);
 
 impl PythonPolicy {
-    /// `call`, and its method `listens` if it has one.
+    /// Creates the policy from `call`, with its method `listens` if it has one.
     pub const fn new(call: Py<PyAny>) -> Self {
         Self(call)
     }
@@ -332,7 +333,7 @@ impl WakeUpPolicy for PythonPolicy {
                 .map_err(|error| at(py, error, &what))?;
             let listens = found.extract::<bool>();
             listens.map_err(|_| {
-                let message = "policy.listens returned something else than True or False";
+                let message = "policy.listens returned a value other than True or False";
                 at(py, refused(message), &what)
             })
         });
@@ -387,21 +388,22 @@ impl WakeUpPolicy for PythonPolicy {
     }
 }
 
-/// A Python object in place of the localizer, of one run.
+/// Python object that replaces the localizer of one run.
 pub struct PythonLocalizer(Py<PyAny>);
 
 impl PythonLocalizer {
-    /// An object that a factory made for one run.
+    /// Creates the localizer from an object that a factory created for one run.
     pub const fn new(object: Py<PyAny>) -> Self {
         Self(object)
     }
 }
 
-/// Calls a plug-in's factory for one run: `factory(site, vehicle, start)`, with site and vehicle as
-/// dictionaries, and the start as the vehicle knows it: x and y in metres, heading in radians.
+/// Calls a factory of a custom component for one run: `factory(site, vehicle, start)`. Site and
+/// vehicle are dictionaries, and the start is the pose that the vehicle knows (x and y in metres,
+/// heading in radians).
 ///
 /// # Errors
-/// The exception that the factory raises.
+/// Exception that the factory raises.
 pub fn made_for_run(
     factory: &Bound<'_, PyAny>,
     scenario: &Scenario,
@@ -451,7 +453,7 @@ impl Localizer for PythonLocalizer {
             }
             let accepted = told.extract::<bool>();
             accepted.map_err(|_| {
-                let message = "localizer.angle returned something else than True, False or None";
+                let message = "localizer.angle returned a value other than True, False or None";
                 at(py, refused(message), &what)
             })
         })?;
@@ -477,7 +479,7 @@ impl Localizer for PythonLocalizer {
         Ok(estimate?)
     }
 
-    /// By `copy.deepcopy`; an object that cannot be copied gets no late angles.
+    /// Copies the object by `copy.deepcopy`. An object that cannot be copied gets no late angles.
     fn copy_to(&self, slot: &mut Option<Box<dyn Localizer>>) -> bool {
         let copy = Python::attach(|py| {
             let deepcopy = py.import("copy")?.getattr("deepcopy")?;
@@ -487,7 +489,7 @@ impl Localizer for PythonLocalizer {
     }
 }
 
-/// Whether a matrix is finite, symmetric and positive semidefinite, each up to rounding.
+/// Whether a matrix is finite, symmetric and positive semidefinite, up to rounding.
 fn is_covariance(matrix: &[[f64; 3]; 3]) -> bool {
     const ROUNDING: f64 = 1e-9;
     let [[xx, xy, xh], [yx, yy, yh], [hx, hy, hh]] = *matrix;
@@ -508,7 +510,7 @@ fn is_covariance(matrix: &[[f64; 3]; 3]) -> bool {
     let [Some(a), Some(b), Some(c)] = found else {
         return false;
     };
-    // Minors of the matrix of correlations.
+    // Principal minors of the correlation matrix.
     let whole = 1.0 + 2.0 * a * b * c - a * a - b * b - c * c;
     [a, b, c].iter().all(|it| it.abs() <= 1.0 + ROUNDING) && whole >= -ROUNDING
 }
@@ -516,7 +518,7 @@ fn is_covariance(matrix: &[[f64; 3]; 3]) -> bool {
 fn pose_estimate(found: &Bound<'_, PyAny>, time_s: f64) -> PyResult<PoseEstimate> {
     let shape = || {
         refused(
-            "localizer.pose returned something else than (x_m, y_m, heading_rad) or (x_m, y_m, \
+            "localizer.pose returned a value other than (x_m, y_m, heading_rad) or (x_m, y_m, \
              heading_rad, covariance), with the 3 by 3 covariance of the three",
         )
     };

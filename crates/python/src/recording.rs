@@ -1,4 +1,4 @@
-//! Recordings: `Recording` and its error.
+//! `Recording` and its error.
 
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -19,13 +19,13 @@ create_exception!(
     "An unusable recording; the message names file, key and what is allowed."
 );
 
-/// The Python error for a core error.
+/// Converts an error of the core to the Python error.
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
 pub fn recording_error(error: CoreError) -> PyErr {
     RecordingError::new_err(brief(error))
 }
 
-/// A recording of one or more antennas, read piece by piece; by one thread at a time, the others wait.
+/// Recording of one or more antennas, read in blocks; by one thread at a time, others wait.
 ///
 /// Examples
 /// --------
@@ -46,7 +46,7 @@ impl From<CoreRecording> for Recording {
 }
 
 impl Recording {
-    /// What `ask` finds in the core's recording; other Python threads run meanwhile.
+    /// Calls `ask` with the core's recording without the interpreter lock.
     pub fn with<T: Send>(
         &self,
         py: Python<'_>,
@@ -58,20 +58,22 @@ impl Recording {
 
 #[pymethods]
 impl Recording {
-    /// Open a SigMF recording by its name, its `.sigmf-meta` or its `.sigmf-data`, or an archive (`.sigmf`) or
-    /// collection (`.sigmf-collection`) of one recording.
+    /// Open a SigMF recording by its name, its `.sigmf-meta` or `.sigmf-data` file, an archive
+    /// (`.sigmf`) or a collection (`.sigmf-collection`) of one recording.
     ///
     /// Parameters
     /// ----------
     /// path : path-like
-    ///     The recording; datatype `cf32_le` or `ci16_le`, any number of interleaved channels.
+    ///     Recording with the datatype `cf32_le` or `ci16_le` and any number of interleaved
+    ///     channels.
     /// verify : bool
-    ///     Compare the data's SHA-512 with the metadata's, which reads all of it once.
+    ///     Whether to compare the data's SHA-512 with the metadata's, which reads all data once.
     ///
     /// Raises
     /// ------
     /// RecordingError
-    ///     A half missing, unusable metadata, data that ends within a sample or is of another type.
+    ///     A missing file of the pair; unusable metadata; data that ends within a sample or has
+    ///     another type.
     #[staticmethod]
     #[pyo3(signature = (path, *, verify = true))]
     fn open(py: Python<'_>, path: PathBuf, verify: bool) -> PyResult<Self> {
@@ -100,13 +102,13 @@ impl Recording {
             .map_err(recording_error)
     }
 
-    /// Samples per second and channel.
+    /// Sample rate in Hz.
     #[getter]
     fn sample_rate_hz(&self, py: Python<'_>) -> f64 {
         self.with(py, |core| core.sample_rate_hz())
     }
 
-    /// Centre frequency of the first capture that states one, in Hz.
+    /// Centre frequency of the first capture that has one, in Hz.
     #[getter]
     fn centre_frequency_hz(&self, py: Python<'_>) -> Option<f64> {
         self.with(py, |core| core.centre_frequency_hz())
@@ -118,7 +120,7 @@ impl Recording {
         self.with(py, |core| core.channels())
     }
 
-    /// Samples per channel.
+    /// Number of samples per channel.
     #[getter]
     fn length(&self, py: Python<'_>) -> u64 {
         self.with(py, |core| core.length())
@@ -130,7 +132,7 @@ impl Recording {
         self.with(py, |core| core.datatype().name())
     }
 
-    /// What looks wrong but does not keep the recording from being read.
+    /// Suspicious properties that do not prevent reading.
     #[getter]
     fn warnings(&self, py: Python<'_>) -> Vec<String> {
         self.with(py, |core| {
@@ -138,18 +140,18 @@ impl Recording {
         })
     }
 
-    /// The metadata as JSON, annotations and keys of extensions included.
+    /// Return the metadata as JSON, including annotations and extension keys.
     fn metadata_json(&self, py: Python<'_>) -> PyResult<String> {
         self.with(py, |core| serde_json::to_string(core.metadata()))
             .map_err(|error| RecordingError::new_err(brief(error)))
     }
 
-    /// Read `count` samples of every channel from sample `start` on.
+    /// Read `count` samples of every channel from sample `start`.
     ///
     /// Returns
     /// -------
     /// ndarray
-    ///     complex64, shape (channels, count); full scale of integers is one.
+    ///     complex64 samples, shape (channels, count); the full scale of integers is one.
     ///
     /// Raises
     /// ------

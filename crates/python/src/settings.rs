@@ -1,4 +1,4 @@
-//! Sites, vehicles, scenarios and platforms: reading, overriding, writing out.
+//! Sites, vehicles, scenarios and platforms: reading, overriding and writing.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -28,13 +28,13 @@ create_exception!(
      allowed."
 );
 
-/// The Python error for a core error.
+/// Converts an error of the core to the Python error.
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
 pub fn settings_error(error: CoreError) -> PyErr {
     SettingsError::new_err(brief(error))
 }
 
-/// A value that can be read, and is most likely not what was meant.
+/// Warning of a valid but implausible value.
 #[pyclass(frozen, eq, hash, module = "access_av._core")]
 #[derive(PartialEq, Eq, Hash)]
 pub struct SettingsWarning(Warning);
@@ -47,19 +47,19 @@ impl SettingsWarning {
         &self.0.key
     }
 
-    /// Its value.
+    /// Value of the key.
     #[getter]
     fn value(&self) -> &str {
         &self.0.value
     }
 
-    /// Why it is doubtful, physically.
+    /// Physical reason why the value is implausible.
     #[getter]
     fn why(&self) -> &str {
         &self.0.why
     }
 
-    /// What to write instead.
+    /// Suggested correction.
     #[getter]
     fn write(&self) -> &str {
         &self.0.write
@@ -78,7 +78,8 @@ fn told(warnings: Vec<Warning>) -> Vec<SettingsWarning> {
     warnings.into_iter().map(SettingsWarning).collect()
 }
 
-/// A Python class for a checked TOML file of which some are shipped by name, with what is its own.
+/// Defines a Python class for a validated TOML file, with shipped files by name and class-specific
+/// methods.
 macro_rules! toml_file {
     ($(#[$doc:meta])* $class:ident($core:ty), $what:literal, $($own:tt)*) => {
         $(#[$doc])*
@@ -137,7 +138,7 @@ macro_rules! toml_file {
                 &self.0.name
             }
 
-            /// What it is for.
+            /// Description of the file's purpose.
             #[getter]
             fn description(&self) -> &str {
                 &self.0.description
@@ -153,7 +154,7 @@ macro_rules! toml_file {
                 hasher.finish()
             }
 
-            /// Copies and pickles are made by way of TOML.
+            /// Copies and pickles use the TOML text.
             fn __reduce__<'py>(
                 slf: &Bound<'py, Self>,
             ) -> PyResult<(Bound<'py, PyAny>, (String, String))> {
@@ -168,12 +169,12 @@ macro_rules! toml_file {
 }
 
 toml_file! {
-    /// A site, checked: the plant as the vehicles believe it to be.
+    /// Site: validated nominal model of the plant.
     Site(CoreSite), "site",
 
-    /// What is most likely not what was meant, heard by a vehicle, or by one of which nothing is
-    /// stated. With a vehicle all that is doubtful of it, too; keys then begin with `site` and
-    /// `vehicle`. Raises `SettingsError` where the vehicle's platform has not what it asks for.
+    /// Return warnings about implausible values for any vehicle. With a vehicle, warnings about the
+    /// vehicle are included, and the keys begin with `site` and `vehicle`. Raises `SettingsError`
+    /// if the vehicle's platform lacks a required capability.
     #[pyo3(signature = (vehicle = None))]
     fn warnings(&self, vehicle: Option<&Vehicle>) -> PyResult<Vec<SettingsWarning>> {
         let Some(vehicle) = vehicle else {
@@ -186,25 +187,25 @@ toml_file! {
 }
 
 toml_file! {
-    /// A vehicle, checked: what it is built of and how it is set, as it believes.
+    /// Vehicle: validated nominal model of the vehicle and its settings.
     Vehicle(CoreVehicle), "vehicle",
 
-    /// Protection level in metres above which its position is not to be relied on; `None` where no
-    /// integrity monitor runs.
+    /// Protection level in metres above which the state is not `ok`; `None` without integrity
+    /// monitoring.
     #[getter]
     fn alert_limit_m(&self) -> Option<f64> {
         self.0.integrity_monitor().map(|it| it.alert_limit_m)
     }
 
-    /// The vehicle with everything of its wake-up written out that it leaves to the platform, which is
-    /// the one it names unless another is given.
+    /// Return the vehicle with explicit wake-up settings in place of the platform's defaults. The
+    /// default platform is the one that the vehicle names.
     #[pyo3(signature = (platform = None))]
     fn resolved(&self, platform: Option<&Platform>) -> PyResult<Self> {
         resolve(&self.0, platform).map(Self).map_err(settings_error)
     }
 
-    /// What is most likely not what was meant. Raises `SettingsError` where there is no such platform,
-    /// or it has not what the vehicle asks for.
+    /// Return warnings about implausible values. Raises `SettingsError` if the platform does not
+    /// exist or lacks a required capability.
     fn warnings(&self) -> PyResult<Vec<SettingsWarning>> {
         let mut found = plausible::of_vehicle(&self.0);
         found.extend(platform_warnings(&self.0).map_err(settings_error)?);
@@ -213,23 +214,23 @@ toml_file! {
 }
 
 toml_file! {
-    /// A scenario, checked: a site, a vehicle, and the world around them.
+    /// Scenario: a site, a vehicle, the environment and the deviations of the truth, validated.
     Scenario(CoreScenario), "scenario",
 
-    /// The site, as it is believed to be.
+    /// Nominal site.
     #[getter]
     fn site(&self) -> Site {
         Site(self.0.site.clone())
     }
 
-    /// The vehicle, as it is believed to be.
+    /// Nominal vehicle.
     #[getter]
     fn vehicle(&self) -> Vehicle {
         Vehicle(self.0.vehicle.clone())
     }
 
-    /// How large a drive is, from above: its duration in seconds, its SSB bursts, SSBs of all radio
-    /// heads and odometry samples, and the bytes of memory that a run takes.
+    /// Upper bounds of the size of a drive: duration in seconds, SSB bursts, SSBs of all radio
+    /// heads, odometry samples, and memory of a run in bytes.
     #[getter]
     fn size(&self) -> PyResult<HashMap<&'static str, f64>> {
         let check = Check { file: &self.0.name };
@@ -243,8 +244,8 @@ toml_file! {
         ]))
     }
 
-    /// What of scenario, site and vehicle is most likely not what was meant. Raises `SettingsError`
-    /// where the vehicle's platform has not what it asks for.
+    /// Return warnings about implausible values of scenario, site and vehicle. Raises
+    /// `SettingsError` if the vehicle's platform lacks a required capability.
     fn warnings(&self) -> PyResult<Vec<SettingsWarning>> {
         let of_platform = platform_warnings(&self.0.vehicle)
             .map_err(|error| settings_error(error.beneath(&self.0.name, "vehicle")))?;
@@ -253,8 +254,8 @@ toml_file! {
         Ok(told(found))
     }
 
-    /// The scenario with everything of the wake-up written out that its vehicle leaves to the
-    /// platform, which is the one it names unless another is given.
+    /// Return the scenario with explicit wake-up settings in place of the platform's defaults. The
+    /// default platform is the one that the vehicle names.
     #[pyo3(signature = (platform = None))]
     fn resolved(&self, platform: Option<&Platform>) -> PyResult<Self> {
         let mut resolved = self.0.clone();
@@ -264,40 +265,41 @@ toml_file! {
 }
 
 toml_file! {
-    /// A plant, checked: a site, a vehicle, a fleet of it, and the accuracy that is needed.
+    /// Plant: a site, a vehicle, the fleet and the required accuracy, validated.
     Plant(CorePlant), "plant",
 
-    /// Horizontal error that is not to be passed, in metres, and for how much of the time, in percent.
+    /// Maximum horizontal error in metres, and the fraction of time for which it is required in
+    /// percent.
     #[getter]
     fn target(&self) -> (f64, f64) {
         (self.0.target.error_m(), self.0.target.percent())
     }
 
-    /// A trip, through the channel as it is believed.
+    /// Return the scenario of a trip with the nominal channel.
     fn scenario(&self) -> Scenario {
         Scenario(self.0.scenario(&self.0.channel))
     }
 
-    /// A trip where lines of sight are poor.
+    /// Return the scenario of a trip with the poor channel.
     fn poor_scenario(&self) -> Scenario {
         Scenario(self.0.scenario(&self.0.poor_channel))
     }
 
-    /// What of site, vehicle and trip is most likely not what was meant. Raises `SettingsError`
-    /// where the vehicle's platform has not what it asks for.
+    /// Return warnings about implausible values of site, vehicle and trip. Raises `SettingsError`
+    /// if the vehicle's platform lacks a required capability.
     fn warnings(&self) -> PyResult<Vec<SettingsWarning>> {
         self.scenario().warnings()
     }
 }
 
 toml_file! {
-    /// A platform, checked.
+    /// Platform: validated figures of the onboard computer.
     Platform(CorePlatform), "platform",
 
-    /// Energy in joules of a run of so many executions, SSB bursts listened to, and seconds, by a
-    /// vehicle's method and power mode: `(executions, listening, idle, boundary)`. `extent` is
-    /// "value", or "low" or "high" for that end of every figure's range. `None` where the platform
-    /// has no figure for the method.
+    /// Return the energy of a run in joules: `(executions, listening, idle, boundary)`, for numbers
+    /// of angle estimates and received SSB bursts and a duration in seconds, with the vehicle's
+    /// method and power mode. `extent` is "value", or "low" or "high" for the end of every figure's
+    /// range. `None` if the platform has no figure for the method.
     #[pyo3(signature = (vehicle, executions, listened, duration_s, extent = "value"))]
     fn energy_j(
         &self,
@@ -315,18 +317,18 @@ toml_file! {
         }))
     }
 
-    /// What is most likely not what was meant.
+    /// Return warnings about implausible values.
     fn warnings(&self) -> Vec<SettingsWarning> {
         told(plausible::of_platform(&self.0))
     }
 
-    /// Shortest time between two estimates, in seconds, of a vehicle's method in its mode.
+    /// Return the minimum time between two estimates in seconds for a vehicle's method and mode.
     fn base_wake_up_s(&self, vehicle: &Vehicle) -> PyResult<f64> {
         self.0.base_wake_up_s(&vehicle.0).map_err(settings_error)
     }
 
-    /// Power in watts of the board with so many busy cores, by the mode's place in the file; `None`
-    /// where the platform has no model of it.
+    /// Return the power of the board in watts with the given number of busy cores, by the index of
+    /// the mode; `None` if the platform has no power model.
     fn busy_power_w(&self, mode: usize, cores: u32) -> PyResult<Option<f64>> {
         let modes = &self.0.modes;
         let mode = modes.get(mode).ok_or_else(|| {
@@ -359,7 +361,8 @@ fn platform_of(vehicle: &CoreVehicle) -> Result<CorePlatform, CoreError> {
         .map_err(|error| error.beneath(&vehicle.name, "platform.name"))
 }
 
-/// What is doubtful of the platform that a vehicle names; an error where it cannot serve it.
+/// Returns warnings about the platform that a vehicle names; an error if it lacks a required
+/// capability.
 fn platform_warnings(vehicle: &CoreVehicle) -> Result<Vec<Warning>, CoreError> {
     let platform = platform_of(vehicle)?;
     platform.mode(&vehicle.platform, &vehicle.name)?;
@@ -386,7 +389,7 @@ fn to_toml(value: &Bound<'_, PyAny>, path: &str) -> PyResult<Value> {
             .map(|item| to_toml(item, path))
             .collect::<PyResult<Vec<_>>>()
     };
-    // In Python, bool is an int: it has to come first.
+    // In Python, bool is a subclass of int and must be checked first.
     if value.is_instance_of::<PyBool>() {
         Ok(Value::Boolean(value.extract()?))
     } else if value.is_instance_of::<PyInt>() {

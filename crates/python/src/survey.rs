@@ -1,4 +1,4 @@
-//! What recorded drives say of site and vehicle.
+//! Calibration of site and vehicle from recorded drives.
 
 use std::path::PathBuf;
 
@@ -14,16 +14,16 @@ use crate::drive::replay_error;
 use crate::recording::recording_error;
 use crate::settings::{Site, Vehicle};
 
-/// A recorded drive, odometry and angles, to be driven again and again.
+/// Recorded drive with odometry and angles for repeated processing.
 ///
 /// Parameters
 /// ----------
 /// odometry : path-like
-///     CSV or MCAP, as `locate` takes it.
+///     CSV or MCAP file; see `locate`.
 /// angles : path-like
-///     CSV log of angles, as `locate` takes it.
+///     CSV log of angles; see `locate`.
 /// track_width_m : float, optional
-///     Distance of left and right wheel, where the odometry is theirs.
+///     Distance between left and right wheel in metres, for odometry of single wheels.
 ///
 /// Raises
 /// ------
@@ -75,21 +75,21 @@ impl LoggedDrive {
             .collect()
     }
 
-    /// Drive, and tell how far each angle is from what was expected of it.
+    /// Process the drive and return the innovation of each angle.
     ///
     /// Parameters
     /// ----------
     /// site, vehicle : Site, Vehicle
-    ///     What is believed; the vehicle's start is this drive's.
+    ///     Nominal models; the vehicle's start is the start of this drive.
     /// used : array of bool, shape (n,), optional
-    ///     Which angles count; those that the tracker's gate lets through without.
+    ///     Mask of the angles to use [default: those that pass the tracker's gate].
     ///
     /// Returns
     /// -------
     /// residual_rad, variance_rad2 : array of float, shape (n,)
-    ///     Innovation of the electrical angle and its variance; NaN where there is none.
+    ///     Innovation of the electrical angle and its variance; NaN if there is none.
     /// used : array of bool, shape (n,)
-    ///     Which counted.
+    ///     Mask of the used angles.
     ///
     /// Raises
     /// ------

@@ -1,4 +1,4 @@
-//! How many threads a caller gets.
+//! Number of threads.
 
 use std::num::NonZero;
 use std::thread::available_parallelism;
@@ -6,14 +6,14 @@ use std::thread::available_parallelism;
 use pyo3::PyResult;
 use pyo3::exceptions::PyValueError;
 
-/// More threads than any machine has cores for.
+/// Maximum number of threads, above the core count of any machine.
 const MOST_THREADS: usize = 1024;
 
-/// As many as asked for, but no more than there are cores: a further one gains nothing, and takes
-/// memory that may not be there.
+/// Limits the number of threads to one per core, because more threads do not increase the speed but
+/// need memory.
 ///
 /// # Errors
-/// `ValueError` where none are asked for, or too many.
+/// `ValueError` if `threads` is zero or too large.
 pub fn at_most_one_per_core(threads: usize) -> PyResult<usize> {
     if !(1..=MOST_THREADS).contains(&threads) {
         let message = format!("`threads` is {threads}; it must be between 1 and {MOST_THREADS}");

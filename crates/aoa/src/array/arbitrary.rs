@@ -1,4 +1,4 @@
-//! Arrays with their elements anywhere: in a circle, in a plane, on a body.
+//! Arrays with arbitrary element positions: circular, planar or three-dimensional.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,12 +8,12 @@ use super::calibration::Calibration;
 use super::manifold::{Direction, Manifold};
 use crate::error::Error;
 
-/// Farthest an element may be from the origin, in wavelengths.
+/// Maximum distance of an element from the origin on each axis, in wavelengths.
 const FARTHEST_WAVELENGTHS: f64 = 100.0;
-/// Elements nearer to one another than this are one.
+/// Minimum distance of two elements in wavelengths; closer elements are rejected as coincident.
 const NEAREST_WAVELENGTHS: f64 = 1e-3;
 
-/// Ideal elements in any places, with the gains of their channels.
+/// Array of ideal elements at arbitrary positions with complex channel gains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArbitraryArray<const N: usize> {
     places_wavelengths: [[f64; 3]; N],
@@ -21,12 +21,12 @@ pub struct ArbitraryArray<const N: usize> {
 }
 
 impl<const N: usize> ArbitraryArray<N> {
-    /// Elements at these places (x, y, z), in wavelengths.
+    /// Creates an array from the element positions (x, y, z) in wavelengths.
     ///
     /// # Errors
-    /// [`Error::ElementPlace`] for one that is not finite or more than 100 wavelengths from the origin;
-    /// [`Error::CoincidentElements`]; [`Error::ElementsInARow`], which tell nothing but the angle from
-    /// their line: use [`Array`](crate::Array).
+    /// [`Error::ElementPlace`] if a coordinate is not finite or exceeds 100 wavelengths;
+    /// [`Error::CoincidentElements`]; [`Error::ElementsInARow`] for collinear elements, which
+    /// measure only the angle from their line: use [`Array`](crate::Array).
     pub fn new(places_wavelengths: [[f64; 3]; N]) -> Result<Self, Error> {
         const { assert!(N >= 2 && N <= 16, "an array has two to sixteen antennas") };
         for (n, place) in places_wavelengths.iter().enumerate() {
@@ -56,10 +56,10 @@ impl<const N: usize> ArbitraryArray<N> {
         })
     }
 
-    /// Elements in a horizontal circle, element `n` at the azimuth `2 pi n / N`.
+    /// Creates a horizontal circular array with element `n` at the azimuth `2 pi n / N`.
     ///
     /// # Errors
-    /// As [`ArbitraryArray::new`].
+    /// See [`ArbitraryArray::new`].
     pub fn circular(radius_wavelengths: f64) -> Result<Self, Error> {
         Self::new(std::array::from_fn(|n| {
             let (sin, cos) = (TAU * n as f64 / N as f64).sin_cos();
@@ -67,11 +67,11 @@ impl<const N: usize> ArbitraryArray<N> {
         }))
     }
 
-    /// Elements in horizontal rows along x, the rows following one another along y, `columns` elements
-    /// in each, the last row perhaps shorter.
+    /// Creates a horizontal rectangular array. Rows of `columns` elements are parallel to x and
+    /// follow one another along y. The last row may be shorter.
     ///
     /// # Errors
-    /// As [`ArbitraryArray::new`].
+    /// See [`ArbitraryArray::new`].
     pub fn rectangular(columns: usize, spacing_wavelengths: f64) -> Result<Self, Error> {
         let columns = columns.max(1);
         Self::new(std::array::from_fn(|n| {
@@ -84,21 +84,21 @@ impl<const N: usize> ArbitraryArray<N> {
         }))
     }
 
-    /// The same geometry with measured channel gains.
+    /// Replaces the channel gains by measured ones.
     #[must_use]
     pub const fn with_calibration(mut self, calibration: Calibration<N>) -> Self {
         self.calibration = calibration;
         self
     }
 
-    /// Where the elements are, in wavelengths.
+    /// Returns the element positions in wavelengths.
     pub const fn places_wavelengths(&self) -> &[[f64; 3]; N] {
         &self.places_wavelengths
     }
 }
 
 impl<const N: usize> Manifold<N> for ArbitraryArray<N> {
-    /// `g_n exp(j 2 pi p_n . s)`, `s` being the unit vector towards the source.
+    /// Returns `g_n exp(j 2 pi p_n . s)`, where `s` is the unit vector towards the source.
     fn response(&self, direction: Direction) -> [Complex64; N] {
         let [x, y, z] = direction.unit_vector();
         let gains = self.calibration.gains();
@@ -108,7 +108,7 @@ impl<const N: usize> Manifold<N> for ArbitraryArray<N> {
         })
     }
 
-    /// One over 2 pi times the largest distance from the centre.
+    /// Returns the inverse of 2 pi times the largest distance from the centre.
     fn resolution_rad(&self) -> f64 {
         let centre: [f64; 3] = std::array::from_fn(|axis| {
             self.places_wavelengths

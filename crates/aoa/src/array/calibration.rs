@@ -4,7 +4,8 @@ use num_complex::Complex64;
 
 use crate::error::Error;
 
-/// One complex gain per channel. Estimators divide what channel `n` received by gain `n`.
+/// Calibration: one complex gain per channel. Estimators divide the signal of channel `n` by gain
+/// `n`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Calibration<const N: usize> {
     gains: [Complex64; N],
@@ -16,7 +17,7 @@ impl<const N: usize> Calibration<N> {
         gains: [Complex64::ONE; N],
     };
 
-    /// Channels with these gains.
+    /// Creates a calibration from the channel gains.
     ///
     /// # Errors
     /// [`Error::CalibrationGain`] if a gain is zero or not finite.
@@ -27,17 +28,17 @@ impl<const N: usize> Calibration<N> {
         }
     }
 
-    /// The gains, one per channel.
+    /// Returns the gains, one per channel.
     pub const fn gains(&self) -> &[Complex64; N] {
         &self.gains
     }
 
-    /// What each channel is multiplied by.
+    /// Returns the factor of each channel that removes its gain.
     pub(crate) fn inverse_gains(&self) -> [Complex64; N] {
         self.gains.map(|gain| gain.inv())
     }
 
-    /// A snapshot as ideal channels would have received it.
+    /// Returns the snapshot that ideal channels would have received.
     pub fn apply(&self, snapshot: &[Complex64; N]) -> [Complex64; N] {
         std::array::from_fn(|n| snapshot[n] / self.gains[n])
     }

@@ -1,20 +1,20 @@
-//! The manifold: what an array receives from every direction.
+//! Array manifold: the response of an array as a function of direction.
 
 use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-/// A direction in space.
+/// Direction in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Direction {
-    /// From the x axis, counter-clockwise seen from above.
+    /// Azimuth in rad from the x axis, counter-clockwise seen from above.
     pub azimuth_rad: f64,
-    /// From the horizontal plane, upwards; -pi/2 to pi/2.
+    /// Elevation in rad from the horizontal plane, positive upwards; -pi/2 to pi/2.
     pub elevation_rad: f64,
 }
 
 impl Direction {
-    /// The direction with this azimuth and elevation.
+    /// Creates a direction from azimuth and elevation in rad.
     pub const fn new(azimuth_rad: f64, elevation_rad: f64) -> Self {
         Self {
             azimuth_rad,
@@ -22,7 +22,7 @@ impl Direction {
         }
     }
 
-    /// A vector of length one towards it.
+    /// Returns the unit vector towards the direction.
     pub fn unit_vector(&self) -> [f64; 3] {
         let (sin, cos) = self.elevation_rad.sin_cos();
         [
@@ -32,7 +32,7 @@ impl Direction {
         ]
     }
 
-    /// Unit vectors of growing azimuth and growing elevation.
+    /// Returns the unit vectors of increasing azimuth and increasing elevation.
     fn tangents(&self) -> [[f64; 3]; 2] {
         let (sin_az, cos_az) = self.azimuth_rad.sin_cos();
         let (sin_el, cos_el) = self.elevation_rad.sin_cos();
@@ -42,8 +42,9 @@ impl Direction {
         ]
     }
 
-    /// The direction `step[0]` rad along growing azimuth (on the great circle) and `step[1]` along
-    /// growing elevation. Unlike azimuth and elevation themselves, that works overhead too.
+    /// Returns the direction displaced by `step[0]` rad along increasing azimuth (on the great
+    /// circle) and `step[1]` rad along increasing elevation. The displacement is also defined at
+    /// the zenith, unlike a change of azimuth and elevation.
     pub(crate) fn moved(&self, step: [f64; 2]) -> Self {
         let (forward, tangents) = (self.unit_vector(), self.tangents());
         let [x, y, z]: [f64; 3] = std::array::from_fn(|i| {
@@ -52,8 +53,8 @@ impl Direction {
         Self::new(y.atan2(x), z.atan2(x.hypot(y)))
     }
 
-    /// The inverse of [`Direction::moved`] for nearby directions: along azimuth and elevation, with the
-    /// length of the angle between them.
+    /// Inverse of [`Direction::moved`] for nearby directions: returns the displacements along
+    /// azimuth and elevation, whose norm is the angle between the directions.
     pub(crate) fn step_to(&self, other: &Self) -> [f64; 2] {
         let (forward, tangents, there) = (self.unit_vector(), self.tangents(), other.unit_vector());
         let dot = |a: [f64; 3]| a.iter().zip(there).map(|(a, b)| a * b).sum::<f64>();
@@ -63,43 +64,45 @@ impl Direction {
         if sine > 0.0 {
             [x * angle / sine, y * angle / sine]
         } else {
-            // Straight ahead or straight behind.
+            // The other direction is equal or opposite.
             [angle, 0.0]
         }
     }
 }
 
-/// What an array of `N` antennas receives from every direction.
+/// Response of an array of `N` antennas as a function of direction.
 ///
-/// A [`DirectionFinder`](crate::DirectionFinder) works with any: geometries by
-/// [`ArbitraryArray`](crate::ArbitraryArray), measurements by
-/// [`MeasuredManifold`](crate::MeasuredManifold), or a model of your own. For elements in a row at equal
-/// distances there is the much faster [`Array`](crate::Array).
+/// A [`DirectionFinder`](crate::DirectionFinder) accepts any manifold: a geometry
+/// ([`ArbitraryArray`](crate::ArbitraryArray)), a measured table
+/// ([`MeasuredManifold`](crate::MeasuredManifold)) or a custom model. For uniform linear arrays,
+/// [`Array`](crate::Array) is much faster.
 pub trait Manifold<const N: usize> {
-    /// The response to a plane wave of unit amplitude: one complex value per antenna, continuous in the
-    /// direction. A factor common to all antennas does not matter.
+    /// Returns the response to a plane wave of unit amplitude: one complex value per antenna,
+    /// continuous in the direction. A common factor of all antennas is arbitrary.
     fn response(&self, direction: Direction) -> [Complex64; N];
 
-    /// An angle in rad over which no antenna's response changes by more than about a radian.
+    /// Returns the angle in rad over which the response of no antenna changes by more than about 1
+    /// rad.
     fn resolution_rad(&self) -> f64;
 }
 
-/// A manifold around a direction.
+/// Response of a manifold and its derivatives at a direction.
 pub(crate) struct Neighbourhood<const N: usize> {
     pub(crate) response: [Complex64; N],
-    /// `a^H a`.
+    /// Power of the response, `a^H a`.
     pub(crate) power: f64,
-    /// Derivatives of the response along azimuth (on the great circle) and elevation.
+    /// Derivatives of the response with respect to azimuth (on the great circle) and elevation.
     pub(crate) tangents: [[Complex64; N]; 2],
-    /// `Re(D^H P D)`, `P` projecting on the complement of the response: what of the derivatives is not
-    /// a mere change of amplitude and phase, and tells directions apart.
+    /// `Re(D^H P D)`, where `P` projects onto the complement of the response. This part of the
+    /// derivatives is not a change of amplitude and phase, and contains the information on the
+    /// direction.
     pub(crate) metric: [[f64; 2]; 2],
 }
 
 impl<const N: usize> Neighbourhood<N> {
     pub(crate) fn of<M: Manifold<N> + ?Sized>(manifold: &M, direction: Direction) -> Self {
-        // Central differences: their error, the third derivative times STEP^2 / 6, is that of rounding
-        // over STEP for arrays of a few wavelengths.
+        // Step of the central differences. Truncation error (third derivative times STEP^2 / 6) and
+        // rounding error (eps / STEP) are about equal for arrays of a few wavelengths.
         const STEP: f64 = 1e-5;
         let response = manifold.response(direction);
         let tangents = [[STEP, 0.0], [0.0, STEP]].map(|step| {
@@ -123,13 +126,13 @@ impl<const N: usize> Neighbourhood<N> {
     }
 }
 
-/// `a^H b`.
+/// Returns `a^H b`.
 pub(crate) fn dot<const N: usize>(a: &[Complex64; N], b: &[Complex64; N]) -> Complex64 {
     a.iter().zip(b).map(|(a, b)| a.conj() * b).sum()
 }
 
-/// Directions about `spacing_rad` apart, between these elevations. None is at an edge, where by symmetry
-/// an array may see no change with the elevation.
+/// Returns directions about `spacing_rad` apart between two elevations. No direction is at the
+/// limits, where the response of a symmetric array may be stationary in elevation.
 pub(crate) fn evenly_spread([lowest, highest]: [f64; 2], spacing_rad: f64) -> Vec<Direction> {
     let rings = ((highest - lowest) / spacing_rad).ceil().max(1.0) as usize;
     let mut directions = Vec::new();

@@ -1,5 +1,4 @@
-//! A manifold that was measured, or computed by a field solver: with the patterns of the elements and
-//! the coupling between them.
+//! Manifold from a measurement or a field solver, including element patterns and mutual coupling.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -8,29 +7,30 @@ use num_complex::Complex64;
 use super::manifold::{Direction, Manifold};
 use crate::error::Error;
 
-/// A table of responses, interpolated by cubics.
+/// Table of responses with cubic interpolation.
 ///
-/// The interpolation is good where the response changes by less than a radian from one entry to the
-/// next: its error is at most a twenty-fourth of the fourth power of that change.
+/// The response should change by less than 1 rad between adjacent entries. The interpolation error
+/// is at most 1/24 of the fourth power of this change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredManifold<const N: usize> {
-    /// Azimuths in each row.
+    /// Number of azimuths in each row.
     columns: usize,
     rows: usize,
     first_elevation_rad: f64,
     elevation_step_rad: f64,
-    /// Row-major (elevation, azimuth).
+    /// Responses, row-major (elevation, azimuth).
     responses: Vec<[Complex64; N]>,
 }
 
 impl<const N: usize> MeasuredManifold<N> {
-    /// Responses at `azimuths` azimuths `2 pi i / azimuths` for each of the elevations, which are equally
-    /// spaced and ascend: `responses` holds one row of azimuths per elevation. Between the rows it is
-    /// interpolated; beyond them the outermost row holds.
+    /// Creates a manifold from responses at the azimuths `2 pi i / azimuths` for each of the
+    /// equally spaced, ascending elevations. `responses` contains one row of azimuths per
+    /// elevation. Elevations between the rows are interpolated; elevations outside use the
+    /// outermost row.
     ///
     /// # Errors
-    /// [`Error::ManifoldTable`] unless there are at least four azimuths and one elevation, as many
-    /// responses as both make, all finite and none zero, and elevations as said.
+    /// [`Error::ManifoldTable`] unless there are at least four azimuths and one elevation, one
+    /// finite nonzero response per pair, and elevations as described.
     pub fn new(
         azimuths: usize,
         elevations_rad: &[f64],
@@ -41,7 +41,7 @@ impl<const N: usize> MeasuredManifold<N> {
         let refused = |why| Err(Error::ManifoldTable(why));
         if azimuths < 4 || rows == 0 || azimuths.checked_mul(rows) != Some(responses.len()) {
             return refused(
-                "it needs four azimuths or more, and one response for each and elevation",
+                "it needs at least four azimuths and one response per azimuth and elevation",
             );
         }
         let power =
@@ -98,7 +98,7 @@ impl<const N: usize> Manifold<N> for MeasuredManifold<N> {
         sum
     }
 
-    /// From the largest change between neighbours in the table.
+    /// Computes the resolution from the largest change between adjacent entries.
     fn resolution_rad(&self) -> f64 {
         let mut fastest: f64 = 0.0;
         let mut compare = |a: &[Complex64; N], b: &[Complex64; N], angle_rad: f64| {
@@ -112,7 +112,7 @@ impl<const N: usize> Manifold<N> for MeasuredManifold<N> {
             for column in 0..self.columns {
                 let here = &self.responses[row * self.columns + column];
                 let beside = &self.responses[row * self.columns + (column + 1) % self.columns];
-                // Overhead all azimuths are one direction.
+                // At the zenith, all azimuths are one direction.
                 if apart > 1e-3 {
                     compare(here, beside, apart);
                 }
@@ -132,7 +132,8 @@ fn add<const N: usize>(sum: &mut [Complex64; N], entry: &[Complex64; N], weight:
     }
 }
 
-/// Lagrange's weights of values at 0, 1 .. `count` - 1 for the place `x`; four values make a cubic.
+/// Returns the Lagrange weights of values at 0, 1 .. `count` - 1 for the position `x`; four values
+/// give a cubic.
 fn lagrange(count: usize, x: f64) -> [f64; 4] {
     let mut weights = [0.0; 4];
     for (i, weight) in weights.iter_mut().take(count).enumerate() {

@@ -1,4 +1,4 @@
-//! The array: where its antennas are, and what its receive channels do to them.
+//! Array: antenna positions and receive channels.
 
 pub(crate) mod arbitrary;
 pub(crate) mod calibration;

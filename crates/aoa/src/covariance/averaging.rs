@@ -1,13 +1,13 @@
-//! What a covariance is made into before an estimate: calibrated, averaged over the array's symmetry,
-//! averaged over subarrays.
+//! Transformations of a covariance before estimation: calibration, forward–backward averaging and
+//! spatial smoothing.
 
 use super::sample::Covariance;
 use crate::array::linear::Array;
 use crate::linalg::matrix::zeros;
 
 impl<const N: usize> Covariance<N> {
-    /// The covariance that ideal channels would have measured: entry (i, j) divided by
-    /// `g_i conj(g_j)`. [`estimate`](crate::estimate) does this by itself.
+    /// Returns the covariance that ideal channels would have measured: entry (i, j) divided by `g_i
+    /// conj(g_j)`. [`estimate`](crate::estimate) applies this transformation itself.
     #[must_use]
     pub fn calibrated(&self, array: &Array<N>) -> Self {
         if array.is_ideal() {
@@ -23,8 +23,9 @@ impl<const N: usize> Covariance<N> {
         result
     }
 
-    /// Forward–backward average `(R + J conj(R) J) / 2`, `J` reversing the antennas: two coherent
-    /// sources become two. Only meaningful for ideal (or [`calibrated`](Self::calibrated)) channels.
+    /// Returns the forward–backward average `(R + J conj(R) J) / 2`, where `J` reverses the
+    /// antennas. The average separates two coherent sources. Valid for ideal or
+    /// [`calibrated`](Self::calibrated) channels only.
     #[must_use]
     pub fn forward_backward(&self) -> Self {
         let mut result = *self;
@@ -36,16 +37,16 @@ impl<const N: usize> Covariance<N> {
         result
     }
 
-    /// Average over the `N - M + 1` subarrays of `M` antennas: decorrelates coherent sources (Shan,
-    /// Wax and Kailath 1985). Estimate with [`Array::subarray`]. Only meaningful for ideal (or
-    /// [`calibrated`](Self::calibrated)) channels.
+    /// Returns the average over the `N - M + 1` subarrays of `M` antennas, which decorrelates
+    /// coherent sources (Shan, Wax and Kailath 1985). Estimate with [`Array::subarray`]. Valid for
+    /// ideal or [`calibrated`](Self::calibrated) channels only.
     #[must_use]
     pub fn spatially_smoothed<const M: usize>(&self) -> Covariance<M> {
         const { assert!(M >= 2 && M <= N, "a subarray has 2 to N antennas") };
         self.over_subarrays()
     }
 
-    /// The same for an `M` that is known to be no larger than `N` only at run time.
+    /// Spatial smoothing without the compile-time check of `M <= N`.
     pub(crate) fn over_subarrays<const M: usize>(&self) -> Covariance<M> {
         let mut sum = zeros::<M>();
         let scale = 1.0 / (N - M + 1) as f64;

@@ -1,4 +1,4 @@
-//! The covariance of the antennas, which is all that an estimate sees of the samples.
+//! Covariance of the antenna signals, the sufficient statistic of all estimators.
 
 pub(crate) mod averaging;
 pub(crate) mod sample;

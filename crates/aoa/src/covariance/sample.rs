@@ -1,4 +1,4 @@
-//! The sample covariance.
+//! Sample covariance.
 
 use num_complex::{Complex, Complex64};
 
@@ -7,11 +7,11 @@ use crate::kernel::real::Real;
 use crate::linalg::eigen::hermitian_eigen;
 use crate::linalg::matrix::{Matrix, zeros};
 
-/// Covariance `R = sum_t w_t x_t x_t^H / sum_t w_t` of the antennas, and how many snapshots it
-/// stands for.
+/// Sample covariance `R = sum_t w_t x_t x_t^H / sum_t w_t` of the antennas, with its number of
+/// snapshots.
 ///
-/// The mean is *not* removed: despread pilots are the same vector in every snapshot, and that vector
-/// is the signal.
+/// The mean is *not* removed: despread pilots give an equal vector in every snapshot, and this
+/// vector is the signal.
 ///
 /// Streaming use: [`Covariance::new`], [`accumulate`](Covariance::accumulate) per snapshot,
 /// [`reset`](Covariance::reset).
@@ -23,7 +23,7 @@ pub struct Covariance<const N: usize> {
 }
 
 impl<const N: usize> Covariance<N> {
-    /// An empty covariance, to be accumulated.
+    /// Creates an empty covariance for accumulation.
     pub const fn new() -> Self {
         Self {
             sum: zeros(),
@@ -32,7 +32,7 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
-    /// The sample covariance of snapshots, one value per antenna each.
+    /// Computes the sample covariance of snapshots with one value per antenna.
     ///
     /// # Errors
     /// [`Error::NoSnapshots`], [`Error::NotFinite`], [`Error::Zero`].
@@ -44,8 +44,8 @@ impl<const N: usize> Covariance<N> {
         covariance.validated()
     }
 
-    /// The sample covariance of channels: `channels[n]` holds the samples of antenna `n`. Channels
-    /// longer than the shortest are cut.
+    /// Computes the sample covariance of channels: `channels[n]` contains the samples of antenna
+    /// `n`. The shortest channel determines the number of snapshots.
     ///
     /// # Errors
     /// [`Error::NoSnapshots`], [`Error::NotFinite`], [`Error::Zero`].
@@ -64,8 +64,8 @@ impl<const N: usize> Covariance<N> {
         .validated()
     }
 
-    /// A covariance known otherwise, standing for `snapshots` snapshots (which set the standard
-    /// deviations of the estimates).
+    /// Creates a covariance from a matrix. The number of `snapshots` determines the standard
+    /// deviations of the estimates.
     ///
     /// # Errors
     /// [`Error::NoSnapshots`], [`Error::NotFinite`], [`Error::Zero`], [`Error::NotHermitian`],
@@ -95,7 +95,7 @@ impl<const N: usize> Covariance<N> {
         Ok(covariance)
     }
 
-    /// Adds one snapshot. Bad values are noticed when an estimate is asked for.
+    /// Adds one snapshot. Invalid values are reported at estimation.
     pub fn accumulate(&mut self, snapshot: &[Complex64; N], weight: f64) {
         for i in 0..N {
             for j in 0..=i {
@@ -110,33 +110,33 @@ impl<const N: usize> Covariance<N> {
         self.snapshots += 1;
     }
 
-    /// Forgets everything accumulated.
+    /// Clears the covariance.
     pub const fn reset(&mut self) {
         *self = Self::new();
     }
 
-    /// How many snapshots this stands for.
+    /// Returns the number of snapshots.
     pub const fn snapshots(&self) -> usize {
         self.snapshots
     }
 
-    /// The normalised matrix `R`.
+    /// Returns the normalised matrix `R`.
     pub fn matrix(&self) -> Matrix<N> {
         let scale = 1.0 / self.weight;
         self.sum.map(|row| row.map(|entry| entry * scale))
     }
 
-    /// The matrix up to a factor.
+    /// Returns the sum of the weighted snapshot products, without normalisation.
     pub(crate) const fn unscaled(&self) -> &Matrix<N> {
         &self.sum
     }
 
-    /// The sum of the weights, which is that factor.
+    /// Returns the sum of the weights, the normalisation of [`Self::unscaled`].
     pub(crate) const fn weight(&self) -> f64 {
         self.weight
     }
 
-    /// Mean power per antenna, `trace(R) / N`.
+    /// Returns the mean power per antenna, `trace(R) / N`.
     pub fn power(&self) -> f64 {
         self.trace() / (self.weight * N as f64)
     }
@@ -145,12 +145,12 @@ impl<const N: usize> Covariance<N> {
         (0..N).map(|n| self.sum[n][n].re).sum()
     }
 
-    /// Fails unless the covariance is fit for estimation.
+    /// Returns an error if the covariance is invalid for estimation.
     pub(crate) fn validated(self) -> Result<Self, Error> {
         if self.snapshots == 0 {
             return Err(Error::NoSnapshots);
         }
-        // No entry is larger than the largest on the diagonal.
+        // The largest entry of a covariance is on the diagonal.
         if !(self.weight.is_finite() && self.trace().is_finite()) {
             return Err(Error::NotFinite);
         }

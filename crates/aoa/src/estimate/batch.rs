@@ -1,4 +1,4 @@
-//! Many estimates in one call, from samples as they lie in memory.
+//! Batches of estimates from contiguous samples.
 
 use num_complex::Complex;
 
@@ -12,31 +12,31 @@ use crate::error::Error;
 use crate::kernel::real::Real;
 use crate::result::angle::AngleEstimate;
 
-/// Items that are estimated side by side: so many that the steps of some need not wait for others, and
-/// so few that all they need stays near the processor.
+/// Number of items that are estimated together: large enough to hide instruction latency, and small
+/// enough for the data to stay in the cache.
 const BLOCK: usize = 32;
 
-/// Samples of many estimates: items of `N` channels of `snapshots` samples each, row-major
-/// `(items, N, snapshots)`.
+/// Samples of many estimates: items of `N` channels with `snapshots` samples each, row-major with
+/// the shape `(items, N, snapshots)`.
 #[derive(Debug, Clone, Copy)]
 pub struct Batch<'a, T, const N: usize> {
     samples: &'a [Complex<T>],
     snapshots: usize,
 }
 
-/// An [`Error`] and the item of the batch that caused it.
+/// [`Error`] with the index of the item that caused it.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("item {item}: {error}")]
 pub struct BatchError {
     /// Index of the item.
     pub item: usize,
-    /// What is wrong with it.
+    /// Error of the item.
     #[source]
     pub error: Error,
 }
 
 impl BatchError {
-    /// The same error for a batch of which this one was a part, `items` from its start.
+    /// Returns the error for a batch in which this batch starts at item `items`.
     #[must_use]
     pub fn shifted(self, items: usize) -> Self {
         Self {
@@ -47,11 +47,11 @@ impl BatchError {
 }
 
 impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
-    /// A view of `samples`; what is left over beyond whole items is not part of it.
+    /// Creates a view of `samples`; an incomplete item at the end is ignored.
     ///
     /// # Errors
-    /// [`Error::NoSnapshots`] if `snapshots` is zero, [`Error::TooManySnapshots`] if those of all
-    /// antennas cannot be counted.
+    /// [`Error::NoSnapshots`] if `snapshots` is zero; [`Error::TooManySnapshots`] if the number of
+    /// samples of an item overflows.
     pub fn new(samples: &'a [Complex<T>], snapshots: usize) -> Result<Self, Error> {
         let antennas = N;
         match snapshots.checked_mul(antennas) {
@@ -64,7 +64,7 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
         }
     }
 
-    /// Number of items.
+    /// Returns the number of items.
     pub fn len(&self) -> usize {
         self.samples.len() / (N * self.snapshots)
     }
@@ -74,7 +74,7 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
         self.len() == 0
     }
 
-    /// The channels of each item.
+    /// Returns the channels of each item.
     fn items(self) -> impl Iterator<Item = [&'a [Complex<T>]; N]> {
         self.samples
             .chunks_exact(N * self.snapshots)
@@ -84,12 +84,12 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
             })
     }
 
-    /// The covariance of each item.
+    /// Returns the covariance of each item.
     pub fn covariances(self) -> impl Iterator<Item = Result<Covariance<N>, Error>> {
         self.items().map(Covariance::from_channels)
     }
 
-    /// Parts of `items` items each, the last one shorter.
+    /// Splits the batch into parts of `items` items; the last part may be shorter.
     pub fn split(self, items: usize) -> impl Iterator<Item = Self> {
         let part = items.saturating_mul(N * self.snapshots).max(1);
         self.samples
@@ -97,11 +97,12 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
             .map(move |samples| Self { samples, ..self })
     }
 
-    /// Estimates every item: `sources` estimates each, one item after the other, into `estimates`.
-    /// Stops where either ends.
+    /// Estimates `sources` sources in every item and writes the estimates, item after item, to
+    /// `estimates`. The shorter of batch and output determines the number of items.
     ///
     /// # Errors
-    /// Those of [`estimate_several`](crate::estimate_several), with the index of the first item concerned.
+    /// Errors of [`estimate_several`](crate::estimate_several) with the index of the first affected
+    /// item.
     pub fn estimate(
         self,
         method: Method,
@@ -134,7 +135,7 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
         Ok(())
     }
 
-    /// One source, `W` items at a time.
+    /// Estimates one source per item, `W` items at a time.
     fn in_blocks<const W: usize>(
         self,
         side_by_side: SideBySide<'_, N>,

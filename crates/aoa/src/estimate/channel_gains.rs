@@ -1,4 +1,4 @@
-//! The gains of the receive channels, from a source in a known direction.
+//! Calibration of the channel gains with a source in a known direction.
 
 use num_complex::Complex64;
 
@@ -12,13 +12,13 @@ use crate::linalg::hermitians::principal_eigenvector;
 impl<const N: usize> Calibration<N> {
     /// Estimates the gains from snapshots of one source in a known direction.
     ///
-    /// The principal eigenvector of the covariance is the array's response to the source; divided
-    /// by the steering vector it leaves the gains. Their common factor cannot be seen: channel 0
-    /// gets phase 0, the mean power gain is 1.
+    /// The principal eigenvector of the covariance is the array's response to the source. Its
+    /// quotient with the steering vector is the vector of gains. The common factor is unobservable:
+    /// channel 0 gets phase 0, and the mean power gain is 1.
     ///
     /// # Errors
-    /// [`Error::Angle`] for an impossible direction, [`Error::CalibrationGain`] if a channel is
-    /// silent, and those of [`Covariance::from_snapshots`].
+    /// [`Error::Angle`] for an invalid direction; [`Error::CalibrationGain`] if a channel has no
+    /// signal; errors of [`Covariance::from_snapshots`].
     pub fn from_reference(
         snapshots: &[[Complex64; N]],
         array: &Array<N>,
@@ -27,10 +27,10 @@ impl<const N: usize> Calibration<N> {
         Self::from_reference_covariance(&Covariance::from_snapshots(snapshots)?, array, angle_rad)
     }
 
-    /// As [`Calibration::from_reference`], from the covariance of the snapshots.
+    /// Estimates the gains from the covariance of snapshots; see [`Calibration::from_reference`].
     ///
     /// # Errors
-    /// As [`Calibration::from_reference`].
+    /// See [`Calibration::from_reference`].
     pub fn from_reference_covariance(
         covariance: &Covariance<N>,
         array: &Array<N>,

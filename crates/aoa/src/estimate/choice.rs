@@ -1,24 +1,24 @@
-//! Which method is to be used.
+//! Choice of the estimation method.
 
-/// How to find the directions.
+/// Estimation method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
-    /// The maximum of `a^H R a`: optimal for one source, and the cheapest. Of several sources, coherent
-    /// ones too, the minimum of `tr(P R)`, `P` projecting on what none of them sends: of all methods the
-    /// most exact, and the slowest.
+    /// Maximum likelihood. One source: maximum of `a^H R a`, the optimal and fastest method.
+    /// Several sources, including coherent ones: minimum of `tr(P R)`, where `P` projects onto the
+    /// complement of the steering vectors; the most accurate and slowest method.
     MaximumLikelihood,
-    /// The peaks of the MUSIC spectrum, each found to rounding: there is no grid to choose.
+    /// Peaks of the MUSIC spectrum, refined to machine precision, without a grid setting.
     Music,
-    /// The roots of the MUSIC polynomial.
+    /// Roots of the MUSIC polynomial.
     RootMusic,
-    /// ESPRIT, least squares.
+    /// ESPRIT with least squares.
     EspritLs,
-    /// ESPRIT, total least squares.
+    /// ESPRIT with total least squares.
     EspritTls,
 }
 
 impl Method {
-    /// How many sources the method can tell apart with `N` antennas.
+    /// Returns the maximum number of sources that the method resolves with `N` antennas.
     pub const fn maximum_sources<const N: usize>(self) -> usize {
         N - 1
     }

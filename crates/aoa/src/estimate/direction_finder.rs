@@ -1,4 +1,4 @@
-//! One source in azimuth and elevation, by maximum likelihood, with an array of any shape.
+//! Maximum likelihood estimate of azimuth and elevation of one source for an array of any shape.
 
 use num_complex::Complex64;
 
@@ -15,19 +15,19 @@ use crate::result::direction::{threshold_doubt, verdict};
 use crate::result::goodness_of_fit::{Model, Residual};
 use crate::result::verdict::Reason;
 
-/// Directions of the first search lie so far apart, in units of the array's resolution: from the nearest
-/// one a source is seen with at least nine tenths of its power.
+/// Spacing of the initial search grid, in units of the array's resolution. The nearest grid point
+/// receives at least nine tenths of a source's power.
 const SPACING: f64 = 0.44;
-/// How much likelier the best direction must be than another one far from it.
+/// Minimum likelihood ratio of the best direction to another direction outside its main lobe.
 const LIKELIER: f64 = 100.0;
-/// Steps of the ascent: each leaves an error of the order of the noise.
+/// Maximum number of ascent steps. Each step reduces the error to the order of the noise.
 const STEPS: usize = 40;
-/// A step of this size ends the ascent: far below what any noise displaces.
+/// Step size in rad that ends the ascent, far below the displacement by any noise.
 const SETTLED_RAD: f64 = 1e-9;
 
-/// Finds directions with the manifold `M` of `N` antennas.
+/// Estimator of directions with the manifold `M` of `N` antennas.
 ///
-/// Made once for an array: it holds the responses that every search begins with.
+/// Create it once per array: it stores the responses of the initial search grid.
 ///
 /// ```
 /// use aoa::{ArbitraryArray, Complex64, Covariance, Direction, DirectionFinder, Manifold};
@@ -46,22 +46,22 @@ pub struct DirectionFinder<M, const N: usize> {
     manifold: M,
     elevations_rad: [f64; 2],
     resolution_rad: f64,
-    /// Directions all over, and the responses there, of unit length.
+    /// Grid of directions, with the responses normalised to unit length.
     grid: Vec<(Direction, [Complex64; N])>,
 }
 
-/// A direction while it is sought.
+/// Direction during the ascent.
 pub(super) struct Candidate<const N: usize> {
     pub(super) direction: Direction,
     around: Neighbourhood<N>,
-    /// `a^H R a / a^H a`.
+    /// Beamformer power, `a^H R a / a^H a`.
     beam: f64,
 }
 
 impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
-    /// Looks at the elevations from the first to the second, which may be the same: then only the
-    /// azimuth is estimated. An array whose elements lie in a horizontal plane does not tell above from
-    /// below, and asks for one of both.
+    /// Creates an estimator for the elevations from the first to the second value in rad. With
+    /// equal values, only the azimuth is estimated. A horizontal planar array cannot distinguish
+    /// directions above and below, so that the range must contain one of both only.
     ///
     /// # Errors
     /// [`Error::Elevations`].
@@ -71,7 +71,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         if !(-most <= lowest && lowest <= highest && highest <= most) {
             return Err(Error::Elevations { lowest, highest });
         }
-        // As many as a megabyte or so holds, however large the array.
+        // The limit of the resolution keeps the grid below about 1 MB for an array of any size.
         let resolution_rad = manifold.resolution_rad().clamp(0.02, 1.0);
         let grid = evenly_spread(elevations_rad, SPACING * resolution_rad)
             .into_iter()
@@ -89,28 +89,28 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         })
     }
 
-    /// The manifold.
+    /// Returns the manifold.
     pub const fn manifold(&self) -> &M {
         &self.manifold
     }
 
-    /// Direction of the strongest source: the maximum of `a^H R a / a^H a`.
+    /// Returns the direction of the strongest source: the maximum of `a^H R a / a^H a`.
     ///
-    /// The covariance is of the snapshots as received; gains of the channels belong to the manifold.
+    /// The covariance is that of the received snapshots; the manifold includes the channel gains.
     ///
     /// # Errors
-    /// If the covariance is empty, zero or not finite.
+    /// An error if the covariance is empty, zero or not finite.
     pub fn estimate(&self, covariance: &Covariance<N>) -> Result<DirectionEstimate, Error> {
         self.strongest(covariance, None)
     }
 
-    /// Direction from despread pilots, as
-    /// [`maximum_likelihood_pilots`](crate::maximum_likelihood_pilots) finds it with a linear array: the
-    /// same maximum, its covariance and verdict by the noise variance per antenna and block where that
-    /// is known.
+    /// Returns the direction from despread pilots, like
+    /// [`maximum_likelihood_pilots`](crate::maximum_likelihood_pilots) for a linear array. A known
+    /// noise variance per antenna and block determines the covariance and the verdict.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for a bad noise variance and those of [`Covariance::from_snapshots`].
+    /// [`Error::NotPositive`] for an invalid noise variance; errors of
+    /// [`Covariance::from_snapshots`].
     pub fn estimate_pilots(
         &self,
         blocks: &[[Complex64; N]],
@@ -194,7 +194,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         })
     }
 
-    /// The same way of looking with another manifold, without directions to begin with.
+    /// Returns an estimator with equal settings for another manifold, with an empty grid.
     pub(super) const fn with_manifold<L>(&self, manifold: L) -> DirectionFinder<L, N> {
         DirectionFinder {
             manifold,
@@ -204,12 +204,12 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         }
     }
 
-    /// Directions all over, and the responses there, of unit length.
+    /// Returns the grid of directions, with the responses normalised to unit length.
     pub(super) fn grid(&self) -> &[(Direction, [Complex64; N])] {
         &self.grid
     }
 
-    /// Whether the source may as well be beyond the elevations looked at. Overhead is no edge.
+    /// Whether the source may be outside the range of elevations. The zenith is not a limit.
     pub(super) fn is_at_edge(&self, direction: Direction, covariance: &[[f64; 2]; 2]) -> bool {
         let [lowest, highest] = self.elevations_rad;
         let margin = 3.0 * covariance[1][1].sqrt();
@@ -218,7 +218,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         !self.is_level() && (low || high)
     }
 
-    /// Whether the elevation is given.
+    /// Whether the elevation is fixed.
     pub(super) fn is_level(&self) -> bool {
         self.elevations_rad[0] == self.elevations_rad[1]
     }
@@ -233,8 +233,8 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         }
     }
 
-    /// Fisher scoring: steps uphill by the slope over the curvature that an exact source would have,
-    /// halved as long as they lead down.
+    /// Maximises the power by Fisher scoring: the step is the slope divided by the expected
+    /// curvature, halved until the power increases.
     pub(super) fn climb(&self, matrix: &Matrix<N>, trace: f64, start: Direction) -> Candidate<N> {
         let mut here = self.candidate(matrix, start);
         for _ in 0..STEPS {
@@ -255,8 +255,8 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         here
     }
 
-    /// A step within the elevations: beyond the edge it ends half-way to it, because at the edge itself
-    /// the slope may vanish.
+    /// Returns a step limited to the range of elevations. A step beyond the limit ends half-way to
+    /// the limit, because the slope may vanish at the limit itself.
     fn moved(&self, from: Direction, step: [f64; 2]) -> Direction {
         let [lowest, highest] = self.elevations_rad;
         let to = from.moved(step);
@@ -285,7 +285,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
             2.0 * along.re / around.power
         });
         let signal = here.beam - residual_power::<N>(trace, here.beam);
-        // Where there is no source the curvature is small, and so must be the step.
+        // Without a source the curvature is small, so that the step must be limited.
         let curvature = 2.0 * signal.max(0.1 * here.beam) / around.power;
         let [[a, b], [_, c]] = around.metric.map(|row| row.map(|it| it * curvature));
         let longest = 0.5 * self.resolution_rad;
@@ -293,13 +293,13 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         let elevation = if self.is_level() {
             0.0
         } else {
-            // Where a direction changes nothing (elevation at the horizon) it is left as it is.
+            // The ridge keeps a parameter without influence (elevation at the horizon) unchanged.
             let ridge = 1e-9 * (a + c);
             let determinant = (a + ridge) * (c + ridge) - b * b;
             bounded(((a + ridge) * slope[1] - b * slope[0]) / determinant)
         };
-        // With the elevation's step as it came to be: next to the horizon that may be much shorter
-        // than it would like to be, and must not shorten this one.
+        // Use the limited elevation step: near the horizon it may be much shorter than the
+        // unlimited one, and must not shorten the azimuth step.
         let step = [bounded((slope[0] - b * elevation) / a), elevation];
         if step.iter().all(|it| it.is_finite()) {
             step
@@ -310,7 +310,8 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
 }
 
 impl<const N: usize> Candidate<N> {
-    /// What a source there leaves, `parameters` of its direction having been chosen: azimuth, elevation.
+    /// Returns the residual after subtraction of a source; `parameters` is the number of estimated
+    /// direction parameters.
     fn residual(&self, matrix: &Matrix<N>, parameters: usize) -> Residual {
         let Neighbourhood {
             response,
@@ -325,7 +326,8 @@ impl<const N: usize> Candidate<N> {
         residual::beside(matrix, response, &tangents[..parameters])
     }
 
-    /// Outside the main lobe, where the response to the first order is another one.
+    /// Whether the other direction is outside the main lobe, where the first-order expansion of the
+    /// response is invalid.
     fn is_far_from(&self, direction: &Direction) -> bool {
         let [x, y] = self.direction.step_to(direction);
         let [[a, b], [_, c]] = self.around.metric;
@@ -333,7 +335,7 @@ impl<const N: usize> Candidate<N> {
     }
 }
 
-/// `a^H R a`.
+/// Returns `a^H R a`.
 pub(super) fn power<const N: usize>(matrix: &Matrix<N>, a: &[Complex64; N]) -> f64 {
     let mut power = 0.0;
     for i in 0..N {
@@ -346,8 +348,8 @@ pub(super) fn power<const N: usize>(matrix: &Matrix<N>, a: &[Complex64; N]) -> f
     power
 }
 
-/// Logarithm of the ratio of two directions' likelihoods, per snapshot: that of a direction is
-/// `-ln(beam) - (N - 1) ln(noise)` (Jaffer 1988, concentrated).
+/// Returns the logarithm of the likelihood ratio of two directions per snapshot. The concentrated
+/// log-likelihood of a direction is `-ln(beam) - (N - 1) ln(noise)` (Jaffer 1988).
 fn log_likelihood_ratio<const N: usize>(trace: f64, best: f64, other: f64) -> f64 {
     let noise = |beam: f64| (trace - beam).max(trace * 1e-15);
     (N - 1) as f64 * (noise(other) / noise(best)).ln() - (best / other).ln()

@@ -1,4 +1,4 @@
-//! What users call: from samples or a covariance to directions.
+//! Public estimators: from samples or a covariance to directions.
 
 pub(crate) mod batch;
 pub(crate) mod channel_gains;

@@ -1,4 +1,4 @@
-//! One source, by any method.
+//! Estimate of one source.
 
 use super::choice::Method;
 use super::side_by_side::SideBySide;
@@ -7,12 +7,12 @@ use crate::covariance::sample::Covariance;
 use crate::error::Error;
 use crate::result::angle::AngleEstimate;
 
-/// Direction of the strongest source.
+/// Returns the direction of the strongest source.
 ///
-/// The covariance is of the snapshots as received: the array's calibration is applied here.
+/// The covariance is that of the received snapshots; the array's calibration is applied here.
 ///
 /// # Errors
-/// If the covariance is empty, zero or not finite.
+/// An error if the covariance is empty, zero or not finite.
 pub fn estimate<const N: usize>(
     method: Method,
     covariance: &Covariance<N>,

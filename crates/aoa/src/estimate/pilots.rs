@@ -1,4 +1,4 @@
-//! One source with known pilots: the entry for despread snapshots.
+//! Estimate of one source from despread pilots.
 
 use num_complex::Complex64;
 
@@ -14,22 +14,22 @@ use crate::result::direction::{Found, describe, threshold_doubt};
 use crate::result::goodness_of_fit::Model;
 use crate::spectrum::side_by_side::Spectra;
 
-/// Maximum likelihood angle from despread pilots.
+/// Returns the maximum likelihood angle from despread pilots.
 ///
-/// A block is one coherent piece of signal (an OFDM symbol): for each antenna the sum of its
-/// received samples times the conjugated pilots, divided by the root of the pilots' energy, so that
-/// the noise keeps the variance it has per sample. Blocks are summed non-coherently, hence neither
-/// carrier offset nor channel phase between blocks matters.
+/// A block is a coherent part of the signal (an OFDM symbol). For each antenna, it is the sum of
+/// the received samples times the conjugated pilots, divided by the square root of the pilots'
+/// energy. The noise variance of a block then equals that of a sample. Blocks are combined
+/// non-coherently, so that carrier offset and channel phase between blocks do not matter.
 ///
-/// With `B` blocks and total SNR `g` after despreading (per antenna, all blocks), the standard
-/// deviation is the known-signal bound and what the unknown gain of each block costs at finite SNR:
-/// `sigma^2 = (1 + B / (N g)) / (2 g A)`, `A = N (N^2 - 1) / 12`.
+/// With `B` blocks and the total SNR `g` after despreading (per antenna, all blocks), the variance
+/// is the known-signal bound plus the loss due to the unknown gain of each block: `sigma^2 = (1 + B
+/// / (N g)) / (2 g A)`, `A = N (N^2 - 1) / 12`.
 ///
-/// `noise_variance` is per antenna and block; `None` estimates it from what does not fit the source.
-/// The estimate's `snr_db` is per antenna and block.
+/// `noise_variance` is per antenna and block; `None` estimates it from the residual. The estimate's
+/// `snr_db` is per antenna and block.
 ///
 /// # Errors
-/// [`Error::NotPositive`] for a bad noise variance and those of [`Covariance::from_snapshots`].
+/// [`Error::NotPositive`] for an invalid noise variance; errors of [`Covariance::from_snapshots`].
 pub fn maximum_likelihood_pilots<const N: usize>(
     blocks: &[[Complex64; N]],
     noise_variance: Option<f64>,

@@ -1,4 +1,4 @@
-//! Spectra over the direction, to look at.
+//! Spectra as a function of direction, for display.
 
 use num_complex::Complex64;
 
@@ -11,14 +11,15 @@ use crate::linalg::eigen::hermitian_eigen;
 use crate::linalg::matrix::{Matrix, zeros};
 use crate::spectrum::polynomial::Spectrum;
 
-/// Which spectrum, `a` being the steering vector of a direction.
+/// Kind of spectrum, where `a` is the steering vector of a direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PseudoSpectrum {
-    /// Power of the beam, `a^H R a / N^2` (Bartlett).
+    /// Beamformer power, `a^H R a / N^2` (Bartlett).
     Bartlett,
-    /// Power that nothing from elsewhere adds to, `1 / (a^H R^-1 a)` (Capon 1969).
+    /// Power with minimum interference, `1 / (a^H R^-1 a)` (Capon 1969).
     Capon,
-    /// `N / (a^H En En^H a)`, at least 1 and infinite at exact sources (Schmidt 1986).
+    /// MUSIC spectrum `N / (a^H En En^H a)`, at least 1 and infinite at exact sources (Schmidt
+    /// 1986).
     Music {
         /// Number of sources, 1 to N - 1.
         sources: usize,
@@ -26,11 +27,11 @@ pub enum PseudoSpectrum {
 }
 
 impl PseudoSpectrum {
-    /// The spectrum at these angles from the array's axis.
+    /// Returns the spectrum at the given angles from the array's axis in rad.
     ///
     /// # Errors
-    /// [`Error::Angle`]; [`Error::TooManySources`]; [`Error::Singular`] for Capon with fewer snapshots
-    /// than antennas; those of a covariance that is empty, zero or not finite.
+    /// [`Error::Angle`]; [`Error::TooManySources`]; [`Error::Singular`] for Capon with fewer
+    /// snapshots than antennas; an error for a covariance that is empty, zero or not finite.
     pub fn at<const N: usize>(
         self,
         covariance: &Covariance<N>,
@@ -49,11 +50,11 @@ impl PseudoSpectrum {
         angles_rad.iter().map(value).collect()
     }
 
-    /// The spectrum of an array of any shape, in these directions; `a` there is the response, and
-    /// `a^H a` takes the place of N.
+    /// Returns the spectrum of an array of any shape in the given directions; `a` is the response,
+    /// and `a^H a` replaces N.
     ///
     /// # Errors
-    /// As [`PseudoSpectrum::at`], but for the angles.
+    /// See [`PseudoSpectrum::at`], except for the angles.
     pub fn over_directions<M: Manifold<N> + ?Sized, const N: usize>(
         self,
         covariance: &Covariance<N>,
@@ -70,7 +71,7 @@ impl PseudoSpectrum {
         Ok(directions.iter().map(value).collect())
     }
 
-    /// From the value of the quadratic form and `a^H a`.
+    /// Returns the spectrum from the value of the quadratic form and `a^H a`.
     fn value(self, form: f64, power: f64) -> f64 {
         match self {
             Self::Bartlett => form.max(0.0) / (power * power),

@@ -1,4 +1,4 @@
-//! What one source leaves of the covariance, see [`GoodnessOfFit`](crate::GoodnessOfFit).
+//! Residual of the covariance after one source, see [`GoodnessOfFit`](crate::GoodnessOfFit).
 
 use num_complex::Complex64;
 
@@ -10,7 +10,7 @@ use crate::result::goodness_of_fit::Residual;
 use crate::simd::math::times_plus;
 use crate::spectrum::side_by_side::Places;
 
-/// That of `W` items, of sources at `places`.
+/// Residuals of `W` items with sources at `places`.
 #[derive(Debug)]
 pub(super) struct Residuals<const W: usize> {
     coherent: [f64; W],
@@ -25,7 +25,7 @@ impl<const W: usize> Residuals<W> {
         places: &Places<W>,
     ) -> Self {
         let steering = Vectors::<N, W>::steering::<FUSED>(&places.cos, &places.sin);
-        // R a, a^H R a and the slope of it.
+        // Compute R a, a^H R a and its derivative.
         let received = covariances.times::<FUSED>(&steering);
         let (mut beam, mut slope) = ([0.0; W], [0.0; W]);
         for n in 0..N {
@@ -93,8 +93,8 @@ impl<const W: usize> Residuals<W> {
     }
 }
 
-/// That of a source with any response. The tangents are the derivatives by the parameters that were
-/// chosen, what they share with the response removed.
+/// Returns the residual of a source with any response. The tangents are the derivatives with
+/// respect to the estimated parameters, orthogonal to the response.
 pub(super) fn beside<const N: usize>(
     matrix: &Matrix<N>,
     response: &[Complex64; N],

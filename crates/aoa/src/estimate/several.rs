@@ -1,4 +1,4 @@
-//! Several sources, by any method that can tell them apart.
+//! Estimates of several sources.
 
 use num_complex::Complex64;
 
@@ -21,17 +21,17 @@ use crate::result::goodness_of_fit::{Model, Tested};
 use crate::result::verdict::Reason;
 use crate::spectrum::polynomial::wrap;
 
-/// Correlation of two sources above which it is named as what made them unresolved.
+/// Minimum correlation of two sources for the verdict "correlated".
 const CORRELATED: f64 = 0.5;
-/// Largest share of a signal eigenvector's power that noise may mix into it for the spread to be what
-/// the linear theory says.
+/// Maximum fraction of a signal eigenvector's power that noise may mix into it, for which the
+/// first-order theory of the variance is valid.
 const LINEAR: f64 = 0.02;
 
-/// Directions of `sources` sources, by ascending angle.
+/// Returns the directions of `sources` sources in order of ascending angle.
 ///
 /// # Errors
-/// As [`estimate`]; [`Error::TooManySources`] unless `sources` is 1 to N - 1; [`Error::Singular`] if
-/// ESPRIT's equations have no solution.
+/// Errors of [`estimate`]; [`Error::TooManySources`] unless `sources` is 1 to N - 1;
+/// [`Error::Singular`] if ESPRIT's equations have no solution.
 pub fn estimate_several<const N: usize>(
     method: Method,
     covariance: &Covariance<N>,
@@ -45,14 +45,14 @@ pub fn estimate_several<const N: usize>(
     estimate_several_smoothed::<N, N>(method, covariance, array, sources, false)
 }
 
-/// Directions of correlated sources: as [`estimate_several`], the covariance averaged over the
-/// `N - M + 1` subarrays of `M` antennas ([`Covariance::spatially_smoothed`]) and, if asked, over the
-/// array's symmetry ([`Covariance::forward_backward`]). The standard deviations are those of what was
-/// averaged: the subarrays share antennas, and the average of their covariances is known less well
-/// than that of as many independent ones.
+/// Returns the directions of correlated sources with spatial smoothing. The covariance is averaged
+/// over the `N - M + 1` subarrays of `M` antennas ([`Covariance::spatially_smoothed`]) and
+/// optionally by [`Covariance::forward_backward`]. The standard deviations account for the
+/// averaging: subarrays share antennas, so that the variance is larger than with independent
+/// subarrays.
 ///
 /// # Errors
-/// As [`estimate_several`] with `M` antennas; [`Error::Subarray`] if they are more than `N`.
+/// See [`estimate_several`] with `M` antennas; [`Error::Subarray`] if `M` exceeds `N`.
 pub fn estimate_several_smoothed<const N: usize, const M: usize>(
     method: Method,
     covariance: &Covariance<N>,
@@ -87,7 +87,7 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
     };
     let mut separated = phases.len() == sources;
     if !separated {
-        // The spectrum has fewer peaks than sources; the roots of the same polynomial are complete.
+        // If the spectrum has fewer peaks than sources, the roots of the polynomial replace them.
         phases = subspace_phases(Method::RootMusic, &eigen, sources)?;
     }
     let likelihood = match method {
@@ -115,16 +115,16 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
     let powers = powers.unwrap_or_default();
     let sigmas = sigmas.unwrap_or_else(|| List::collect(0.0, [std::f64::consts::PI; M]));
     let hidden = match method {
-        // Each must stand out of the noise; coherent ones share an eigenvector.
+        // Each source must exceed the noise. Coherent sources share an eigenvector.
         Method::MaximumLikelihood => (0..sources)
             .any(|k| powers.snr(k, noise_variance) < bound::resolvable_snr::<M>(full.snapshots())),
         _ => !shows(&eigen, sources, full.snapshots()) || spread.mixing() > LINEAR,
     };
-    // Of coherent sources only one shows at all, until the array's symmetry tells them apart.
+    // Without averaging, coherent sources appear as one source in the eigenvalues.
     let averaged_again = || hermitian_eigen(full.forward_backward().matrix(), N);
     let correlated = powers.largest_correlation(sources) > CORRELATED
         || hidden && shows(&averaged_again(), sources, full.snapshots());
-    // Of what was received itself: an average is no sample covariance.
+    // The tests require the original covariance, because an average is not a sample covariance.
     let snapshots = full.snapshots();
     let model = Model::new::<N>([sources, sources], snapshots, false);
     let tests = model.tests();
@@ -172,19 +172,19 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
     ))
 }
 
-/// The mean of the eigenvalues that no source has.
+/// Returns the mean of the noise eigenvalues.
 fn noise_variance<const N: usize>(eigen: &HermitianEigen<N>, sources: usize) -> f64 {
     let mean = eigen.values[sources..].iter().sum::<f64>() / (N - sources) as f64;
     mean.max(eigen.values[0] * 1e-15)
 }
 
-/// Whether the weakest source stands out of the noise.
+/// Whether the weakest source exceeds the noise.
 fn shows<const N: usize>(eigen: &HermitianEigen<N>, sources: usize, snapshots: usize) -> bool {
     let ratio = eigen.values[sources - 1] / noise_variance(eigen, sources);
     (ratio - 1.0) / N as f64 >= bound::resolvable_snr::<N>(snapshots)
 }
 
-/// Electrical angles from the eigenvectors.
+/// Returns the electrical angles from the eigenvectors.
 fn subspace_phases<const N: usize>(
     method: Method,
     eigen: &HermitianEigen<N>,
@@ -204,7 +204,7 @@ fn subspace_phases<const N: usize>(
     }
 }
 
-/// The covariance of the sources.
+/// Covariance of the sources.
 struct SourcePowers<const N: usize>(Matrix<N>);
 
 impl<const N: usize> Default for SourcePowers<N> {
@@ -233,7 +233,7 @@ impl<const N: usize> SourcePowers<N> {
     }
 }
 
-/// `S = A^+ (R - sigma^2 I) A^+H`; `None` if the steering vectors do not tell the sources apart.
+/// Returns `S = A^+ (R - sigma^2 I) A^+H`; `None` if the steering vectors are linearly dependent.
 fn source_powers<const N: usize>(
     phases: &[f64],
     covariance: &Covariance<N>,

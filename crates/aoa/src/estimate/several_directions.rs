@@ -1,4 +1,5 @@
-//! Several sources in azimuth and elevation, by maximum likelihood, with an array of any shape.
+//! Maximum likelihood estimate of azimuth and elevation of several sources for an array of any
+//! shape.
 
 use num_complex::Complex64;
 
@@ -16,17 +17,18 @@ use crate::result::direction::{threshold_doubt, verdict};
 use crate::result::goodness_of_fit::{Model, Tested};
 use crate::result::verdict::Reason;
 
-/// Rounds of alternating projection, and the step that ends them: far below what any noise displaces.
+/// Maximum number of rounds of alternating projection.
 const ROUNDS: usize = 300;
+/// Step size in rad that ends the iteration, far below the displacement by any noise.
 const SETTLED_RAD: f64 = 1e-8;
 
-/// Directions of the first source that are tried.
+/// Maximum number of initial directions of the first source.
 const FIRSTS: usize = 64;
 
-/// What an array receives beside some directions: its response less what is in their responses.
+/// Response of an array orthogonal to the responses of other directions.
 struct Beside<'a, M, const N: usize> {
     manifold: &'a M,
-    /// Orthonormal.
+    /// Orthonormal basis of the responses of the other directions.
     others: List<[Complex64; N], N>,
 }
 
@@ -60,7 +62,7 @@ impl<'a, M: Manifold<N>, const N: usize> Beside<'a, M, N> {
         response
     }
 
-    /// Of these responses of unit length the one that most power is left of, and that power.
+    /// Returns the response of unit length with the largest remaining power, and the power.
     fn brightest<'g>(
         &self,
         matrix: &Matrix<N>,
@@ -69,7 +71,7 @@ impl<'a, M: Manifold<N>, const N: usize> Beside<'a, M, N> {
         let beams = grid.iter().filter_map(|point| {
             let left = self.left_of(point.1);
             let length = dot(&left, &left).re;
-            // What others hide is not looked at.
+            // Skip directions whose response is almost in the span of the others.
             (length > 1e-3).then(|| (power(matrix, &left) / length, point))
         });
         beams.max_by(|a, b| a.0.total_cmp(&b.0))
@@ -87,8 +89,8 @@ impl<M: Manifold<N>, const N: usize> Manifold<N> for Beside<'_, M, N> {
 }
 
 impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
-    /// Directions of `sources` sources, coherent ones too, by ascending azimuth: the minimum of `tr(P R)`
-    /// by alternating projection (Ziskind and Wax 1988), with the covariance of that estimate.
+    /// Returns the directions of `sources` sources, including coherent ones, in order of ascending
+    /// azimuth. The estimate minimises `tr(P R)` by alternating projection (Ziskind and Wax 1988).
     ///
     /// ```
     /// use aoa::{ArbitraryArray, Covariance, Direction, DirectionFinder, Manifold};
@@ -103,8 +105,9 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
     /// ```
     ///
     /// # Errors
-    /// [`Error::TooManySources`] unless they are fewer than the antennas and have no more parameters than
-    /// those; [`Error::Singular`] if they are not told apart; those of [`estimate`](Self::estimate).
+    /// [`Error::TooManySources`] unless there are fewer sources than antennas and at most as many
+    /// parameters as the antennas allow; [`Error::Singular`] if the sources are inseparable; errors
+    /// of [`estimate`](Self::estimate).
     pub fn estimate_several(
         &self,
         covariance: &Covariance<N>,
@@ -153,9 +156,10 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         Ok(directions)
     }
 
-    /// Where a search begins: each of some directions is taken for the first source's, the others for
-    /// those that most power is left of, and the best set wins. Coherent sources may add up to a beam that
-    /// points at neither, so the brightest direction alone can be far from all.
+    /// Returns initial directions. Each of several directions is tried for the first source, and
+    /// the others follow by the largest remaining power. The best set is selected. The direction of
+    /// maximum power alone may be far from all sources, because coherent sources can add up to a
+    /// beam in another direction.
     fn start(&self, matrix: &Matrix<N>, sources: usize) -> Option<Vec<Direction>> {
         let grid = self.grid();
         let firsts = grid.iter().step_by(grid.len().div_ceil(FIRSTS).max(1));
@@ -175,7 +179,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         Some(sets.max_by(|a, b| a.0.total_cmp(&b.0))?.1)
     }
 
-    /// What is known of sources in these directions, each of so many parameters.
+    /// Returns the estimates of sources in the given directions with `each` parameters per source.
     fn describe_several(
         &self,
         covariance: &Covariance<N>,
@@ -210,7 +214,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
             for (p, row) in noise_covariance.iter_mut().enumerate().take(each) {
                 for (q, entry) in row.iter_mut().enumerate().take(each) {
                     *entry = match determined {
-                        // The scale of the matrix is in neither.
+                        // The result does not depend on the scale of the matrix.
                         Some(()) => {
                             let at = [p, q].map(|it| &sensitivities[k * each + it]);
                             trace_of_product(at) / snapshots as f64
@@ -220,7 +224,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
                     };
                 }
             }
-            // From the great circle to the azimuth.
+            // Convert from the great circle to the azimuth.
             let stretch = direction.elevation_rad.cos().recip();
             noise_covariance[0][0] *= stretch * stretch;
             noise_covariance[0][1] *= stretch;
@@ -244,7 +248,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
     }
 }
 
-/// `tr(A B)`, real for products of Hermitian matrices with the same one.
+/// Returns `tr(A B)` of two Hermitian matrices, which is real.
 fn trace_of_product<const N: usize>([a, b]: [&Matrix<N>; 2]) -> f64 {
     let mut trace = 0.0;
     for i in 0..N {

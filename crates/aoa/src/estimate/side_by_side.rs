@@ -1,8 +1,8 @@
-//! One source in each of many items, by any method.
+//! Estimates of one source in each of many items.
 //!
-//! None of the methods needs a branch for one source, so items go through every step side by side in
-//! vector registers; a single estimate is one item. What is found in an item does not depend on its
-//! neighbours, hence not on how a batch is divided among threads either.
+//! For one source, all methods are branch-free. Therefore, `W` items are processed together in
+//! vector registers; a single estimate is one item. The result of an item does not depend on its
+//! neighbours, so that the partition of a batch among threads does not matter.
 
 use num_complex::Complex;
 
@@ -26,7 +26,7 @@ use crate::simd::instructions::dispatch;
 use crate::simd::math::{log10, times_plus};
 use crate::spectrum::side_by_side::{Places, Spectra};
 
-/// How to estimate one source in each item.
+/// Settings for the estimate of one source per item.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SideBySide<'a, const N: usize> {
     pub(super) method: Method,
@@ -39,7 +39,7 @@ impl<const N: usize> SideBySide<'_, N> {
     /// Estimates up to `W` items of row-major samples `(items, N, snapshots)`.
     ///
     /// # Errors
-    /// The first item that cannot be estimated, and why.
+    /// Index and error of the first invalid item.
     pub(super) fn of_samples<T: Real, const W: usize>(
         &self,
         samples: &[Complex<T>],
@@ -103,7 +103,7 @@ impl<const N: usize> SideBySide<'_, N> {
         let spectra = Spectra::of_matrices(covariances);
         spectra.check(estimates.len())?;
         let places = if self.method == Method::MaximumLikelihood {
-            // Forward–backward averaging leaves the sums along the diagonals as they are.
+            // Forward–backward averaging does not change the sums along the diagonals.
             spectra.maxima::<FUSED>()
         } else {
             let averaged = self
@@ -124,7 +124,7 @@ impl<const N: usize> SideBySide<'_, N> {
         Ok(())
     }
 
-    /// What is known of sources at these places: SNR, standard deviations, verdict.
+    /// Computes SNR, standard deviations and verdict of sources at the given positions.
     #[inline(always)]
     fn describe<const FUSED: bool, const W: usize>(
         &self,
@@ -152,7 +152,7 @@ impl<const N: usize> SideBySide<'_, N> {
             let beam = values[w] * (1.0 / N as f64);
             let power = residual_power::<N>(spectra.re[0][w], beam);
             let snr = snr::<N>(beam, power);
-            // The stochastic bound.
+            // Standard deviation according to the stochastic bound.
             let inverse = 1.0 / snr;
             let variance = times_plus::<FUSED>(inverse * (1.0 / N as f64), inverse, inverse);
             noise_sigma[w] = no_more_than_ignorance((variance * per_snapshot).sqrt());
@@ -188,7 +188,7 @@ impl<const N: usize> SideBySide<'_, N> {
         }
     }
 
-    /// Estimates from a single covariance of calibrated channels.
+    /// Estimates one source from a single covariance of calibrated channels.
     pub(super) fn of_covariance(&self, covariance: &Matrix<N>) -> Result<AngleEstimate, Error> {
         let mut single = Hermitians::<N, 1>::ZERO;
         single.set(0, covariance);

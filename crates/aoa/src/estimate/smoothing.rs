@@ -1,4 +1,4 @@
-//! Averaging over subarrays whose size is known at run time.
+//! Spatial smoothing with a subarray size that is known at run time.
 
 use super::choice::Method;
 use super::several::estimate_several_smoothed;
@@ -7,17 +7,18 @@ use crate::covariance::sample::Covariance;
 use crate::error::Error;
 use crate::result::angle::AngleEstimate;
 
-/// What a covariance is averaged over, so that correlated sources become several.
+/// Averaging of the covariance, which separates correlated sources.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Smoothing {
-    /// Over the array's symmetry, see [`Covariance::forward_backward`].
+    /// Whether to apply [`Covariance::forward_backward`].
     pub forward_backward: bool,
-    /// Over the subarrays of so many antennas, see [`Covariance::spatially_smoothed`].
+    /// Number of antennas of the subarrays, see [`Covariance::spatially_smoothed`]; `None` for no
+    /// smoothing.
     pub subarray: Option<usize>,
 }
 
 impl Smoothing {
-    /// As many sources as there are places.
+    /// Estimates as many sources as `places` has entries.
     pub(super) fn estimate<const N: usize>(
         self,
         method: Method,
@@ -35,7 +36,8 @@ impl Smoothing {
         macro_rules! over {
             ($($m:literal)*) => {
                 match subarray {
-                    // What no array of this size has need not be compiled.
+                    // The condition removes subarrays that are larger than the array at compile
+                    // time.
                     $($m if const { $m < N } => self.over::<N, $m>(method, covariance, array, places),)*
                     _ => self.over::<N, N>(method, covariance, array, places),
                 }

@@ -1,26 +1,27 @@
-//! How many sources? Information criteria on the eigenvalues (Wax and Kailath 1985).
+//! Number of sources by information criteria on the eigenvalues (Wax and Kailath 1985).
 
 use crate::covariance::sample::Covariance;
 use crate::error::Error;
 use crate::linalg::eigen::hermitian_eigen;
 
-/// What a source must add to the likelihood to be counted.
+/// Penalty of the number of sources.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Criterion {
-    /// Akaike's: sensitive, overestimates now and then even with many snapshots.
+    /// Akaike information criterion: sensitive, but may overestimate even with many snapshots.
     Aic,
-    /// Minimum description length: consistent, misses weak sources with few snapshots.
+    /// Minimum description length: consistent, but misses weak sources with few snapshots.
     Mdl,
 }
 
-/// Number of sources, 0 to N - 1.
+/// Returns the number of sources, 0 to N - 1.
 ///
-/// Minimises `-L (N - k) ln(geometric / arithmetic mean of the N - k smallest eigenvalues)` plus
-/// `k (2 N - k)` (AIC) or `k (2 N - k) ln(L) / 2` (MDL).
+/// Minimises `-L (N - k) ln(geometric / arithmetic mean of the N - k smallest eigenvalues)` plus `k
+/// (2 N - k)` (AIC) or `k (2 N - k) ln(L) / 2` (MDL).
 ///
 /// # Errors
-/// If the covariance is empty, zero or not finite; [`Error::TooFewSnapshots`] unless they are more
-/// than the antennas: the smallest eigenvalues are zero then, and any noise looks like sources.
+/// An error if the covariance is empty, zero or not finite; [`Error::TooFewSnapshots`] unless there
+/// are more snapshots than antennas. Otherwise the smallest eigenvalues are zero, and noise is
+/// counted as sources.
 pub fn source_count<const N: usize>(
     criterion: Criterion,
     covariance: &Covariance<N>,
@@ -32,7 +33,7 @@ pub fn source_count<const N: usize>(
     }
     let snapshots = covariance.snapshots() as f64;
     let values = hermitian_eigen(covariance.matrix(), N).values;
-    // Exactly zero eigenvalues (signals without noise) must not decide by a logarithm of 0.
+    // The floor avoids the logarithm of zero eigenvalues (signals without noise).
     let floor = values[0] * f64::EPSILON;
     let penalty = match criterion {
         Criterion::Aic => 1.0,

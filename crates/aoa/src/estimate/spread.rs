@@ -1,19 +1,20 @@
-//! How an electrical angle spreads about the truth: the asymptotic variance of the method that found
-//! it, for whatever correlation of the sources and whatever averaging of the covariance.
+//! Asymptotic variance of an electrical angle for each method, any correlation of the sources and
+//! any averaging of the covariance.
 //!
-//! To first order an angle moves linearly with the error of the sample covariance,
-//! `d omega = tr(H dR)`, and for Gaussian snapshots `var tr(H R^) = tr(H R H R) / L`. With `w = Rs^+ a`,
-//! `Rs` the signal part of the covariance, `H` is the Hermitian part of `w v^H`, where
+//! To first order, an angle is a linear function of the error of the sample covariance, `d omega =
+//! tr(H dR)`. For Gaussian snapshots, `var tr(H R^) = tr(H R H R) / L`. With `w = Rs^+ a` and the
+//! signal part `Rs` of the covariance, `H` is the Hermitian part of `w v^H`:
 //!
-//! - MUSIC and Root-MUSIC: `v = P d / (d^H P d)`, `d` the derivative of `a`, `P` the projection on the
-//!   noise (Stoica and Nehorai 1989; Rao and Hari 1989 for the roots);
-//! - ESPRIT: `v^H = -j exp(-j omega) b^H`, `b^H` being the source's row of
-//!   `A1^+ ([0 I] - exp(j omega) [I 0])`, `A1` the steering vectors without the last antenna (Rao and
-//!   Hari 1989); least squares and total least squares spread alike.
+//! - MUSIC and Root-MUSIC: `v = P d / (d^H P d)`, where `d` is the derivative of `a` and `P`
+//!   projects onto the noise subspace (Stoica and Nehorai 1989; Rao and Hari 1989 for the roots).
+//! - ESPRIT: `v^H = -j exp(-j omega) b^H`, where `b^H` is the source's row of `A1^+ ([0 I] - exp(j
+//!   omega) [I 0])` and `A1` are the steering vectors without the last antenna (Rao and Hari 1989).
+//!   Least squares and total least squares have equal variances.
 //!
-//! Maximum likelihood has an `H` of its own, [`Fit::sensitivities`].
+//! Maximum likelihood has a different `H`, see [`Fit::sensitivities`].
 //!
-//! An average over subarrays or over the array's symmetry is linear in `R` and becomes one of `H`.
+//! An average over subarrays or a forward–backward average is linear in `R` and gives an average of
+//! `H`.
 
 use num_complex::Complex64;
 
@@ -26,7 +27,7 @@ use crate::linalg::matrix::{Matrix, zeros};
 use crate::list::List;
 use crate::method::alternating_projection::Fit;
 
-/// Average over the subarrays of `M` antennas, and over the array's symmetry.
+/// Average over the subarrays of `M` antennas, optionally with forward–backward averaging.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Averaging<const N: usize, const M: usize> {
     pub(super) forward_backward: bool,
@@ -42,7 +43,7 @@ impl<const N: usize, const M: usize> Averaging<N, M> {
         }
     }
 
-    /// From `H` of the average to that of the covariance it was made of.
+    /// Converts the `H` of the average to the `H` of the original covariance.
     fn spread_out(self, of_average: &Matrix<M>) -> Matrix<N> {
         let mut h = *of_average;
         if self.forward_backward {
@@ -66,20 +67,21 @@ impl<const N: usize, const M: usize> Averaging<N, M> {
     }
 }
 
-/// What the spread depends on.
+/// Inputs of the asymptotic variance.
 pub(super) struct Spread<'a, const N: usize, const M: usize> {
-    /// Of the average.
+    /// Eigendecomposition of the averaged covariance.
     pub(super) eigen: &'a HermitianEigen<M>,
     pub(super) sources: usize,
     pub(super) noise_variance: f64,
     pub(super) averaging: Averaging<N, M>,
-    /// What was averaged.
+    /// Original covariance.
     pub(super) covariance: &'a Matrix<N>,
     pub(super) snapshots: usize,
 }
 
 impl<const N: usize, const M: usize> Spread<'_, N, M> {
-    /// Standard deviations; `None` if the steering vectors do not tell the sources apart.
+    /// Returns the standard deviations in rad; `None` if the steering vectors are linearly
+    /// dependent.
     pub(super) fn phase_sigmas_rad(&self, method: Method, phases: &[f64]) -> Option<List<f64, M>> {
         let steering = steering_matrix::<M>(phases);
         let rotations = match method {
@@ -103,15 +105,15 @@ impl<const N: usize, const M: usize> Spread<'_, N, M> {
         determined.then(|| List::collect(0.0, sigmas[..phases.len()].iter().copied()))
     }
 
-    /// Those of maximum likelihood.
+    /// Returns the standard deviations of maximum likelihood in rad.
     pub(super) fn of_maximum_likelihood(&self, likelihood: &Fit<M>) -> Option<List<f64, M>> {
         let mut sigmas = List::empty(0.0);
         likelihood.sensitivities(|h| sigmas.push(self.variance(h).sqrt()))?;
         sigmas.iter().all(|it| it.is_finite()).then_some(sigmas)
     }
 
-    /// Share of the weakest signal eigenvector that noise mixes into it, in the mean
-    /// `sigma^2 l / (L (l - sigma^2)^2)` for each of the noise's dimensions.
+    /// Returns the mean fraction of the weakest signal eigenvector that noise mixes into it:
+    /// `sigma^2 l / (L (l - sigma^2)^2)` for each dimension of the noise subspace.
     pub(super) fn mixing(&self) -> f64 {
         let weakest = self.eigen.values[self.sources - 1];
         let gap = weakest - self.noise_variance;
@@ -119,7 +121,7 @@ impl<const N: usize, const M: usize> Spread<'_, N, M> {
         each * (M - self.sources) as f64
     }
 
-    /// `P d / (d^H P d)`.
+    /// Returns `P d / (d^H P d)`.
     fn towards_noise(&self, a: &[Complex64; M]) -> Option<[Complex64; M]> {
         let derivative: [Complex64; M] =
             std::array::from_fn(|n| a[n] * Complex64::new(0.0, n as f64));
@@ -131,7 +133,7 @@ impl<const N: usize, const M: usize> Spread<'_, N, M> {
         (power > 0.0).then(|| projected.map(|it| it / power))
     }
 
-    /// `Rs^+ a`.
+    /// Returns `Rs^+ a`.
     fn of_signal(&self, a: &[Complex64; M]) -> [Complex64; M] {
         let mut result = [Complex64::ZERO; M];
         let eigen = self.eigen.values.iter().zip(&self.eigen.vectors);
@@ -142,7 +144,7 @@ impl<const N: usize, const M: usize> Spread<'_, N, M> {
         result
     }
 
-    /// `tr(H R H R) / L`.
+    /// Returns `tr(H R H R) / L`.
     fn variance(&self, of_average: &Matrix<M>) -> f64 {
         let h = self.averaging.spread_out(of_average);
         let hr = product(&h, self.covariance, [N; 3]);
@@ -156,7 +158,7 @@ impl<const N: usize, const M: usize> Spread<'_, N, M> {
     }
 }
 
-/// ESPRIT's `-j exp(-j omega) b^H` of every source; see the module.
+/// Returns ESPRIT's `-j exp(-j omega) b^H` of every source; see the module documentation.
 fn esprit_rows<const M: usize>(
     steering: &Matrix<M>,
     phases: &[f64],
@@ -181,7 +183,7 @@ fn esprit_rows<const M: usize>(
     Some(rows)
 }
 
-/// `a^H b`.
+/// Returns `a^H b`.
 fn dot<const M: usize>(a: &[Complex64; M], b: &[Complex64; M]) -> Complex64 {
     a.iter().zip(b).map(|(a, b)| a.conj() * b).sum()
 }

@@ -1,4 +1,4 @@
-//! One source with known pilots, received by channels whose noise differs.
+//! Estimate of one source from despread pilots with a different noise variance per channel.
 
 use num_complex::Complex64;
 
@@ -14,22 +14,22 @@ use crate::result::goodness_of_fit::Model;
 use crate::result::verdict::Reason;
 use crate::spectrum::polynomial::Spectrum;
 
-/// Directions that the pattern of the weighted array is looked at in.
+/// Number of directions at which the pattern of the weighted array is evaluated.
 const DIRECTIONS: usize = 64;
-/// A direction that receives this part of the source's power is another source's as well.
+/// Maximum relative side lobe power; above it, a direction is ambiguous.
 const ALIKE: f64 = 0.98;
 
-/// [`maximum_likelihood_pilots`](crate::maximum_likelihood_pilots) where the noise of antenna `n` has
-/// the variance `noise_variances[n]` per block, as received; infinite where a channel is dead.
+/// [`maximum_likelihood_pilots`](crate::maximum_likelihood_pilots) for a different noise variance
+/// `noise_variances[n]` per block and antenna `n`, as received; infinite for a dead channel.
 ///
-/// With weights `w_n = |gain_n|^2 / sigma_n^2` the likelihood is largest where
-/// `sum_b |sum_n w_n a_n* x_nb|^2` is: what is far from the source and noisy counts little. The
-/// standard deviation is [`bound::known_signal_unequal`]'s and, as with equal noise, what the unknown
-/// gain of each block costs. The verdict allows for the side lobes of a thinned array.
+/// With the weights `w_n = |gain_n|^2 / sigma_n^2`, the estimate maximises `sum_b |sum_n w_n a_n*
+/// x_nb|^2`. The variance is that of [`bound::known_signal_unequal`] plus, as with equal noise, the
+/// loss due to the unknown gain of each block. The verdict accounts for the side lobes of a thinned
+/// array.
 ///
 /// # Errors
-/// [`Error::NotPositive`] for a bad noise variance, [`Error::DeadChannels`] if fewer than two
-/// channels live, and those of [`Covariance::from_snapshots`].
+/// [`Error::NotPositive`] for an invalid noise variance; [`Error::DeadChannels`] if fewer than two
+/// channels have a finite noise variance; errors of [`Covariance::from_snapshots`].
 pub fn maximum_likelihood_pilots_unequal<const N: usize>(
     blocks: &[[Complex64; N]],
     noise_variances: &[f64; N],
@@ -47,7 +47,7 @@ pub fn maximum_likelihood_pilots_unequal<const N: usize>(
     }
     let mut covariance = Covariance::new();
     for block in blocks {
-        // Whatever a dead channel holds must not come in.
+        // Set the samples of dead channels to zero, because they may be NaN.
         let live = |n| {
             if weights[n] > 0.0 {
                 block[n]
@@ -69,7 +69,7 @@ pub fn maximum_likelihood_pilots_unequal<const N: usize>(
     let count = blocks.len();
     let per_block = value / (total * count as f64);
     let snr = ((per_block - 1.0) / N as f64).max(1e-9);
-    // The SNR of each antenna, all blocks together.
+    // SNR of each antenna over all blocks.
     let snrs = weights.map(|weight| snr * (N * count) as f64 * weight / total);
     let lost = 1.0 + 1.0 / (N as f64 * snr);
     let sigma = bound::known_signal_unequal(&snrs) * lost.sqrt();
@@ -79,7 +79,7 @@ pub fn maximum_likelihood_pilots_unequal<const N: usize>(
     } else {
         threshold_doubt(snr, bound::resolvable_snr::<N>(count) / (1.0 - alike))
     };
-    // White noise of unit variance in the living channels.
+    // Whiten to unit noise variance in the channels with a finite noise variance.
     let whitening = weights.map(f64::sqrt);
     let mut white = *covariance.unscaled();
     for (row, a) in white.iter_mut().zip(whitening) {
@@ -111,8 +111,8 @@ pub fn maximum_likelihood_pilots_unequal<const N: usize>(
     ))
 }
 
-/// Power that the weighted array receives from the worst direction beside its main lobe, over that
-/// from its own.
+/// Returns the largest power of the weighted array's pattern outside its main lobe, relative to the
+/// maximum.
 fn strongest_side_lobe<const N: usize>(weights: &[f64; N]) -> f64 {
     let total: f64 = weights.iter().sum();
     let turn = Complex64::cis(std::f64::consts::PI / DIRECTIONS as f64);
@@ -128,7 +128,7 @@ fn strongest_side_lobe<const N: usize>(weights: &[f64; N]) -> f64 {
     let mut worst: Option<f64> = None;
     for _ in 0..DIRECTIONS {
         let here = next_power();
-        // Down the main lobe first, then over everything beyond.
+        // Skip the main lobe, then take the maximum.
         if let Some(worst) = &mut worst {
             *worst = worst.max(here);
         } else if here > last {
@@ -144,8 +144,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn side_lobes_are_those_of_the_book() {
-        // Four equal elements: the first side lobe is 11.3 dB down; every second one: as strong.
+    fn side_lobes_equal_textbook_values() {
+        // Four equal elements have a first side lobe of -11.3 dB; with every second element
+        // missing, the side lobe equals the main lobe.
         let uniform = strongest_side_lobe(&[1.0; 4]);
         assert!((10.0 * uniform.log10() + 11.3).abs() < 0.2, "{uniform}");
         assert!(strongest_side_lobe(&[1.0, 0.0, 1.0, 0.0]) > ALIKE);

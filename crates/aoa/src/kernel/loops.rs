@@ -1,8 +1,8 @@
-//! The loops over samples, for any vector registers.
+//! Loops over samples for any vector registers.
 //!
-//! The samples of one antenna are taken into a pair of registers, and the products of two antennas'
-//! pairs are added to two sums: to `direct` the real parts of `x conj(y)`, to `crossed` the imaginary
-//! ones. How a processor lays that out in lanes is its own affair.
+//! The samples of one antenna are loaded into a pair of registers. The products of two antennas'
+//! pairs are added to two sums: the real parts of `x conj(y)` to `direct`, the imaginary parts to
+//! `crossed`. The layout in the lanes depends on the processor.
 
 macro_rules! kernels {
     (
@@ -21,7 +21,7 @@ macro_rules! kernels {
             use crate::kernel::portable::shortest;
             use crate::linalg::matrix::{Matrix, zeros};
 
-            /// So many samples as are taken at once.
+            /// Samples that are loaded at once.
             type Chunk = [Complex<$real>; $complexes];
             type Pair = ($vector, $vector);
 
@@ -41,28 +41,28 @@ macro_rules! kernels {
                 pairs
             }
 
-            /// `sum` and the real parts of `x conj(y)`.
+            /// Returns `sum` plus the real parts of `x conj(y)`.
             #[target_feature(enable = $features)]
             #[inline]
             fn direct(sum: $vector, x: Pair, y: Pair) -> $vector {
                 $direct(sum, x, y)
             }
 
-            /// `sum` and the imaginary parts of `x conj(y)`.
+            /// Returns `sum` plus the imaginary parts of `x conj(y)`.
             #[target_feature(enable = $features)]
             #[inline]
             fn crossed(sum: $vector, x: Pair, y: Pair) -> $vector {
                 $crossed(sum, x, y)
             }
 
-            /// The complex number that these sums are.
+            /// Reduces the lanes of the sums to a complex number.
             #[target_feature(enable = $features)]
             #[inline]
             fn total(direct: $vector, crossed: $vector) -> Complex64 {
                 $total(direct, crossed)
             }
 
-            /// The whole chunks of the channels, equally many, and how many samples those are.
+            /// Returns the complete chunks of the channels and their number of samples.
             #[target_feature(enable = $features)]
             #[inline]
             fn chunks<'a, const N: usize>(
@@ -84,7 +84,7 @@ macro_rules! kernels {
                 let (mut re, mut im) = ([[zero(); N]; N], [[zero(); N]; N]);
                 for at in 0..length / $complexes {
                     let x = load(&whole, at);
-                    // Bounds known to the compiler keep the sums in registers.
+                    // Loop bounds known at compile time keep the sums in registers.
                     for i in 0..N {
                         for j in 0..N {
                             if j <= i {

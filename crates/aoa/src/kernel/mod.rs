@@ -1,4 +1,4 @@
-//! The inner loops over samples: portable, and for the vector instructions that a processor may have.
+//! Inner loops over samples: portable and for the vector instructions of a processor.
 
 #[cfg(any(target_arch = "aarch64", target_arch = "x86_64"))]
 mod loops;

@@ -1,7 +1,7 @@
-//! Kernels for NEON, which every aarch64 has.
+//! Kernels for NEON, which is part of every aarch64 processor.
 //!
-//! A load that takes the samples apart leaves their real parts in one register and their imaginary ones
-//! in another, so that no product has to be rearranged.
+//! A de-interleaving load puts the real parts and the imaginary parts into separate registers, so
+//! that no product requires a shuffle.
 
 use super::loops::kernels;
 
@@ -9,7 +9,7 @@ kernels!(
     neon_f64, aarch64, "neon", f64, 2,
     float64x2_t, vdupq_n_f64(0.0),
     load: |chunk: &Chunk| {
-        // SAFETY: the chunk is as many pairs of a real and an imaginary part as are loaded.
+        // SAFETY: the chunk has the number of complex samples that the instruction loads.
         #[allow(unsafe_code)]
         let float64x2x2_t(re, im) = unsafe { vld2q_f64(chunk.as_ptr().cast()) };
         (re, im)
@@ -22,7 +22,7 @@ kernels!(
     neon_f32, aarch64, "neon", f32, 4,
     float32x4_t, vdupq_n_f32(0.0),
     load: |chunk: &Chunk| {
-        // SAFETY: as above.
+        // SAFETY: the chunk has the number of complex samples that the instruction loads.
         #[allow(unsafe_code)]
         let float32x4x2_t(re, im) = unsafe { vld2q_f32(chunk.as_ptr().cast()) };
         (re, im)

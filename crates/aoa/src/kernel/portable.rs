@@ -1,10 +1,10 @@
-//! Kernels for any processor.
+//! Portable kernels.
 
 use num_complex::{Complex, Complex64};
 
 use crate::linalg::matrix::{Matrix, zeros};
 
-/// Length of the shortest channel.
+/// Returns the length of the shortest channel.
 #[inline]
 pub(super) fn shortest<T, const N: usize>(channels: &[&[T]; N]) -> usize {
     let mut length = usize::MAX;
@@ -14,7 +14,7 @@ pub(super) fn shortest<T, const N: usize>(channels: &[&[T]; N]) -> usize {
     length
 }
 
-/// `sum_t x_t conj(y_t)`.
+/// Returns `sum_t x_t conj(y_t)`.
 pub(super) fn correlation<T: Copy + Into<f64>>(x: &[Complex<T>], y: &[Complex<T>]) -> Complex64 {
     let wide = |z: &Complex<T>| Complex64::new(z.re.into(), z.im.into());
     let (mut even, mut odd) = (Complex64::ZERO, Complex64::ZERO);
@@ -40,7 +40,7 @@ pub(super) fn products<T: Copy + Into<f64>, const N: usize>(
     matrix
 }
 
-/// Adds to the lower triangle what the samples from `start` on contribute.
+/// Adds the products of the samples from `start` to the lower triangle.
 pub(super) fn add_products<T: Copy + Into<f64>, const N: usize>(
     channels: &[&[Complex<T>]; N],
     start: usize,

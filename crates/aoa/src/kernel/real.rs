@@ -1,4 +1,4 @@
-//! The sample types, and for each the kernels that fit the processor.
+//! Sample types and their kernels.
 
 use num_complex::Complex;
 
@@ -10,7 +10,7 @@ use super::x86;
 use crate::linalg::matrix::Matrix;
 use crate::simd::instructions::dispatch;
 
-/// A real sample type: `f32` or `f64`.
+/// Real sample type: `f32` or `f64`.
 pub trait Real: sealed::Kernel + Into<f64> + Send + Sync + 'static {}
 impl Real for f32 {}
 impl Real for f64 {}
@@ -20,9 +20,9 @@ mod sealed {
 
     use crate::linalg::matrix::Matrix;
 
-    /// What is compiled for each type. Reachable by name for nobody else.
+    /// Kernels of a sample type; sealed.
     pub trait Kernel: Copy {
-        /// `sum_t x_t x_t^H` of channels of the same length.
+        /// Returns `sum_t x_t x_t^H` of channels of equal length.
         fn products<const N: usize>(channels: &[&[Complex<Self>]; N]) -> Matrix<N>;
     }
 }
@@ -43,14 +43,15 @@ macro_rules! kernel {
     };
 }
 kernel!(f64, neon_f64, avx2_f64, avx512_f64);
-// Twenty samples of f32 fill five registers of AVX2, and two and a half of AVX-512.
+// Twenty samples of f32 fill five AVX2 registers, but 2.5 AVX-512 registers; therefore AVX2 is
+// used.
 kernel!(f32, neon_f32, avx2_f32, avx2_f32);
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Whatever this processor has is compared with the portable code, for all remainders.
+    /// Compares the kernel of this processor with the portable code for all remainders.
     fn check<T: Real>(make: impl Fn(usize) -> Complex<T>) {
         for length in 1..23 {
             let samples: Vec<Complex<T>> = (0..4 * length).map(&make).collect();
@@ -63,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn kernels_agree() {
+    fn kernels_agree_with_the_portable_code() {
         let part = |i: usize| (i * 7 % 31) as f32 * 0.1 - 1.4;
         check::<f32>(|i| Complex::new(part(i), part(i * i + 3)));
         check::<f64>(|i| Complex::new(part(i).into(), part(i * i + 3).into()));

@@ -1,9 +1,9 @@
 //! Kernels for AVX2 with FMA, and for AVX-512.
 //!
-//! Complex samples are left as they lie in memory, real and imaginary parts in turn, and again with
-//! them exchanged. With `v` the samples of one antenna and `x` those of another, the lanes of `v x` sum
-//! to the real part of `v conj(x)`; of `v` times `x` exchanged, the odd lanes less the even ones sum
-//! to the imaginary part.
+//! Complex samples keep their memory layout (interleaved real and imaginary parts), and a second
+//! register contains them exchanged. With `v` the samples of one antenna and `x` those of another,
+//! the lanes of `v x` sum up to the real part of `v conj(x)`. For `v` times the exchanged `x`, the
+//! odd lanes minus the even lanes sum up to the imaginary part.
 
 use std::arch::x86_64::{__m128d, _mm_addsub_pd, _mm_cvtsd_f64, _mm_unpackhi_pd, _mm_unpacklo_pd};
 
@@ -11,7 +11,7 @@ use num_complex::Complex64;
 
 use super::loops::kernels;
 
-/// The real part `direct_0 + direct_1` and the imaginary part `crossed_1 - crossed_0`.
+/// Returns the real part `direct_0 + direct_1` and the imaginary part `crossed_1 - crossed_0`.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn parts_pd(direct: __m128d, crossed: __m128d) -> Complex64 {
@@ -30,7 +30,7 @@ kernels!(
     avx2_f64, x86_64, "avx2,fma", f64, 2,
     __m256d, _mm256_setzero_pd(),
     load: |chunk: &Chunk| {
-        // SAFETY: the chunk is as many numbers as are loaded.
+        // SAFETY: the chunk has the number of values that the instruction loads.
         #[allow(unsafe_code)]
         let v = unsafe { _mm256_loadu_pd(chunk.as_ptr().cast()) };
         (v, _mm256_permute_pd::<0b0101>(v))
@@ -46,7 +46,7 @@ kernels!(
     avx2_f32, x86_64, "avx2,fma", f32, 4,
     __m256, _mm256_setzero_ps(),
     load: |chunk: &Chunk| {
-        // SAFETY: as above.
+        // SAFETY: the chunk has the number of values that the instruction loads.
         #[allow(unsafe_code)]
         let v = unsafe { _mm256_loadu_ps(chunk.as_ptr().cast()) };
         (v, _mm256_permute_ps::<0b10_11_00_01>(v))
@@ -65,7 +65,7 @@ kernels!(
     avx512_f64, x86_64, "avx2,fma,avx512f", f64, 4,
     __m512d, _mm512_setzero_pd(),
     load: |chunk: &Chunk| {
-        // SAFETY: as above.
+        // SAFETY: the chunk has the number of values that the instruction loads.
         #[allow(unsafe_code)]
         let v = unsafe { _mm512_loadu_pd(chunk.as_ptr().cast()) };
         (v, _mm512_permute_pd::<0b0101_0101>(v))

@@ -1,10 +1,11 @@
-//! Small dense complex linear algebra, on the leading `n` by `n` block of a matrix of fixed capacity.
+//! Small dense complex linear algebra on the leading `n` by `n` block of a matrix of fixed
+//! capacity.
 
 use num_complex::Complex64;
 
 use super::matrix::{Matrix, zeros};
 
-/// `a b`, of the leading blocks: `rows` by `inner` times `inner` by `columns`.
+/// Returns `a b` of the leading blocks: `rows` by `inner` times `inner` by `columns`.
 pub(crate) fn product<const N: usize>(
     a: &Matrix<N>,
     b: &Matrix<N>,
@@ -21,13 +22,13 @@ pub(crate) fn product<const N: usize>(
     c
 }
 
-/// Conjugate transpose of the whole matrix.
+/// Returns the conjugate transpose of the whole matrix.
 pub(crate) fn adjoint<const N: usize>(a: &Matrix<N>) -> Matrix<N> {
     std::array::from_fn(|i| std::array::from_fn(|j| a[j][i].conj()))
 }
 
-/// Inverse by Gauss–Jordan elimination with partial pivoting; `None` if singular to working
-/// precision.
+/// Returns the inverse by Gauss–Jordan elimination with partial pivoting; `None` for a numerically
+/// singular matrix.
 pub(crate) fn inverse<const N: usize>(mut a: Matrix<N>, n: usize) -> Option<Matrix<N>> {
     let mut b = zeros::<N>();
     for (i, row) in b.iter_mut().enumerate() {

@@ -1,22 +1,24 @@
-//! Eigenvalues of the small matrices of this field. For four antennas a general library spends its
-//! time on generality; these are the textbook methods on arrays of known size.
+//! Eigenvalues of small matrices by textbook methods. For four antennas, a general library is
+//! slower.
 
 use num_complex::Complex64;
 
 use super::matrix::{Matrix, zeros};
 
-/// A cyclic Jacobi sweep converges quadratically; ten are never needed for N <= 16.
+/// Maximum number of cyclic Jacobi sweeps; the convergence is quadratic, and N <= 16 never needs
+/// ten.
 const SWEEPS: usize = 12;
 
-/// Eigenvalues in descending order, and the eigenvectors as the *rows* of `vectors`.
+/// Eigenvalues in descending order, with the eigenvectors as the *rows* of `vectors`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HermitianEigen<const N: usize> {
     pub(crate) values: [f64; N],
     pub(crate) vectors: Matrix<N>,
 }
 
-/// Eigendecomposition of the leading `n` by `n` block of a Hermitian matrix by cyclic complex Jacobi
-/// rotations (Golub and Van Loan, Matrix Computations, 8.5). Only finite input is meaningful.
+/// Computes the eigendecomposition of the leading `n` by `n` block of a Hermitian matrix by cyclic
+/// complex Jacobi rotations (Golub and Van Loan, Matrix Computations, 8.5). The input must be
+/// finite.
 pub(crate) fn hermitian_eigen<const N: usize>(mut a: Matrix<N>, n: usize) -> HermitianEigen<N> {
     let mut v = zeros::<N>();
     for (i, row) in v.iter_mut().enumerate() {
@@ -47,8 +49,8 @@ pub(crate) fn hermitian_eigen<const N: usize>(mut a: Matrix<N>, n: usize) -> Her
     }
 }
 
-/// One unitary rotation of rows and columns p and q that annihilates entry (p, q). The eigenvectors
-/// are kept as rows of `v`.
+/// Applies a unitary rotation of rows and columns p and q that annihilates entry (p, q). The
+/// eigenvectors are the rows of `v`.
 fn rotate<const N: usize>(a: &mut Matrix<N>, v: &mut Matrix<N>, p: usize, q: usize, n: usize) {
     let magnitude = a[p][q].norm_sqr().sqrt();
     let phase = a[p][q] / magnitude;
@@ -74,8 +76,8 @@ fn rotate<const N: usize>(a: &mut Matrix<N>, v: &mut Matrix<N>, p: usize, q: usi
     }
 }
 
-/// Eigenvalues of the leading `n` by `n` block of any complex matrix: shifted QR iteration by
-/// Gram–Schmidt-free Givens rotations (Golub and Van Loan, 7.5), deflating from below.
+/// Computes the eigenvalues of the leading `n` by `n` block of a general complex matrix by shifted
+/// QR iteration with Givens rotations (Golub and Van Loan, 7.5) and deflation.
 pub(crate) fn general_eigenvalues<const N: usize>(mut a: Matrix<N>, n: usize) -> [Complex64; N] {
     let mut active = n;
     for iteration in 0..40 * n {
@@ -96,7 +98,7 @@ pub(crate) fn general_eigenvalues<const N: usize>(mut a: Matrix<N>, n: usize) ->
         }
         let mut shift = corner_eigenvalue(&a, active);
         if iteration % 11 == 10 {
-            // An exceptional shift gets a rare cycle going again.
+            // An exceptional shift ends a rare cycle.
             shift += a[active - 1][active - 2].norm();
         }
         qr_step(&mut a, active, shift);
@@ -104,7 +106,8 @@ pub(crate) fn general_eigenvalues<const N: usize>(mut a: Matrix<N>, n: usize) ->
     std::array::from_fn(|i| a[i][i])
 }
 
-/// Wilkinson's shift: the eigenvalue of the last 2 by 2 block that is nearer to its last entry.
+/// Returns Wilkinson's shift: the eigenvalue of the last 2 by 2 block that is nearer to its last
+/// entry.
 fn corner_eigenvalue<const N: usize>(a: &Matrix<N>, n: usize) -> Complex64 {
     let (p, q) = (n - 2, n - 1);
     let half = (a[p][p] - a[q][q]) * 0.5;
@@ -121,7 +124,7 @@ fn corner_eigenvalue<const N: usize>(a: &Matrix<N>, n: usize) -> Complex64 {
     }
 }
 
-/// `A - s I = Q R`, then `A = R Q + s I`, on a full matrix.
+/// Computes one QR step: `A - s I = Q R`, then `A = R Q + s I`.
 fn qr_step<const N: usize>(a: &mut Matrix<N>, n: usize, shift: Complex64) {
     for (i, row) in a[..n].iter_mut().enumerate() {
         row[i] -= shift;

@@ -1,8 +1,8 @@
-//! Hermitian matrices side by side.
+//! Hermitian matrices processed together.
 //!
-//! The products of one small matrix are too few for vector registers, so `W` matrices go through every
-//! step together, and the compiler makes vectors of the innermost loops. What becomes of one matrix
-//! does not depend on its neighbours.
+//! A single small matrix has too few products for vector registers. Therefore, `W` matrices are
+//! processed together, and the compiler vectorises the innermost loops. The result of one matrix
+//! does not depend on the others.
 
 use num_complex::Complex64;
 
@@ -17,7 +17,7 @@ pub(crate) struct Vectors<const N: usize, const W: usize> {
     pub(crate) im: [[f64; W]; N],
 }
 
-/// `W` Hermitian matrices, their lower triangles.
+/// Lower triangles of `W` Hermitian matrices.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hermitians<const N: usize, const W: usize> {
     re: [[[f64; W]; N]; N],
@@ -47,7 +47,8 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
         std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
     }
 
-    /// Entry (i, j) of every matrix: real parts, imaginary parts, and the sign of the latter.
+    /// Returns entry (i, j) of every matrix: real parts, imaginary parts, and the sign of the
+    /// imaginary parts.
     #[inline(always)]
     pub(crate) fn entries(&self, i: usize, j: usize) -> (&[f64; W], &[f64; W], f64) {
         if j <= i {
@@ -57,7 +58,7 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
         }
     }
 
-    /// Row and column `n` of every matrix times `factors[n]` and its conjugate.
+    /// Multiplies row `n` of every matrix by `factors[n]` and column `n` by its conjugate.
     #[inline(always)]
     pub(crate) fn scaled(mut self, factors: &[Complex64; N]) -> Self {
         for i in 0..N {
@@ -73,7 +74,7 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
         self
     }
 
-    /// `(R + J conj(R) J) / 2`, `J` reversing the order.
+    /// Returns `(R + J conj(R) J) / 2`, where `J` reverses the order.
     #[inline(always)]
     pub(crate) fn forward_backward(&self) -> Self {
         let mut average = *self;
@@ -100,15 +101,16 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
         traces
     }
 
-    /// Entry (i, j) of matrix `w`, and (j, i) with it.
+    /// Sets entry (i, j) of matrix `w`, and entry (j, i) to its conjugate.
     #[inline(always)]
     fn put(&mut self, (i, j, w): (usize, usize, usize), re: f64, im: f64) {
         (self.re[i][j][w], self.im[i][j][w]) = (re, im);
         (self.re[j][i][w], self.im[j][i][w]) = (re, -im);
     }
 
-    /// Of matrices with both triangles filled `A^2 / tr A^2` into `square`, and the traces; where `keep[w]`
-    /// is not zero, `A` as it is. As `A = A^H`, entry (i, j) of the square is the product of rows i and j.
+    /// Computes `A^2 / tr A^2` of full matrices into `square` and returns the traces of the
+    /// squares. If `keep[w]` is not zero, `A` is copied. Because `A = A^H`, entry (i, j) of the
+    /// square is the product of rows i and j.
     #[inline(always)]
     fn square_into<const FUSED: bool>(&self, square: &mut Self, keep: &[f64; W]) -> [f64; W] {
         let (mut diagonal, mut traces) = ([[0.0; W]; N], [0.0; W]);
@@ -148,18 +150,19 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
         traces
     }
 
-    /// The eigenvectors (unit norm) of the largest eigenvalues of positive semidefinite matrices.
+    /// Computes the unit eigenvectors of the largest eigenvalues of positive semidefinite matrices.
     ///
-    /// Squaring a matrix squares the ratios of its eigenvalues; after a few squarings only the largest
-    /// is left, and a product with the last square makes up for one more. Where the two largest are
-    /// nearly equal that takes too many, and Jacobi's method takes over. A matrix that is zero has no
-    /// such vector, and gets zeros.
+    /// Each squaring of a matrix squares the ratios of its eigenvalues. After a few squarings only
+    /// the largest eigenvalue remains, and a product with the last square replaces one squaring. If
+    /// the two largest eigenvalues are almost equal, Jacobi's method is used instead. A zero matrix
+    /// gives a zero vector.
     #[inline(always)]
     pub(crate) fn principal_eigenvectors<const FUSED: bool>(&self) -> Vectors<N, W> {
         const SQUARINGS: usize = 9;
-        // A matrix of unit trace whose square has the trace 1 - x has a share of x / 2 outside its
-        // largest eigenvalue, its square one of x^2 / 4, and a column of that, multiplied by it once
-        // more, one of x^4 / 16, which is the error of the vector.
+        // If a matrix of unit trace has a square of trace 1 - x, a fraction x / 2 is outside its
+        // largest eigenvalue. The fraction is x^2 / 4 for the square. A column of the square,
+        // multiplied by the square once more, has a fraction of x^4 / 16, which is the error of the
+        // vector.
         const REMAINDER: f64 = 2e-3;
         let traces = self.traces();
         let (mut scales, mut done) = ([0.0; W], [0.0; W]);
@@ -179,7 +182,7 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
             }
         }
         for _ in 0..SQUARINGS {
-            // Whoever is done stays as it is, however long the others take.
+            // Converged matrices are not changed while the others are iterated.
             let traces = power.square_into::<FUSED>(square, &done);
             std::mem::swap(&mut power, &mut square);
             for w in 0..W {
@@ -202,7 +205,7 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
         vectors
     }
 
-    /// Of matrices with both triangles filled, the columns with the largest entries on the diagonal.
+    /// Returns the columns of full matrices with the largest diagonal entries.
     #[inline(always)]
     fn heaviest_columns(&self) -> Vectors<N, W> {
         let mut columns = Vectors {
@@ -225,7 +228,7 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
         columns
     }
 
-    /// `A v`.
+    /// Returns `A v`.
     #[inline(always)]
     pub(crate) fn times<const FUSED: bool>(&self, vectors: &Vectors<N, W>) -> Vectors<N, W> {
         let mut products = Vectors {
@@ -250,7 +253,7 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
 }
 
 impl<const N: usize, const W: usize> Vectors<N, W> {
-    /// Steering vectors, of the electrical angles whose cosines and sines these are.
+    /// Returns the steering vectors of the electrical angles with the given cosines and sines.
     #[inline(always)]
     pub(crate) fn steering<const FUSED: bool>(cos: &[f64; W], sin: &[f64; W]) -> Self {
         let mut steering = Self {
@@ -267,7 +270,7 @@ impl<const N: usize, const W: usize> Vectors<N, W> {
         steering
     }
 
-    /// To unit norm; zero stays zero.
+    /// Normalises to unit norm; a zero vector remains zero.
     #[inline(always)]
     fn normalise<const FUSED: bool>(&mut self) {
         let mut powers = [0.0; W];
@@ -290,7 +293,7 @@ impl<const N: usize, const W: usize> Vectors<N, W> {
     }
 }
 
-/// The eigenvector (unit norm) of the largest eigenvalue of a positive semidefinite matrix.
+/// Returns the unit eigenvector of the largest eigenvalue of a positive semidefinite matrix.
 pub(crate) fn principal_eigenvector<const N: usize>(matrix: &Matrix<N>) -> [Complex64; N] {
     let mut single = Hermitians::<N, 1>::ZERO;
     single.set(0, matrix);

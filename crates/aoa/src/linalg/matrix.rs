@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-/// A Hermitian matrix, row-major.
+/// Hermitian matrix, row-major.
 pub type Matrix<const N: usize> = [[Complex64; N]; N];
 
 pub(crate) const fn zeros<const N: usize>() -> Matrix<N> {

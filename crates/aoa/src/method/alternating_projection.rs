@@ -1,13 +1,15 @@
-//! Several sources by maximum likelihood, their waveforms unknown: the minimum over the electrical
-//! angles of `V = tr(P R)`, `P` projecting on the complement of the steering vectors.
+//! Maximum likelihood estimate of several sources with unknown waveforms: the minimum over the
+//! electrical angles of `V = tr(P R)`, where `P` projects onto the complement of the steering
+//! vectors.
 //!
-//! Alternating projection (Ziskind and Wax 1988) brings the angles near it: one after the other is put
-//! where most of the power is that the others leave. Scoring steps end the search (Viberg, Ottersten
-//! and Kailath 1991): with `A+` the pseudo-inverse and `D` the derivatives, slope and curvature are
+//! Alternating projection (Ziskind and Wax 1988) gives initial angles: in turn, each angle is moved
+//! to the maximum of the power that the other sources leave. Scoring steps complete the search
+//! (Viberg, Ottersten and Kailath 1991). With the pseudo-inverse `A+` and the derivatives `D`,
+//! slope and curvature are
 //!
 //! `V' = -2 Re diag(A+ R P D)`, `V'' = 2 Re[(D^H P D) * (A+ R A+^H)^T]`.
 //!
-//! Coherent sources need no averaging.
+//! Coherent sources require no averaging.
 
 use num_complex::Complex64;
 
@@ -19,43 +21,47 @@ use crate::list::List;
 use crate::result::goodness_of_fit::Residual;
 use crate::spectrum::polynomial::wrap;
 
-/// Directions on the circle that a projected beam is looked at in, for each antenna.
+/// Number of search directions on the circle per antenna.
 const DIRECTIONS: usize = 8;
-/// Rounds of alternating projection, and scoring steps: each leaves an error of the order of the noise.
+/// Maximum number of rounds of alternating projection; each reduces the error to the order of the
+/// noise.
 const ROUNDS: usize = 20;
+/// Maximum number of scoring steps.
 const STEPS: usize = 40;
-/// Nearer than this, rad, alternating projection hands over.
+/// Change in rad below which scoring steps replace alternating projection.
 const NEAR_RAD: f64 = 1e-2;
-/// Relative rise of `V` that is rounding.
+/// Relative increase of `V` that is attributed to rounding.
 const ROUNDING: f64 = 1e-12;
-/// A step of this size ends the search.
+/// Step size in rad that ends the search.
 const SETTLED_RAD: f64 = 1e-10;
 
-/// The likelihood around the directions of sources, each of one parameter or of equally many.
+/// Likelihood near the directions of sources, each with an equal number of parameters.
 pub(crate) struct Fit<const N: usize> {
     sources: usize,
-    /// Of all sources together, those of each side by side.
+    /// Number of parameters of all sources; the parameters of one source are adjacent.
     parameters: usize,
-    /// `A+`, sources by antennas.
+    /// Pseudo-inverse `A+`, sources by antennas.
     pseudo_inverse: Matrix<N>,
     /// `P D`, antennas by parameters.
     projected: Matrix<N>,
     /// `D^H P D`, parameters by parameters.
     metric: Matrix<N>,
-    /// `A+ R A+^H` and `(A^H A)^-1`, sources by sources.
+    /// `A+ R A+^H`, sources by sources.
     powers: Matrix<N>,
+    /// `(A^H A)^-1`, sources by sources.
     gram_inverse: Matrix<N>,
     /// `V'`.
     slope: [f64; N],
-    /// `R`, and `A+ R`, sources by antennas.
+    /// Covariance `R`.
     matrix: Matrix<N>,
+    /// `A+ R`, sources by antennas.
     received: Matrix<N>,
-    /// `V`: what the sources leave.
+    /// Residual power `V`.
     residual: f64,
 }
 
 impl<const N: usize> Fit<N> {
-    /// Around electrical angles. `None` if the steering vectors do not tell the sources apart.
+    /// Creates the fit at electrical angles; `None` if the steering vectors are linearly dependent.
     pub(crate) fn at(matrix: &Matrix<N>, phases: &[f64]) -> Option<Self> {
         let steering = steering_matrix::<N>(phases);
         let mut derivative = steering;
@@ -67,7 +73,8 @@ impl<const N: usize> Fit<N> {
         Self::around(matrix, (&steering, &derivative), [phases.len(); 2])
     }
 
-    /// Around the responses `A` of sources and `D`, their derivatives by all parameters, both as columns.
+    /// Creates the fit from the responses `A` of the sources and their derivatives `D` with respect
+    /// to all parameters, both as columns.
     pub(crate) fn around(
         matrix: &Matrix<N>,
         (steering, derivative): (&Matrix<N>, &Matrix<N>),
@@ -108,12 +115,12 @@ impl<const N: usize> Fit<N> {
         })
     }
 
-    /// What the sources leave, and the noise power per antenna that this makes, both of the matrix that
-    /// was fitted. `None` if what is received from the sources is singular.
+    /// Returns the residual and the resulting noise variance per antenna, in the scale of the
+    /// fitted matrix. Returns `None` if the source covariance is singular.
     ///
-    /// With `H = P R A+^H`, regressed on the waveforms `S = A+ R A+^H`, the part that hangs together with
-    /// them is `tr(H S^-1 H^H)`. Of it the angles take what a step of theirs would,
-    /// `V'^T V''^-1 V' / 2` without the noise in `V''`.
+    /// With `H = P R A+^H`, regressed on the waveforms `S = A+ R A+^H`, the part that is correlated
+    /// with the waveforms is `tr(H S^-1 H^H)`. The choice of the angles removes `V'^T V''^-1 V' /
+    /// 2` of this part, without the noise in `V''`.
     pub(crate) fn residual(&self) -> Option<(Residual, f64)> {
         let k = self.sources;
         let inverse_powers = inverse(self.powers, k)?;
@@ -146,24 +153,25 @@ impl<const N: usize> Fit<N> {
         Some((residual, self.noise_variance()))
     }
 
-    /// Variance of the noise per antenna.
+    /// Returns the noise variance per antenna.
     pub(crate) fn noise_variance(&self) -> f64 {
         self.residual / (N - self.sources) as f64
     }
 
-    /// The source that a parameter is of.
+    /// Returns the source to which a parameter belongs.
     const fn owner(&self, parameter: usize) -> usize {
         parameter * self.sources / self.parameters
     }
 
-    /// SNR of a source.
+    /// Returns the SNR of a source.
     pub(crate) fn snr(&self, source: usize) -> f64 {
         let noise = self.noise_variance();
         let power = self.powers[source][source].re - self.gram_inverse[source][source].re * noise;
         (power / noise).max(1e-9)
     }
 
-    /// Inverse of the curvature for sources whose covariance is `A+ R A+^H` less the noise's part.
+    /// Returns the inverse of the curvature for sources with the covariance `A+ R A+^H` minus the
+    /// noise's contribution.
     fn inverse_curvature(&self, noise_variance: f64) -> Option<Matrix<N>> {
         let mut curvature = zeros::<N>();
         for i in 0..self.parameters {
@@ -176,8 +184,9 @@ impl<const N: usize> Fit<N> {
         inverse(curvature, self.parameters)
     }
 
-    /// Visits for each parameter the Hermitian `H` by which it moves with the covariance,
-    /// `d omega = tr(H dR)`: to first order `-V''^-1 dV'`. `None` if the curvature is singular.
+    /// Calls `visit` for each parameter with the Hermitian `H` of its first-order dependence on the
+    /// covariance, `d omega = tr(H dR)`: `-V''^-1 dV'`. Returns `None` if the curvature is
+    /// singular.
     pub(crate) fn sensitivities(&self, mut visit: impl FnMut(&Matrix<N>)) -> Option<()> {
         let inverse_curvature = self.inverse_curvature(self.noise_variance())?;
         for k in 0..self.parameters {
@@ -200,7 +209,8 @@ impl<const N: usize> Fit<N> {
     }
 }
 
-/// Electrical angles of `sources` sources; `None` for none or as many as antennas.
+/// Returns the electrical angles of `sources` sources; `None` for zero sources or at least as many
+/// as antennas.
 pub(crate) fn phases<const N: usize>(matrix: &Matrix<N>, sources: usize) -> Option<List<f64, N>> {
     if !(1..N).contains(&sources) {
         return None;
@@ -226,13 +236,13 @@ pub(crate) fn phases<const N: usize>(matrix: &Matrix<N>, sources: usize) -> Opti
     Some(List::collect(0.0, phases[..sources].iter().copied()))
 }
 
-/// Scoring steps, halved as long as they lead up.
+/// Applies scoring steps, halved until `V` decreases.
 fn settle<const N: usize>(matrix: &Matrix<N>, phases: &mut [f64]) {
     let Some(mut here) = Fit::<N>::at(matrix, phases) else {
         return;
     };
     for _ in 0..STEPS {
-        // With the noise in it the curvature is positive whatever the angles.
+        // Without subtraction of the noise, the curvature is positive definite for all angles.
         let Some(inverse_curvature) = here.inverse_curvature(0.0) else {
             return;
         };
@@ -267,7 +277,7 @@ fn settle<const N: usize>(matrix: &Matrix<N>, phases: &mut [f64]) {
     }
 }
 
-/// A beam that does not hear some directions: orthonormal vectors that span their steering vectors.
+/// Beam with nulls in several directions: orthonormal basis of their steering vectors.
 struct Beam<const N: usize>(List<[Complex64; N], N>);
 
 impl<const N: usize> Beam<N> {
@@ -282,7 +292,7 @@ impl<const N: usize> Beam<N> {
         beam
     }
 
-    /// What of a steering vector is left beside those directions, and its power.
+    /// Returns the part of a steering vector orthogonal to the nulls, and its power.
     fn left_of(&self, phase: f64) -> ([Complex64; N], f64) {
         let mut left = steering_vector::<N>(phase);
         for vector in self.0.iter() {
@@ -295,7 +305,7 @@ impl<const N: usize> Beam<N> {
         (left, power)
     }
 
-    /// Power from a direction; none from one that is as good as not heard.
+    /// Returns the power from a direction; 0 near a null.
     fn power(&self, matrix: &Matrix<N>, phase: f64) -> f64 {
         let (left, power) = self.left_of(phase);
         if power < 1e-6 * N as f64 {
@@ -309,8 +319,8 @@ impl<const N: usize> Beam<N> {
         sum / power
     }
 
-    /// The direction of the most power: the best of a grid, then between its neighbours by golden
-    /// sections.
+    /// Returns the direction of maximum power: the best point of a grid, refined by golden section
+    /// search.
     fn strongest(&self, matrix: &Matrix<N>) -> f64 {
         let spacing = std::f64::consts::TAU / (DIRECTIONS * N) as f64;
         let power = |phase: f64| self.power(matrix, phase);

@@ -10,15 +10,15 @@ use crate::list::List;
 use crate::simd::math::times_plus;
 use crate::spectrum::side_by_side::Places;
 
-/// Standard deviation over the Cramér–Rao bound, one source and high SNR:
-/// `sqrt(N (N + 1) / (6 (N - 1)))` (Rao and Hari 1989). Dropping an antenna at each end costs little.
+/// Returns the ratio of standard deviation to Cramér–Rao bound for one source and high SNR: `sqrt(N
+/// (N + 1) / (6 (N - 1)))` (Rao and Hari 1989). The loss of one antenna in each subarray is small.
 pub(crate) fn excess<const N: usize>() -> f64 {
     let n = N as f64;
     (n * (n + 1.0) / (6.0 * (n - 1.0))).sqrt()
 }
 
-/// One source in each of many: both kinds of least squares give the phase of
-/// `sum conj(u_n) u_(n+1)`.
+/// Estimates one source in each of many items: both kinds of least squares give the phase of `sum
+/// conj(u_n) u_(n+1)`.
 #[inline(always)]
 pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
     principal: &Vectors<N, W>,
@@ -35,8 +35,8 @@ pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
     Places::of_directions::<FUSED>(&re, &im)
 }
 
-/// Least squares: `Psi = (U1^H U1)^-1 U1^H U2`; its eigenvalues are `exp(j omega)`. `None` if
-/// singular.
+/// Least squares: the eigenvalues of `Psi = (U1^H U1)^-1 U1^H U2` are `exp(j omega)`. Returns
+/// `None` for a singular matrix.
 pub(crate) fn least_squares<const N: usize>(
     eigen: &HermitianEigen<N>,
     sources: usize,
@@ -54,13 +54,14 @@ pub(crate) fn least_squares<const N: usize>(
     Some(phases_of(rotation, sources))
 }
 
-/// Total least squares: both subspaces may be wrong. With `E` the eigenvectors of
-/// `[U1 U2]^H [U1 U2]`, smallest eigenvalues last, `Psi = -E12 E22^-1`. `None` if singular.
+/// Total least squares, with errors in both subspaces. With the eigenvectors `E` of `[U1 U2]^H [U1
+/// U2]` in order of descending eigenvalues, `Psi = -E12 E22^-1`. Returns `None` for a singular
+/// matrix.
 pub(crate) fn total_least_squares<const N: usize>(
     eigen: &HermitianEigen<N>,
     sources: usize,
 ) -> Option<List<f64, N>> {
-    // Room for the bases of both subarrays side by side.
+    // The capacity must hold the bases of both subarrays.
     match 2 * sources {
         0..=8 => total::<N, 8>(eigen, sources),
         9..=16 => total::<N, 16>(eigen, sources),

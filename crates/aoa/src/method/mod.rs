@@ -1,4 +1,4 @@
-//! The methods, each from a covariance or its eigenvectors to electrical angles.
+//! Estimation methods: from a covariance or its eigenvectors to electrical angles.
 
 pub(crate) mod alternating_projection;
 pub(crate) mod esprit;

@@ -1,4 +1,4 @@
-//! MUSIC (Schmidt 1986): the directions whose steering vectors are nearest to the signal subspace.
+//! MUSIC (Schmidt 1986): directions whose steering vectors are nearest to the signal subspace.
 
 use crate::linalg::eigen::HermitianEigen;
 use crate::linalg::hermitians::Vectors;
@@ -6,8 +6,8 @@ use crate::list::List;
 use crate::spectrum::polynomial::Spectrum;
 use crate::spectrum::side_by_side::{Places, Spectra};
 
-/// The signal subspace's spectrum `a^H E_s E_s^H a`. It is N minus the null spectrum, so its largest
-/// local maxima are MUSIC's peaks.
+/// Returns the signal spectrum `a^H E_s E_s^H a`. It equals N minus the null spectrum, so that its
+/// largest local maxima are MUSIC's peaks.
 pub(crate) fn signal_spectrum<const N: usize>(
     eigen: &HermitianEigen<N>,
     sources: usize,
@@ -15,7 +15,7 @@ pub(crate) fn signal_spectrum<const N: usize>(
     Spectrum::of_subspace(&eigen.vectors[..sources])
 }
 
-/// The null spectrum `a^H E_n E_n^H a`, from the noise subspace itself: near its zeros, N minus the
+/// Returns the null spectrum `a^H E_n E_n^H a` from the noise subspace. Near its zeros, N minus the
 /// signal spectrum would lose digits.
 pub(crate) fn null_spectrum<const N: usize>(
     eigen: &HermitianEigen<N>,
@@ -24,7 +24,7 @@ pub(crate) fn null_spectrum<const N: usize>(
     Spectrum::of_subspace(&eigen.vectors[sources..])
 }
 
-/// One source in each of many: the highest peak.
+/// Estimates one source in each of many items: the highest peak.
 #[inline(always)]
 pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
     principal: &Vectors<N, W>,
@@ -32,7 +32,8 @@ pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
     Spectra::of_vectors::<FUSED>(principal).maxima::<FUSED>()
 }
 
-/// The electrical angles of the `sources` highest peaks; fewer if the spectrum has fewer.
+/// Returns the electrical angles of the `sources` highest peaks; fewer if the spectrum has fewer
+/// peaks.
 pub(crate) fn phases<const N: usize>(spectrum: &Spectrum<N>, sources: usize) -> List<f64, N> {
     let mut peaks = spectrum.peaks();
     peaks.sort_unstable_by(|a, b| b.1.total_cmp(&a.1));

@@ -1,5 +1,4 @@
-//! Root-MUSIC (Barabell 1983; Rao and Hari 1989): the roots of the null spectrum instead of its
-//! minima.
+//! Root-MUSIC (Barabell 1983; Rao and Hari 1989): roots of the null spectrum instead of its minima.
 
 use std::f64::consts::TAU;
 
@@ -14,10 +13,10 @@ use crate::spectrum::side_by_side::{Places, Spectra};
 
 const ITERATIONS: usize = 60;
 
-/// Electrical angles of the `sources` roots nearest to the unit circle. `null` is the spectrum of the
-/// noise subspace.
+/// Returns the electrical angles of the `sources` roots nearest to the unit circle. `null` is the
+/// spectrum of the noise subspace.
 pub(crate) fn phases<const N: usize>(null: &Spectrum<N>, sources: usize) -> List<f64, N> {
-    // A start without symmetry, so that no two roots can stay together.
+    // The asymmetric initial values prevent two roots from converging together.
     let mut start = [Complex64::ZERO; N];
     for (i, root) in start[..N - 1].iter_mut().enumerate() {
         *root = Complex64::from_polar(0.7, 0.4 + TAU * i as f64 / (N - 1) as f64);
@@ -30,16 +29,16 @@ pub(crate) fn phases<const N: usize>(null: &Spectrum<N>, sources: usize) -> List
     )
 }
 
-/// One source in each of many: the root at the highest peak of the spectrum, which is the one
-/// nearest to the unit circle unless noise rules. Newton's method from above the peak, with the
-/// root's mirror image divided out.
+/// Estimates one source in each of many items: the root at the highest peak of the spectrum. At a
+/// sufficient SNR, this root is the nearest to the unit circle. Newton's method starts above the
+/// peak, with the root's mirror image divided out.
 #[inline(always)]
 pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
     principal: &Vectors<N, W>,
 ) -> Places<W> {
     const STEPS: usize = 8;
-    /// Depth of the null, over N, from which on the root cannot be told from its mirror image. The
-    /// peak between the two is the better known then, and nearer than any noise displaces it.
+    /// Relative depth of the null (divided by N) below which the root and its mirror image coincide
+    /// numerically. The peak between them is then better determined.
     const DOUBLE: f64 = 1e-10;
     let signal = Spectra::of_vectors::<FUSED>(principal);
     let peaks = signal.maxima::<FUSED>();
@@ -49,7 +48,7 @@ pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
     for w in 0..W {
         let depth = N as f64 - heights[w];
         free[w] = if depth > DOUBLE * N as f64 { 1.0 } else { 0.0 };
-        // Without other roots the null is a parabola with the curvature of an exact source.
+        // Without other roots, the null is a parabola with the curvature of an exact source.
         let inward = (depth.abs() / aperture::<N>()).sqrt();
         let radius = 1.0 - free[w] * if inward < 0.5 { inward } else { 0.5 };
         re[w] *= radius;
@@ -58,7 +57,8 @@ pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
     for _ in 0..STEPS {
         for w in 0..W {
             let (x, y) = (re[w], im[w]);
-            // P(z) and P'(z) by Horner's scheme, the coefficients of N - f from the highest down.
+            // P(z) and P'(z) by Horner's scheme, with the coefficients of N - f in descending
+            // order.
             let (mut p_re, mut p_im, mut slope_re, mut slope_im) = (0.0, 0.0, 0.0, 0.0);
             for place in 0..2 * N - 1 {
                 let k = place.abs_diff(N - 1);
@@ -72,7 +72,7 @@ pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
                 p_im = times_plus::<FUSED>(p_re, y, times_plus::<FUSED>(p_im, x, c_im));
                 p_re = next;
             }
-            // step = P / (P' - P / (z - 1 / conj(z)))
+            // Compute step = P / (P' - P / (z - 1 / conj(z))).
             let squared = times_plus::<FUSED>(x, x, y * y);
             let inverse = 1.0 / (squared - 1.0);
             let (a, b) = (x * inverse, -y * inverse);
@@ -98,8 +98,9 @@ pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
     Places::of_directions::<FUSED>(&re, &im)
 }
 
-/// The phase of a root. A root on the circle is double, and rounding moves it along the circle by
-/// the square root of eps; but there the spectrum has a zero, and its minimum is well determined.
+/// Returns the phase of a root. A root on the unit circle is double, and rounding moves it along
+/// the circle by the square root of eps. The spectrum has a zero there, whose minimum is well
+/// determined.
 fn settled<const N: usize>(null: &Spectrum<N>, root: Complex64) -> f64 {
     let phase = root.arg();
     if root.norm_sqr() > 1.0 - 1e-4 {
@@ -111,12 +112,10 @@ fn settled<const N: usize>(null: &Spectrum<N>, root: Complex64) -> f64 {
     phase
 }
 
-/// The N - 1 roots inside (or on) the unit circle of
-/// `P(z) = z^(N-1) sum_k (c_k z^-k + conj(c_k) z^k)`; the others are their mirror images
-/// `1 / conj(z)`.
+/// Returns the N - 1 roots inside or on the unit circle of `P(z) = z^(N-1) sum_k (c_k z^-k +
+/// conj(c_k) z^k)`. The other roots are their mirror images `1 / conj(z)`.
 ///
-/// Ehrlich–Aberth iteration on the inner roots alone, the mirror images taking part in the
-/// repulsion.
+/// Ehrlich–Aberth iteration of the inner roots; the mirror images contribute to the repulsion.
 fn inner_roots<const N: usize>(null: &Spectrum<N>, mut roots: [Complex64; N]) -> [Complex64; N] {
     let degree = N - 1;
     for _ in 0..ITERATIONS {
@@ -137,7 +136,7 @@ fn inner_roots<const N: usize>(null: &Spectrum<N>, mut roots: [Complex64; N]) ->
                     repulsion += other.conj() / mirror;
                 }
             }
-            // Newton's step is value / slope; written so that a zero slope does no harm.
+            // Newton's step is value / slope; this form is finite for a zero slope.
             let step = value / (slope - value * repulsion);
             if step.is_finite() {
                 let mut next = z - step;
@@ -148,7 +147,7 @@ fn inner_roots<const N: usize>(null: &Spectrum<N>, mut roots: [Complex64; N]) ->
                 moved = moved.max(step.norm_sqr());
             }
         }
-        // The error of a simple root cubes at each step.
+        // The iteration converges cubically for simple roots.
         if moved < 1e-12 {
             break;
         }
@@ -156,7 +155,7 @@ fn inner_roots<const N: usize>(null: &Spectrum<N>, mut roots: [Complex64; N]) ->
     roots
 }
 
-/// P(z) and P'(z) by Horner's scheme, coefficients from the highest power down:
+/// Returns P(z) and P'(z) by Horner's scheme, with the coefficients in descending order of power:
 /// `conj(c_(N-1)), ..., conj(c_1), c_0, c_1, ..., c_(N-1)`.
 fn evaluate<const N: usize>(null: &Spectrum<N>, z: Complex64) -> (Complex64, Complex64) {
     let (mut value, mut slope) = (Complex64::ZERO, Complex64::ZERO);

@@ -1,4 +1,4 @@
-//! What an estimate says.
+//! Estimate of an angle.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -6,27 +6,27 @@ use super::goodness_of_fit::GoodnessOfFit;
 use super::verdict::{Reason, Verdict};
 use crate::list::List;
 
-/// A direction, and how well it is known.
+/// Estimated direction with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngleEstimate {
-    /// Electrical angle `omega`, in (-pi, pi]: what was measured. Its noise is Gaussian and does not
-    /// depend on the direction, so filters should take this one.
+    /// Electrical angle `omega` in (-pi, pi], the measured quantity. Its noise is Gaussian and does
+    /// not depend on the direction, so that filters should use this value.
     pub phase_rad: f64,
-    /// Standard deviation of `phase_rad`: that of noise and, where the model does not fit
-    /// ([`GoodnessOfFit::misfit`]), what the misfit displaces.
+    /// Standard deviation of `phase_rad` due to noise and, if the model does not fit
+    /// ([`GoodnessOfFit::misfit`]), due to the misfit.
     pub phase_sigma_rad: f64,
-    /// That of noise alone, of the method at the estimated SNR.
+    /// Standard deviation of `phase_rad` due to noise only, for the method at the estimated SNR.
     pub phase_noise_sigma_rad: f64,
-    /// Angle from the array's axis, 0 to pi.
+    /// Angle from the array's axis in rad, 0 to pi.
     pub angle_rad: f64,
-    /// Standard deviation of `angle_rad`; near end-fire, where the linear law diverges, the angle
-    /// that one standard deviation of `phase_rad` makes there.
+    /// Standard deviation of `angle_rad` in rad. Near end-fire, where the linear approximation
+    /// diverges, it is the angle that corresponds to one standard deviation of `phase_rad`.
     pub sigma_rad: f64,
-    /// Estimated SNR per antenna and snapshot. Whatever the sources leave counts as noise.
+    /// Estimated SNR per antenna and snapshot. The whole residual counts as noise.
     pub snr_db: f64,
-    /// How well plane waves and white noise explain what was received; of all sources together.
+    /// Goodness of fit of plane waves and white noise, for all sources together.
     pub fit: GoodnessOfFit,
-    /// Whether noise and geometry leave a doubt of it.
+    /// Whether the estimate is resolved with respect to noise and geometry.
     pub verdict: Verdict,
 }
 
@@ -36,16 +36,18 @@ impl AngleEstimate {
         self.verdict == Verdict::Resolved
     }
 
-    /// Why the estimate should not be relied on: it is not resolved, or the model does not fit.
+    /// Returns the reason why the estimate is unreliable: it is not resolved, or the model does not
+    /// fit. Returns `None` for a reliable estimate.
     pub fn doubt(&self) -> Option<Reason> {
         self.verdict.reason().or_else(|| self.fit.misfit())
     }
 
-    /// The estimate of samples of which only the phases were received, all of one modulus.
+    /// Converts the estimate of samples of constant modulus, of which only the phases were
+    /// received.
     ///
-    /// Half of the noise, the part along the samples, is missing in the residual: the variance of an angle is twice
-    /// of what the residual shows, the SNR is half of it, and the residual is no white noise, so that the fit is not
-    /// tested.
+    /// The noise component along the samples (half of the noise) is missing in the residual.
+    /// Therefore, the variance of the angle is doubled and the SNR is halved. The fit is not tested
+    /// because the residual is not white.
     #[must_use]
     pub fn of_phases(self) -> Self {
         Self {
@@ -59,13 +61,13 @@ impl AngleEstimate {
         }
     }
 
-    /// Whether the estimate may be relied on: it is resolved, and the model fits.
+    /// Whether the estimate is reliable: it is resolved, and the model fits.
     pub fn is_reliable(&self) -> bool {
         self.doubt().is_none()
     }
 }
 
-/// The estimate of who knows nothing: any direction, not resolved.
+/// Estimate without information: any direction, unresolved.
 impl Default for AngleEstimate {
     fn default() -> Self {
         Self {
@@ -81,5 +83,5 @@ impl Default for AngleEstimate {
     }
 }
 
-/// Angle estimates of several sources, by ascending angle.
+/// Angle estimates of several sources in order of ascending angle.
 pub type AngleEstimates<const N: usize> = List<AngleEstimate, N>;

@@ -1,4 +1,4 @@
-//! From an electrical angle to the direction, and what geometry leaves in doubt there.
+//! Conversion of an electrical angle to a direction, with its ambiguities.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -8,18 +8,18 @@ use super::verdict::{Reason, Verdict};
 use crate::array::linear::Array;
 use crate::simd::math::{acos, log10};
 
-/// What is known of an electrical angle before it becomes a direction.
+/// Estimated electrical angle before the conversion to a direction.
 pub(crate) struct Found {
     pub(crate) phase_rad: f64,
     pub(crate) noise_sigma_rad: f64,
     pub(crate) snr: f64,
     pub(crate) tests: Tests,
     pub(crate) tested: Tested,
-    /// What gives reason to doubt it, geometry and misfit aside.
+    /// Reason for an unreliable estimate, except geometry and misfit.
     pub(crate) doubt: Option<Reason>,
 }
 
-/// An estimate from its electrical angle, with the angle, its standard deviation, and the verdict.
+/// Converts an electrical angle to an estimate with angle, standard deviation and verdict.
 pub(crate) fn describe<const N: usize>(found: &Found, array: &Array<N>) -> AngleEstimate {
     let end_fire = array.phase_at_end_fire_rad();
     let Found {
@@ -44,8 +44,8 @@ pub(crate) fn describe<const N: usize>(found: &Found, array: &Array<N>) -> Angle
     }
 }
 
-/// Whether noise and geometry leave a doubt. Something wrong with the model explains why the SNR seems low,
-/// so it is named in the place of that.
+/// Returns the verdict with respect to noise and geometry. A misfit of the model can cause a low
+/// SNR, so that the misfit is reported instead of the low SNR.
 #[inline(always)]
 pub(crate) fn verdict(
     doubt: Option<Reason>,
@@ -60,7 +60,7 @@ pub(crate) fn verdict(
     reason.map_or(Verdict::Resolved, Verdict::Unresolved)
 }
 
-/// Whether noise may have led to a wholly wrong direction, where this SNR is needed to exclude that.
+/// Returns the reason if the SNR is below `needed`, the minimum that excludes an outlier.
 #[inline(always)]
 pub(crate) fn threshold_doubt(snr: f64, needed: f64) -> Option<Reason> {
     (snr < needed).then_some(if snr < 1.0 {
@@ -70,7 +70,7 @@ pub(crate) fn threshold_doubt(snr: f64, needed: f64) -> Option<Reason> {
     })
 }
 
-/// A standard deviation, or that of a phase drawn at random, `pi / sqrt(3)`, where it is larger.
+/// Limits a standard deviation to that of a uniformly distributed phase, `pi / sqrt(3)`.
 #[inline(always)]
 pub(crate) fn no_more_than_ignorance(phase_sigma_rad: f64) -> f64 {
     const IGNORANCE: f64 = 1.813_799_364_234_217_8;
@@ -81,8 +81,8 @@ pub(crate) fn no_more_than_ignorance(phase_sigma_rad: f64) -> f64 {
     }
 }
 
-/// From an electrical angle and its standard deviation: that standard deviation limited to what it
-/// means to know nothing, the angle, and its standard deviation.
+/// Converts an electrical angle and its standard deviation to the limited standard deviation, the
+/// angle, and the standard deviation of the angle.
 #[inline(always)]
 pub(crate) fn direction<const FUSED: bool>(
     phase_rad: f64,
@@ -96,7 +96,8 @@ pub(crate) fn direction<const FUSED: bool>(
     let cosine = if cosine < -1.0 { -1.0 } else { cosine };
     let sine = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
     let spread = phase_sigma_rad / end_fire_rad;
-    // acos(1 - x) is sqrt(2 x) near the axis: there the deviation is of that size, not infinite.
+    // acos(1 - x) is sqrt(2 x) near the axis, so that the standard deviation is of this size
+    // instead of infinite.
     let sigma_rad = lesser(spread / sine, (2.0 * spread).sqrt());
     (
         phase_sigma_rad,
@@ -105,14 +106,14 @@ pub(crate) fn direction<const FUSED: bool>(
     )
 }
 
-/// What the direction itself gives reason to doubt.
+/// Returns the reason if the direction is ambiguous or near end-fire.
 pub(crate) fn geometric_doubt(
     phase_rad: f64,
     phase_sigma_rad: f64,
     end_fire_rad: f64,
 ) -> Option<Reason> {
     let reach = phase_rad.abs() + 3.0 * phase_sigma_rad;
-    // Another direction has the phase beyond the turn: nearest -(2 pi - |phase|).
+    // A second direction has the phase beyond ±2 pi: the nearest one is -(2 pi - |phase|).
     if phase_rad.abs() + end_fire_rad >= 2.0 * PI * (1.0 + 1e-9) {
         Some(Reason::Ambiguous)
     } else if reach > end_fire_rad {

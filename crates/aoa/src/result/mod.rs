@@ -1,4 +1,4 @@
-//! What an estimate says about the direction, and about itself.
+//! Results: directions, uncertainty and reliability.
 
 pub(crate) mod angle;
 pub(crate) mod azimuth_elevation;

@@ -1,48 +1,49 @@
-//! Whether noise and geometry leave a doubt of an estimate.
+//! Verdict on an estimate with respect to noise and geometry.
 
 use std::fmt;
 
-/// Whether an estimate may be used as a Gaussian measurement with its standard deviation, if plane waves in
-/// white noise are what was received: that is told beside it, by the
-/// [`GoodnessOfFit`](crate::GoodnessOfFit).
+/// Whether an estimate is a Gaussian measurement with its standard deviation, provided that the
+/// samples are plane waves in white noise. [`GoodnessOfFit`](crate::GoodnessOfFit) tests this
+/// assumption.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// It may.
+    /// The estimate is resolved.
     Resolved,
-    /// It may not, for this reason.
+    /// The estimate is not resolved, with the reason.
     Unresolved(Reason),
 }
 
-/// Why an estimate should not be relied on.
+/// Reason for an unreliable estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Reason {
-    /// The SNR is too low, below 0 dB, to exclude a wholly wrong direction with so many snapshots.
+    /// The SNR is below 0 dB and too low to exclude an outlier with this number of snapshots.
     ThresholdSnr,
-    /// Too few snapshots to exclude a wholly wrong direction at this SNR, which is above 0 dB.
+    /// The number of snapshots is too small to exclude an outlier at this SNR, which is above 0 dB.
     TooFewSnapshots,
-    /// What arrives with the source's waveform is no plane wave: there are reflections, or the antennas
-    /// are not as described. The standard deviation holds what that displaces, see
+    /// The signal with the source's waveform is not a plane wave because of reflections or
+    /// deviations of the antennas. The standard deviation includes the effect, see
     /// [`GoodnessOfFit`](crate::GoodnessOfFit).
     Multipath,
-    /// What the sources leave is no white noise: there are more of them, or the channels' noise is
-    /// unequal, or larger than stated.
+    /// The residual is not white noise: there are more sources, the noise of the channels is
+    /// unequal, or it is larger than specified.
     MoreSources,
-    /// So near to the array's axis that the other end, or no direction, fits as well.
+    /// The direction is so near to the array's axis that the opposite direction or no direction
+    /// fits as well.
     NearEndFire,
-    /// Elements more than half a wavelength apart: several directions fit equally well.
+    /// Elements are more than half a wavelength apart, so that several directions fit equally well.
     Ambiguous,
-    /// Fewer peaks than sources, or two sources closer than their standard deviations.
+    /// There are fewer peaks than sources, or two sources are closer than their standard
+    /// deviations.
     SourcesNotSeparated,
-    /// Sources that are reflections of each other, more alike than the method can tell apart: average
-    /// over subarrays.
+    /// Sources are too correlated for the method; spatial smoothing is required.
     Correlated,
-    /// At the edge of the elevations that were looked at, beyond which the source may be as well.
+    /// The estimate is at the limit of the elevation range, so that the source may be outside.
     EdgeOfElevations,
 }
 
 impl Verdict {
-    /// Every verdict there is.
+    /// All verdicts.
     pub const ALL: [Self; 10] = [
         Self::Resolved,
         Self::Unresolved(Reason::ThresholdSnr),
@@ -56,7 +57,7 @@ impl Verdict {
         Self::Unresolved(Reason::MoreSources),
     ];
 
-    /// The reason, if there is one.
+    /// Returns the reason; `None` for a resolved estimate.
     pub const fn reason(&self) -> Option<Reason> {
         match self {
             Self::Resolved => None,
@@ -64,7 +65,7 @@ impl Verdict {
         }
     }
 
-    /// Its place in [`Verdict::ALL`].
+    /// Returns the index in [`Verdict::ALL`].
     pub const fn index(&self) -> usize {
         match self {
             Self::Resolved => 0,
@@ -84,17 +85,15 @@ impl Verdict {
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::ThresholdSnr => "SNR too low to exclude a wholly wrong direction",
-            Self::TooFewSnapshots => "too few snapshots to exclude a wholly wrong direction",
-            Self::Multipath => "no plane wave: reflections, or antennas unlike those described",
-            Self::MoreSources => {
-                "more than white noise is left: another source, or unequal channels"
-            }
+            Self::ThresholdSnr => "SNR too low to exclude an outlier",
+            Self::TooFewSnapshots => "too few snapshots to exclude an outlier",
+            Self::Multipath => "not a plane wave: reflections, or deviations of the antennas",
+            Self::MoreSources => "residual is not white noise: another source, or unequal channels",
             Self::NearEndFire => "too near to the array's axis",
             Self::Ambiguous => "several directions fit: elements more than half a wavelength apart",
             Self::SourcesNotSeparated => "sources not separated",
             Self::Correlated => "sources too correlated: average over subarrays",
-            Self::EdgeOfElevations => "at the edge of the elevations looked at",
+            Self::EdgeOfElevations => "at the limit of the elevation range",
         })
     }
 }

@@ -1,11 +1,11 @@
-//! Which vector instructions the processor has.
+//! Detection of the processor's vector instructions.
 
-/// What the processor can do, beyond the baseline.
+/// Vector instructions of the processor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Instructions {
-    /// The baseline of the architecture.
+    /// Baseline of the architecture.
     Baseline,
-    /// NEON, which every aarch64 has.
+    /// NEON, which is part of every aarch64 processor.
     #[cfg(target_arch = "aarch64")]
     Neon,
     /// AVX2 and FMA.
@@ -37,7 +37,7 @@ impl Instructions {
     }
 }
 
-/// Calls the variant of a function that fits the processor.
+/// Calls the variant of a function for the processor.
 macro_rules! dispatch {
     ($baseline:expr, $neon:expr, $avx2:expr, $avx512:expr) => {
         match $crate::simd::instructions::Instructions::available() {
@@ -46,11 +46,11 @@ macro_rules! dispatch {
             #[cfg(target_arch = "aarch64")]
             #[allow(unsafe_code, unused_unsafe)]
             $crate::simd::instructions::Instructions::Neon => unsafe { $neon },
-            // SAFETY: as above.
+            // SAFETY: the processor has the features that the function is compiled for.
             #[cfg(target_arch = "x86_64")]
             #[allow(unsafe_code)]
             $crate::simd::instructions::Instructions::Avx2 => unsafe { $avx2 },
-            // SAFETY: as above.
+            // SAFETY: the processor has the features that the function is compiled for.
             #[cfg(target_arch = "x86_64")]
             #[allow(unsafe_code)]
             $crate::simd::instructions::Instructions::Avx512 => unsafe { $avx512 },

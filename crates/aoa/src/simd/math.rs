@@ -1,14 +1,15 @@
-//! Elementary functions without branches, so that loops over them become vector code.
+//! Branch-free elementary functions, which allow vectorised loops.
 
 use std::f64::consts::{FRAC_PI_2, LN_2, LN_10, PI, SQRT_2};
 
-/// `a * b + c`, fused only where that is one instruction: elsewhere `mul_add` is a library call.
+/// Returns `a * b + c`. It is fused only if the processor has the instruction, because `mul_add` is
+/// otherwise a library call.
 #[inline(always)]
 pub(crate) fn times_plus<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
     if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
-/// `a` or else `b`, without a branch: one would keep a loop from becoming vector code.
+/// Returns `a` if `condition` is true, else `b`, without a branch that would prevent vectorisation.
 #[inline(always)]
 pub(crate) fn select(condition: bool, a: f64, b: f64) -> f64 {
     let mask = u64::from(condition).wrapping_neg();
@@ -27,7 +28,7 @@ const ARCSINE: [f64; 22] = {
     series
 };
 
-/// Arc cosine of `x` in -1 to 1, to 1e-15.
+/// Returns the arc cosine of `x` in -1 to 1 with an error of 1e-15.
 ///
 /// `asin` by its series where `|x| <= 1/2`, elsewhere `acos(x) = 2 asin(sqrt((1 - x) / 2))`.
 #[inline(always)]
@@ -45,10 +46,11 @@ pub(crate) fn acos<const FUSED: bool>(x: f64) -> f64 {
     if inner { FRAC_PI_2 - x * series } else { outer }
 }
 
-/// Argument of the complex number `x + j y`, in [-pi, pi], to 1e-15; 0 for zero.
+/// Returns the argument of the complex number `x + j y` in [-pi, pi] with an error of 1e-15; 0 for
+/// zero.
 ///
-/// Half of an angle of at most 45 degrees has a tangent of at most `sqrt(2) - 1`, where the series of
-/// the arc tangent converges fast.
+/// An angle of at most 45 degrees is halved, which gives a tangent of at most `sqrt(2) - 1`, for
+/// which the series of the arc tangent converges fast.
 #[inline(always)]
 pub(crate) fn arg<const FUSED: bool>(x: f64, y: f64) -> f64 {
     let (a, b) = (x.abs(), y.abs());
@@ -67,13 +69,15 @@ pub(crate) fn arg<const FUSED: bool>(x: f64, y: f64) -> f64 {
     (if x < 0.0 { PI - quadrant } else { quadrant }).copysign(y)
 }
 
-/// Decimal logarithm of a positive normal number, to 1e-14 of itself plus 1e-15.
+/// Returns the decimal logarithm of a positive normal number with a relative error of 1e-14 plus
+/// 1e-15.
 ///
 /// With `x = 2^e m`, `m` between sqrt(1/2) and sqrt(2): `ln m = 2 artanh((m - 1) / (m + 1))`.
 #[inline(always)]
 pub(crate) fn log10<const FUSED: bool>(x: f64) -> f64 {
     const MANTISSA: u64 = (1 << 52) - 1;
-    // An integer below 2^52 as a float: into the mantissa of 2^52, which is then taken off.
+    // Converts an integer below 2^52 to a float: the bits become the mantissa of 2^52, which is
+    // then subtracted.
     const MAGIC: u64 = 1075 << 52;
     let bits = x.to_bits();
     let mantissa = f64::from_bits((bits & MANTISSA) | (1023 << 52));
@@ -95,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn functions_are_those_of_the_standard_library() {
+    fn functions_equal_the_standard_library() {
         for i in -1000..=1000 {
             let x = f64::from(i) / 1000.0;
             assert!((acos::<false>(x) - x.acos()).abs() < 2e-15, "acos({x})");

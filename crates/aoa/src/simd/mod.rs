@@ -1,4 +1,4 @@
-//! What loops need to become vector code: a choice by processor, and functions without branches.
+//! Support for vectorised loops: selection by processor, and branch-free functions.
 
 pub(crate) mod instructions;
 pub(crate) mod math;

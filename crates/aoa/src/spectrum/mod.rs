@@ -1,4 +1,4 @@
-//! The spectra `a(omega)^H M a(omega)` that every method but ESPRIT searches, and how they are searched.
+//! Spectra `a(omega)^H M a(omega)`, which all methods except ESPRIT search, and their maxima.
 
 pub(crate) mod polynomial;
 pub(crate) mod side_by_side;

@@ -1,4 +1,4 @@
-//! The function that every spectral method searches: `f(omega) = a(omega)^H M a(omega)`.
+//! Spectrum that every spectral method searches: `f(omega) = a(omega)^H M a(omega)`.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,12 +8,13 @@ use super::side_by_side::Spectra;
 use crate::linalg::matrix::Matrix;
 use crate::list::List;
 
-/// Newton from a grid of eight points per antenna doubles its digits at each step.
+/// Number of Newton steps. Starting from eight points per antenna, each step doubles the number of
+/// digits.
 const NEWTON_STEPS: usize = 6;
 
-/// `f(omega) = a^H M a` of a Hermitian `M` is a trigonometric polynomial of degree N - 1: with `c_k`
-/// the sum along the k-th off-diagonal of `M`,
-/// `f(omega) = c_0 + 2 Re sum_k c_k exp(-j k omega)`.
+/// For a Hermitian `M`, `f(omega) = a^H M a` is a trigonometric polynomial of degree N - 1. With
+/// the sum `c_k` along the k-th off-diagonal of `M`, `f(omega) = c_0 + 2 Re sum_k c_k exp(-j k
+/// omega)`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Spectrum<const N: usize> {
     pub(crate) lags: [Complex64; N],
@@ -30,7 +31,7 @@ impl<const N: usize> Spectrum<N> {
         Self { lags }
     }
 
-    /// The spectrum of the projection on orthonormal vectors, `M = sum u u^H`.
+    /// Creates the spectrum of the projection onto orthonormal vectors, `M = sum u u^H`.
     pub(crate) fn of_subspace(vectors: &[[Complex64; N]]) -> Self {
         let mut lags = [Complex64::ZERO; N];
         for u in vectors {
@@ -43,19 +44,19 @@ impl<const N: usize> Spectrum<N> {
         Self { lags }
     }
 
-    /// `-f`, whose maxima are the minima of `f`.
+    /// Returns `-f`, whose maxima are the minima of `f`.
     pub(crate) fn negated(&self) -> Self {
         Self {
             lags: self.lags.map(|lag| -lag),
         }
     }
 
-    /// `f` at one electrical angle.
+    /// Returns `f` at one electrical angle.
     pub(crate) fn value(&self, phase_rad: f64) -> f64 {
         self.derivatives(Complex64::cis(-phase_rad)).0
     }
 
-    /// f, f', f'' at `rotation = exp(-j omega)`.
+    /// Returns f, f', f'' at `rotation = exp(-j omega)`.
     fn derivatives(&self, rotation: Complex64) -> (f64, f64, f64) {
         let (mut f, mut df, mut ddf) = (0.5 * self.lags[0].re, 0.0, 0.0);
         let mut power = rotation;
@@ -70,7 +71,7 @@ impl<const N: usize> Spectrum<N> {
         (2.0 * f, 2.0 * df, 2.0 * ddf)
     }
 
-    /// The electrical angle at which `f` is largest, and that value.
+    /// Returns the electrical angle of the global maximum of `f`, and the maximum.
     pub(crate) fn maximum(&self) -> (f64, f64) {
         let single = Spectra::<N, 1> {
             re: self.lags.map(|lag| [lag.re]),
@@ -80,9 +81,9 @@ impl<const N: usize> Spectrum<N> {
         (place.phase_rad[0], single.values::<false>(&place)[0])
     }
 
-    /// Every local maximum: electrical angle and value. A polynomial of degree N - 1 has no more than
-    /// N - 1. None is too narrow to be found: intervals are halved until bounds on the derivatives
-    /// prove that each holds one extremum or none.
+    /// Returns all local maxima as electrical angle and value. A polynomial of degree N - 1 has at
+    /// most N - 1. No peak is missed: intervals are bisected until bounds on the derivatives prove
+    /// that each contains at most one extremum.
     pub(crate) fn peaks(&self) -> List<(f64, f64), N> {
         let orders = self.lags.iter().enumerate();
         let third = orders.map(|(k, lag)| 2.0 * (k as f64).powi(3) * lag.norm());
@@ -96,7 +97,8 @@ impl<const N: usize> Spectrum<N> {
             let phase = |i: usize| TAU * i as f64 / intervals as f64 - PI;
             let mut low = (-PI, self.slope(-PI));
             for i in 1..=intervals {
-                // The last end is the first, to the bit: no peak is lost between them or found twice.
+                // The last end of an interval equals the first bit by bit, so that no peak is lost
+                // or found twice.
                 let high = (phase(i), self.slope(phase(i % intervals)));
                 search.look_between(low, high, &mut peaks);
                 low = high;
@@ -109,12 +111,12 @@ impl<const N: usize> Spectrum<N> {
         self.derivatives(Complex64::cis(-phase_rad)).1
     }
 
-    /// The local maximum within `reach` of `start`, by Newton's method, in (-pi, pi].
+    /// Returns the local maximum within `reach` of `start` in (-pi, pi] by Newton's method.
     pub(crate) fn refined_maximum(&self, start: f64, reach: f64) -> f64 {
         let mut offset: f64 = 0.0;
         for _ in 0..NEWTON_STEPS {
             let (_, slope, curvature) = self.derivatives(Complex64::cis(-(start + offset)));
-            // Where the curvature has the wrong sign, walk uphill.
+            // If the curvature is positive, move uphill by half of the reach.
             let newton = if curvature < 0.0 {
                 -slope / curvature
             } else {
@@ -130,17 +132,17 @@ impl<const N: usize> Spectrum<N> {
     }
 }
 
-/// The search for every local maximum.
+/// Search for all local maxima.
 struct PeakSearch<'a, const N: usize> {
     spectrum: &'a Spectrum<N>,
-    /// No third derivative is larger.
+    /// Upper bound of the third derivative.
     third_derivative: f64,
 }
 
 impl<const N: usize> PeakSearch<'_, N> {
-    /// Adds the maxima between two electrical angles, each given with the slope there.
+    /// Adds the maxima between two electrical angles, each given with its slope.
     fn look_between(&self, low: (f64, f64), high: (f64, f64), peaks: &mut List<(f64, f64), N>) {
-        // Extrema closer than this are one.
+        // Minimum distance of two extrema in rad.
         const CLOSEST_RAD: f64 = 1e-9;
         let (middle, half) = (0.5 * (low.0 + high.0), 0.5 * (high.0 - low.0));
         let (_, slope, curvature) = self.spectrum.derivatives(Complex64::cis(-middle));

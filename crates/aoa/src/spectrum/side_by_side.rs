@@ -1,8 +1,8 @@
-//! Maxima of many spectra side by side.
+//! Maxima of many spectra, searched together.
 //!
-//! One spectrum needs some hundred operations without a branch, so `W` of them are searched together
-//! and the compiler makes vectors of the innermost loops. `FUSED` says whether they are compiled for
-//! a processor that multiplies and adds in one instruction.
+//! The search of one spectrum takes some hundred branch-free operations. Therefore, `W` spectra are
+//! searched together, and the compiler vectorises the innermost loops. `FUSED` selects fused
+//! multiply-add for processors that have the instruction.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -10,11 +10,11 @@ use crate::error::Error;
 use crate::linalg::hermitians::{Hermitians, Vectors};
 use crate::simd::math::{arg, times_plus};
 
-/// Points of the finest search grid on the circle.
+/// Number of points of the finest search grid on the circle.
 const CIRCLE: usize = 128;
 /// `cos(2 pi i / 128)`.
 const COS: [f64; CIRCLE] = cosines();
-/// From the grid Newton's method needs three steps, four at the worst.
+/// Maximum number of Newton steps; three to four are required from the grid.
 const NEWTON_STEPS: usize = 6;
 
 /// `W` spectra `f(omega) = c_0 + 2 Re sum_k c_k exp(-j k omega)` of degree N - 1.
@@ -24,17 +24,17 @@ pub(crate) struct Spectra<const N: usize, const W: usize> {
     pub(crate) im: [[f64; W]; N],
 }
 
-/// A place of each spectrum.
+/// One position on the circle for each spectrum.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Places<const W: usize> {
-    /// In (-pi, pi].
+    /// Electrical angle in (-pi, pi].
     pub(crate) phase_rad: [f64; W],
     pub(crate) cos: [f64; W],
     pub(crate) sin: [f64; W],
 }
 
 impl<const W: usize> Places<W> {
-    /// Where complex numbers, of any modulus, point to.
+    /// Returns the phases of complex numbers of any modulus.
     #[inline(always)]
     pub(crate) fn of_directions<const FUSED: bool>(re: &[f64; W], im: &[f64; W]) -> Self {
         let mut places = Self {
@@ -54,7 +54,7 @@ impl<const W: usize> Places<W> {
     }
 }
 
-/// The best grid point so far.
+/// Best grid point.
 #[derive(Clone, Copy)]
 struct Best<const W: usize> {
     value: [f64; W],
@@ -69,7 +69,7 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
         im: [[0.0; W]; N],
     };
 
-    /// Every stride-th point of the circle is searched: at least eight per antenna.
+    /// Stride of the search grid, with at least eight points per antenna.
     const STRIDE: usize = match N {
         0..=2 => 8,
         3..=4 => 4,
@@ -78,7 +78,7 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
     };
 
     /// # Errors
-    /// The first of the spectra that is of no covariance, and why.
+    /// Index and error of the first spectrum that is not of a valid covariance.
     #[inline(always)]
     pub(crate) fn check(&self, count: usize) -> Result<(), (usize, Error)> {
         for (w, trace) in self.re[0].iter().take(count).enumerate() {
@@ -92,7 +92,7 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
         Ok(())
     }
 
-    /// `a^H A a` of Hermitian matrices: the sums along their diagonals.
+    /// Returns the spectra `a^H A a` of Hermitian matrices from the sums along their diagonals.
     #[inline(always)]
     pub(crate) fn of_matrices(matrices: &Hermitians<N, W>) -> Self {
         let mut spectra = Self::ZERO;
@@ -108,7 +108,7 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
         spectra
     }
 
-    /// `|a^H u|^2` of vectors.
+    /// Returns the spectra `|a^H u|^2` of vectors.
     #[inline(always)]
     pub(crate) fn of_vectors<const FUSED: bool>(vectors: &Vectors<N, W>) -> Self {
         let mut spectra = Self::ZERO;
@@ -128,7 +128,7 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
         spectra
     }
 
-    /// `f` at these places, by Horner's scheme.
+    /// Returns `f` at the given positions by Horner's scheme.
     #[inline(always)]
     pub(crate) fn values<const FUSED: bool>(&self, places: &Places<W>) -> [f64; W] {
         let mut values = [0.0; W];
@@ -145,11 +145,11 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
         values
     }
 
-    /// Where they are largest: the best point of a grid, then Newton's method.
+    /// Returns the positions of the maxima: the best point of a grid, refined by Newton's method.
     ///
-    /// A spectrum `f >= 0` of degree n = N - 1 has at least `cos(n x / 2)^2` of its maximum at a
-    /// distance x from it (M. Riesz 1914), hence 96 % of it at the nearest of eight points per antenna:
-    /// the peak found is the highest unless another is within 4 % of it.
+    /// A spectrum `f >= 0` of degree n = N - 1 is at least `cos(n x / 2)^2` times its maximum at
+    /// the distance x from it (M. Riesz 1914), i.e. 96 % at the nearest of eight points per
+    /// antenna. The result is the global maximum unless another peak is within 4 % of it.
     #[inline(always)]
     pub(crate) fn maxima<const FUSED: bool>(&self) -> Places<W> {
         let best = self.best_grid_points::<FUSED>();
@@ -166,8 +166,8 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
         };
         let mut point = 0;
         while point <= CIRCLE / 4 {
-            // The sums of even and of odd k give the spectrum at omega, -omega, pi - omega and
-            // omega - pi, which differ only in signs.
+            // The sums over even and odd k give the spectrum at omega, -omega, pi - omega and omega
+            // - pi, which differ in signs only.
             let angle = TAU * point as f64 / CIRCLE as f64;
             let (cos, sin) = (COS[point], COS[CIRCLE / 4 - point]);
             for w in 0..W {
@@ -219,11 +219,11 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
             ..
         } = *best;
         let mut offset = [0.0; W];
-        // Whoever has settled stays, however long the others take.
+        // Converged positions are not changed while the others are iterated.
         let mut free = [1.0; W];
         for _ in 0..NEWTON_STEPS {
             for w in 0..W {
-                // z = exp(-j omega), raised to the k-th power as k grows.
+                // z = exp(-j omega), raised to the k-th power in the loop.
                 let (z_re, z_im) = (cos[w], -sin[w]);
                 let (mut power_re, mut power_im) = (z_re, z_im);
                 let (mut slope, mut curvature) = (0.0, 0.0);
@@ -238,7 +238,7 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
                     power_im = times_plus::<FUSED>(power_re, z_im, power_im * z_re);
                     power_re = next_re;
                 }
-                // Where the spectrum is convex, walk uphill instead.
+                // If the spectrum is convex, move uphill instead.
                 let newton = -slope / curvature;
                 let uphill = (0.5 * reach).copysign(slope);
                 let step = if curvature < 0.0 { newton } else { uphill };
@@ -247,12 +247,12 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
                 let target = if target < -reach { -reach } else { target };
                 let step = (target - offset[w]) * free[w];
                 offset[w] += step;
-                // Rotate by the step, |step| <= 2 reach.
+                // Rotate by the step, with |step| <= 2 reach.
                 let (step_sin, step_cos) = small_sin_cos::<FUSED>(step);
                 let next_cos = times_plus::<FUSED>(cos[w], step_cos, -(sin[w] * step_sin));
                 sin[w] = times_plus::<FUSED>(cos[w], step_sin, sin[w] * step_cos);
                 cos[w] = next_cos;
-                // The error squares at each step.
+                // The convergence is quadratic.
                 free[w] = if step.abs() > 1e-7 { free[w] } else { 0.0 };
             }
             if free.iter().all(|it| *it == 0.0) {
@@ -273,7 +273,7 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
     }
 }
 
-/// Sine and cosine by their Taylor series: to 1e-14 for |x| < 0.6.
+/// Returns sine and cosine by their Taylor series with an error of 1e-14 for |x| < 0.6.
 #[inline(always)]
 fn small_sin_cos<const FUSED: bool>(x: f64) -> (f64, f64) {
     let squared = x * x;
@@ -298,12 +298,12 @@ const SINE_COSINE: [(f64, f64); 7] = {
     series
 };
 
-/// The cosines of the grid, by the Taylor series about the nearest multiple of pi / 2.
+/// Returns the cosines of the grid by the Taylor series at the nearest multiple of pi / 2.
 const fn cosines() -> [f64; CIRCLE] {
     let mut table = [0.0; CIRCLE];
     let mut i = 0;
     while i < CIRCLE {
-        // Reduce to the first octant, where sine and cosine are both small series.
+        // Reduce to the first octant, where the series of sine and cosine converge fast.
         let quadrant = (i + CIRCLE / 8) / (CIRCLE / 4);
         let x = (i as f64 - (quadrant * CIRCLE / 4) as f64) * (FRAC_PI_2 / (CIRCLE / 4) as f64);
         let (mut sin, mut cos) = (0.0, 0.0);
@@ -330,7 +330,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_grid_is_of_cosines() {
+    fn grid_cosines_equal_the_standard_library() {
         for (i, value) in COS.iter().enumerate() {
             assert!(
                 (value - (TAU * i as f64 / CIRCLE as f64).cos()).abs() < 1e-15,
@@ -340,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn small_angles_have_their_sine_and_cosine() {
+    fn small_angle_sine_and_cosine_equal_the_standard_library() {
         for i in -60..=60 {
             let x = f64::from(i) * 0.01;
             let (sin, cos) = small_sin_cos::<false>(x);

@@ -1,4 +1,4 @@
-//! Arrays of any shape: azimuth and elevation, their bound, measured manifolds.
+//! Arrays of any shape: azimuth and elevation, their bound, and measured manifolds.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -8,7 +8,7 @@ use aoa::{
     Manifold, MeasuredManifold, Method, PseudoSpectrum, Reason, Verdict, bound, estimate,
 };
 
-/// Gaussian sources in unit noise.
+/// Returns snapshots of a Gaussian source in unit noise.
 fn snapshots<M: Manifold<N>, const N: usize>(
     random: &mut Random,
     manifold: &M,
@@ -27,8 +27,8 @@ fn snapshots<M: Manifold<N>, const N: usize>(
     Covariance::from_snapshots(&snapshots).unwrap()
 }
 
-/// RMSE over bound in azimuth and elevation, the mean of the normalised squared error of what is
-/// resolved (2 where the covariance is right), and the part that is.
+/// Returns the ratio of RMSE to bound in azimuth and elevation, the mean normalised squared error
+/// of the resolved estimates (2 for a correct covariance), and the resolved fraction.
 fn quality<M: Manifold<N>, const N: usize>(
     finder: &DirectionFinder<M, N>,
     truth: &impl Manifold<N>,
@@ -53,7 +53,7 @@ fn quality<M: Manifold<N>, const N: usize>(
             (turned + 3.0 * PI).rem_euclid(TAU) - PI,
             found.direction.elevation_rad - direction.elevation_rad,
         ];
-        // The bound takes the mean over the antennas.
+        // The bound takes the mean SNR over the antennas.
         let response = truth.response(direction);
         let gain = response.iter().map(Complex64::norm_sqr).sum::<f64>() / N as f64;
         let limit = bound::azimuth_elevation(truth, direction, snr * gain, count);
@@ -79,7 +79,7 @@ fn quality<M: Manifold<N>, const N: usize>(
 }
 
 #[test]
-fn a_circle_of_five_reaches_the_bound_in_azimuth_and_elevation() {
+fn a_circle_of_five_attains_the_bound_in_azimuth_and_elevation() {
     let array = ArbitraryArray::<5>::circular(0.425).unwrap();
     let finder = DirectionFinder::new(array, [0.0, FRAC_PI_2]).unwrap();
     for snr_db in [5.0, 15.0, 25.0] {
@@ -91,7 +91,7 @@ fn a_circle_of_five_reaches_the_bound_in_azimuth_and_elevation() {
 }
 
 #[test]
-fn other_shapes_reach_it_too() {
+fn other_shapes_attain_the_bound() {
     let sky = [0.0, FRAC_PI_2];
     let square = ArbitraryArray::<9>::rectangular(3, 0.5).unwrap();
     let (ratios, nees, _) = quality(
@@ -102,7 +102,8 @@ fn other_shapes_reach_it_too() {
     );
     assert!(ratios.iter().all(|it| *it < 1.1) && (1.8..2.2).contains(&nees));
 
-    // A tetrahedron sees above and below, and needs no horizon.
+    // A tetrahedron distinguishes directions above and below, so that the elevation range is
+    // unlimited.
     let tetrahedron = [
         [0.2, 0.2, 0.2],
         [0.2, -0.2, -0.2],
@@ -139,8 +140,9 @@ fn unequal_channels_are_part_of_the_manifold() {
 }
 
 #[test]
-fn the_bound_of_a_row_is_that_of_the_linear_array() {
-    // Three in a row and one beside: with the one so near, all but the row's bound.
+fn the_bound_of_collinear_elements_equals_that_of_the_linear_array() {
+    // Three collinear elements and one element very close to the line: the bound is almost that of
+    // a linear array.
     struct Row;
     impl Manifold<4> for Row {
         fn response(&self, direction: Direction) -> [Complex64; 4] {
@@ -162,23 +164,23 @@ fn the_bound_of_a_row_is_that_of_the_linear_array() {
         assert!((found.direction.azimuth_rad.abs() - linear.angle_rad).abs() < 1e-7);
         assert!((found.azimuth_sigma_rad() / linear.sigma_rad - 1.0).abs() < 1e-4);
         assert!((found.snr_db - linear.snr_db).abs() < 1e-9);
-        // Left and right of a row are one.
+        // A linear array cannot distinguish left and right.
         assert_eq!(found.verdict, Verdict::Unresolved(Reason::Ambiguous));
     }
 }
 
 #[test]
-fn doubts_are_told() {
+fn unreliable_estimates_are_reported() {
     let array = ArbitraryArray::<5>::circular(0.425).unwrap();
     let sky = DirectionFinder::new(array, [0.0, FRAC_PI_2]).unwrap();
     let both = DirectionFinder::new(array, [-FRAC_PI_2, FRAC_PI_2]).unwrap();
     let mut random = Random::new(14);
     let high = snapshots(&mut random, &array, Direction::new(1.0, 0.7), 20.0, 20);
     assert!(sky.estimate(&high).unwrap().is_resolved());
-    // In a plane, below is as good as above.
+    // A planar array cannot distinguish directions above and below.
     let verdict = both.estimate(&high).unwrap().verdict;
     assert_eq!(verdict, Verdict::Unresolved(Reason::Ambiguous));
-    // At the horizon the elevation does not show; who knows it gets the azimuth.
+    // At the horizon the elevation is unobservable; with a fixed elevation the azimuth is resolved.
     let low = snapshots(&mut random, &array, Direction::new(1.0, 0.0), 20.0, 20);
     let verdict = sky.estimate(&low).unwrap().verdict;
     assert_eq!(verdict, Verdict::Unresolved(Reason::EdgeOfElevations));
@@ -190,7 +192,7 @@ fn doubts_are_told() {
         (found.direction.elevation_rad, found.elevation_sigma_rad()),
         (0.0, 0.0)
     );
-    // Elements far apart have many directions that look alike.
+    // Elements far apart have many ambiguous directions.
     let wide = ArbitraryArray::<3>::circular(2.0).unwrap();
     let finder = DirectionFinder::new(wide, [0.0, FRAC_PI_2]).unwrap();
     let direction = Direction::new(0.3, 0.5);
@@ -206,7 +208,7 @@ fn doubts_are_told() {
 }
 
 #[test]
-fn overhead_is_a_direction_like_others() {
+fn the_zenith_is_estimated_like_other_directions() {
     let array = ArbitraryArray::<5>::circular(0.425).unwrap();
     let finder = DirectionFinder::new(array, [0.0, FRAC_PI_2]).unwrap();
     let overhead = Direction::new(0.0, FRAC_PI_2).unit_vector();
@@ -229,8 +231,8 @@ fn overhead_is_a_direction_like_others() {
 }
 
 #[test]
-fn a_measured_manifold_with_coupling_does_as_well_as_the_true_one() {
-    // A circle whose neighbours receive a part of one another's signals.
+fn a_measured_manifold_with_coupling_is_as_accurate_as_the_true_one() {
+    // Circular array with coupling between adjacent elements.
     struct Coupled(ArbitraryArray<5>);
     impl Manifold<5> for Coupled {
         fn response(&self, direction: Direction) -> [Complex64; 5] {
@@ -266,8 +268,8 @@ fn a_measured_manifold_with_coupling_does_as_well_as_the_true_one() {
             .zip(b)
             .map(|(a, b)| (a - b).norm())
             .fold(0.0, f64::max);
-        // The twenty-fourth part of the fourth power of the change from entry to entry, in azimuth and
-        // in elevation, of an element and its two neighbours.
+        // Interpolation error: 1/24 of the fourth power of the change between entries, in azimuth
+        // and in elevation, for an element and its two neighbours.
         let change = 2.0 * PI * 0.425 * 5_f64.to_radians();
         let limit = 2.0 * change.powi(4) / 24.0 * 1.5;
         assert!(error < limit, "{direction:?}: {error}");
@@ -275,13 +277,14 @@ fn a_measured_manifold_with_coupling_does_as_well_as_the_true_one() {
     let finder = DirectionFinder::new(table, [0.0, FRAC_PI_2]).unwrap();
     let (ratios, nees, _) = quality(&finder, &truth, [20.0, 70.0], 20.0);
     assert!(ratios.iter().all(|it| *it < 1.1), "{ratios:?}");
-    // The bound holds for an SNR per antenna, which coupling changes: the estimate knows that.
+    // The bound is valid for the SNR per antenna, which coupling changes; the estimate accounts for
+    // this.
     assert!((1.8..2.2).contains(&nees), "NEES {nees} of 2");
-    // Who leaves the coupling out is wrong by more than the noise.
+    // Without the coupling in the manifold, the error exceeds the noise.
     let ideal = DirectionFinder::new(truth.0, [0.0, FRAC_PI_2]).unwrap();
     let (_, blind, _) = quality(&ideal, &truth, [20.0, 70.0], 20.0);
     assert!(blind > 10.0, "{blind}");
-    // That the model does not fit is told, and is in the covariance that holds it.
+    // The misfit is reported, and the covariance includes its effect.
     let mut random = Random::new(16);
     let (mut reliable, mut squares) = (0, 0.0);
     for _ in 0..200 {
@@ -324,7 +327,7 @@ fn spectra_over_azimuth_and_elevation_peak_at_the_source() {
 }
 
 #[test]
-fn impossible_arrays_are_refused() {
+fn invalid_arrays_are_rejected() {
     let corner = [[0.0; 3], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
     assert!(ArbitraryArray::new(corner).is_ok());
     for bad in [f64::NAN, f64::INFINITY, 101.0, -1e300] {

@@ -1,4 +1,4 @@
-//! Whatever comes in: an error or an estimate with finite numbers, never a panic.
+//! Invalid inputs give an error or an estimate with finite numbers, never a panic.
 
 use crate::common::{METHODS, Random};
 use aoa::{
@@ -7,7 +7,7 @@ use aoa::{
 };
 
 #[test]
-fn each_fault_has_its_error() {
+fn each_invalid_input_has_its_error() {
     let good = [Complex64::ONE; 4];
     assert_eq!(
         Covariance::<4>::from_snapshots(&[]),
@@ -36,7 +36,7 @@ fn each_fault_has_its_error() {
         Err(Error::NoSnapshots)
     );
 
-    // Off the diagonal more than on it.
+    // An off-diagonal entry exceeds the diagonal.
     let mut matrix = [[Complex64::from(2.0); 4]; 4];
     for (n, row) in matrix.iter_mut().enumerate() {
         row[n] = Complex64::ONE;
@@ -112,7 +112,7 @@ fn each_fault_has_its_error() {
 }
 
 #[test]
-fn a_batch_names_the_item_at_fault() {
+fn a_batch_reports_the_invalid_item() {
     let array = Array::<2>::half_wavelength();
     let mut samples = vec![Complex64::ONE; 2 * 3 * 200];
     samples[2 * 3 * 130 + 4].re = f64::NAN;
@@ -138,11 +138,11 @@ fn a_batch_names_the_item_at_fault() {
 }
 
 #[test]
-fn no_input_makes_a_panic_or_an_endless_number() {
+fn no_input_causes_a_panic_or_a_non_finite_number() {
     fn check<const N: usize>(random: &mut Random) {
         let array = Array::<N>::new(random.uniform(0.05, 2.0)).unwrap();
         let scale = 10_f64.powf(random.uniform(-140.0, 140.0));
-        // Few snapshots, silent channels, repeated rows, huge and tiny numbers.
+        // Few snapshots, channels without a signal, repeated rows, and huge and tiny numbers.
         let count = random.uniform(1.0, 5.0) as usize;
         let kind = random.uniform(0.0, 4.0) as usize;
         let snapshots: Vec<[Complex64; N]> = (0..count)

@@ -1,10 +1,10 @@
-//! The Cramér–Rao bounds agree where they must.
+//! Consistency of the Cramér–Rao bounds.
 
 use aoa::{Array, bound};
 
 #[test]
-fn several_sources_far_apart_are_as_good_as_one() {
-    // Orthogonal steering vectors and little noise: neither source disturbs the other.
+fn well_separated_sources_have_the_bound_of_one_source() {
+    // With orthogonal steering vectors and low noise, the sources do not disturb each other.
     let phases = [0.0, std::f64::consts::PI];
     let snr = 1e4;
     let together = bound::deterministic_several::<4>(&phases, &[snr; 2], 20).unwrap();
@@ -12,7 +12,7 @@ fn several_sources_far_apart_are_as_good_as_one() {
     for sigma in together.iter() {
         assert!((1.0..1.2).contains(&(sigma / alone)), "{sigma} {alone}");
     }
-    // One source alone: the matrix formulas give the closed ones.
+    // With one source, the matrix formulas equal the closed forms.
     let pairs = [
         (
             bound::stochastic_several::<4>(&[0.7], &[0.5], 20),
@@ -33,7 +33,7 @@ fn several_sources_far_apart_are_as_good_as_one() {
 }
 
 #[test]
-fn knowing_less_costs_more() {
+fn bounds_increase_with_the_number_of_unknowns() {
     for snr in [0.1, 1.0, 10.0, 100.0] {
         let stochastic = bound::stochastic::<4>(snr, 20);
         let deterministic = bound::deterministic::<4>(snr, 20);
@@ -48,7 +48,7 @@ fn knowing_less_costs_more() {
 }
 
 #[test]
-fn the_stated_numbers() {
+fn bounds_equal_reference_values() {
     // Four antennas, twenty snapshots, angles uniform in 20 to 160 degrees: RMS in degrees.
     let array = Array::<4>::half_wavelength();
     for (snr_db, expected) in [(0.0, 2.175), (10.0, 0.609), (20.0, 0.193), (30.0, 0.0613)] {
@@ -60,7 +60,7 @@ fn the_stated_numbers() {
         let rms = (sum / 1400.0).sqrt().to_degrees();
         assert!((rms / expected - 1.0).abs() < 0.05, "{snr_db} dB: {rms}");
     }
-    // The resolvable SNR of the usual snapshots lies in the threshold region.
+    // The resolvable SNR for 20 snapshots is in the threshold region.
     let threshold_db = 10.0 * bound::resolvable_snr::<4>(20).log10();
     assert!((-5.0..0.0).contains(&threshold_db), "{threshold_db}");
 }

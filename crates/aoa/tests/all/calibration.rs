@@ -9,7 +9,7 @@ fn gains() -> [Complex64; 4] {
 }
 
 #[test]
-fn a_reference_burst_gives_the_gains() {
+fn a_reference_source_gives_the_gains() {
     let truth = Calibration::new(gains()).unwrap();
     let array = Array::<4>::new(0.458).unwrap().with_calibration(truth);
     let burst = Random::new(31).snapshots(&array, &[(1.0, 30.0)], 2000);
@@ -44,7 +44,7 @@ fn calibrated_estimates_are_exact() {
 }
 
 #[test]
-fn impossible_calibrations_are_refused() {
+fn invalid_calibrations_are_rejected() {
     let mut bad = gains();
     bad[2] = Complex64::ZERO;
     assert_eq!(Calibration::new(bad), Err(Error::CalibrationGain(2)));
@@ -64,7 +64,7 @@ fn impossible_calibrations_are_refused() {
         Calibration::from_reference(&silent, &array, 1.0),
         Err(Error::CalibrationGain(1))
     );
-    // An ideal array's covariance passes through calibration unchanged.
+    // Calibration of an ideal array does not change the covariance.
     let covariance = Covariance::from_matrix(exact(&array, &[(1.0, 3.0)]), 5).unwrap();
     assert_eq!(covariance.calibrated(&array), covariance);
 }

@@ -1,4 +1,4 @@
-//! The estimators, as whoever uses the crate meets them.
+//! Tests of the estimators through the public interface.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "these are tests")]
 
 mod arrays;

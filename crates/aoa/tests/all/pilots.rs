@@ -3,7 +3,7 @@
 use crate::common::Random;
 use aoa::{Array, Complex64, Error, Reason, Verdict, bound, maximum_likelihood_pilots};
 
-/// Four blocks holding together 830 resource elements, each with its own unknown phase.
+/// Returns four despread blocks with 830 resource elements in total, each with an unknown phase.
 fn despread(
     random: &mut Random,
     array: &Array<4>,
@@ -20,7 +20,7 @@ fn despread(
 }
 
 #[test]
-fn the_known_signal_bound_is_attained_and_known() {
+fn the_known_signal_bound_is_attained_and_reported() {
     let array = Array::<4>::half_wavelength();
     let mut random = Random::new(21);
     for snr_db in [-10.0, 0.0, 10.0, 20.0] {
@@ -54,7 +54,7 @@ fn the_known_signal_bound_is_attained_and_known() {
 }
 
 #[test]
-fn weak_pilots_are_not_believed() {
+fn weak_pilots_are_unresolved() {
     let array = Array::<4>::half_wavelength();
     let mut random = Random::new(22);
     let (mut resolved, mut wrong, mut believed_noise) = (0, 0, 0);
@@ -81,7 +81,7 @@ fn weak_pilots_are_not_believed() {
 }
 
 #[test]
-fn bad_noise_variance_is_refused() {
+fn an_invalid_noise_variance_is_rejected() {
     let array = Array::<4>::half_wavelength();
     let blocks = [[Complex64::ONE; 4]; 2];
     for value in [0.0, -1.0, f64::INFINITY] {

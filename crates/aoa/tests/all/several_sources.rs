@@ -34,7 +34,7 @@ fn every_method_is_exact_on_the_exact_covariance_of_two_sources() {
 }
 
 #[test]
-fn as_many_sources_as_antennas_less_one() {
+fn one_source_less_than_antennas_is_resolved() {
     let array = Array::<4>::half_wavelength();
     let truth: [f64; 3] = [40.0, 75.0, 120.0];
     let sources = truth.map(|degrees| (degrees.to_radians(), 10.0));
@@ -55,7 +55,7 @@ fn as_many_sources_as_antennas_less_one() {
 }
 
 #[test]
-fn two_sources_stay_near_their_bound_and_know_it() {
+fn estimates_of_two_sources_are_near_the_bound_and_consistent() {
     let array = Array::<4>::half_wavelength();
     let truth = [1.1, 1.8];
     let phases = truth.map(|angle| array.phase_from_angle(angle));
@@ -89,8 +89,8 @@ fn two_sources_stay_near_their_bound_and_know_it() {
 }
 
 #[test]
-fn coherent_sources_need_averaging() {
-    // A reflection carries the waveform of the direct path: R has rank one.
+fn coherent_sources_require_averaging() {
+    // A reflection has the waveform of the direct path, so that R has rank one.
     let array = Array::<4>::half_wavelength();
     let truth: [f64; 2] = [60.0, 105.0];
     let [direct, reflected] =
@@ -115,7 +115,7 @@ fn coherent_sources_need_averaging() {
     }
 }
 
-/// Snapshots of two sources of 15 dB whose waveforms have this correlation, in unit noise.
+/// Returns snapshots of two sources of 15 dB with correlated waveforms in unit noise.
 fn correlated<const N: usize>(
     random: &mut Random,
     phases: [f64; 2],
@@ -129,7 +129,7 @@ fn correlated<const N: usize>(
     (0..count)
         .map(|_| {
             let (one, other) = (random.gaussian(), random.gaussian());
-            // Neither in phase nor in quadrature.
+            // The phase of the correlation is neither 0 nor 90 degrees.
             let second = one * Complex64::from_polar(correlation, -0.8) + other * own;
             std::array::from_fn(|n| {
                 (responses[0][n] * one + responses[1][n] * second) * amplitude + random.gaussian()
@@ -138,7 +138,7 @@ fn correlated<const N: usize>(
         .collect()
 }
 
-/// Normalised squared errors of the resolved estimates, and how many of all are.
+/// Returns the mean normalised squared error of the resolved estimates, and the resolved fraction.
 fn consistency<const N: usize, const M: usize>(
     random: &mut Random,
     method: Method,
@@ -161,7 +161,7 @@ fn consistency<const N: usize, const M: usize>(
                 estimate_several_smoothed::<N, M>(method, &covariance, &array, 2, forward_backward);
             found.unwrap().to_vec()
         };
-        // By ascending angle, that is by descending phase.
+        // Ascending angle is descending phase.
         for (estimate, phase) in found.iter().zip([0.9, -0.7]) {
             if estimate.is_resolved() {
                 resolved += 1.0;
@@ -176,7 +176,7 @@ fn consistency<const N: usize, const M: usize>(
 }
 
 #[test]
-fn what_is_resolved_knows_how_good_it_is_whatever_the_correlation() {
+fn resolved_estimates_are_consistent_for_any_correlation() {
     let mut random = Random::new(15);
     for method in &METHODS {
         for correlation in [0.0, 0.5, 0.9, 0.95, 0.99, 1.0] {
@@ -203,13 +203,13 @@ fn what_is_resolved_knows_how_good_it_is_whatever_the_correlation() {
                 ),
             ] {
                 println!("{method:?} {correlation} {name}: NEES {nees:.2}, resolved {resolved:.2}");
-                // Four standard deviations of the mean of so many squares beside what is asked.
+                // Tolerance: four standard deviations of the mean of the squares.
                 let chance = 4.0 * (2.0 / (800.0 * resolved).max(1.0)).sqrt();
                 assert!(
                     nees < 1.3 + chance,
                     "{method:?} {correlation} {name}: {nees}"
                 );
-                // Coherent sources need averaging, but for maximum likelihood.
+                // Coherent sources require averaging, except with maximum likelihood.
                 let likely = *method == Method::MaximumLikelihood;
                 if name.ends_with("averaged") || correlation < 0.6 || likely {
                     assert!(
@@ -223,7 +223,7 @@ fn what_is_resolved_knows_how_good_it_is_whatever_the_correlation() {
 }
 
 #[test]
-fn a_batch_is_smoothed_as_one_covariance_is() {
+fn a_batch_is_smoothed_like_a_single_covariance() {
     let mut random = Random::new(17);
     let array = Array::<6>::half_wavelength();
     let snapshots = correlated::<6>(&mut random, [-0.7, 0.9], 0.9, 40);
@@ -249,8 +249,8 @@ fn a_batch_is_smoothed_as_one_covariance_is() {
     }
 }
 
-/// Bound of the electrical angles of two coherent sources of [`correlated`], their waveforms unknown:
-/// `C^-1 = 2 L Re[(D^H P D) * S^T]` (Stoica and Nehorai 1989).
+/// Returns the bound of the electrical angles of the coherent sources of [`correlated`] with
+/// unknown waveforms: `C^-1 = 2 L Re[(D^H P D) * S^T]` (Stoica and Nehorai 1989).
 fn coherent_bound(phases: [f64; 2], count: usize) -> [f64; 2] {
     let steering = phases.map(|phase| Array::<4>::half_wavelength().steering_vector(phase));
     let derivatives: [[Complex64; 4]; 2] =
@@ -258,7 +258,7 @@ fn coherent_bound(phases: [f64; 2], count: usize) -> [f64; 2] {
     let dot = |a: &[Complex64; 4], b: &[Complex64; 4]| -> Complex64 {
         a.iter().zip(b).map(|(a, b)| a.conj() * b).sum()
     };
-    // Gram and Schmidt.
+    // Gram–Schmidt orthogonalisation.
     let second = dot(&steering[0], &steering[1]) / 4.0;
     let second: [Complex64; 4] = std::array::from_fn(|n| steering[1][n] - steering[0][n] * second);
     let power = dot(&second, &second).re;
@@ -277,7 +277,7 @@ fn coherent_bound(phases: [f64; 2], count: usize) -> [f64; 2] {
 }
 
 #[test]
-fn maximum_likelihood_tells_coherent_sources_apart_unaveraged() {
+fn maximum_likelihood_separates_coherent_sources_without_averaging() {
     let array = Array::<4>::half_wavelength();
     let phases = [-0.7, 0.9];
     let mut random = Random::new(18);
@@ -301,9 +301,9 @@ fn maximum_likelihood_tells_coherent_sources_apart_unaveraged() {
 }
 
 #[test]
-fn spectra_have_the_powers_of_the_sources() {
+fn spectra_have_the_power_of_the_sources() {
     let array = Array::<8>::half_wavelength();
-    // In unit noise: 10 and 5 dB.
+    // SNRs of 10 and 5 dB in unit noise.
     let sources = [(1.1, 10.0), (2.0, 5.0)];
     let covariance = Covariance::from_matrix(exact(&array, &sources), 100).unwrap();
     let angles = [1.1, 2.0, 1.55];
@@ -311,8 +311,8 @@ fn spectra_have_the_powers_of_the_sources() {
     let bartlett = at(PseudoSpectrum::Bartlett);
     let capon = at(PseudoSpectrum::Capon);
     for (k, (_, snr_db)) in sources.iter().enumerate() {
-        // The noise of eight antennas adds an eighth; Bartlett also hears the other source, by its
-        // side lobe of -13 dB at most.
+        // The noise adds 1/8 with eight antennas. Bartlett also receives the other source with a
+        // side lobe of at most -13 dB.
         let power = 10.0_f64.powf(0.1 * snr_db) + 1.0 / 8.0;
         assert!((capon[k] / power - 1.0).abs() < 0.02, "{capon:?}");
         assert!((0.9..1.3).contains(&(bartlett[k] / power)), "{bartlett:?}");
@@ -329,7 +329,7 @@ fn spectra_have_the_powers_of_the_sources() {
 }
 
 #[test]
-fn coherent_sources_are_called_so() {
+fn coherent_sources_are_reported_as_correlated() {
     let mut random = Random::new(16);
     let array = Array::<4>::half_wavelength();
     for method in &METHODS[1..] {
@@ -342,7 +342,7 @@ fn coherent_sources_are_called_so() {
 }
 
 #[test]
-fn sources_closer_than_the_noise_allows_are_not_separated() {
+fn sources_below_the_resolution_limit_are_not_separated() {
     let array = Array::<4>::half_wavelength();
     let mut random = Random::new(12);
     let resolved = (0..200)
@@ -357,7 +357,7 @@ fn sources_closer_than_the_noise_allows_are_not_separated() {
 }
 
 #[test]
-fn the_number_of_sources_is_found() {
+fn the_number_of_sources_is_estimated() {
     let array = Array::<5>::half_wavelength();
     let mut random = Random::new(13);
     let sources = [(0.9, 10.0), (1.5, 10.0), (2.2, 10.0)];

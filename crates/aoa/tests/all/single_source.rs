@@ -1,4 +1,4 @@
-//! One source: exactness, efficiency, and what the estimates say about themselves.
+//! One source: exactness, efficiency and reliability.
 
 use std::f64::consts::PI;
 
@@ -9,7 +9,7 @@ use aoa::{
 };
 
 #[test]
-fn maximum_likelihood_is_the_maximum_of_a_dense_grid() {
+fn maximum_likelihood_equals_the_maximum_of_a_dense_grid() {
     let array = Array::<4>::half_wavelength();
     let mut random = Random::new(1);
     for trial in 0..200 {
@@ -51,7 +51,7 @@ fn every_method_is_exact_on_the_exact_covariance() {
 }
 
 #[test]
-fn efficient_methods_reach_the_stochastic_bound() {
+fn efficient_methods_attain_the_stochastic_bound() {
     let array = Array::<4>::half_wavelength();
     for snr_db in [10.0, 20.0, 30.0] {
         let snr = 10.0_f64.powf(snr_db / 10.0);
@@ -91,8 +91,9 @@ fn efficient_methods_reach_the_stochastic_bound() {
 }
 
 #[test]
-fn constant_snapshots_are_as_good_as_random_ones() {
-    // Despread pilots: the same vector in every snapshot. Who removes the mean removes the signal.
+fn constant_snapshots_are_as_accurate_as_random_ones() {
+    // Despread pilots give an equal vector in every snapshot; removing the mean would remove the
+    // signal.
     let array = Array::<4>::half_wavelength();
     let mut random = Random::new(3);
     let amplitude = 10.0;
@@ -115,9 +116,9 @@ fn constant_snapshots_are_as_good_as_random_ones() {
 }
 
 #[test]
-fn musics_peak_is_the_highest_wherever_the_source_is() {
-    // A hundred points per antenna find no higher one, whatever the number of antennas: in noise alone
-    // too, but for a peak of the same height within what the coarse search allows.
+fn music_finds_the_highest_peak_for_all_directions() {
+    // A grid of a hundred points per antenna contains no higher value, also for noise only. Peaks
+    // whose heights differ by less than the resolution of the coarse search are exempt.
     fn check<const N: usize>(random: &mut Random) {
         let array = Array::<N>::half_wavelength();
         for trial in 0..60 {
@@ -135,7 +136,7 @@ fn musics_peak_is_the_highest_wherever_the_source_is() {
             angles.push(array.angle_from_phase(found));
             let music = PseudoSpectrum::Music { sources: 1 };
             let spectrum = music.at(&covariance, &array, &angles).unwrap();
-            // The share of a^H a that lies in the signal subspace.
+            // Fraction of a^H a in the signal subspace.
             let share = |height: &f64| 1.0 - height.recip();
             let highest = spectrum.iter().map(share).fold(0.0, f64::max);
             let here = spectrum.last().map_or(0.0, share);
@@ -157,7 +158,7 @@ fn musics_peak_is_the_highest_wherever_the_source_is() {
 }
 
 #[test]
-fn root_music_takes_the_root_nearest_to_the_circle() {
+fn root_music_selects_the_root_nearest_to_the_circle() {
     fn check<const N: usize>(random: &mut Random) {
         let array = Array::<N>::half_wavelength();
         let mut compared = 0;
@@ -167,7 +168,7 @@ fn root_music_takes_the_root_nearest_to_the_circle() {
             let snapshots = random.snapshots(&array, &[(angle, snr_db)], 20);
             let covariance = Covariance::from_snapshots(&snapshots).unwrap();
             let at_the_peak = estimate(Method::RootMusic, &covariance, &array).unwrap();
-            // With subarrays as large as the array, every root is sought.
+            // With subarrays as large as the array, all roots are computed.
             let of_all =
                 estimate_several_smoothed::<N, N>(Method::RootMusic, &covariance, &array, 1, false);
             if at_the_peak.is_resolved() {
@@ -190,7 +191,7 @@ fn root_music_takes_the_root_nearest_to_the_circle() {
 }
 
 #[test]
-fn what_is_found_in_an_item_does_not_depend_on_its_neighbours() {
+fn the_result_of_an_item_does_not_depend_on_its_neighbours() {
     let array = Array::<4>::half_wavelength();
     let mut random = Random::new(10);
     let mut samples = Vec::new();
@@ -217,7 +218,7 @@ fn what_is_found_in_an_item_does_not_depend_on_its_neighbours() {
 }
 
 #[test]
-fn a_batch_gives_what_single_calls_give() {
+fn a_batch_equals_single_calls() {
     fn check<const N: usize>() {
         let array = Array::<N>::new(0.45).unwrap();
         let mut random = Random::new(5);
@@ -275,7 +276,7 @@ fn a_batch_gives_what_single_calls_give() {
 }
 
 #[test]
-fn verdicts_say_when_not_to_believe() {
+fn verdicts_reject_unreliable_estimates() {
     let array = Array::<4>::half_wavelength();
     let mut random = Random::new(6);
     let of = |snapshots: &[[Complex64; 4]]| {
@@ -283,12 +284,12 @@ fn verdicts_say_when_not_to_believe() {
         estimate(Method::MaximumLikelihood, &covariance, &array).unwrap()
     };
     let trials = 2000;
-    // Noise alone has the look of a source now and then.
+    // Noise alone rarely resembles a source.
     let believed = (0..trials)
         .filter(|_| of(&random.snapshots(&array, &[], 20)).is_resolved())
         .count();
     assert!(believed < trials / 10, "{believed} of {trials}");
-    // In the threshold region, what is believed is right.
+    // In the threshold region, resolved estimates are correct.
     for snr_db in [-8.0, -5.0, -2.0, 0.0] {
         let (mut wrong, mut resolved) = (0, 0);
         for _ in 0..trials {
@@ -309,7 +310,7 @@ fn verdicts_say_when_not_to_believe() {
         .filter(|_| of(&random.snapshots(&array, &[(1.2, 5.0)], 20)).is_resolved())
         .count();
     assert!(good * 100 > trials * 99, "{good} of {trials}");
-    // Along the axis the other end fits as well.
+    // Near the axis, the opposite direction fits as well.
     let found = of(&random.snapshots(&array, &[(0.02, 20.0)], 20));
     assert_eq!(found.verdict, Verdict::Unresolved(Reason::NearEndFire));
     assert!(found.sigma_rad.is_finite());
@@ -317,7 +318,7 @@ fn verdicts_say_when_not_to_believe() {
         found.verdict.to_string(),
         "unresolved: too near to the array's axis"
     );
-    // A wavelength of spacing makes every direction ambiguous.
+    // With a spacing of one wavelength, every direction is ambiguous.
     let wide = Array::<4>::new(1.0).unwrap();
     let covariance = Covariance::from_matrix(exact(&wide, &[(1.2, 20.0)]), 20).unwrap();
     let found = estimate(Method::RootMusic, &covariance, &wide).unwrap();

@@ -1,4 +1,4 @@
-//! Channels whose noise differs, or that are dead.
+//! Channels with different noise variances, and dead channels.
 
 use crate::common::Random;
 use aoa::{
@@ -6,7 +6,7 @@ use aoa::{
     maximum_likelihood_pilots_unequal,
 };
 
-/// Despread blocks of a whole SSB, with noise of these variances.
+/// Returns despread blocks of a whole SSB with the given noise variances.
 fn despread<const N: usize>(
     random: &mut Random,
     array: &Array<N>,
@@ -28,7 +28,7 @@ fn despread<const N: usize>(
     })
 }
 
-/// RMSE over the bound and mean normalised square error over many directions.
+/// Returns the ratio of RMSE to bound and the mean normalised squared error over many directions.
 fn statistics<const N: usize>(array: &Array<N>, snr_db: f64, noise: &[f64; N]) -> (f64, f64) {
     let mut random = Random::new(40);
     let power = 830.0 * 10_f64.powf(snr_db / 10.0);
@@ -51,13 +51,14 @@ fn statistics<const N: usize>(array: &Array<N>, snr_db: f64, noise: &[f64; N]) -
 }
 
 #[test]
-fn one_bad_channel_costs_what_it_must_and_is_known() {
+fn one_bad_channel_has_the_predicted_loss() {
     fn check<const N: usize>() {
         let ideal = Array::<N>::half_wavelength();
         let uneven = std::array::from_fn(|n| Complex64::from_polar(1.0 + 0.3 * n as f64, n as f64));
         let uneven = ideal.with_calibration(Calibration::new(uneven).unwrap());
         for array in [ideal, uneven] {
-            // Of three antennas the middle one cannot be spared: a wavelength is ambiguous.
+            // The middle one of three antennas is required: a spacing of one wavelength is
+            // ambiguous.
             for bad in (0..N).filter(|bad| N > 3 || *bad != 1) {
                 for level in [10.0, 100.0, f64::INFINITY] {
                     for snr_db in [0.0, 15.0] {
@@ -81,7 +82,7 @@ fn one_bad_channel_costs_what_it_must_and_is_known() {
 }
 
 #[test]
-fn equal_noise_gives_what_it_gave() {
+fn equal_noise_equals_the_estimator_for_equal_noise() {
     let array = Array::<4>::half_wavelength();
     let mut random = Random::new(41);
     for _ in 0..200 {
@@ -96,7 +97,7 @@ fn equal_noise_gives_what_it_gave() {
 }
 
 #[test]
-fn what_a_thinned_array_cannot_tell_is_said() {
+fn ambiguities_of_a_thinned_array_are_reported() {
     let array = Array::<4>::half_wavelength();
     let mut random = Random::new(42);
     let dead = f64::INFINITY;

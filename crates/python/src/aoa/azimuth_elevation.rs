@@ -13,10 +13,10 @@ use super::calibration_of;
 use super::result::{Estimates, repr_of};
 use super::samples::{Samples, for_antennas, value_error};
 
-/// Azimuth and elevation, with what is known about each.
+/// Azimuth and elevation with their uncertainty.
 ///
-/// Every field is a number where one estimate was asked for. For a batch, or several sources, it is
-/// an array with one axis for the batch and, last, one for the sources, by ascending azimuth.
+/// Every field is a number for a single estimate. For a batch or several sources, a field is an
+/// array whose last axis is the sources by ascending azimuth, after an axis for the batch.
 #[pyclass(frozen, module = "access_av.aoa")]
 pub struct DirectionEstimate {
     estimates: Estimates<aoa::DirectionEstimate>,
@@ -47,57 +47,61 @@ impl DirectionEstimate {
         self.estimates.field(py, |it| it.direction.elevation_rad)
     }
 
-    /// Standard deviation of `azimuth_rad`: of noise and, where the model does not fit, of the misfit.
+    /// Standard deviation of `azimuth_rad` in rad due to noise and, if the model does not fit, the
+    /// misfit.
     #[getter]
     fn azimuth_sigma_rad<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates
             .field(py, aoa::DirectionEstimate::azimuth_sigma_rad)
     }
 
-    /// Standard deviation of `elevation_rad`; 0 where the elevation was given.
+    /// Standard deviation of `elevation_rad` in rad; 0 if the elevation is fixed.
     #[getter]
     fn elevation_sigma_rad<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates
             .field(py, aoa::DirectionEstimate::elevation_sigma_rad)
     }
 
-    /// Covariance of azimuth and elevation in rad^2: `(..., 2, 2)`.
+    /// Covariance of azimuth and elevation in rad^2, shape `(..., 2, 2)`.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         self.matrices(py, |it| it.covariance)
     }
 
-    /// What of `covariance` noise alone makes.
+    /// Covariance of azimuth and elevation due to noise only, in rad^2.
     #[getter]
     fn noise_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         self.matrices(py, |it| it.noise_covariance)
     }
 
-    /// Estimated SNR per antenna and snapshot.
+    /// Estimated SNR per antenna and snapshot in dB.
     #[getter]
     fn snr_db<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.field(py, |it| it.snr_db)
     }
 
-    /// Probability that plane waves in white noise fit as badly as this or worse; of all sources together.
+    /// Probability of a fit that is equal or worse if the samples are plane waves in white noise,
+    /// for all sources together.
     #[getter]
     fn p_value<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.field(py, |it| it.fit.p_value())
     }
 
-    /// Whether the estimate may be relied on: it is resolved, and the model fits.
+    /// Whether the estimate is reliable: it is resolved, and the model fits.
     #[getter]
     fn reliable<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.flag(py, aoa::DirectionEstimate::is_reliable)
     }
 
-    /// Why it may not be relied on: the verdict's reason, or what does not fit. Empty where it may.
+    /// Reason why the estimate is unreliable: from the verdict or the misfit. Empty for a reliable
+    /// estimate.
     #[getter]
     fn doubt<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.doubts(py, aoa::DirectionEstimate::doubt)
     }
 
-    /// Whether noise and geometry leave no doubt, if the model fits.
+    /// Whether the estimate is resolved with respect to noise and geometry, provided that the model
+    /// fits.
     #[getter]
     fn resolved<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.flag(py, aoa::DirectionEstimate::is_resolved)
@@ -121,21 +125,23 @@ impl DirectionEstimate {
     }
 }
 
-/// What an array receives from every direction, measured or computed: patterns and coupling included.
+/// Measured or computed response of an array as a function of direction, including element patterns
+/// and mutual coupling.
 ///
 /// Parameters
 /// ----------
 /// responses : array_like
-///     Complex, `(azimuths, antennas)` or `(elevations, azimuths, antennas)`: azimuth ``2 pi i / azimuths``,
-///     four or more. Interpolated by cubics, which is good where a response changes by less than a radian
-///     from one entry to the next.
+///     Complex responses, `(azimuths, antennas)` or `(elevations, azimuths, antennas)`, at the
+///     azimuths ``2 pi i / azimuths``; at least four azimuths. Cubic interpolation requires that a
+///     response changes by less than 1 rad between entries.
 /// elevations_rad : array_like
-///     Ascending in equal steps; beyond them the outermost holds.
+///     Elevations in ascending order with equal steps; outside, the outermost elevation applies.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Wrong shape, responses that are not finite or zero, elevations not as said.
+///     Wrong shape; responses that are zero or not finite; elevations that are not ascending in
+///     equal steps.
 ///
 /// Examples
 /// --------
@@ -153,7 +159,7 @@ impl DirectionEstimate {
 /// 90.0
 #[pyclass(frozen, module = "access_av.aoa")]
 pub struct MeasuredManifold {
-    /// Row-major (elevation, azimuth, antenna).
+    /// Responses, row-major (elevation, azimuth, antenna).
     responses: Vec<Complex64>,
     elevations_rad: Vec<f64>,
     antennas: usize,
@@ -192,7 +198,7 @@ impl MeasuredManifold {
             elevations_rad,
             antennas,
         };
-        // Whatever is wrong with it is told here, not at its first use.
+        // Report invalid values at creation instead of first use.
         for_antennas!(antennas, N => manifold.core::<N>(None).map(|_| ()))?;
         Ok(manifold)
     }
@@ -212,7 +218,7 @@ impl MeasuredManifold {
         self.responses.len() / (self.antennas * self.elevations_rad.len()).max(1)
     }
 
-    /// With these gains of the channels on top of it.
+    /// Returns the manifold with additional channel gains.
     fn core<const N: usize>(
         &self,
         gains: Option<&[Complex64; N]>,
@@ -232,7 +238,7 @@ impl MeasuredManifold {
     }
 }
 
-/// An array as the user describes it.
+/// Array description of the user.
 enum Shape<'py> {
     Places(Vec<[f64; 3]>),
     Measured(PyRef<'py, MeasuredManifold>),
@@ -279,36 +285,38 @@ impl<'py> Shape<'py> {
     }
 }
 
-/// Azimuth and elevation by maximum likelihood, with antennas in any places.
+/// Estimate azimuth and elevation by maximum likelihood with an array of any shape.
 ///
 /// Parameters
 /// ----------
 /// snapshots : ndarray
 ///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`.
 /// places_wavelengths : array_like or MeasuredManifold
-///     Where the antennas are, in wavelengths: `(antennas, 3)`, or `(antennas, 2)` in a plane. Or what they
-///     receive from every direction.
+///     Antenna positions in wavelengths, `(antennas, 3)`, or `(antennas, 2)` for a planar array; or
+///     the responses as a function of direction.
 /// elevations_rad : (float, float)
-///     Elevations to look at. A horizontal array does not tell above from below, and sees no elevation
-///     at the horizon; with twice the same elevation only the azimuth is estimated.
+///     Range of elevations in rad. A horizontal planar array cannot distinguish directions above
+///     and below, and cannot measure the elevation at the horizon. With equal values, only the
+///     azimuth is estimated.
 /// sources : int
-///     Number of sources, coherent ones too: up to half the antennas, and where only the azimuth is
-///     estimated up to all but one.
+///     Number of sources, which may be coherent. Maximum: half of the antennas, or antennas - 1 if
+///     only the azimuth is estimated.
 /// noise_variance : float, optional
-///     Of one source: variance of the noise per antenna and snapshot, where it is known; the snapshots
-///     may then be a single one, as the blocks of `maximum_likelihood_pilots`.
+///     Known noise variance per antenna and snapshot, for one source. A single snapshot then
+///     suffices, like the blocks of `maximum_likelihood_pilots`.
 /// calibration : array_like, optional
 ///     Complex gain of each channel.
 ///
 /// Returns
 /// -------
 /// DirectionEstimate
-///     Azimuths and elevations, standard deviations, SNRs, verdicts.
+///     Azimuths and elevations, standard deviations, SNRs and verdicts.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Wrong shape or type; NaN, infinite or only zero samples; elements in one place or in a row.
+///     Wrong shape or type; samples that are NaN, infinite or all zero; elements that coincide or
+///     are collinear.
 ///
 /// Examples
 /// --------
@@ -333,7 +341,7 @@ pub fn direction(
 ) -> PyResult<DirectionEstimate> {
     if noise_variance.is_some() && sources != 1 {
         return Err(PyValueError::new_err(
-            "noise_variance is for one source; leave it out for several",
+            "noise_variance requires one source; remove it for several sources",
         ));
     }
     let samples = Samples::of(snapshots)?;
@@ -351,16 +359,16 @@ pub fn direction(
     Ok(DirectionEstimate { estimates })
 }
 
-/// Spectrum over azimuth and elevation, with antennas in any places.
+/// Compute a spectrum over azimuth and elevation with an array of any shape.
 ///
 /// Parameters
 /// ----------
 /// snapshots, places_wavelengths, calibration
-///     As for `direction`.
+///     See `direction`.
 /// azimuths_rad, elevations_rad : array_like
-///     Where to look.
+///     Directions of the spectrum in rad.
 /// method, sources
-///     As for `spectrum`.
+///     See `spectrum`.
 ///
 /// Returns
 /// -------
@@ -407,24 +415,24 @@ pub fn direction_spectrum<'py>(
     PyArray1::from_vec(snapshots.py(), values.concat()).reshape(IxDyn(&shape))
 }
 
-/// Cramér–Rao bound of azimuth and elevation: standard deviations in rad that no unbiased estimator
-/// beats, for one Gaussian source of unknown power.
+/// Compute the Cramér–Rao bound of azimuth and elevation for one Gaussian source of unknown power:
+/// the minimum standard deviations of an unbiased estimator in rad.
 ///
 /// Parameters
 /// ----------
 /// places_wavelengths : array_like
-///     As for `direction`.
+///     See `direction`.
 /// azimuth_rad, elevation_rad : float
-///     The direction.
+///     Direction of the source in rad.
 /// snr_db : float
-///     SNR per antenna and snapshot.
+///     SNR per antenna and snapshot in dB.
 /// snapshots : int
-///     At least one.
+///     Number of snapshots, at least one.
 ///
 /// Returns
 /// -------
 /// (float, float)
-///     Of the azimuth and of the elevation; infinite where the array shows none.
+///     Standard deviations of azimuth and elevation in rad; infinite for an unobservable angle.
 ///
 /// Examples
 /// --------

@@ -1,4 +1,4 @@
-//! Cramér–Rao bounds for Python.
+//! Cramér–Rao bounds.
 
 use aoa::{Array, bound};
 use numpy::{AllowTypeChange, IxDyn, PyArray1, PyArrayLikeDyn, PyArrayMethods};
@@ -8,35 +8,35 @@ use pyo3::prelude::*;
 
 use super::samples::{for_antennas, value_error};
 
-/// Cramér–Rao bound: the standard deviation in rad that no unbiased estimator can beat.
+/// Compute the Cramér–Rao bound: the minimum standard deviation of an unbiased estimator in rad.
 ///
 /// Parameters
 /// ----------
 /// angle_rad : array_like
-///     Angle from the array's axis.
+///     Angle from the array's axis in rad.
 /// snr_db : array_like
-///     SNR per antenna and snapshot, broadcast against `angle_rad`.
+///     SNR per antenna and snapshot in dB, broadcast against `angle_rad`.
 /// antennas, snapshots : int
 ///     2 to 16 antennas, at least one snapshot.
 /// spacing_wavelengths : float
-///     Distance between neighbouring antennas in wavelengths.
+///     Distance between adjacent antennas in wavelengths.
 /// model : {'stochastic', 'deterministic', 'known'}
-///     What is known of the signal: that it is Gaussian; nothing; all but a complex gain.
+///     Knowledge of the waveform: Gaussian; deterministic and unknown; known up to a complex gain.
 /// quantity : {'angle', 'phase'}
-///     Bound the angle, or the electrical angle ``2 pi (d / lambda) cos(angle)``.
+///     Bounded quantity: the angle, or the electrical angle ``2 pi (d / lambda) cos(angle)``.
 /// joint : bool
-///     Take the last axis as sources that are present at the same time, uncorrelated, instead of
-///     one alone for each element.
+///     Whether the last axis contains simultaneous, uncorrelated sources. Otherwise, each
+///     element is a single source.
 ///
 /// Returns
 /// -------
 /// float or ndarray
-///     Of the shape that `angle_rad` and `snr_db` broadcast to.
+///     Standard deviations in rad, in the broadcast shape of `angle_rad` and `snr_db`.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Not finite values, coinciding sources, more sources than antennas - 1.
+///     Values that are not finite; coinciding sources; more sources than antennas - 1.
 ///
 /// Examples
 /// --------
@@ -135,7 +135,7 @@ struct Setting {
 }
 
 impl Setting {
-    /// Bounds of sources present together, appended to `sigmas`.
+    /// Appends the bounds of simultaneous sources to `sigmas`.
     fn bound<const N: usize>(
         &self,
         angles_rad: &[f64],

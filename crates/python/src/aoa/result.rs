@@ -1,20 +1,20 @@
-//! What an estimator returns to Python.
+//! Result of an estimator.
 
 use aoa::{Reason, Verdict};
 use numpy::{Element, IxDyn, PyArray1, PyArrayMethods};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 
-/// Estimates in the shape that was asked for.
+/// Estimates in the requested shape.
 pub(super) enum Estimates<T> {
     /// A single estimate.
     One(T),
-    /// One per item and source, in this shape.
+    /// Estimates per item and source in the given shape.
     Many { values: Vec<T>, shape: Vec<usize> },
 }
 
 impl<T> Estimates<T> {
-    /// One where one was asked for.
+    /// Creates a single estimate or an array, depending on the shape.
     pub(super) fn new(values: Vec<T>, shape: Vec<usize>) -> Self
     where
         T: Copy,
@@ -25,7 +25,7 @@ impl<T> Estimates<T> {
         }
     }
 
-    /// Each of them changed.
+    /// Applies a function to each estimate.
     pub(super) fn map(self, change: impl Fn(T) -> T) -> Self {
         match self {
             Self::One(value) => Self::One(change(value)),
@@ -43,7 +43,7 @@ impl<T> Estimates<T> {
         }
     }
 
-    /// The axes, and these after them.
+    /// Returns the shape with additional axes at the end.
     pub(super) fn shape(&self, axes: &[usize]) -> Vec<usize> {
         match self {
             Self::One(_) => axes.to_vec(),
@@ -65,7 +65,7 @@ impl<T> Estimates<T> {
         }
     }
 
-    /// A field of flags, a single one Python's own `bool`.
+    /// Returns a boolean field; a single value is a Python `bool`.
     pub(super) fn flag<'py>(
         &self,
         py: Python<'py>,
@@ -85,7 +85,7 @@ impl<T> Estimates<T> {
         self.named(py, verdict, Verdict::to_string)
     }
 
-    /// Reasons not to rely on an estimate, empty where there is none.
+    /// Returns the reasons for unreliable estimates; empty strings for reliable ones.
     pub(super) fn doubts<'py>(
         &self,
         py: Python<'py>,
@@ -113,12 +113,12 @@ impl<T> Estimates<T> {
     }
 }
 
-/// A reason in words; empty without.
+/// Returns the text of a reason; empty for `None`.
 pub fn name_of(doubt: Option<Reason>) -> String {
     doubt.map_or_else(String::new, |reason| reason.to_string())
 }
 
-/// `Name(field=value, ...)`.
+/// Returns `Name(field=value, ...)`.
 pub(super) fn repr_of(name: &str, fields: &[(&str, Bound<'_, PyAny>)]) -> PyResult<String> {
     let fields = fields
         .iter()
@@ -129,10 +129,10 @@ pub(super) fn repr_of(name: &str, fields: &[(&str, Bound<'_, PyAny>)]) -> PyResu
     ))
 }
 
-/// Angles of arrival, with what is known about each.
+/// Angles of arrival with their uncertainty.
 ///
-/// Every field is a number where one estimate was asked for. For a batch, or several sources, it is
-/// an array with one axis for the batch and, last, one for the sources, by ascending angle.
+/// Every field is a number for a single estimate. For a batch or several sources, a field is an
+/// array whose last axis is the sources by ascending angle, after an axis for the batch.
 #[pyclass(frozen, module = "access_av.aoa")]
 pub struct AngleEstimate {
     pub(super) estimates: Estimates<aoa::AngleEstimate>,
@@ -146,7 +146,8 @@ impl AngleEstimate {
         self.estimates.field(py, |estimate| estimate.angle_rad)
     }
 
-    /// Standard deviation of `angle_rad`: of noise and, where the model does not fit, of the misfit.
+    /// Standard deviation of `angle_rad` in rad due to noise and, if the model does not fit, the
+    /// misfit.
     #[getter]
     fn sigma_rad<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.field(py, |estimate| estimate.sigma_rad)
@@ -158,45 +159,49 @@ impl AngleEstimate {
         self.estimates.field(py, |estimate| estimate.phase_rad)
     }
 
-    /// Standard deviation of `phase_rad`; unlike `sigma_rad` it does not depend on the direction.
+    /// Standard deviation of `phase_rad` in rad, which does not depend on the direction, unlike
+    /// `sigma_rad`.
     #[getter]
     fn phase_sigma_rad<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates
             .field(py, |estimate| estimate.phase_sigma_rad)
     }
 
-    /// Standard deviation of `phase_rad` that noise alone makes.
+    /// Standard deviation of `phase_rad` due to noise only, in rad.
     #[getter]
     fn phase_noise_sigma_rad<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates
             .field(py, |estimate| estimate.phase_noise_sigma_rad)
     }
 
-    /// Estimated SNR per antenna and snapshot. Whatever the sources leave counts as noise.
+    /// Estimated SNR per antenna and snapshot in dB. The whole residual counts as noise.
     #[getter]
     fn snr_db<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.field(py, |estimate| estimate.snr_db)
     }
 
-    /// Probability that plane waves in white noise fit as badly as this or worse; of all sources together.
+    /// Probability of a fit that is equal or worse if the samples are plane waves in white noise,
+    /// for all sources together.
     #[getter]
     fn p_value<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.field(py, |estimate| estimate.fit.p_value())
     }
 
-    /// Whether the estimate may be relied on: it is resolved, and the model fits.
+    /// Whether the estimate is reliable: it is resolved, and the model fits.
     #[getter]
     fn reliable<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.flag(py, aoa::AngleEstimate::is_reliable)
     }
 
-    /// Why it may not be relied on: the verdict's reason, or what does not fit. Empty where it may.
+    /// Reason why the estimate is unreliable: from the verdict or the misfit. Empty for a reliable
+    /// estimate.
     #[getter]
     fn doubt<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.doubts(py, aoa::AngleEstimate::doubt)
     }
 
-    /// Whether noise and geometry leave no doubt, if the model fits.
+    /// Whether the estimate is resolved with respect to noise and geometry, provided that the model
+    /// fits.
     #[getter]
     fn resolved<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.flag(py, aoa::AngleEstimate::is_resolved)

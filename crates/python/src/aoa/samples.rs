@@ -1,4 +1,4 @@
-//! Samples as NumPy hands them over.
+//! Conversion of samples from NumPy arrays.
 
 use aoa::{Batch, Complex64, Covariance, Real};
 use num_complex::Complex;
@@ -8,7 +8,7 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Evaluates `$body`, a result, with the constant `$N` equal to `$antennas`.
+/// Evaluates `$body`, a `Result`, with the constant `$N` equal to `$antennas`.
 macro_rules! for_antennas {
     ($antennas:expr, $N:ident => $body:expr) => {
         for_antennas!($antennas, $N => $body; 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16)
@@ -28,7 +28,7 @@ pub(super) use for_antennas;
 /// Samples `(antennas, snapshots)` or `(batch, antennas, snapshots)`, row-major.
 pub(super) struct Samples<'py> {
     pub(super) array: SampleArray<'py>,
-    /// `None` if the caller gave a single item.
+    /// Number of items; `None` for a single item without a batch axis.
     pub(super) batch: Option<usize>,
     pub(super) antennas: usize,
     pub(super) snapshots: usize,
@@ -40,7 +40,7 @@ pub(super) enum SampleArray<'py> {
 }
 
 impl<'py> Samples<'py> {
-    /// Takes a view; only an array that is not row-major is copied.
+    /// Creates a view; an array that is not row-major is copied.
     pub(super) fn of(object: &Bound<'py, PyAny>) -> PyResult<Self> {
         if let Ok(array) = object.cast::<PyArrayDyn<Complex<f64>>>() {
             Self::view(array, SampleArray::Double)
@@ -85,7 +85,8 @@ impl<'py> Samples<'py> {
         })
     }
 
-    /// Whether all samples have one modulus, up to rounding: those of a receiver that gives phases only.
+    /// Whether all samples have equal modulus up to rounding, as from a receiver that outputs
+    /// phases only.
     pub(super) fn are_phases(&self) -> PyResult<bool> {
         Ok(match &self.array {
             SampleArray::Double(array) => have_one_modulus(slice(array)?, 1e-12),
@@ -93,12 +94,12 @@ impl<'py> Samples<'py> {
         })
     }
 
-    /// The batch axis, if any, and these axes.
+    /// Returns the batch axis, if any, followed by the given axes.
     pub(super) fn shape(&self, axes: impl IntoIterator<Item = usize>) -> Vec<usize> {
         self.batch.into_iter().chain(axes).collect()
     }
 
-    /// What becomes of each item, other threads of Python running meanwhile.
+    /// Applies a function to each item without the interpreter lock.
     pub(super) fn map<const N: usize, O: Send>(
         &self,
         py: Python<'_>,
@@ -132,7 +133,7 @@ impl<'py> Samples<'py> {
     }
 }
 
-/// The channels of one item.
+/// Channels of one item.
 #[derive(Clone, Copy)]
 pub(super) enum Item<'a, const N: usize> {
     Double([&'a [Complex<f64>]; N]),
@@ -147,7 +148,7 @@ impl<const N: usize> Item<'_, N> {
         }
     }
 
-    /// Snapshot after snapshot.
+    /// Returns the snapshots in order of time.
     pub(super) fn snapshots(&self) -> Vec<[Complex64; N]> {
         let wide = |it: Complex<f32>| Complex64::new(it.re.into(), it.im.into());
         let count = match self {
@@ -162,7 +163,7 @@ impl<const N: usize> Item<'_, N> {
     }
 }
 
-/// Whether the powers of all samples agree, relative.
+/// Whether the relative differences of all sample powers are within the tolerance.
 fn have_one_modulus<T: Real>(samples: &[Complex<T>], tolerance: f64) -> bool {
     let power = |sample: &Complex<T>| {
         let (re, im): (f64, f64) = (sample.re.into(), sample.im.into());
@@ -173,14 +174,14 @@ fn have_one_modulus<T: Real>(samples: &[Complex<T>], tolerance: f64) -> bool {
     samples.len() > 1 && samples.iter().all(agrees)
 }
 
-/// Row-major samples as a slice.
+/// Returns row-major samples as a slice.
 pub(super) fn slice<'a, T: Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> PyResult<&'a [T]> {
     array
         .as_slice()
         .map_err(|error| PyValueError::new_err(error.to_string()))
 }
 
-/// An error of the core as Python's.
+/// Converts an error of the core to a `ValueError`.
 pub(super) fn value_error(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }

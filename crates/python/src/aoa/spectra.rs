@@ -1,4 +1,4 @@
-//! Spectra over the direction.
+//! Spectra as a function of direction.
 
 use aoa::{Array, PseudoSpectrum};
 use numpy::{AllowTypeChange, IxDyn, PyArray1, PyArrayDyn, PyArrayLike1, PyArrayMethods};
@@ -8,21 +8,21 @@ use pyo3::prelude::*;
 use super::calibrated_array;
 use super::samples::{Samples, for_antennas, value_error};
 
-/// Spectrum over the angle of arrival, to look at or to search oneself.
+/// Compute a spectrum over the angle of arrival.
 ///
 /// Parameters
 /// ----------
 /// snapshots : ndarray
 ///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`.
 /// angles_rad : array_like
-///     Angles from the array's axis, 0 to pi.
+///     Angles from the array's axis in rad, 0 to pi.
 /// method : {'bartlett', 'capon', 'music'}
-///     Power of the beam, ``a^H R a / N^2``; power that nothing from elsewhere adds to,
-///     ``1 / (a^H R^-1 a)``; or ``N / (a^H En En^H a)``, no power, but infinite at exact sources.
+///     Beamformer power ``a^H R a / N^2``; power with minimum interference ``1 / (a^H R^-1 a)``; or
+///     ``N / (a^H En En^H a)``, which is not a power and is infinite at exact sources.
 /// sources : int
 ///     Number of sources for MUSIC, 1 to antennas - 1.
 /// spacing_wavelengths, forward_backward, calibration
-///     As for `music`.
+///     See `music`.
 ///
 /// Returns
 /// -------
@@ -71,7 +71,7 @@ pub fn spectrum<'py>(
     PyArray1::from_vec(py, values.concat()).reshape(IxDyn(&shape))
 }
 
-/// The spectrum of this name.
+/// Returns the kind of spectrum with this name.
 pub(super) fn kind_of(method: &str, sources: usize) -> PyResult<PseudoSpectrum> {
     match method {
         "bartlett" => Ok(PseudoSpectrum::Bartlett),

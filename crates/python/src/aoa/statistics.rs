@@ -1,4 +1,4 @@
-//! Covariances, the number of sources, calibration, bounds.
+//! Covariances, number of sources and calibration.
 
 use aoa::{Array, Calibration, Complex64, Criterion};
 use numpy::{
@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use super::samples::{Samples, for_antennas, value_error};
 
-/// Sample covariance of the antennas, mean not removed.
+/// Compute the sample covariance of the antennas without removal of the mean.
 ///
 /// Parameters
 /// ----------
@@ -43,7 +43,8 @@ pub fn covariance<'py>(
     PyArray1::from_vec(py, entries).reshape(IxDyn(&shape))
 }
 
-/// Forward–backward average of a covariance: ``(R + J conj(R) J) / 2``, ``J`` reversing the antennas.
+/// Compute the forward–backward average of a covariance: ``(R + J conj(R) J) / 2``, where ``J``
+/// reverses the antennas.
 ///
 /// Parameters
 /// ----------
@@ -76,7 +77,7 @@ pub fn forward_backward<'py>(
     }
     let entries: Vec<Complex64> = covariance.as_array().iter().copied().collect();
     let average = entries.chunks((rows * columns).max(1)).flat_map(|matrix| {
-        // J conj(R) J is R read backwards, conjugated.
+        // J conj(R) J is the conjugate of R in reverse order.
         matrix
             .iter()
             .zip(matrix.iter().rev())
@@ -92,20 +93,20 @@ fn not_square(shape: &[usize]) -> PyErr {
     ))
 }
 
-/// Number of sources, from the eigenvalues of the covariance (Wax and Kailath 1985).
+/// Estimate the number of sources from the eigenvalues of the covariance (Wax and Kailath 1985).
 ///
 /// Parameters
 /// ----------
 /// snapshots : ndarray
 ///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`.
 /// criterion : {'mdl', 'aic'}
-///     Minimum description length, or Akaike's criterion, which sees weaker sources and now and
-///     then one that is not there.
+///     Minimum description length, or Akaike's criterion, which detects weaker sources but may
+///     report a source that does not exist.
 ///
 /// Returns
 /// -------
 /// int or ndarray
-///     0 to antennas - 1.
+///     Number of sources, 0 to antennas - 1.
 ///
 /// Examples
 /// --------
@@ -143,16 +144,16 @@ pub fn estimate_sources<'py>(
     }
 }
 
-/// Channel gains from a burst of one source in a known direction.
+/// Estimate the channel gains from samples of one source in a known direction.
 ///
 /// Parameters
 /// ----------
 /// snapshots : ndarray
-///     Complex samples of the burst, `(antennas, snapshots)`.
+///     Complex samples of the source, `(antennas, snapshots)`.
 /// angle_rad : float
-///     Its angle from the array's axis, 0 to pi.
+///     Angle of the source from the array's axis in rad, 0 to pi.
 /// spacing_wavelengths : float
-///     Distance between neighbouring antennas in wavelengths.
+///     Distance between adjacent antennas in wavelengths.
 ///
 /// Returns
 /// -------

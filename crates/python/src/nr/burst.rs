@@ -1,4 +1,4 @@
-//! SSB bursts as a cell sends them.
+//! Generation of SSB bursts.
 
 use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci};
 use num_complex::Complex32;
@@ -6,42 +6,43 @@ use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Build one burst set: what a cell sends in a half frame of 5 ms, SSB centred at 0 Hz.
+/// Generate one burst set of a cell: a half frame of 5 ms with the SSB centred at 0 Hz.
 ///
 /// Parameters
 /// ----------
 /// pci : int
 ///     Physical cell identity, 0 to 1007.
 /// ssb_indices : sequence of int
-///     The SSBs that are sent.
+///     Indices of the transmitted SSBs.
 /// gains : sequence of complex, optional
-///     Amplitude of each of them; 1 without.
+///     Amplitude of each SSB [default: 1].
 /// case : str
-///     Where they lie in time (TS 38.213, 4.1): `A` (15 kHz), `B` or `C` (30 kHz), `D` (120 kHz),
+///     Time pattern of the SSBs (TS 38.213, 4.1): `A` (15 kHz), `B` or `C` (30 kHz), `D` (120 kHz),
 ///     `E` (240 kHz).
 /// lmax : int
-///     SSB indices that the cell has, 4 or 8; 64 for the cases `D` and `E`.
+///     Number of SSB indices of the cell, 4 or 8; 64 for the cases `D` and `E`.
 /// sfn : int
 ///     System frame number, 0 to 1023.
 /// half_frame : bool
-///     Second half of the frame.
+///     Whether the burst is in the second half of the frame.
 /// mib_bits : str, optional
-///     24 bits of the master information block; the frame number in them is `sfn`'s.
+///     24 bits of the master information block; the frame number is replaced by `sfn`.
 /// ssb_freq_hz : float, optional
-///     Absolute frequency of the SSB's centre, for the phase of each symbol (TS 38.211, 5.4);
-///     without it there is no such phase.
+///     Absolute centre frequency of the SSB for the phase of each symbol (TS 38.211, 5.4) [default:
+///     no such phase].
 /// sample_rate_hz : float
-///     256, 512, 1024, ... times the subcarrier spacing.
+///     Sample rate: 256, 512, 1024, ... times the subcarrier spacing.
 ///
 /// Returns
 /// -------
 /// ndarray
-///     complex64, 5 ms. A resource element of amplitude one has power 1 / FFT size squared.
+///     complex64 samples of 5 ms. A resource element of amplitude one has the power 1 / FFT size
+///     squared.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     A value out of its range; the message says which is allowed.
+///     A value outside its range; the message contains the allowed values.
 #[pyfunction]
 #[pyo3(signature = (pci, *, ssb_indices = vec![0], gains = None, case = "C", lmax = 8, sfn = 0, half_frame = false, mib_bits = None, ssb_freq_hz = None, sample_rate_hz = 7.68e6))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // Python's keywords

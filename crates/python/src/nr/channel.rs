@@ -1,4 +1,4 @@
-//! Channels of an SSB as an array.
+//! Conversion of the channel of an SSB to arrays.
 
 use nr_ssb::ChannelCovariance;
 use nr_ssb::grid::SUBCARRIERS;
@@ -6,10 +6,10 @@ use num_complex::{Complex32, Complex64};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
-/// Per antenna the channel on the subcarriers; in Python complex64 of shape `(antennas, 240)`.
+/// Channel on the subcarriers per antenna; in Python complex64 of shape `(antennas, 240)`.
 pub struct Channel(pub Vec<[Complex32; SUBCARRIERS]>);
 
-/// How the channel's noise hangs together; in Python complex64 of shape `(240, 240)`.
+/// Covariance of the channel's noise; in Python complex64 of shape `(240, 240)`.
 pub struct Covariance(pub Option<ChannelCovariance>);
 
 impl<'py> IntoPyObject<'py> for &Covariance {
@@ -24,7 +24,7 @@ impl<'py> IntoPyObject<'py> for &Covariance {
     }
 }
 
-/// Per symbol the antennas' responses; in Python complex128 of shape `(antennas, symbols)`.
+/// Responses of the antennas per symbol; in Python complex128 of shape `(antennas, symbols)`.
 pub struct Blocks(pub Vec<Vec<Complex64>>);
 
 impl<'py> IntoPyObject<'py> for &Blocks {

@@ -1,4 +1,4 @@
-//! Search and tracking of a stream.
+//! Search and tracking of SSBs in a stream of samples.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -10,38 +10,39 @@ use recording::scan::{ArrayView, array_view};
 use super::{Cell, array_setup, complex_samples, rows, scan_error, subcarrier_spacing};
 use crate::recording::RecordingError;
 
-/// Receive the SSBs of one frequency from a stream of samples, in blocks of any length.
+/// Receive the SSBs of one frequency in a stream of samples, in blocks of any length.
 ///
-/// Cells are searched for until one is found, and then once in `search_every_s`; between searches
-/// their beams are tracked, which takes a small part of a search's time. Other threads run meanwhile;
-/// one receiver serves one of them at a time, the others wait.
+/// Cells are searched continuously until one is found, and then once per `search_every_s`. Between
+/// searches, the found beams are tracked, which takes a small part of a search's time. Other
+/// threads run meanwhile. A receiver serves one thread at a time; others wait.
 ///
 /// Parameters
 /// ----------
 /// sample_rate_hz : float
-///     Any usual rate that holds an SSB: 3.84 Msps at least.
+///     Any common sample rate of at least 3.84 Msps.
 /// centre_frequency_hz : float
-///     Frequency that stands at 0 Hz in the samples.
+///     Absolute frequency at 0 Hz in the samples.
 /// ssb_freq_hz : float
-///     Absolute frequency of the SSB's centre.
+///     Absolute centre frequency of the SSB in Hz.
 /// scs_khz : int
 ///     Subcarrier spacing, 15, 30, 120 or 240.
 /// antennas : int
 ///     Number of antennas, 1 to 16.
 /// period_s : float
-///     From one burst set to the next, 0.005 to 0.16.
+///     Period of the burst sets in seconds, 0.005 to 0.16.
 /// search_every_s : float
-///     How often is searched for cells and beams that are not yet tracked.
+///     Interval in seconds between searches for new cells and beams.
 /// cfo_ppm : float, optional
-///     Largest error of receiver's and cell's oscillators together, 20 without. Every frequency offset within it is
-///     searched until a cell is found: that of 20 ppm within a fifth of a second at 20 ms.
+///     Maximum frequency error of receiver and cell together [default: 20]. All offsets within it
+///     are searched until a cell is found; with 20 ppm this takes less than 0.2 s at a period of 20
+///     ms.
 /// spacing_wavelengths, places_wavelengths, calibration
-///     The array, as for `scan`, for the angles of two antennas and more.
+///     Array for the angles with at least two antennas; see `scan`.
 ///
 /// Raises
 /// ------
 /// RecordingError
-///     A rate, band, number of antennas, array or setting that is not possible; a `cfo_ppm` beyond the 15
+///     An unsupported rate, band, number of antennas, array or setting; a `cfo_ppm` above the 15
 ///     subcarriers that can be searched.
 ///
 /// Examples
@@ -103,7 +104,7 @@ impl Receiver {
         })
     }
 
-    /// Take the next samples.
+    /// Process the next samples.
     ///
     /// Parameters
     /// ----------
@@ -113,13 +114,13 @@ impl Receiver {
     /// Returns
     /// -------
     /// list of Cell
-    ///     The SSBs that are complete with them; what is searched is held back by 6 ms. `sample_start`
-    ///     counts from the first sample of the stream.
+    ///     SSBs that are complete with these samples. The search delays SSBs by 6 ms.
+    ///     `sample_start` counts from the first sample of the stream.
     ///
     /// Raises
     /// ------
     /// RecordingError
-    ///     Another number of antennas, samples that are not finite.
+    ///     A different number of antennas; samples that are not finite.
     fn push(&self, py: Python<'_>, samples: &Bound<'_, PyAny>) -> PyResult<Vec<Py<Cell>>> {
         let samples = complex_samples(samples)?;
         let antennas = rows(&samples)?;
@@ -129,19 +130,20 @@ impl Receiver {
         })
     }
 
-    /// End the stream: the SSBs that were held back. All cells are forgotten.
+    /// End the stream and return the delayed SSBs. All cells are removed.
     ///
     /// Returns
     /// -------
     /// list of Cell
-    ///     As of `push`.
+    ///     Delayed SSBs; see `push`.
     fn finish(&self, py: Python<'_>) -> PyResult<Vec<Py<Cell>>> {
         self.hear(py, |receiver, take| {
             receiver.finish(take).map_err(receiver_error)
         })
     }
 
-    /// DC offset and tones that are removed now, the strongest first: pairs of frequency in Hz and power in dBFS.
+    /// DC offset and tones that are currently removed, strongest first: pairs of frequency in Hz
+    /// and power in dBFS.
     #[getter]
     fn tones(&self, py: Python<'_>) -> Vec<(f64, f64)> {
         py.detach(|| {
@@ -169,7 +171,7 @@ impl Receiver {
 }
 
 impl Receiver {
-    /// What a call on the receiver hears.
+    /// Calls the receiver and returns the received SSBs.
     fn hear(
         &self,
         py: Python<'_>,

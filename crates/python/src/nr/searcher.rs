@@ -1,4 +1,4 @@
-//! A search whose plans and buffers are kept.
+//! Search with persistent FFT plans and buffers.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -8,35 +8,34 @@ use recording::scan::{SsbSearch, SsbSearchConfig};
 
 use super::{Cell, array_setup, complex_samples, rows, scan_error, subcarrier_spacing};
 
-/// Search for the SSBs of one frequency, prepared once and used for one recording after another.
+/// Search for the SSBs of one frequency, prepared once for many recordings.
 ///
-/// Transforms and buffers are kept between calls, and complex64 samples that lie in memory row by row
-/// are searched where they are. Other threads run meanwhile; one searcher serves one of them at a
-/// time, the others wait.
+/// FFT plans and buffers are kept between calls, and row-major complex64 samples are not copied.
+/// Other threads run meanwhile. A searcher serves one thread at a time; others wait.
 ///
 /// Parameters
 /// ----------
 /// sample_rate_hz : float
-///     Any usual rate that holds an SSB: 3.84 Msps at least.
+///     Any common sample rate of at least 3.84 Msps.
 /// centre_frequency_hz : float
-///     Frequency that stands at 0 Hz in the samples.
+///     Absolute frequency at 0 Hz in the samples.
 /// ssb_freq_hz : float
-///     Absolute frequency of the SSB's centre.
+///     Absolute centre frequency of the SSB in Hz.
 /// scs_khz : int
 ///     Subcarrier spacing, 15, 30, 120 or 240.
 /// antennas : int
-///     Number of antennas, 1 to 16; angles come with 2 and more.
+///     Number of antennas, 1 to 16; angles require at least 2.
 /// spacing_wavelengths : float
-///     Distance between neighbouring antennas.
+///     Distance between adjacent antennas in wavelengths.
 /// places_wavelengths : list of (float, float), optional
-///     Where the antennas are in a horizontal plane, in wavelengths, if they are not in a row.
+///     Antenna positions in a horizontal plane in wavelengths, for an array that is not linear.
 /// calibration : array_like, optional
-///     Complex gain of each channel, by which it is divided.
+///     Complex gain of each channel, by which its samples are divided.
 ///
 /// Raises
 /// ------
 /// RecordingError
-///     A rate, band or array that is not possible.
+///     An unsupported rate, band or array.
 ///
 /// Examples
 /// --------
@@ -98,7 +97,7 @@ impl Searcher {
     /// Raises
     /// ------
     /// RecordingError
-    ///     Another number of antennas, less than one SSB, samples that are not finite.
+    ///     A different number of antennas; less than one SSB; samples that are not finite.
     fn search(&self, py: Python<'_>, samples: &Bound<'_, PyAny>) -> PyResult<Vec<Py<Cell>>> {
         let samples = complex_samples(samples)?;
         let antennas = rows(&samples)?;
@@ -111,7 +110,8 @@ impl Searcher {
         found.into_iter().map(|cell| Py::new(py, cell)).collect()
     }
 
-    /// DC offset and tones that were removed in the last search: pairs of frequency in Hz and power in dBFS.
+    /// DC offset and tones that were removed in the last search, strongest first: pairs of
+    /// frequency in Hz and power in dBFS.
     #[getter]
     fn tones(&self, py: Python<'_>) -> Vec<(f64, f64)> {
         py.detach(|| {

@@ -1,4 +1,4 @@
-//! Simulated snapshots and a naive oracle.
+//! Simulated snapshots and a brute-force reference.
 
 use std::f64::consts::PI;
 
@@ -32,7 +32,7 @@ impl Random {
         self.0.random_range(low..high)
     }
 
-    /// Snapshots of Gaussian sources at these angles in unit noise.
+    /// Returns snapshots of Gaussian sources at the given angles in unit noise.
     pub fn snapshots<const N: usize>(
         &mut self,
         array: &Array<N>,
@@ -55,7 +55,7 @@ impl Random {
     }
 }
 
-/// The exact covariance of uncorrelated sources in unit noise.
+/// Returns the exact covariance of uncorrelated sources in unit noise.
 pub fn exact<const N: usize>(array: &Array<N>, sources: &[(f64, f64)]) -> [[Complex64; N]; N] {
     let mut matrix = [[Complex64::ZERO; N]; N];
     for i in 0..N {
@@ -70,7 +70,7 @@ pub fn exact<const N: usize>(array: &Array<N>, sources: &[(f64, f64)]) -> [[Comp
     matrix
 }
 
-/// Where `a^H M a` is largest on a dense grid of electrical angles: slow and obviously right.
+/// Returns the maximum of `a^H M a` on a dense grid of electrical angles.
 pub fn oracle<const N: usize>(array: &Array<N>, matrix: &[[Complex64; N]; N]) -> f64 {
     let mut best = (f64::NEG_INFINITY, 0.0);
     for g in 0..20_000 {
