@@ -6,6 +6,8 @@ are first used, so that importing the package takes no time.
 =====================  ============================================================================
 ``study_plant``        is a plant's localization good enough, what mends it, what does it cost
 ``simulate``           drive a scenario many times
+``sweep``              every combination of some values, in the same environments
+``difference``         paired comparison of two results
 ``bound``              how well any localizer can do in it
 ``plan``               where to put further radio heads
 ``synthesize``         record a scenario's drive as somebody on the vehicle would have
@@ -73,14 +75,17 @@ if TYPE_CHECKING:
     from access_av.radio import channel, ray_paths
     from access_av.radio.placement import Plan, plan
     from access_av.run import service_levels
+    from access_av.run.difference import Difference, difference
     from access_av.run.error_bound import ErrorBound, bound
     from access_av.run.simulation import Simulation, simulate
+    from access_av.run.sweep import Sweep, sweep
     from access_av.signal import aoa, nr, recorded_angles
     from access_av.study.answer import Study, study_plant
     from access_av.tables import columns
 
 __all__ = [
     "AngleLog",
+    "Difference",
     "Drive",
     "ErrorBound",
     "Evaluation",
@@ -99,6 +104,7 @@ __all__ = [
     "Site",
     "Study",
     "Survey",
+    "Sweep",
     "SynthesizedDrive",
     "Vehicle",
     "__version__",
@@ -108,6 +114,7 @@ __all__ = [
     "channel",
     "columns",
     "cost",
+    "difference",
     "drives",
     "estimate_angles",
     "evaluate",
@@ -123,6 +130,7 @@ __all__ = [
     "statistics",
     "study_plant",
     "survey",
+    "sweep",
     "synthesize",
 ]
 
@@ -133,12 +141,14 @@ if not TYPE_CHECKING:
             "access_av.drives.angle_log": ["AngleLog", "estimate_angles"],
             "access_av.designs.operating_points": ["Query", "explore"],
             "access_av.drives.recorded": ["Drive", "SynthesizedDrive", "locate", "synthesize"],
+            "access_av.run.difference": ["Difference", "difference"],
             "access_av.run.error_bound": ["ErrorBound", "bound"],
             "access_av.paper.evaluation": ["Evaluation", "evaluate"],
             "access_av.radio.placement": ["Plan", "plan"],
             "access_av.device.platform": ["Platform"],
             "access_av.drives.self_survey": ["Survey", "survey"],
             "access_av.run.simulation": ["Simulation", "simulate"],
+            "access_av.run.sweep": ["Sweep", "sweep"],
             "access_av.study.answer": ["Study", "study_plant"],
         },
         modules={

@@ -26,6 +26,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.errors import InputError
+from access_av.tables.result import Result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -98,8 +99,8 @@ class Parameter:
         return abs(self.found - self.before) < 3.0 * self.std_before
 
 
-@dataclass(frozen=True)
-class Survey:
+@dataclass(frozen=True, eq=False)
+class Survey(Result):
     """What a survey found.
 
     Attributes

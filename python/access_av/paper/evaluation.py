@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +29,7 @@ from access_av.paper.outcome import Drives, Outcome
 from access_av.paper.readings import SHIPPED, Reading, load
 from access_av.paper.statements import METHODS, paper_numbers
 from access_av.statistics.percentiles import as_columns, names
+from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -91,7 +92,7 @@ def cases(platform: Platform) -> list[Case]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Evaluation:
+class Evaluation(Result):
     """All results of one reading.
 
     Attributes
@@ -108,6 +109,8 @@ class Evaluation:
         Whether the energies per execution were fitted to the paper anew, or are the platform's.
     freedoms
         What they were fitted by, of :data:`access_av.paper.energy_fit.FREEDOMS`.
+    duration_s, origin
+        Computing time; version and commit. Not compared.
     """
 
     reading: Reading
@@ -119,8 +122,9 @@ class Evaluation:
     runs: int
     seed: int
     refitted: bool
-    duration_s: float = 0.0
+    duration_s: float = field(default=0.0, compare=False)
     freedoms: tuple[str, ...] = energy_fit.SHIPPED
+    origin: Origin = field(default_factory=origin, compare=False)
 
     def __repr__(self) -> str:
         return f"Evaluation({self.reading.name}, {self.runs} runs, {self.points.height} points)"
@@ -129,6 +133,17 @@ class Evaluation:
     def scenario(self) -> Scenario:
         """The reading's scenario."""
         return self.reading.scenario
+
+    def plot(self) -> Any:
+        """Draws RMS error against energy of every operating point with a mode, with Altair."""
+        from access_av.plots.of_results import scatter
+
+        kind = pl.when("adaptive").then(pl.lit("adaptive ")).otherwise(pl.lit("fixed "))
+        rows = self.points.filter(pl.col("energy_j").is_not_null()).with_columns(
+            line=kind + pl.col("method")
+        )
+        titles = ("energy of a trip / J", "RMS error / m")
+        return scatter(rows, "energy_j", "rms_error_m", "line", titles=titles)
 
     @property
     def longest_gap_s(self) -> float:

@@ -18,6 +18,7 @@ from access_av.errors import InputError
 from access_av.run import service_levels
 from access_av.run.error_bound import along_route
 from access_av.tables import validation
+from access_av.tables.result import Result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -33,8 +34,8 @@ BESIDE_M = (15.0, 40.0)
 DIRECTIONS = 8
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, eq=False)
+class Plan(Result):
     """Which masts to equip.
 
     Attributes

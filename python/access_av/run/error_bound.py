@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ import polars as pl
 from access_av import _core
 from access_av.errors import InputError
 from access_av.run import service_levels
+from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,8 +32,8 @@ MOST_MAP_CELLS = 40_000
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
 
-@dataclass(frozen=True)
-class ErrorBound:
+@dataclass(frozen=True, eq=False)
+class ErrorBound(Result):
     """The posterior Cramér–Rao bound of a scenario.
 
     Attributes
@@ -56,6 +57,19 @@ class ErrorBound:
     map_step_m: float
     map_angles: float
     map_heading_std_rad: float
+    origin: Origin = field(default_factory=origin, compare=False)
+
+    def __repr__(self) -> str:
+        median_m = float(self.route.select(pl.col("bound_m").median()).item())
+        return f"ErrorBound({self.scenario.name}, median {median_m:.3f} m)"
+
+    def plot(self) -> Any:
+        """Draws the bound and its parts against the distance along the road, with Altair."""
+        from access_av.plots.of_results import lines
+
+        columns = ("bound_m", "along_std_m", "across_std_m")
+        titles = ("distance along the road / m", "bound of the RMS error / m")
+        return lines(self.route, "along_m", columns, titles=titles)
 
     def summary(self) -> dict[str, Any]:
         """The numbers to judge a placement of radio heads by, without the tables."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from access_av.statistics.consistency import Consistency, horizontal_error_m
 from access_av.statistics.integrity import Integrity
 from access_av.statistics.percentiles import Percentile, column, percentiles
 from access_av.tables.numbers import number
+from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -33,7 +34,7 @@ SETTLED_STEPS = 500
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Simulation:
+class Simulation(Result):
     """What many drives found. :mod:`access_av.columns` says what each table's columns are.
 
     Attributes
@@ -57,6 +58,8 @@ class Simulation:
         not known. ``None`` unless kept.
     scenario, seed
         What was driven, and by which seed: the same two give the same again.
+    origin
+        Version and commit that simulated it. Not compared.
     """
 
     steps: pl.DataFrame
@@ -69,6 +72,7 @@ class Simulation:
     levels_m: NDArray[np.float32] | None = None
     scenario: Scenario | None = None
     seed: int | None = None
+    origin: Origin = field(default_factory=origin, compare=False)
 
     def __repr__(self) -> str:
         name = "" if self.scenario is None else f"{self.scenario.name}, "
@@ -127,11 +131,11 @@ class Simulation:
 
     @property
     def percentiles(self) -> list[Percentile] | None:
-        """Percentiles of the horizontal error with intervals; ``None`` without trajectories.
+        """Percentiles of the horizontal error with intervals; ``None`` without single runs.
 
         Over all positions that are told, by :func:`access_av.statistics.percentiles`.
         """
-        errors_m = self._horizontal_m()
+        errors_m = self.horizontal_errors_m
         if errors_m is None or np.isnan(errors_m).all():
             return None
         driven_s = len(errors_m) * float(self.steps["time_s"][-1])
@@ -140,14 +144,35 @@ class Simulation:
 
     @property
     def mean_error_m(self) -> float | None:
-        """Mean horizontal error over all positions that are told; ``None`` without trajectories."""
-        errors_m = self._horizontal_m()
+        """Mean horizontal error over all known positions; ``None`` without single runs."""
+        errors_m = self.horizontal_errors_m
         if errors_m is None or np.isnan(errors_m).all():
             return None
         return float(np.nanmean(errors_m))
 
-    def _horizontal_m(self) -> NDArray[np.float64] | None:
-        """Horizontal errors of shape (runs, SSBs); NaN as long as the place is searched for."""
+    @property
+    def horizontal_errors_m(self) -> NDArray[np.float64] | None:
+        """Horizontal errors of shape (runs, times); NaN until the first pose is known.
+
+        At every SSB with trajectories, at every ``errors_every``-th one with errors; ``None``
+        without both.
+        """
+        if self.trajectories is None:
+            if self.errors_m is None:
+                return None
+            errors_m = self.errors_m.astype(np.float64)
+            return np.asarray(np.hypot(errors_m[..., 0], errors_m[..., 1]))
+        return self._at_every_ssb()
+
+    def plot(self) -> Any:
+        """Draws the RMS error and percentiles of all runs against time, with Altair."""
+        from access_av.plots.of_results import lines
+
+        columns = ("rms_error_m", "p50_error_m", "p90_error_m", "p99_error_m")
+        titles = ("time / s", "horizontal error / m")
+        return lines(self.steps, "time_s", columns, titles=titles)
+
+    def _at_every_ssb(self) -> NDArray[np.float64] | None:
         if self.trajectories is None:
             return None
         error_m = pl.when(~pl.col("searching")).then(horizontal_error_m())
@@ -175,7 +200,7 @@ class Simulation:
     @property
     def service_levels(self) -> list[service_levels.Verdict] | None:
         """The 3GPP service levels that the drives reach; ``None`` without trajectories."""
-        errors_m = self._horizontal_m()
+        errors_m = self._at_every_ssb()
         if errors_m is None:
             return None
         step_s = float(self.steps["time_s"][-1]) / max(1, self.steps.height - 1)

@@ -22,6 +22,7 @@ from access_av.statistics.consistency import (
 from access_av.statistics.distributions import beta_quantile, chi_squared_quantile
 from access_av.statistics.extremes import ObtainedRisk, exceedance
 from access_av.statistics.integrity import Integrity, stanford_counts
+from access_av.statistics.paired import paired_difference
 from access_av.statistics.percentiles import Percentile, percentiles
 from access_av.statistics.proportions import clopper_pearson, wilson
 
@@ -40,6 +41,7 @@ __all__ = [
     "mean_nees",
     "nees",
     "nees_band",
+    "paired_difference",
     "percentiles",
     "stanford_counts",
     "wilson",

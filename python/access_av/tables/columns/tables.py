@@ -278,6 +278,23 @@ TABLES: Mapping[str, Table] = {
             ),
         ),
         Table(
+            "sweep",
+            "A combination of values of a sweep",
+            "`access_av.sweep(…).table`",
+            (
+                "variant", "runs", "rms_error_m", *_PERCENTILES, "delta_m", "delta_low_m",
+                "delta_high_m", "executions", "listened", "energy_j",
+            ),
+            {
+                **_PERCENTILES_NULL,
+                **dict.fromkeys(
+                    ("delta_m", "delta_low_m", "delta_high_m"),
+                    "one run has no interval; or the place is not known for so much of the time",
+                ),
+                "energy_j": _NO_FIGURE,
+            },
+        ),
+        Table(
             "operating_points",
             "An operating point of a reading of the paper",
             "`operating_points.parquet` of `access-av evaluate`; `access-av explore --json`; all "

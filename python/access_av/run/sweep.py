@@ -1,0 +1,201 @@
+"""Sweeps: a scenario with every combination of some values, in the same environments."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import polars as pl
+
+from access_av._core import Scenario
+from access_av.errors import InputError
+from access_av.run.difference import Difference, difference
+from access_av.run.simulation import Simulation, simulate
+from access_av.statistics.percentiles import as_columns
+from access_av.tables.result import Origin, Result, origin
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+# Keys of a sweep whose values are plug-ins instead of settings.
+PLUG_INS = ("estimator", "policy", "localizer")
+# Errors are kept every so many SSBs: at 20 ms, a vehicle moves 0.8 m meanwhile.
+ERRORS_EVERY = 10
+MAX_COMBINATIONS = 1000
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sweep(Result):
+    """Results of a sweep.
+
+    Attributes
+    ----------
+    table
+        One row per combination; columns ``sweep`` of :mod:`access_av.columns`. Differences are to
+        the first combination, in pairs of runs.
+    values
+        Swept values of each combination, by key. A plug-in has its name.
+    results
+        The simulation of each combination.
+    scenario, seed, runs
+        What was swept, the seed of all combinations, and the number of runs of each.
+    percent
+        Percentile of ``delta_m`` and of :meth:`plot`.
+    origin
+        Version and commit.
+    """
+
+    table: pl.DataFrame
+    values: list[dict[str, Any]]
+    results: list[Simulation]
+    scenario: Scenario
+    seed: int
+    runs: int
+    percent: float
+    origin: Origin = field(default_factory=origin, compare=False)
+
+    def __repr__(self) -> str:
+        keys = ", ".join(self.values[0])
+        return f"Sweep({self.scenario.name}, {len(self.values)} combinations of {keys})"
+
+    def _repr_html_(self) -> str:
+        return str(self.table._repr_html_())
+
+    def difference(self, index: int, baseline: int = 0, *, percent: float = 99.0) -> Difference:
+        """Compares two combinations run by run.
+
+        Parameters
+        ----------
+        index, baseline
+            Rows of :attr:`table`.
+        percent
+            Percentile of the horizontal error.
+        """
+        return difference(self.results[index], self.results[baseline], percent=percent)
+
+    def plot(self) -> Any:
+        """Draws the error percentile of each combination with its 95 % interval, with Altair."""
+        from access_av.plots.of_results import intervals
+
+        name = f"p{self.percent:g}".replace(".", "_")
+        columns = (f"{name}_error_m", f"{name}_error_low_m", f"{name}_error_high_m")
+        title = f"{self.percent:g} % of horizontal errors within / m"
+        return intervals(self.table, "variant", columns, title=title)
+
+
+def sweep(
+    scenario: Scenario | str | Path,
+    vary: Mapping[str, Sequence[Any]],
+    *,
+    runs: int = 10,
+    seed: int = 1,
+    percent: float = 99.0,
+    threads: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Sweep:
+    """Simulates every combination of some values, in the same environments.
+
+    Parameters
+    ----------
+    scenario
+        A scenario, or the name or path of one.
+    vary
+        Values by key of the scenario, for example ``{"site.rician_k_db": [0.0, 10.0]}``. The keys
+        ``estimator``, ``policy`` and ``localizer`` take plug-ins as ``simulate`` does; ``None`` is
+        the scenario's own.
+    runs
+        Number of runs of each combination.
+    seed
+        Seed of all combinations.
+    percent
+        Percentile of the differences: 50, 90, 95, 99 or 99.9.
+    threads
+        Worker threads; results do not depend on their number.
+    progress
+        Called as ``progress(done, total)`` with numbers of runs.
+
+    Returns
+    -------
+    Sweep
+        A table with one row per combination, and their results.
+
+    Raises
+    ------
+    InputError
+        If nothing is varied, or there are more than :data:`MAX_COMBINATIONS` combinations.
+    SettingsError
+        If a combination cannot be used; names the key and what is allowed.
+
+    Examples
+    --------
+    >>> found = sweep("paper", {"site.rician_k_db": [10.0, 40.0]}, runs=2)
+    >>> found.table["variant"].to_list()
+    ['rician_k_db = 10.0', 'rician_k_db = 40.0']
+    """
+    if not isinstance(scenario, Scenario):
+        scenario = Scenario.load(str(scenario))
+    if not vary or not all(len(values) for values in vary.values()):
+        raise InputError("vary: at least one key with at least one value is needed")
+    combined = [
+        dict(zip(vary, values, strict=True)) for values in itertools.product(*vary.values())
+    ]
+    if len(combined) > MAX_COMBINATIONS:
+        raise InputError(
+            f"vary: {len(combined)} combinations; at most {MAX_COMBINATIONS} are allowed"
+        )
+    results = []
+    for number, chosen in enumerate(combined):
+
+        def tell(done: int, _: int, before: int = number * runs) -> None:
+            if progress is not None:
+                progress(before + done, runs * len(combined))
+
+        keys = {key: value for key, value in chosen.items() if key not in PLUG_INS}
+        plug_ins = {key: value for key, value in chosen.items() if key in PLUG_INS}
+        results.append(
+            simulate(
+                scenario.with_overrides(keys),
+                runs=runs,
+                seed=seed,
+                threads=threads,
+                errors_every=ERRORS_EVERY,
+                progress=tell,
+                **plug_ins,
+            )
+        )
+    values = [{key: _shown(value) for key, value in chosen.items()} for chosen in combined]
+    rows = [
+        _row(each, result, difference(result, results[0], percent=percent))
+        for each, result in zip(values, results, strict=True)
+    ]
+    table = pl.DataFrame(rows, infer_schema_length=None)
+    return Sweep(table, values, results, scenario, seed, runs, percent)
+
+
+def _row(values: Mapping[str, Any], found: Simulation, to_first: Difference) -> dict[str, Any]:
+    exact = found.percentiles
+    mean = found.runs.select("executions", "listened", "energy_j").mean().row(0, named=True)
+    return {
+        "variant": ", ".join(f"{key.rpartition('.')[2]} = {it}" for key, it in values.items()),
+        "runs": found.runs.height,
+        "rms_error_m": found.rms_error_m,
+        **({} if exact is None else as_columns(exact)),
+        "delta_m": _finite(to_first.delta_m),
+        "delta_low_m": _finite(to_first.low_m),
+        "delta_high_m": _finite(to_first.high_m),
+        **mean,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _shown(value: Any) -> Any:
+    """A value of a setting, or the name of a plug-in."""
+    if value is None:
+        return "own of the scenario"
+    return getattr(value, "__name__", type(value).__name__) if callable(value) else value
