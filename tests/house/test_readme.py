@@ -34,7 +34,7 @@ def commands(page: Path) -> list[list[str]]:
 
 
 def test_python_example(tmp_path: Path) -> None:
-    (example,) = blocks(PYTHON, "python")
+    example = "\n".join(blocks(PYTHON, "python"))
     done = subprocess.run(
         [sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=True
     )
