@@ -83,13 +83,13 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
         {"site.road.segments[1].turn_rad": 60.0}, "segments[1].turn_rad", "1.0472"),
     "heads in latitude and longitude": (
         heads([8.6821, 50.1109, 8.0], [8.6852, 50.1107, 8.0], [8.6866, 50.1131, 8.0]),
-        "radio_heads[0].position_m", "write metres"),
+        "radio_heads[0].position_m", "specify metres"),
     "heads in UTM": (
         heads([477000.0, 5551000.0, 8.0], [477230.0, 5550950.0, 8.0], [477340.0, 5551225.0, 8.0]),
-        "radio_heads[0].position_m", "take [477000, 5551000]"),
+        "radio_heads[0].position_m", "subtract [477000, 5551000]"),
     "a head under the ground": (
         {"site.radio_heads[0].position_m": [30.0, 25.0, -8.0]}, "position_m[2]", "upwards: 8"),
-    "three heads on one SSB index": (SAME_INDEX, "ssb_index", "free are 1, 2, 3, 4, 5, 6, 7"),
+    "three heads on one SSB index": (SAME_INDEX, "ssb_index", "unused are 1, 2, 3, 4, 5, 6, 7"),
     "an SSB index the band has not": (
         {"site.radio_heads[0].ssb_index": 9}, "radio_heads[0].ssb_index", "write 0 to 7"),
     "scale in percent": ({"vehicle.odometer.scale_std": 0.5}, "scale_std", "0.5 % are 0.005"),
@@ -122,9 +122,9 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
     "road far from all heads": ({"motion.path": PATH_AWAY}, "radio_heads[0]", "one frame"),
     "road in degrees": (
         {"site.road": {"polyline_m": [[8.68, 50.11], [8.685, 50.11], [8.686, 50.113]]}},
-        "road", "write metres"),
+        "road", "specify metres"),
     "heights above the sea": (
-        {"site.radio_heads[0].position_m": [30.0, 25.0, 412.0]}, "position_m[2]", "above the sea"),
+        {"site.radio_heads[0].position_m": [30.0, 25.0, 412.0]}, "position_m[2]", "above sea level"),
     "radio heads of a flat drawing": (
         heads([30.0, 25.0, 0.0], [170.0, -10.0, 0.0], [300.0, 40.0, 0.0]),
         "array.position_m[2]", "height of each radio head above the ground"),
@@ -398,7 +398,7 @@ def test_check_warns_and_goes_on(tmp_path: Path, access_av: Callable[..., Finish
     assert done.code == 0
     assert "fine.toml: fine" in done.out
     assert "deep.toml: 1 doubtful" in done.out
-    assert "write metres above the ground, upwards: 8" in done.err
+    assert "specify metres above the ground, positive upwards: 8" in done.err
     (tmp_path / "cart.toml").write_text(VEHICLE + 'platform = { name = "jetson" }\n')
     done = access_av("vehicle", "check", tmp_path / "cart.toml")
     assert done.code == 2
@@ -415,7 +415,7 @@ def test_a_run_says_it_first(
     (tmp_path / "cart.toml").write_text(VEHICLE)
     trip = 'name = "trip"\nsite = "deep.toml"\nvehicle = "cart.toml"\n'
     (tmp_path / "trip.toml").write_text(trip)
-    write = "write metres above the ground, upwards: 8"
+    write = "specify metres above the ground, positive upwards: 8"
     done = access_av("run", tmp_path / "trip.toml", "--out", tmp_path / "run")
     assert done.code == 0
     assert write in done.err

@@ -106,7 +106,7 @@ def test_walls_that_cannot_be_are_named() -> None:
 
     assert not said(WALL)
     across = {"points_m": [[100.0, -10.0], [100.0, 10.0]]}
-    assert said(WALL, across) == ["walls[1].points_m: it stands across the road, 100 m along it"]
+    assert said(WALL, across) == ["walls[1].points_m: it crosses the road at 100 m along the road"]
     x_m, y_m, _ = site["radio_heads"][0]["position_m"]
     ring = [
         [x_m + dx_m, y_m + dy_m] for dx_m, dy_m in ((-5, -5), (5, -5), (5, 5), (-5, 5), (-5, -5))

@@ -1,5 +1,5 @@
-//! Who hears whom, by the link budget: where radio heads, road and start are not in one frame, or
-//! cells send at one time, it shows here.
+//! Reception of radio heads along the road, by the link budget. It reveals radio heads, road and
+//! start in different coordinate frames, and cells that interfere.
 
 use super::warning::Warning;
 use crate::geometry::Point;
@@ -9,18 +9,19 @@ use crate::road::Road;
 use crate::settings::{Site, Vehicle};
 use crate::walls::Walls;
 
-/// An SSB is found down to so much above noise, or above what else is on the air at its time, with
-/// four antennas (dB; `cargo test -p nr-ssb --test all detection`).
+/// Minimum ratio of an SSB to noise, or to noise plus interference, for detection with four
+/// antennas (dB; `cargo test -p nr-ssb --test all detection`).
 const FOUND_DB: f64 = -10.0;
-/// A place takes so many radio heads where no road helps.
+/// Number of radio heads that determine a position without a road.
 const FOR_A_PLACE: usize = 3;
-/// Places along a road that are looked at, and how far from each other at the least (m).
+/// Maximum number of positions that are examined along a road.
 const MOST_PLACES: f64 = 400.0;
 const STEP_M: f64 = 5.0;
-/// Nearer to its mast no vehicle comes (m).
+/// Minimum distance of a vehicle from a radio head (m).
 const NEAREST_M: f64 = 10.0;
 
-/// Radio heads that are heard nowhere along the road, or near any other where there is none.
+/// Returns warnings for radio heads that are received nowhere along the road. Without a road, the
+/// positions of the other radio heads are examined.
 pub(super) fn unheard(site: &Site, vehicle: &Vehicle, road: Option<&Road>) -> Vec<Warning> {
     let air = Air::new(site, vehicle);
     let where_ = if road.is_some() {
@@ -31,14 +32,14 @@ pub(super) fn unheard(site: &Site, vehicle: &Vehicle, road: Option<&Road>) -> Ve
     air.unheard(&air.places(road), where_)
 }
 
-/// Of cells that send at one time, those that are wanted somewhere and are too weak there beside the
-/// others.
+/// Returns warnings for cells with simultaneous SSBs that are needed at a position where the
+/// interference of the others is too strong.
 pub(super) fn drowned(site: &Site, vehicle: &Vehicle, road: Option<&Road>) -> Vec<Warning> {
     let air = Air::new(site, vehicle);
     air.drowned(site, &air.places(road))
 }
 
-/// A start from which nothing is heard.
+/// Returns a warning if no radio head is received at the start.
 pub(super) fn unheard_at_start(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     let air = Air::new(site, vehicle);
     let pose = vehicle.start.pose?;
@@ -53,12 +54,13 @@ pub(super) fn unheard_at_start(site: &Site, vehicle: &Vehicle) -> Option<Warning
     (!is_heard).then(|| Warning {
         key: "start.pose".to_owned(),
         value: format!("[{}, {}]", pose.x_m, pose.y_m),
-        why: format!("no radio head is heard there: the nearest stands {nearest_m:.0} m away"),
-        write: "write it in metres in the frame of the radio heads".to_owned(),
+        why: format!("no radio head is received there: the nearest is {nearest_m:.0} m away"),
+        write: "specify it in metres in the frame of the radio heads".to_owned(),
     })
 }
 
-/// Places along a road, a step apart or as many as there may be at most; before each the distance along it (m).
+/// Returns the positions along a road, one step apart up to the maximum number, each with its
+/// distance along the road (m).
 pub(super) fn steps_along(
     road: &Road,
     step_m: f64,
@@ -75,10 +77,10 @@ fn along(road: &Road) -> Vec<Point> {
     steps.map(|(_, place)| place).collect()
 }
 
-/// The radio heads that a vehicle listens to, and how strong they are where.
+/// Received power of the radio heads.
 struct Air {
     heads: Vec<RadioHead>,
-    /// Their numbers in the site.
+    /// Indices of the radio heads in the site.
     numbers: Vec<usize>,
     budget: LinkBudget,
     walls: Walls,
@@ -101,7 +103,7 @@ impl Air {
         }
     }
 
-    /// Where to listen: along the road, or at the others' places.
+    /// Returns the examined positions: along the road, or those of the other radio heads.
     fn places(&self, road: Option<&Road>) -> Vec<Point> {
         match road {
             Some(road) => along(road),
@@ -128,8 +130,8 @@ impl Air {
         let hidden = hidden.map(|(head, number)| Warning {
             key: format!("radio_heads[{number}].position_m"),
             value: format!("[{}, {}]", head.position.x_m, head.position.y_m),
-            why: format!("walls keep it out of sight everywhere {where_}"),
-            write: "write its place, and the walls' points_m, in one frame; leave doors out"
+            why: format!("walls block its line of sight everywhere {where_}"),
+            write: "specify its position and the walls' points_m in one frame; omit doors"
                 .to_owned(),
         });
         let far = heads().filter_map(|(head, number)| {
@@ -143,12 +145,12 @@ impl Air {
                 key: format!("radio_heads[{number}].position_m"),
                 value: format!("[{}, {}]", head.position.x_m, head.position.y_m),
                 why: format!(
-                    "it is heard nowhere {where_}: {distance_m:.0} m away at the nearest, its \
-                         SNR is {snr_db:.0} dB at best, and an SSB is found down to {FOUND_DB} dB"
+                    "it is received nowhere {where_}: at the minimum distance of {distance_m:.0} m, its \
+                         SNR is {snr_db:.0} dB, and the detection limit of an SSB is {FOUND_DB} dB"
                 ),
                 write: format!(
-                    "write all places in metres in one frame (no degrees, no grid of a map), or \
-                         an eirp_dbm that reaches: now {}",
+                    "specify all positions in metres in one local frame (no degrees, no map grid), or \
+                         a sufficient eirp_dbm: now {}",
                     head.eirp_dbm
                 ),
             })
@@ -158,7 +160,8 @@ impl Air {
 
     fn drowned(&self, site: &Site, places: &[Point]) -> Vec<Warning> {
         let count = self.heads.len();
-        // Of each the least ratio to the others, where, and who is strongest there.
+        // For each radio head: minimum ratio to the interference, its position, and the strongest
+        // interferer.
         let mut worst: Vec<Option<(f64, Point, usize)>> = vec![None; count];
         let mut snr_db = vec![0.0; count];
         let mut by_strength: Vec<usize> = (0..count).collect();
@@ -190,7 +193,7 @@ impl Air {
         let write = if free.is_empty() {
             "write the index of a radio head that stands farther away".to_owned()
         } else {
-            format!("write an index of its own; free are {}", free.join(", "))
+            format!("specify another index; unused are {}", free.join(", "))
         };
         let lost = worst.iter().enumerate();
         lost.filter_map(|(wanted, worst)| {
@@ -199,8 +202,8 @@ impl Air {
                 key: format!("radio_heads[{}].ssb_index", self.numbers[wanted]),
                 value: self.heads[wanted].ssb_index.to_string(),
                 why: format!(
-                    "radio_heads[{}] sends at the same time and drowns it: at ({:.0}, {:.0}) it is \
-                     {:.0} dB stronger, and an SSB is found down to {} dB below another",
+                    "radio_heads[{}] transmits at the same time: at ({:.0}, {:.0}) it is \
+                     {:.0} dB stronger, and an SSB is detected up to {} dB below another",
                     self.numbers[strongest], place.x_m, place.y_m, -ratio_db, -FOUND_DB
                 ),
                 write: write.clone(),

@@ -1,10 +1,9 @@
-//! What can be read of site, vehicle and platform, and is most likely not what was meant: degrees
-//! for radians, millimetres for metres, a head below the ground. What cannot be is refused on
-//! reading ([`SettingsError`](crate::settings::SettingsError)); what is found here is said, and
-//! driven all the same.
+//! Implausible values of site, vehicle and platform: degrees instead of radians, millimetres
+//! instead of metres, a radio head below the ground. Impossible values are errors on reading
+//! ([`SettingsError`](crate::settings::SettingsError)); implausible ones are warnings.
 //!
-//! Each check is one row of a table ([`Usual`]) where a number tells by itself, and a function where
-//! it takes several. Beside it stand its reason and what to write instead.
+//! A check of a single number is a row of a table ([`Usual`]), with its reason and a suggestion. A
+//! check of several values is a function.
 
 mod hearing;
 mod platform;

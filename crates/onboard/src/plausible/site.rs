@@ -1,4 +1,4 @@
-//! What a site's file says by itself.
+//! Plausibility of a site file.
 
 use std::f64::consts::TAU;
 
@@ -11,16 +11,16 @@ use crate::settings::Site;
 
 const ROWS: &[Usual] = &[
     Usual {
-        // Half a metre for ground that is not quite even.
+        // Half a metre below zero, because the ground may be uneven.
         key: "radio_heads[].position_m[2]",
         within: [-0.5, 100.0],
-        why: "heights count from the ground that vehicles drive on, and masts of a plant are up to 60 m high",
+        why: "heights are relative to the ground that vehicles drive on, and masts of a plant are at most 60 m high",
         write: |it| {
             if it < 0.0 {
-                format!("write metres above the ground, upwards: {}", -it)
+                format!("specify metres above the ground, positive upwards: {}", -it)
             } else {
                 format!(
-                    "write metres above the ground, not above the sea: {it} mm are {}",
+                    "specify metres above the ground, not above sea level: {it} mm are {}",
                     rounded(it / 1000.0)
                 )
             }
@@ -29,23 +29,23 @@ const ROWS: &[Usual] = &[
     Usual {
         key: "radio_heads[].position_std_m",
         within: [0.0, 20.0],
-        why: "a phone's GNSS is better",
+        why: "larger than the error of a phone's GNSS",
         write: as_millimetres,
     },
     Usual {
-        // 75 dBm per 100 MHz is the most that is licensed at 28 GHz (47 CFR 30.202).
+        // The maximum licensed EIRP at 28 GHz is 75 dBm per 100 MHz (47 CFR 30.202).
         key: "radio_heads[].eirp_dbm",
         within: [-60.0, 80.0],
-        why: "cells of a plant send 0 to 60 dBm, none more than 80",
+        why: "the EIRP of cells in a plant is 0 to 60 dBm, and at most 80 dBm",
         write: |it| {
             let dbm = 10.0 * it.max(1e-9).log10();
-            format!("write dBm: {it} mW are {dbm:.1}")
+            format!("specify dBm: {it} mW are {dbm:.1}")
         },
     },
     Usual {
         key: "radio_heads[].eirp_std_db",
         within: [0.0, 15.0],
-        why: "nobody knows a transmitter as little",
+        why: "larger than the uncertainty of any transmitter",
         write: |_| "write dB, 1 to 6".to_owned(),
     },
     Usual {
@@ -57,40 +57,41 @@ const ROWS: &[Usual] = &[
     Usual {
         key: "road.position_std_m",
         within: [0.0, 5.0],
-        why: "a road in an aerial photograph is known better",
+        why: "larger than the error of a road in an aerial photograph",
         write: as_millimetres,
     },
     Usual {
         key: "road.start.heading_rad",
         within: [-TAU, TAU],
-        why: "that is more than a whole turn",
+        why: "more than a full turn",
         write: as_degrees,
     },
     Usual {
         key: "road.segments[].turn_rad",
         within: [-TAU, TAU],
-        why: "that is more than a whole turn, and the road would lie on itself",
+        why: "more than a full turn, so that the road would cross itself",
         write: as_degrees,
     },
 ];
 
-/// Where no NR cell is: the frequency ranges of TS 38.104, 5.1, in MHz.
+/// NR frequency range FR1 in MHz (TS 38.104, 5.1).
 const FR1_MHZ: [f64; 2] = [410.0, 7125.0];
 const FR2_MHZ: [f64; 2] = [24_250.0, 71_000.0];
 
-/// Farther than a local frame reaches, as grid coordinates are (m): UTM eastings begin at 166 km.
+/// Maximum coordinate of a local frame (m). Grid coordinates are larger: UTM eastings start at 166
+/// km.
 const LOCAL_M: f64 = 1e5;
-/// Within so much all places of a plant lie where they are written in degrees: 0.3° are 33 km.
+/// Maximum extent of a plant whose coordinates are in degrees: 0.3° correspond to 33 km.
 const DEGREES: f64 = 0.3;
-/// Nearer than antennas of one mast stand to each other (m).
+/// Minimum distance between antennas of one mast (m).
 const SAME_PLACE_M: f64 = 0.05;
-/// A road is followed in steps of so much, and at most so many (m).
+/// Step along the road, and maximum number of steps.
 const STEP_M: f64 = 1.0;
 const MOST_STEPS: f64 = 2000.0;
-/// No bend of a vehicle's road is as narrow (m).
+/// Minimum bend radius of a vehicle's road (m).
 const LEAST_RADIUS_M: f64 = 0.3;
 
-/// What is doubtful of a site by itself, but for who hears whom.
+/// Returns the warnings of a site, without those of reception.
 pub(super) fn written(site: &Site, road: Option<&Road>) -> Vec<Warning> {
     let mut found = unusual(site, ROWS);
     found.extend(carrier(site));
@@ -109,7 +110,7 @@ fn carrier(site: &Site) -> Option<Warning> {
         return Some(Warning {
             key: "carrier_mhz".to_owned(),
             value: mhz.to_string(),
-            why: "no NR cell is there: frequency range 1 is 410 to 7125 MHz, 2 is 24250 to 71000 \
+            why: "outside the NR bands: frequency range 1 is 410 to 7125 MHz, 2 is 24250 to 71000 \
                   (TS 38.104, 5.1)"
                 .to_owned(),
             write: "write the carrier in MHz: 3500".to_owned(),
@@ -154,11 +155,11 @@ fn coordinates(site: &Site, road: Option<&Road>) -> Option<Warning> {
         return Some(warning(
             &key,
             format!("{place:?}"),
-            "these are coordinates of a map's grid (UTM, Gauss-Krüger), hundreds of kilometres from \
+            "these are grid coordinates (UTM, Gauss-Krüger), hundreds of kilometres from \
              its origin",
             &format!(
-                "write metres from a point of the plant's own: take [{x_m}, {y_m}] from all x and y, \
-                 of the road, too"
+                "specify metres relative to a point of the plant: subtract [{x_m}, {y_m}] from all x and y, \
+                 including those of the road"
             ),
         ));
     }
@@ -182,7 +183,7 @@ fn coordinates(site: &Site, road: Option<&Road>) -> Option<Warning> {
     (length_m < 1.0).then(|| warning("road", format!("{length_m:.4} m long"), why, write))
 }
 
-/// SSB indices that bursts do not have at this carrier.
+/// Returns warnings for SSB indices that do not exist at this carrier.
 fn indices(site: &Site) -> Vec<Warning> {
     let (count, heads) = (site.ssb_indices(), site.radio_heads.iter().enumerate());
     let beyond = heads.filter(|(_, head)| head.ssb_index >= count);
@@ -199,7 +200,7 @@ fn indices(site: &Site) -> Vec<Warning> {
         .collect()
 }
 
-/// Heads that are one head, or are called the same.
+/// Returns warnings for radio heads with identical positions or names.
 fn twins(site: &Site) -> Vec<Warning> {
     let mut found = Vec::new();
     let point = |position_m: [f64; 3]| Point::new(position_m[0], position_m[1]);
@@ -211,8 +212,8 @@ fn twins(site: &Site) -> Vec<Warning> {
                 found.push(Warning {
                     key: format!("radio_heads[{index}].position_m"),
                     value: format!("{:?}", head.position_m),
-                    why: format!("radio_heads[{earlier}] stands {apart_m:.3} m from there"),
-                    write: "write each radio head's own place; leave out what is there twice"
+                    why: format!("radio_heads[{earlier}] is {apart_m:.3} m from this position"),
+                    write: "specify the position of each radio head once; remove duplicates"
                         .to_owned(),
                 });
             }
@@ -220,7 +221,9 @@ fn twins(site: &Site) -> Vec<Warning> {
                 found.push(Warning {
                     key: format!("radio_heads[{index}].name"),
                     value: format!("{:?}", head.name),
-                    why: format!("radio_heads[{earlier}] is called the same, and names are how others are told apart"),
+                    why: format!(
+                        "radio_heads[{earlier}] has the same name, and names identify radio heads"
+                    ),
                     write: format!("write another name: \"{}-{index}\"", head.name),
                 });
             }
@@ -229,14 +232,15 @@ fn twins(site: &Site) -> Vec<Warning> {
     found
 }
 
-/// Arcs narrower than any vehicle's, whose turn is in degrees.
+/// Returns warnings for arcs with a radius below that of any vehicle, whose heading change is
+/// probably in degrees.
 fn bends(site: &Site) -> Vec<Warning> {
     let segments = site
         .road
         .iter()
         .flat_map(|road| road.segments.iter().flatten());
     let narrow = segments.enumerate().filter(|(_, it)| {
-        // What turns more than once round has been said already.
+        // Heading changes above one turn have a warning of their own.
         it.turn_rad.abs() <= TAU && it.length_m < LEAST_RADIUS_M * it.turn_rad.abs()
     });
     narrow
@@ -244,7 +248,7 @@ fn bends(site: &Site) -> Vec<Warning> {
             key: format!("road.segments[{index}].turn_rad"),
             value: it.turn_rad.to_string(),
             why: format!(
-                "over {} m that is a bend of {:.2} m radius, which no vehicle drives",
+                "over {} m this is a bend of {:.2} m radius, below that of any vehicle",
                 it.length_m,
                 it.length_m / it.turn_rad.abs()
             ),
@@ -253,7 +257,7 @@ fn bends(site: &Site) -> Vec<Warning> {
         .collect()
 }
 
-/// Walls that stand across the road.
+/// Returns warnings for walls that cross the road.
 fn across(site: &Site, road: &Road) -> Vec<Warning> {
     if site.walls.is_empty() {
         return Vec::new();
@@ -273,8 +277,8 @@ fn across(site: &Site, road: &Road) -> Vec<Warning> {
             Some(Warning {
                 key: format!("walls[{index}].points_m"),
                 value: format!("a wall of {} points", wall.points_m.len()),
-                why: format!("it stands across the road, {along_m:.0} m along it"),
-                write: "write it in the frame of the road, and as two walls beside a door"
+                why: format!("it crosses the road at {along_m:.0} m along the road"),
+                write: "specify it in the frame of the road, and as two walls with a gap at a door"
                     .to_owned(),
             })
         })

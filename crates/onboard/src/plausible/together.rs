@@ -1,4 +1,4 @@
-//! What site and vehicle are together.
+//! Plausibility of a site together with a vehicle.
 
 use super::hearing::{drowned, unheard, unheard_at_start};
 use super::site::written;
@@ -8,7 +8,7 @@ use super::warning::Warning;
 use crate::road::Road;
 use crate::settings::{LocalizerSettings, Shipped, Site, TomlFile, Vehicle};
 
-/// What is doubtful of a site, heard by a vehicle of which nothing is stated.
+/// Returns the warnings of a site, with the reception of a default vehicle.
 pub fn of_site(site: &Site) -> Vec<Warning> {
     let road = site.build_road().ok().flatten();
     let Ok(vehicle) = Vehicle::from_library("default", &Shipped) else {
@@ -19,7 +19,7 @@ pub fn of_site(site: &Site) -> Vec<Warning> {
     found
 }
 
-/// What is doubtful of a site and a vehicle that has driven there. Keys begin with `site` and
+/// Returns the warnings of a site and a vehicle before a drive. Keys begin with `site` and
 /// `vehicle`.
 pub fn of_both(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
     let road = site.build_road().ok().flatten();
@@ -28,8 +28,8 @@ pub fn of_both(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
         .collect()
 }
 
-/// The same of a vehicle that is to drive along a way: on a drive that was recorded, what was heard
-/// shows who drowns whom.
+/// Returns the warnings of a site and a vehicle for a recorded path. Interference is not checked,
+/// because the recording shows it.
 pub fn of_both_along(site: &Site, vehicle: &Vehicle, way: &Road) -> Vec<Warning> {
     let mut of_site = in_reach(site, vehicle, Some(way));
     of_site.extend(drowned(site, vehicle, Some(way)));
@@ -42,10 +42,10 @@ fn beneath(path: &str, found: Vec<Warning>) -> impl Iterator<Item = Warning> {
     found.into_iter().map(move |it| it.beneath(path))
 }
 
-/// A site by itself, and radio heads that are heard nowhere on the way.
+/// Returns the warnings of the site, and of radio heads that are received nowhere on the path.
 fn in_reach(site: &Site, vehicle: &Vehicle, way: Option<&Road>) -> Vec<Warning> {
     let mut found = written(site, way);
-    // Of places in degrees or in a map's grid all has been said.
+    // Positions in degrees or grid coordinates have a warning already.
     let of_places = |it: &Warning| it.key.ends_with("position_m") || it.key.starts_with("road");
     if !found.iter().any(of_places) {
         found.extend(unheard(site, vehicle, way));
@@ -53,7 +53,7 @@ fn in_reach(site: &Site, vehicle: &Vehicle, way: Option<&Road>) -> Vec<Warning> 
     found
 }
 
-/// A vehicle by itself, and on the site.
+/// Returns the warnings of the vehicle, alone and at the site.
 fn on_site(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
     let mut found = of_vehicle(vehicle);
     found.extend(spacing_in_metres(site, vehicle));
@@ -64,8 +64,8 @@ fn on_site(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
     found
 }
 
-/// Radio heads that all have the height 0, below an array that has a height. A site and a vehicle in
-/// one plane have none.
+/// Returns a warning if all radio heads have height 0 and the array is above it. A model in a plane
+/// has no heights.
 fn below_array(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     let height_m = vehicle.array.position_m[2];
     let is_flat = site.radio_heads.iter().all(|it| it.position_m[2] == 0.0);
@@ -80,7 +80,7 @@ fn below_array(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     })
 }
 
-/// Several radio heads for a localizer that takes its heading from one.
+/// Returns a warning for several radio heads with a localizer that uses one.
 fn one_head_only(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     let heads = site.radio_heads.len();
     let takes_one = matches!(vehicle.localizer, LocalizerSettings::DeadReckoning(_));
@@ -95,7 +95,8 @@ fn one_head_only(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     })
 }
 
-/// Half a wavelength, in metres: at carriers below 3 GHz the number is one that wavelengths may be.
+/// Returns a warning if the antenna spacing is half a wavelength in metres. Below 3 GHz that number
+/// is also a plausible spacing in wavelengths.
 fn spacing_in_metres(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     let (spacing, half_m) = (vehicle.array.spacing_wavelengths, 0.5 * site.wavelength_m());
     let is_metres = (spacing / half_m - 1.0).abs() < 0.05 && spacing < 0.45;
@@ -103,17 +104,17 @@ fn spacing_in_metres(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
         key: "array.spacing_wavelengths".to_owned(),
         value: spacing.to_string(),
         why: format!(
-            "half a wavelength at {} MHz is {half_m:.4} m, and antennas as near are coupled",
+            "half a wavelength at {} MHz is {half_m:.4} m, and antennas at this spacing are coupled",
             site.carrier_mhz
         ),
         write: format!(
-            "write wavelengths: {spacing} m are {:.2}",
+            "specify wavelengths: {spacing} m are {:.2}",
             spacing / site.wavelength_m()
         ),
     })
 }
 
-/// A start beside the road that the vehicle follows, by more than it may be.
+/// Returns a warning if the start is farther from the followed road than its uncertainty permits.
 fn start_off_road(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     let (pose, road) = (vehicle.start.pose?, site.build_road().ok().flatten()?);
     let projection = road.project(pose.point());
@@ -132,7 +133,7 @@ fn start_off_road(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     })
 }
 
-/// Lane keeping that leaves the lane.
+/// Returns a warning if the lane keeping leaves the road.
 fn strays(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     let (rms_m, width_m) = (vehicle.lane_keeping.rms_m, site.road.as_ref()?.width_m);
     (vehicle.follows_road() && rms_m > 0.5 * width_m).then(|| Warning {

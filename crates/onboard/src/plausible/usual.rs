@@ -1,24 +1,24 @@
-//! Numbers that are not as numbers of their kind are: one row for each.
+//! Usual ranges of numbers, one row each.
 
 use serde::Serialize;
 use serde_json::Value;
 
 use super::warning::Warning;
 
-/// What is usual of a number.
+/// Usual range of a number.
 #[derive(Debug, Clone, Copy)]
 pub struct Usual {
-    /// Path of its key; `[]` stands for every entry of a list, `[2]` for one.
+    /// Path of the key; `[]` denotes every entry of a list, `[2]` the entry at index 2.
     pub key: &'static str,
-    /// Least and most of what is usual.
+    /// Lower and upper end of the usual range.
     pub within: [f64; 2],
-    /// Why nothing else is.
+    /// Reason for the range.
     pub why: &'static str,
-    /// What to write instead of a value.
+    /// Suggestion for an unusual value.
     pub write: fn(f64) -> String,
 }
 
-/// Warnings of numbers that are not as the rows say.
+/// Returns a warning for every number outside its usual range.
 pub fn unusual(settings: &impl Serialize, rows: &[Usual]) -> Vec<Warning> {
     let settings = serde_json::to_value(settings).unwrap_or_default();
     let mut found = Vec::new();
@@ -67,18 +67,18 @@ fn visit(here: &Value, steps: &[&str], path: String, told: &mut impl FnMut(Strin
     }
 }
 
-/// A number to be read by people: five digits of it.
+/// Returns a number with five significant digits, for display.
 pub fn rounded(value: f64) -> f64 {
     format!("{value:.4e}").parse().unwrap_or(value)
 }
 
-/// What to write for an angle given in degrees.
+/// Returns the suggestion for an angle that is probably in degrees.
 pub fn as_degrees(value: f64) -> String {
     let rad = value.to_radians();
     format!("write radians: {value} degrees are {rad:.4}")
 }
 
-/// What to write for a share given in percent.
+/// Returns the suggestion for a fraction that is probably in percent.
 pub fn as_percent(value: f64) -> String {
     format!(
         "write a share of 1: {value} % are {}",
@@ -86,12 +86,12 @@ pub fn as_percent(value: f64) -> String {
     )
 }
 
-/// What to write for a length given in millimetres.
+/// Returns the suggestion for a length that is probably in millimetres.
 pub fn as_millimetres(value: f64) -> String {
     format!("write metres: {value} mm are {}", rounded(value / 1000.0))
 }
 
-/// What to write for milliseconds given in seconds.
+/// Returns the suggestion for milliseconds that are probably in seconds.
 pub fn as_milliseconds(value: f64) -> String {
     format!(
         "write milliseconds: {value} s are {}",

@@ -1,4 +1,4 @@
-//! What a vehicle's file says of the vehicle by itself.
+//! Plausibility of a vehicle file.
 
 use std::f64::consts::TAU;
 
@@ -11,12 +11,12 @@ use crate::settings::Vehicle;
 const TYRES: &str = "no tyre grips better than 1 g";
 const KNOWN_NO_BETTER: &str = "that is no better than not knowing the direction at all";
 
-/// Numbers that tell by themselves. The bounds are wide: what is within them some vehicle has.
+/// Usual ranges of numbers. They are wide: some vehicle exists at every value within.
 const ROWS: &[Usual] = &[
     Usual {
         key: "top_speed_kmh",
         within: [0.1, 100.0],
-        why: "no vehicle of a plant is as fast",
+        why: "above the speed of any vehicle in a plant",
         write: |it| format!("write km/h: {it} m/min are {:.1}", it * 0.06),
     },
     Usual {
@@ -28,25 +28,25 @@ const ROWS: &[Usual] = &[
     Usual {
         key: "top_yaw_rate_radps",
         within: [0.01, 12.0],
-        why: "that is more than two turns in a second",
+        why: "more than two turns per second",
         write: as_degrees,
     },
     Usual {
         key: "lane_keeping.rms_m",
         within: [0.0, 3.0],
-        why: "that is not keeping to a lane",
+        why: "larger than the width of a lane",
         write: as_millimetres,
     },
     Usual {
         key: "array.rx_gain_dbi",
         within: [-20.0, 30.0],
-        why: "an antenna that hears all round has 0 to 8 dBi, a panel up to 25",
+        why: "an omnidirectional antenna has 0 to 8 dBi, a panel up to 25 dBi",
         write: |_| "write the gain of one antenna in dBi, without its amplifier's".to_owned(),
     },
     Usual {
         key: "array.position_m[0]",
         within: [-20.0, 20.0],
-        why: "no vehicle is as long",
+        why: "longer than any vehicle",
         write: |it| {
             format!(
                 "write metres forward of the odometer's point: {it} cm are {}",
@@ -57,7 +57,7 @@ const ROWS: &[Usual] = &[
     Usual {
         key: "array.position_m[1]",
         within: [-5.0, 5.0],
-        why: "no vehicle is as wide",
+        why: "wider than any vehicle",
         write: |it| {
             format!(
                 "write metres to the left of the odometer's point: {it} cm are {}",
@@ -68,7 +68,7 @@ const ROWS: &[Usual] = &[
     Usual {
         key: "array.position_m[2]",
         within: [0.0, 15.0],
-        why: "an array is above the ground, and no higher than the highest vehicle",
+        why: "an array is above the ground, and not above the highest vehicle",
         write: |it| {
             let height = if it < 0.0 { -it } else { rounded(it / 100.0) };
             format!("write metres above the ground, upwards: {height}")
@@ -77,139 +77,139 @@ const ROWS: &[Usual] = &[
     Usual {
         key: "array.position_std_m",
         within: [0.0, 1.0],
-        why: "a tape measure is better",
+        why: "larger than the error of a tape measure",
         write: as_millimetres,
     },
     Usual {
         key: "array.mounting_std_rad",
         within: [0.0, 0.35],
-        why: "an array is mounted better than to 20 degrees",
+        why: "the mounting error of an array is below 20 degrees",
         write: as_degrees,
     },
     Usual {
         key: "array.mounting_drift_rad_per_sqrt_m",
         within: [0.0, 0.05],
-        why: "it would have turned by more than 90 degrees within a kilometre",
+        why: "the array would turn by more than 90 degrees per kilometre",
         write: as_degrees,
     },
     Usual {
         key: "array.phase_std_rad",
         within: [0.0, 1.0],
-        why: "of channels that are as little calibrated no angle can be had",
+        why: "angles cannot be estimated with channels of this phase uncertainty",
         write: as_degrees,
     },
     Usual {
         key: "array.phase_drift_rad_per_sqrt_m",
         within: [0.0, 0.1],
-        why: "the phases would be forgotten within a hundred metres",
+        why: "the phases would be unknown after a hundred metres",
         write: as_degrees,
     },
     Usual {
         key: "receiver.noise_figure_db",
         within: [0.0, 20.0],
-        why: "a receiver has 2 to 12 dB",
+        why: "the noise figure of a receiver is 2 to 12 dB",
         write: |_| "write the noise figure in dB; kelvin are temperature_k".to_owned(),
     },
     Usual {
         key: "receiver.temperature_k",
         within: [150.0, 400.0],
-        why: "that is no temperature an antenna looks at outdoors or in a hall",
+        why: "not an antenna noise temperature outdoors or in a hall",
         write: |it| format!("write kelvin: {it} °C are {}", rounded(it + 273.0)),
     },
     Usual {
         key: "receiver.bandwidth_mhz",
         within: [0.1, 1000.0],
         why: "an SSB of 240 subcarriers is 3.6 to 57.6 MHz wide",
-        write: |it| format!("write MHz: {it} GHz are {}", rounded(it * 1000.0)),
+        write: |it| format!("specify MHz: {it} GHz are {}", rounded(it * 1000.0)),
     },
     Usual {
         key: "receiver.phase_bias_std_rad",
         within: [0.0, 1.0],
-        why: "an error as large leaves nothing of an angle",
+        why: "an angle with this error contains no information",
         write: as_degrees,
     },
     Usual {
         key: "odometer.scale",
         within: [0.8, 1.25],
-        why: "wheels are worn and loaded by some per cent",
+        why: "wear and load change the wheel radius by a few percent",
         write: |_| "write metres read per metre driven: about 1".to_owned(),
     },
     Usual {
         key: "odometer.scale_std",
         within: [0.0, 0.1],
-        why: "wear and load make an odometer wrong by some per cent at most",
+        why: "wear and load cause a scale error of a few percent at most",
         write: as_percent,
     },
     Usual {
         key: "odometer.noise_m_per_sqrt_m",
         within: [0.0, 0.5],
-        why: "wheels count a metre better than to half a metre",
+        why: "the error of wheel odometry is below half a metre per metre",
         write: as_percent,
     },
     Usual {
         key: "odometer.noise_m_per_sqrt_s",
         within: [0.0, 0.5],
-        why: "a standing vehicle is not read to move as far in a second",
+        why: "larger than the apparent motion of a vehicle at standstill per second",
         write: as_millimetres,
     },
     Usual {
         key: "odometer.speed_noise_mps",
         within: [0.0, 1.0],
-        why: "wheels tell a speed better than to a walking pace",
+        why: "the speed error of wheel odometry is below walking speed",
         write: |it| format!("write m/s: {it} mm/s are {}", rounded(it / 1000.0)),
     },
     Usual {
         key: "odometer.track_width_m",
         within: [0.05, 6.0],
-        why: "no vehicle's wheels are as far from each other",
+        why: "wider than any vehicle's track",
         write: |it| format!("write metres: {it} feet are {:.2}", it * 0.3048),
     },
     Usual {
         key: "odometer.track_width_std_m",
         within: [0.0, 0.2],
-        why: "a tape measure is better",
+        why: "larger than the error of a tape measure",
         write: as_millimetres,
     },
     Usual {
         key: "odometer.dropout_probability",
         within: [0.0, 0.5],
-        why: "more would be lost than arrives",
+        why: "more samples would be lost than received",
         write: as_percent,
     },
     Usual {
         key: "gyroscope.noise_rad_per_sqrt_s",
         within: [0.0, 0.1],
-        why: "gyroscopes have 1e-5 to 1e-3, pairs of wheels up to 0.05",
+        why: "gyroscopes have 1e-5 to 1e-3 rad/√s, pairs of wheels up to 0.05 rad/√s",
         write: |it| format!("write rad/√s: {it} °/√h are {:.1e}", it.to_radians() / 60.0),
     },
     Usual {
         key: "gyroscope.noise_rad_per_sqrt_m",
         within: [0.0, 0.5],
-        why: "a direction would be forgotten within some metres",
+        why: "the heading would be unknown after a few metres",
         write: as_degrees,
     },
     Usual {
         key: "gyroscope.noise_rad_per_sqrt_rad",
         within: [0.0, 0.7],
-        why: "a turn would be forgotten as it is made",
+        why: "the heading would be unknown after one turn",
         write: as_degrees,
     },
     Usual {
         key: "gyroscope.bias_radps",
         within: [-0.2, 0.2],
-        why: "the worst gyroscope is off by 0.1 rad/s",
+        why: "the bias of any gyroscope is below 0.1 rad/s",
         write: |it| format!("write rad/s: {it} °/h are {:.1e}", it.to_radians() / 3600.0),
     },
     Usual {
         key: "gyroscope.bias_std_radps",
         within: [0.0, 0.2],
-        why: "the worst gyroscope is off by 0.1 rad/s",
+        why: "the bias of any gyroscope is below 0.1 rad/s",
         write: |it| format!("write rad/s: {it} °/h are {:.1e}", it.to_radians() / 3600.0),
     },
     Usual {
         key: "gyroscope.bias_walk_radps_per_sqrt_s",
         within: [0.0, 0.02],
-        why: "the bias would be anything within minutes",
+        why: "the bias would be unknown after minutes",
         write: |it| {
             format!(
                 "write rad/s per √s: {it} degrees are {:.1e}",
@@ -220,11 +220,11 @@ const ROWS: &[Usual] = &[
     Usual {
         key: "start.position_std_m",
         within: [0.0, 200.0],
-        why: "a start as uncertain is not known",
+        why: "a start with this uncertainty is an unknown start",
         write: |it| format!("{}, or start.known = false", as_millimetres(it)),
     },
     Usual {
-        // A direction of which nothing is known has a deviation of π/√3.
+        // A uniformly distributed heading has a standard deviation of π/√3.
         key: "start.heading_std_rad",
         within: [0.0, 1.82],
         why: KNOWN_NO_BETTER,
@@ -233,55 +233,55 @@ const ROWS: &[Usual] = &[
     Usual {
         key: "start.pose.heading_rad",
         within: [-TAU, TAU],
-        why: "that is more than a whole turn",
+        why: "more than a full turn",
         write: as_degrees,
     },
     Usual {
         key: "integrity.alert_limit_m",
         within: [0.01, 100.0],
-        why: "no plant can use a position as uncertain",
+        why: "no plant can use a position with this uncertainty",
         write: as_millimetres,
     },
     Usual {
         key: "wake_up.interval_ms",
         within: [1.0, 3.6e6],
-        why: "SSBs come every 5 ms at the most",
+        why: "the minimum SSB period is 5 ms",
         write: as_milliseconds,
     },
     Usual {
         key: "wake_up.t_max_ms",
         within: [1.0, 3.6e6],
-        why: "SSBs come every 5 ms at the most",
+        why: "the minimum SSB period is 5 ms",
         write: as_milliseconds,
     },
     Usual {
         key: "wake_up.latest_ms",
         within: [1.0, 3.6e6],
-        why: "SSBs come every 5 ms at the most",
+        why: "the minimum SSB period is 5 ms",
         write: as_milliseconds,
     },
     Usual {
         key: "wake_up.bound_m",
         within: [0.005, 50.0],
-        why: "an error as large, or as small, is nobody's bound",
+        why: "not a plausible target for the position error",
         write: as_millimetres,
     },
 ];
 
-/// What is doubtful of a vehicle by itself.
+/// Returns the warnings of a vehicle.
 pub fn of_vehicle(vehicle: &Vehicle) -> Vec<Warning> {
     let mut found = unusual(vehicle, ROWS);
     found.extend(speed_in_mps("top_speed_kmh", vehicle.top_speed_kmh));
     found
 }
 
-/// Whether a speed is a round number of km/h that somebody has converted to m/s. A speed is known to
-/// be written in km/h where it is round itself, or round in m/s once converted: 1.08 km/h is a robot
-/// of 0.3 m/s, 3.33 are 12 km/h.
+/// Returns a warning if a speed in km/h is probably in m/s: it is not a round number of km/h or
+/// m/s, but 3.6 times the value is. 1.08 km/h is a robot's 0.3 m/s, whereas 3.33 corresponds to 12
+/// km/h.
 pub fn speed_in_mps(key: &str, speed_kmh: f64) -> Option<Warning> {
     let is_round = |value: f64, step: f64| (value / step - (value / step).round()).abs() < 1e-6;
     let meant_kmh = (speed_kmh * 3.6).round();
-    // As far as two digits after the point can tell.
+    // Within two decimal places.
     let fits = meant_kmh >= 1.0 && (meant_kmh / 3.6 - speed_kmh).abs() <= 0.005;
     let doubtful = fits && !is_round(speed_kmh, 0.1) && !is_round(speed_kmh / 3.6, 0.05);
     doubtful.then(|| Warning {
@@ -303,7 +303,7 @@ mod tests {
             let wanted = format!("write km/h: {meant},");
             assert!(told.is_some_and(|it| it.starts_with(&wanted)), "{written}");
         }
-        // Robots of so many tenths of m/s, and whole and half km/h.
+        // Tenths of m/s up to 4 m/s, and whole and half km/h.
         let robots = (1..40).map(|tenths| f64::from(tenths) * 0.36);
         let round = (1..80).map(|halves| f64::from(halves) * 0.5);
         for speed_kmh in robots.chain(round) {

@@ -1,22 +1,22 @@
-//! One thing that is most likely not meant.
+//! Warning for an implausible value.
 
 use std::fmt;
 
-/// A value that can be, and is most likely not what was meant.
+/// Warning for a value that is possible, but probably a mistake.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Warning {
-    /// Path of the key: `radio_heads[0].position_m`.
+    /// Path of the key, such as `radio_heads[0].position_m`.
     pub key: String,
     /// Its value.
     pub value: String,
-    /// Why it is doubtful, physically.
+    /// Physical reason.
     pub why: String,
-    /// What to write instead.
+    /// Suggested value.
     pub write: String,
 }
 
 impl Warning {
-    /// The same of a table that another file holds at `path`.
+    /// Returns the warning with the path of the enclosing table, for a table of another file.
     #[must_use]
     pub fn beneath(mut self, path: &str) -> Self {
         self.key = format!("{path}.{}", self.key);

@@ -1,4 +1,4 @@
-//! The vehicle's antennas.
+//! Antenna array of the vehicle.
 
 use std::sync::Arc;
 
@@ -12,57 +12,61 @@ use super::error::SettingsError;
 use crate::elements::for_elements;
 use crate::manifold::{AnyManifold, ArrayManifold, Measurand};
 
-/// `[array]`: the antennas, in a row unless `shape` says otherwise.
+/// `[array]`: the antenna array. The geometry is a uniform linear array unless `shape` specifies
+/// another.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArraySettings {
     /// Number of antennas.
     #[schemars(range(min = 2, max = 16))]
     pub elements: u8,
-    /// How they stand.
+    /// Array geometry.
     #[serde(skip_serializing_if = "ArrayShape::is_row")]
     pub shape: ArrayShape,
-    /// Distance between neighbours in wavelengths, in a row or around a circle.
+    /// Distance between neighbouring antennas in wavelengths, along the row or the circle.
     #[schemars(range(min = 0.05, max = 0.5))]
     pub spacing_wavelengths: f64,
     /// Antenna gain in dBi.
     #[schemars(range(min = -60.0, max = 60.0))]
     pub rx_gain_dbi: f64,
-    /// Place of its middle on the vehicle `[forward, left, up]` in metres, from the point on the
-    /// ground whose motion the odometer measures.
+    /// Position of the array's centre in the vehicle frame `[forward, left, up]`, in metres. The
+    /// origin is the point on the ground whose motion the odometer measures.
     #[schemars(inner(range(min = -100.0, max = 100.0)))]
     pub position_m: [f64; 3],
-    /// Standard deviation of that in each of forward and left, in metres.
+    /// Standard deviation of the array's forward and left position, each in metres.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub position_std_m: f64,
-    /// Direction of its axis, along the row, from the vehicle's forward axis, counter-clockwise, in radians.
+    /// Direction of the array axis (along the row) relative to the vehicle's forward axis,
+    /// counter-clockwise, in radians.
     #[schemars(range(min = -3.2, max = 3.2))]
     pub mounting_rad: f64,
-    /// Standard deviation of that direction in radians; 0 is known exactly. Where it is not stated it
-    /// is taken as exact until angles speak against it, and as 0.005 then; 0.02 on a differential drive.
+    /// Standard deviation of `mounting_rad`, in radians; 0 means exactly known. Default: treated as
+    /// exact until angles contradict it, then 0.005 on a road vehicle and 0.02 on a differential
+    /// drive.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 3.2))]
     pub mounting_std_rad: Option<f64>,
-    /// Random walk of that direction, in radians per root of a metre driven.
+    /// Random walk of `mounting_rad`, in radians per square root of metre driven.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub mounting_drift_rad_per_sqrt_m: f64,
-    /// Phase, left by calibration, by which each antenna of a row runs ahead of the one before, in
-    /// radians.
+    /// Residual phase difference between neighbouring antennas of the row after calibration, in
+    /// radians. Positive: each antenna leads the previous one.
     #[schemars(range(min = -3.2, max = 3.2))]
     pub phase_rad: f64,
-    /// Standard deviation of that phase in radians; 0 is known exactly. Where it is not stated it is taken
-    /// as exact until angles speak against it, and as 0.02 then.
+    /// Standard deviation of `phase_rad`, in radians; 0 means exactly known. Default: treated as
+    /// exact until angles contradict it, then 0.02.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 3.2))]
     pub phase_std_rad: Option<f64>,
-    /// Random walk of that phase, in radians per root of a metre driven.
+    /// Random walk of `phase_rad`, in radians per square root of metre driven.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub phase_drift_rad_per_sqrt_m: f64,
-    /// Random walk of each antenna's gain, in dB per root of a metre driven. It turns no angle of a
-    /// wave that comes alone, so that only simulations reckon with it.
+    /// Random walk of each antenna's gain, in dB per square root of metre driven. A gain error does
+    /// not bias the angle of a single wave, so only simulations use this value.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub gain_drift_db_per_sqrt_m: f64,
-    /// Complex gain `[re, im]` of each channel, by which it is divided; ideal channels without.
+    /// Complex gain `[re, im]` of each receiver channel. Samples are divided by it. Default: ideal
+    /// channels.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(inner(range(min = -1e3, max = 1e3))))]
     pub channel_gains: Option<Vec<[f64; 2]>>,
@@ -90,7 +94,7 @@ impl Default for ArraySettings {
 }
 
 impl ArraySettings {
-    /// Gains of the channels, one of each antenna.
+    /// Returns the complex gain of each channel.
     pub fn calibration(&self) -> Vec<Complex64> {
         match &self.channel_gains {
             Some(gains) => gains
@@ -101,16 +105,16 @@ impl ArraySettings {
         }
     }
 
-    /// The manifold of antennas that are not in a row; `None` of those that are.
+    /// Returns the manifold of a non-linear array; `None` for a uniform linear array.
     ///
     /// # Errors
-    /// [`aoa::Error`] for places or a table that make no array of `N` antennas.
+    /// [`aoa::Error`] if the positions or the response table do not form an array of `N` antennas.
     pub fn manifold<const N: usize>(&self) -> Result<Option<ArrayManifold<N>>, aoa::Error> {
         ArrayManifold::new(&self.shape, self.spacing_wavelengths)
     }
 
-    /// [`manifold`](Self::manifold) for whatever number of antennas there is, the settings being
-    /// checked.
+    /// Returns the [`manifold`](Self::manifold) for the configured number of antennas. Requires
+    /// checked settings.
     pub fn any_manifold(&self) -> Option<Arc<dyn AnyManifold>> {
         for_elements!(self.elements, N => {
             let manifold = self.manifold::<N>().ok()??;
@@ -118,7 +122,7 @@ impl ArraySettings {
         })
     }
 
-    /// What is measured with it, its settings being checked.
+    /// Returns the angle that the array measures. Requires checked settings.
     pub fn measurand(&self) -> Measurand {
         self.try_measurand().unwrap_or_else(|_| self.in_a_row())
     }

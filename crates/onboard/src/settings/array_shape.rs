@@ -1,24 +1,25 @@
-//! How the vehicle's antennas stand.
+//! Geometry of the antenna array.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How the antennas stand. Of all but a row the azimuth is measured, from the array's axis
-/// counter-clockwise, at elevations from the horizon upwards.
+/// Array geometry. A uniform linear array measures the angle from its axis. Every other geometry
+/// measures the azimuth, counter-clockwise from the array axis, for elevations from the horizon
+/// upwards.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ArrayShape {
-    /// In a row along the axis. Only the angle from the axis shows.
+    /// Uniform linear array along the array axis.
     UniformLinear {},
-    /// In a horizontal circle, counter-clockwise from the axis on.
+    /// Uniform circular array in the horizontal plane, counter-clockwise from the array axis.
     Circular {},
-    /// In a horizontal plane, anywhere but in a row.
+    /// Planar array in the horizontal plane; the antennas are not collinear.
     Planar {
-        /// Place of each in wavelengths, along the axis and to its left.
+        /// Position of each antenna in wavelengths: along the array axis, and to its left.
         #[schemars(inner(inner(range(min = -10.0, max = 10.0))))]
         places_wavelengths: Vec<[f64; 2]>,
     },
-    /// As a table of responses says, patterns and coupling included.
+    /// Measured manifold: a table of responses that includes element patterns and coupling.
     Measured(MeasuredShape),
 }
 
@@ -26,11 +27,11 @@ pub enum ArrayShape {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeasuredShape {
-    /// Elevations in radians, ascending in equal steps.
+    /// Elevations of the table in radians, ascending in equal steps.
     #[schemars(inner(range(min = -1.6, max = 1.6)))]
     pub elevations_rad: Vec<f64>,
-    /// For each elevation, and there for each azimuth counter-clockwise from the axis on, in equal
-    /// steps: `[re, im]` of each antenna.
+    /// Response `[re, im]` of each antenna, for each elevation and each azimuth. Azimuths are
+    /// counter-clockwise from the array axis, in equal steps.
     #[schemars(inner(inner(inner(range(min = -1e6, max = 1e6)))))]
     pub responses: Vec<Vec<[f64; 2]>>,
 }
@@ -42,7 +43,7 @@ impl Default for ArrayShape {
 }
 
 impl ArrayShape {
-    /// Whether it is a row.
+    /// Whether the array is a uniform linear array.
     pub const fn is_row(&self) -> bool {
         matches!(self, Self::UniformLinear {})
     }

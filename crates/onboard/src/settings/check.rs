@@ -1,18 +1,19 @@
-//! Values that contradict each other. Ranges of single numbers stand in the schema.
+//! Checks for settings that contradict each other. The JSON Schema contains the ranges of single
+//! numbers.
 
 use std::fmt::Display;
 
 use super::error::SettingsError;
 
-/// Collects nothing: the first bad value is the error.
+/// Check of one file; the first invalid value is returned as the error.
 #[derive(Debug, Clone, Copy)]
 pub struct Check<'a> {
-    /// The file that errors name.
+    /// Name of the file, for error messages.
     pub file: &'a str,
 }
 
 impl Check<'_> {
-    /// The error for a value that is not `allowed`.
+    /// Returns the error for a value that is not `allowed`.
     pub fn error(&self, key: &str, value: impl Display, allowed: &str) -> SettingsError {
         SettingsError::Value {
             file: self.file.to_owned(),
@@ -22,7 +23,7 @@ impl Check<'_> {
         }
     }
 
-    /// Refuses a value for which `good` is false.
+    /// Returns an error if `good` is false.
     ///
     /// # Errors
     /// [`SettingsError::Value`].

@@ -1,78 +1,79 @@
-//! What can be wrong with a settings file, said so that it can be put right.
+//! Errors of settings files; each names the file, the key and the allowed values.
 
 use std::io;
 
 use thiserror::Error;
 
-/// An unusable settings file. `file` is the path, or the origin the caller named.
+/// Unusable settings file. `file` is its path, or the origin that the caller named.
 #[derive(Debug, Error)]
 pub enum SettingsError {
     /// The file cannot be read.
     #[error("{file}: {source}")]
     Read {
-        /// The file.
+        /// Path of the file.
         file: String,
-        /// Why not.
+        /// Cause, as reported by the operating system.
         source: io::Error,
     },
-    /// Neither a shipped name nor a file.
+    /// The name is neither that of a shipped file nor that of an existing file.
     #[error("no {what} `{name}`: neither a file nor one of {}{}", quoted(known), suggestion(nearest.as_deref()))]
     UnknownName {
-        /// The kind of file: "site", "vehicle", "scenario", "platform".
+        /// Kind of file: "site", "vehicle", "scenario" or "platform".
         what: &'static str,
-        /// What was asked for.
+        /// Requested name.
         name: String,
-        /// The shipped ones.
+        /// Names of the shipped files.
         known: Vec<String>,
-        /// The shipped one that looks most like it.
+        /// The most similar name of a shipped file, if one is similar.
         nearest: Option<String>,
     },
-    /// Not TOML.
+    /// The text is not valid TOML.
     #[error("{file}: not valid TOML: {message}")]
     Syntax {
-        /// The file.
+        /// Path of the file.
         file: String,
         /// The parser's message, with line and column.
         message: String,
     },
-    /// A key the schema does not have.
+    /// The schema does not contain the key.
     #[error("{file}: unknown key `{key}`; allowed here: {}{}", quoted(allowed), suggestion(nearest.as_deref()))]
     UnknownKey {
-        /// The file.
+        /// Path of the file.
         file: String,
         /// Path of the key.
         key: String,
-        /// The keys allowed in its place.
+        /// Keys that are allowed in this table.
         allowed: Vec<String>,
-        /// The allowed key that looks most like it.
+        /// The most similar allowed key, if one is similar.
         nearest: Option<String>,
     },
-    /// A missing key, or a value of the wrong type.
+    /// A key is missing, or its value has the wrong type.
     #[error("{file}: `{key}`: {message}")]
     Shape {
-        /// The file.
+        /// Path of the file.
         file: String,
-        /// Path of the key, or of the table it is missing from.
+        /// Path of the key, or of the table that lacks the key.
         key: String,
-        /// What was found and what is expected.
+        /// Value found, and expected type.
         message: String,
     },
-    /// A value out of range, or one that contradicts another.
+    /// A value is out of range, or contradicts another value.
     #[error("{file}: `{key}` is {value}; {allowed}")]
     Value {
-        /// The file.
+        /// Path of the file.
         file: String,
         /// Path of the key.
         key: String,
-        /// Its value.
+        /// Invalid value.
         value: String,
-        /// What is allowed.
+        /// Allowed values.
         allowed: String,
     },
 }
 
 impl SettingsError {
-    /// The same defect of a table that another file holds at `path`.
+    /// Returns the error with the path of the enclosing table, for a table that is part of another
+    /// file.
     #[must_use]
     pub fn beneath(mut self, holder: &str, path: &str) -> Self {
         if let Self::UnknownName { name, .. } = &self {
@@ -97,7 +98,7 @@ impl SettingsError {
         self
     }
 
-    /// The error for a name that is neither a file nor one of the shipped.
+    /// Returns the error for a name that is neither a file nor a shipped file.
     pub fn unknown_name<'a>(
         what: &'static str,
         name: &str,
@@ -126,7 +127,7 @@ fn suggestion(nearest: Option<&str>) -> String {
         .unwrap_or_default()
 }
 
-/// The name that looks most like `name`, if any does.
+/// Returns the known name that is most similar to `name`, if one is similar.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
     known
         .into_iter()

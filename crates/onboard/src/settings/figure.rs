@@ -1,4 +1,4 @@
-//! Numbers that say where they come from.
+//! Numbers with their range, provenance and source.
 
 use std::fmt;
 
@@ -10,63 +10,63 @@ use super::check::Check;
 use super::error::SettingsError;
 use super::read::join;
 
-/// A number and where it comes from.
+/// Power or energy value with its provenance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Figure {
-    /// The number, in the unit its key names.
+    /// Value, in the unit of its key.
     #[schemars(range(min = 0.0, max = 1e9))]
     pub value: f64,
-    /// The least it may be.
+    /// Lower end of the range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e9, max = 1e9))]
     pub low: Option<f64>,
-    /// The most it may be.
+    /// Upper end of the range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e9))]
     pub high: Option<f64>,
-    /// How it came about.
+    /// Provenance of the value.
     pub provenance: Provenance,
-    /// Document, data set or fit it is taken from.
+    /// Document, data set or fit that contains the value.
     pub source: String,
-    /// What is counted in it.
+    /// Components that the value includes.
     pub boundary: Boundary,
 }
 
-/// A number that is neither power nor energy, and where it comes from.
+/// Value with its provenance, for quantities other than power and energy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Quantity {
-    /// The number, in the unit its key names.
+    /// Value, in the unit of its key.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub value: f64,
-    /// The least it may be.
+    /// Lower end of the range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e12))]
     pub low: Option<f64>,
-    /// The most it may be.
+    /// Upper end of the range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e12))]
     pub high: Option<f64>,
-    /// How it came about.
+    /// Provenance of the value.
     pub provenance: Provenance,
-    /// Document, data set or fit it is taken from.
+    /// Document, data set or fit that contains the value.
     pub source: String,
 }
 
-/// Which value of a range is meant.
+/// Position within the range of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
-    /// The least that it may be.
+    /// Lower end.
     Low,
-    /// The value itself.
+    /// Nominal value.
     Value,
-    /// The most that it may be.
+    /// Upper end.
     High,
 }
 
 impl Extent {
-    /// The other end.
+    /// Returns the opposite end of the range.
     #[must_use]
     pub fn opposite(self) -> Self {
         match self {
@@ -86,46 +86,48 @@ impl Extent {
 }
 
 impl Figure {
-    /// Its value, or an end of its range; the value where it states no range.
+    /// Returns the nominal value or an end of its range. Without a range, the nominal value is
+    /// returned.
     pub fn at(&self, extent: Extent) -> f64 {
         extent.of(self.value, self.low, self.high)
     }
 }
 
 impl Quantity {
-    /// Its value, or an end of its range; the value where it states no range.
+    /// Returns the nominal value or an end of its range. Without a range, the nominal value is
+    /// returned.
     pub fn at(&self, extent: Extent) -> f64 {
         extent.of(self.value, self.low, self.high)
     }
 }
 
-/// How a number came about.
+/// Provenance of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Provenance {
-    /// With an instrument.
+    /// Measured with an instrument.
     Measured,
-    /// Chosen so that a model meets published totals.
+    /// Fitted so that a model reproduces published totals.
     Fitted,
-    /// From the maker's documents.
+    /// Taken from a data sheet.
     Datasheet,
-    /// Measured on another machine and carried over by cycles and clock.
+    /// Measured on another computer, and scaled by cycles and clock frequency.
     Projected,
-    /// Somebody's judgement.
+    /// Assumed.
     Assumed,
 }
 
-/// What a power or energy figure counts.
+/// Components that a power or energy value includes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Boundary {
-    /// What is drawn above idle.
+    /// Power above idle.
     Marginal,
-    /// The rails of the system on chip.
+    /// Supply rails of the system on chip.
     SocRails,
-    /// The wall socket.
+    /// Power at the wall socket.
     Wall,
-    /// The source does not say.
+    /// Not specified by the source.
     Unstated,
 }
 
@@ -140,7 +142,7 @@ impl fmt::Display for Boundary {
     }
 }
 
-/// Refuses a range that does not hold its value.
+/// Returns an error if a range does not contain its value.
 pub(super) fn check_ranges(
     value: &Json,
     path: &str,

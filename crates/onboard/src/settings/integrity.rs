@@ -1,4 +1,4 @@
-//! Whom the tracker mistrusts, and the risk that is left.
+//! Integrity monitoring: fault probabilities and integrity risk.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,30 +6,32 @@ use serde::{Deserialize, Serialize};
 use super::check::Check;
 use super::error::SettingsError;
 
-/// `[integrity]`: the tracker mistrusts its sources and states a protection level. It does so without this
-/// table, too, by these defaults.
+/// `[integrity]`: the tracker monitors its sources and computes a protection level. Without this
+/// table, the defaults apply.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct IntegritySettings {
-    /// Whether it does. `false` takes every source at its word, and no position has a protection level.
+    /// Whether integrity is monitored. With `false`, every source is trusted and no protection
+    /// level is computed.
     pub enabled: bool,
-    /// Protection level in metres above which the position is not to be relied on.
+    /// Alert limit: protection level above which the position must not be used, in metres.
     #[schemars(range(min = 0.01, max = 1000.0))]
     pub alert_limit_m: f64,
-    /// Target integrity risk: how often in an hour the error may come to exceed the protection
-    /// level without an alarm.
+    /// Target integrity risk per hour: expected number of times that the error exceeds the
+    /// protection level without an alarm.
     #[schemars(range(min = 1e-9, max = 1.0))]
     pub risk_per_hour: f64,
-    /// Time in seconds after which the error may be beyond the level anew: so many epochs of an hour are
-    /// independent.
+    /// Correlation time of the position error, in seconds. Errors at times this far apart are
+    /// treated as independent.
     #[schemars(range(min = 0.01, max = 600.0))]
     pub error_correlation_s: f64,
-    /// How probable each fault is, at any time.
+    /// Prior probability of each fault, at any time.
     pub fault_probability: FaultProbability,
 }
 
-/// `[integrity.fault_probability]`: probabilities of being at fault, at any time, each independently of
-/// the others. What is wrong within the standard deviations of site and vehicle is no fault.
+/// `[integrity.fault_probability]`: prior probability that a source is faulty, at any time. Faults
+/// are independent. An error within the standard deviations of the site and vehicle files is not a
+/// fault.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FaultProbability {
@@ -38,15 +40,17 @@ pub struct FaultProbability {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub radio_head: Option<f64>,
-    /// Of the odometer: it slips, each time that the vehicle sets off; that it is noisier than stated is ninety times as
-    /// probable. Trackers that expect it count as probable as the angles leave it.
+    /// Prior probability of wheel slip, each time that the vehicle starts to move. An odometer
+    /// noisier than specified is 90 times as probable. Trackers that model the noise weight it by
+    /// the angles.
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub odometer: f64,
     /// Displacement of all radio heads relative to the map. A filter estimates it, and the angles weigh that filter.
     /// Without a map the radio heads define the frame, and this fault does not exist.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub all_radio_heads: f64,
-    /// Of the array: its mounting or its phases. Nobody watches it: it comes off the risk.
+    /// Prior probability of an array fault (mounting or phases). The monitor does not detect this
+    /// fault: its probability is subtracted from the integrity risk.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub array: f64,
 }
@@ -75,7 +79,7 @@ impl Default for FaultProbability {
 }
 
 impl IntegritySettings {
-    /// Switched off: every source is taken at its word.
+    /// Integrity monitoring switched off: every source is trusted.
     pub fn off() -> Self {
         Self {
             enabled: false,
@@ -93,16 +97,16 @@ impl FaultProbability {
 }
 
 impl IntegritySettings {
-    /// Probability with which an independent epoch may exceed the protection level: what a fault that
-    /// nobody watches leaves of the hour's risk, by the epochs of an hour that are independent
-    /// (Blanch, Walter, Enge, Lee, Pervan, Rippl, Spletter and Kropp, IEEE Transactions on Aerospace
-    /// and Electronic Systems 51, 2015).
+    /// Returns the maximum probability that the error exceeds the protection level at one
+    /// independent epoch. It is the integrity risk per hour, less that of unmonitored faults,
+    /// divided by the number of independent epochs per hour (Blanch, Walter, Enge, Lee, Pervan,
+    /// Rippl, Spletter and Kropp, IEEE Transactions on Aerospace and Electronic Systems 51, 2015).
     pub fn risk_per_epoch(&self) -> f64 {
         let monitored = self.risk_per_hour - self.fault_probability.array;
         monitored * self.error_correlation_s / 3600.0
     }
 
-    /// Refuses a fault that is likelier than the risk can bear.
+    /// Returns an error if a fault is more probable than the integrity risk permits.
     ///
     /// # Errors
     /// [`SettingsError::Value`].

@@ -1,4 +1,4 @@
-//! Numbers against the ranges that the JSON Schema states: one place for both.
+//! Comparison of numbers with the ranges of the JSON Schema.
 
 use serde_json::{Map, Value};
 
@@ -6,7 +6,7 @@ use super::check::Check;
 use super::error::SettingsError;
 use super::read::join;
 
-/// Refuses the first number, or length of a list, outside the range that `schema` states for it.
+/// Returns an error for the first number, or list length, outside its range in `schema`.
 ///
 /// # Errors
 /// [`SettingsError::Value`] naming the key and the range.
@@ -100,7 +100,7 @@ impl Walk<'_> {
     }
 }
 
-/// What to write where a number that is out of range looks like one of another unit.
+/// Returns a hint if a number that is out of range is plausible in another unit.
 fn unit_hint(path: &str, value: f64) -> String {
     let key = path.rsplit('.').next().unwrap_or(path);
     let key = key.split('[').next().unwrap_or(key);
@@ -136,7 +136,7 @@ fn unit_hint(path: &str, value: f64) -> String {
     format!("; {hint}")
 }
 
-/// Whether a variant of several is the one at hand: its tag says so, or it has none.
+/// Whether `variant` is the selected one: its tag has the value's tag, or it has no tag.
 fn is_meant(value: &Value, variant: &Value) -> bool {
     let tags = variant.get("properties").and_then(Value::as_object);
     tags.into_iter().flatten().all(|(name, schema)| {

@@ -1,4 +1,4 @@
-//! How angles and odometry become a pose, and how far that is trusted.
+//! Localizer settings: computation of a pose from angles and odometry.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,9 +7,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum LocalizerSettings {
-    /// The paper's: each angle becomes a heading, distances are added up along it.
+    /// Localizer of the paper: each angle yields a heading, and the distance is integrated along
+    /// it.
     DeadReckoning(DeadReckoningSettings),
-    /// A Kalman filter over pose, odometer scale and array calibration.
+    /// Kalman filter for pose, odometer scale and array calibration.
     Tracker(TrackerSettings),
 }
 
@@ -23,27 +24,27 @@ impl Default for LocalizerSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DeadReckoningSettings {
-    /// Along which heading the distance between two angles is laid.
+    /// Heading used for the distance between two angles.
     pub heading_between: HeadingBetween,
 }
 
-/// Along which heading the distance between two angles is laid.
+/// Heading used for the distance between two angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeadingBetween {
-    /// The one of the first angle: in a bend it lags behind.
+    /// Heading of the first angle; it lags in a bend.
     #[default]
     Held,
-    /// The mean of both, once the second is there.
+    /// Mean of both headings, available after the second angle.
     Mean,
 }
 
-/// `kind = "tracker"`. What it assumes of odometer, gyroscope, array and lane stands in their own
+/// `kind = "tracker"`. The models of odometer, gyroscope, array and lane keeping are in their own
 /// tables.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackerSettings {
-    /// Whether it takes the road's course from the site, where the site has one.
+    /// Whether the tracker uses the site's road as a map, if there is one.
     pub map: bool,
     /// RMS curvature of the path in 1/m, used where neither a map nor a yaw rate is available.
     #[schemars(range(min = 0.0, max = 10.0))]
@@ -51,12 +52,13 @@ pub struct TrackerSettings {
     /// Correlation length of the curvature, in metres.
     #[schemars(range(min = 1e-3, max = 1e6))]
     pub curvature_correlation_m: f64,
-    /// How the odometer's scale walks, per root of a metre driven; 0 is a constant scale on a road and
-    /// where the odometer's scale deviation and noise are stated, and 0.03 for any other differential
-    /// drive.
+    /// Random walk of the odometer scale, per square root of metre driven; 0 means a constant
+    /// scale. Default: 0.03 for a differential drive without specified scale deviation and noise,
+    /// otherwise 0.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub odometer_scale_walk_per_sqrt_m: f64,
-    /// Probability with which a good angle is taken for an outlier.
+    /// False-rejection probability: a correct angle is rejected as an outlier with this
+    /// probability.
     #[schemars(range(min = 1e-12, max = 0.5))]
     pub outlier_probability: f64,
 }
@@ -65,7 +67,8 @@ impl Default for TrackerSettings {
     fn default() -> Self {
         Self {
             map: true,
-            // Bends with a radius of 20 m (σ), each about as long as its radius: a vehicle in a yard.
+            // Bends with a radius of 20 m (1σ) and a length of about one radius: a vehicle in a
+            // yard.
             curvature_rms_per_m: 0.05,
             curvature_correlation_m: 15.0,
             odometer_scale_walk_per_sqrt_m: 0.0,

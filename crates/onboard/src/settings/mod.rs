@@ -1,10 +1,9 @@
-//! What the vehicle believes, as TOML files for people: a *site* (the plant, one for the fleet), a
-//! *vehicle* and a *platform* (its computer).
+//! Configuration of the nominal model, as TOML files: a *site* (the plant, one file for the fleet),
+//! a *vehicle* and a *platform* (onboard computer).
 //!
-//! Units are in the names of keys, human ones where people write them; everything that computes
-//! takes the SI values that the types' methods give. Beside every value that can be wrong stands
-//! its standard deviation. Ranges of numbers stand at the fields, where the JSON Schema shows them
-//! and [`TomlFile`] checks them.
+//! The names of the keys contain the units. Methods of the types return SI values, which all
+//! computations use. Every uncertain value has a key for its standard deviation. Ranges of numbers
+//! are attributes of the fields: the JSON Schema contains them, and [`TomlFile`] checks them.
 
 mod array;
 mod array_shape;

@@ -1,19 +1,20 @@
-//! How the vehicle drives, and the data sheets of what measures it.
+//! Drive type of the vehicle, and data-sheet values of its motion sensors.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::road::LaneKeeping;
 
-/// What the vehicle's kinematics allow.
+/// Drive type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DriveKind {
-    /// Steered wheels: it turns only as it drives, and its path bends slowly.
+    /// Steered wheels: the heading changes only while the vehicle drives, and the curvature varies
+    /// slowly.
     #[default]
     Road,
-    /// Two driven wheels: it also turns on the spot, wherever its yaw rate says. It roams: no road
-    /// is followed.
+    /// Two driven wheels: the vehicle also turns on the spot, at the measured yaw rate. It moves
+    /// freely, without a road.
     Differential,
 }
 
@@ -21,30 +22,32 @@ pub enum DriveKind {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct OdometerSettings {
-    /// Samples per second.
+    /// Sampling rate in hertz.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub rate_hz: f64,
-    /// Metres read per metre driven.
+    /// Scale factor: distance measured per distance driven.
     #[schemars(range(min = 0.5, max = 2.0))]
     pub scale: f64,
-    /// Standard deviation of that (0.003 is 0.3 %).
+    /// Standard deviation of the scale factor (0.003 is 0.3 %).
     #[schemars(range(min = 0.0, max = 0.5))]
     pub scale_std: f64,
-    /// Standard deviation of the distance after one metre, growing with the root of distance.
+    /// Standard deviation of the distance after one metre, in metres; it grows with the square root
+    /// of distance.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub noise_m_per_sqrt_m: f64,
-    /// The same after one second of not quite standing, growing with the root of time.
+    /// Standard deviation of the distance after one second of slow motion, in metres; it grows with
+    /// the square root of time.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub noise_m_per_sqrt_s: f64,
-    /// Standard deviation of a single reading of the speed, in m/s.
+    /// Standard deviation of one speed measurement, in m/s.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub speed_noise_mps: f64,
-    /// Distance of the contact points of left and right wheel in metres, where these tell the yaw
-    /// rate.
+    /// Track width: distance between the contact points of left and right wheel in metres, if the
+    /// wheels measure the yaw rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.01, max = 10.0))]
     pub track_width_m: Option<f64>,
-    /// Standard deviation of that in metres.
+    /// Standard deviation of the track width, in metres.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub track_width_std_m: f64,
     /// Probability that a sample is lost.
@@ -68,41 +71,41 @@ impl Default for OdometerSettings {
     }
 }
 
-/// `[gyroscope]`: whatever tells the yaw rate, a gyroscope or a pair of wheels.
+/// `[gyroscope]`: yaw-rate sensor, a gyroscope or a pair of wheels.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GyroscopeSettings {
     /// Angle random walk in rad/√s.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub noise_rad_per_sqrt_s: f64,
-    /// The same by the distance driven, in rad/√m: wheels of unequal grip.
+    /// Random walk of the heading with distance, in rad/√m: wheels of unequal grip.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub noise_rad_per_sqrt_m: f64,
-    /// The same by the angle turned, in rad/√rad: wheels that slip as they turn.
+    /// Random walk of the heading with the yaw change, in rad/√rad: wheels that slip while turning.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub noise_rad_per_sqrt_rad: f64,
     /// Constant bias in rad/s.
     #[schemars(range(min = -10.0, max = 10.0))]
     pub bias_radps: f64,
-    /// Standard deviation of that in rad/s.
+    /// Standard deviation of the bias, in rad/s.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub bias_std_radps: f64,
-    /// How the bias walks, in rad/s per root of a second; 0 is a constant bias.
+    /// Random walk of the bias, in rad/s per square root of second; 0 means a constant bias.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub bias_walk_radps_per_sqrt_s: f64,
 }
 
-/// `[lane_keeping]`: how the vehicle strays from the middle of the road and comes back.
+/// `[lane_keeping]`: lateral deviation of the vehicle from the centre of the road.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LaneKeepingSettings {
-    /// Root mean square distance from the middle, in metres.
+    /// RMS lateral deviation, in metres.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub rms_m: f64,
     /// Typical wavelength along the road, in metres.
     #[schemars(range(min = 0.1, max = 10_000.0))]
     pub wavelength_m: f64,
-    /// Damping ratio: how soon one swing forgets the last.
+    /// Damping ratio of the lateral oscillation.
     #[schemars(range(min = 0.01, max = 0.99))]
     pub damping: f64,
 }
@@ -118,7 +121,7 @@ impl Default for LaneKeepingSettings {
 }
 
 impl LaneKeepingSettings {
-    /// The process behind it.
+    /// Returns the stochastic process of the lateral deviation.
     pub const fn process(&self) -> LaneKeeping {
         LaneKeeping {
             rms_m: self.rms_m,

@@ -1,19 +1,19 @@
-//! Laying some keys over others: files that are `like` another one, overrides, truth over belief.
+//! Overriding keys: `like` files, overrides, and the truth of a simulation.
 
 use toml::{Table, Value};
 
 use super::check::Check;
 use super::error::SettingsError;
 
-/// Tags that decide which other keys their table may have.
+/// Tags that determine the other keys of their table.
 const TAGS: [&str; 2] = ["policy", "kind"];
 
-/// Lays `over` over `base`: tables key by key, everything else whole. A tag that changes drops the
-/// keys that belonged to the old one. Where `base` has a list of named tables, a table over it
-/// speaks of its entries by their names, or of `all` of them.
+/// Applies the keys of `over` to `base`: tables key by key, other values as a whole. A tag that
+/// changes removes the keys of the previous variant. If `base` has a list of named tables, a table
+/// in `over` refers to its entries by name, or to `all` of them.
 ///
 /// # Errors
-/// [`SettingsError::Value`] for the name of an entry that is not on the list.
+/// [`SettingsError::Value`] if the list has no entry of that name.
 pub fn lay_over(
     base: &mut Table,
     over: Table,
@@ -37,7 +37,7 @@ pub fn lay_over(
                     lay_over_entries(entries, &name, &value, &path, check)?;
                 }
             }
-            // Over the name of a file: its keys over those of that file.
+            // The base is the name of a file: override keys of that file.
             (Some(Value::String(name)), Value::Table(mut value)) => {
                 let name = Value::String(name.clone());
                 value.entry("like").or_insert(name);
@@ -79,11 +79,11 @@ fn lay_over_entries(
 
 /// Sets the value at a dotted path (`channel.rician_k_db`, `site.radio_heads[0].eirp_dbm`).
 ///
-/// Where the path ends in a tag (`wake_up.policy`) whose value changes, the table's other keys
-/// belonged to the old variant and are dropped.
+/// If the path ends in a tag (`wake_up.policy`) whose value changes, the keys of the previous
+/// variant are removed.
 ///
 /// # Errors
-/// [`SettingsError::Shape`] for a path that leads nowhere.
+/// [`SettingsError::Shape`] if the path does not exist.
 pub fn set(table: &mut Table, path: &str, value: Value, file: &str) -> Result<(), SettingsError> {
     let no_such = || SettingsError::Shape {
         file: file.to_owned(),
@@ -116,7 +116,7 @@ pub fn set(table: &mut Table, path: &str, value: Value, file: &str) -> Result<()
     Ok(())
 }
 
-/// Whether a path names a tag; such overrides come before those of other keys.
+/// Whether a path ends in a tag. Overrides of tags are applied before those of other keys.
 pub fn ends_in_tag(path: &str) -> bool {
     TAGS.contains(&path.rsplit_once('.').map_or(path, |(_, key)| key))
 }

@@ -1,4 +1,4 @@
-//! The onboard computer: its power modes, how fast they estimate and what that costs.
+//! Onboard computer: power modes, speed of the estimators, and energy.
 
 use std::collections::BTreeSet;
 
@@ -13,29 +13,29 @@ use super::receiver::EstimatorMethod;
 use super::toml_file::TomlFile;
 use super::vehicle::{PlatformSettings, Vehicle};
 
-/// A platform file.
+/// Platform file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Platform {
     /// Short name.
     pub name: String,
-    /// What the computer is.
+    /// Description of the computer.
     #[serde(default)]
     pub description: String,
-    /// Power drawn whether or not anything is estimated.
+    /// Idle power, drawn at all times.
     #[serde(default)]
     pub idle: IdleSettings,
-    /// Power drawn by the radio receiver while it listens.
+    /// Power of the radio receiver while it is on.
     #[serde(default)]
     pub receiver: ReceiverPower,
-    /// What a computation costs, for modes without a figure of their own.
+    /// Cost of a computation, for modes without a measured value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cpu: Option<CpuSettings>,
-    /// Sleep between wake-ups; without, the board idles.
+    /// Suspend state between wake-ups. Default: the board idles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub suspend: Option<SuspendSettings>,
-    /// Share of the power at the wall that reaches the rails; without, figures above idle are taken
-    /// for what the wall sees of them.
+    /// Efficiency of the power supply, from the wall socket to the supply rails. Default: power
+    /// above idle counts as power at the wall socket.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub supply_efficiency: Option<Quantity>,
     /// The power modes.
@@ -44,10 +44,10 @@ pub struct Platform {
 }
 
 impl Platform {
-    /// The mode that a vehicle asks for.
+    /// Returns the power mode that a vehicle selects.
     ///
     /// # Errors
-    /// [`SettingsError::Value`] when the platform has no such mode.
+    /// [`SettingsError::Value`] if the platform does not have this mode.
     pub fn mode(
         &self,
         settings: &PlatformSettings,
@@ -67,12 +67,12 @@ impl Platform {
             })
     }
 
-    /// Power drawn in a mode whether or not anything is estimated.
+    /// Returns the idle power of a mode.
     pub fn idle_power_w<'a>(&'a self, mode: &'a PowerMode) -> Option<&'a Figure> {
         mode.idle_power_w.as_ref().or(self.idle.power_w.as_ref())
     }
 
-    /// Power of one busy core above idle in a mode, with what it counts and where it is from.
+    /// Returns the power of one busy core above idle in a mode, with its boundary and source.
     pub fn core_power_w<'a>(
         &'a self,
         mode: &'a PowerMode,
@@ -85,17 +85,18 @@ impl Platform {
         Some((core.at(mode.cpu_mhz, extent), &core.power_w))
     }
 
-    /// Power of the board with so many busy cores in a mode: idle, and each core above it.
+    /// Returns the board's power in a mode with `cores` busy cores: idle power plus that of each
+    /// core.
     pub fn busy_power_w(&self, mode: &PowerMode, cores: u32) -> Option<f64> {
         let (core_w, _) = self.core_power_w(mode, Extent::Value)?;
         Some(self.idle_power_w(mode)?.value + f64::from(cores) * core_w)
     }
 
-    /// What a sum counts of which these parts are counted. What is above idle adds to anything; two
-    /// parts that each hold the idle board would count it twice.
+    /// Returns the boundary of a sum of power values. A value above idle can be added to any other;
+    /// two values that both contain the idle board would count it twice.
     ///
     /// # Errors
-    /// [`SettingsError::Value`] where there are two of those.
+    /// [`SettingsError::Value`] if two values contain the idle board.
     pub fn boundary_of_sum(
         &self,
         parts: impl IntoIterator<Item = Option<Boundary>>,
@@ -115,10 +116,12 @@ impl Platform {
         Ok(first.unwrap_or(Boundary::Marginal))
     }
 
-    /// Shortest time between estimates, in seconds, of the vehicle's method in its mode.
+    /// Returns the minimum time between two estimates, for the vehicle's method in its power mode,
+    /// in seconds.
     ///
     /// # Errors
-    /// [`SettingsError::Value`] when the platform has no such mode, or no figure for the method.
+    /// [`SettingsError::Value`] if the platform does not have this mode, or no value for the
+    /// method.
     pub fn base_wake_up_s(&self, vehicle: &Vehicle) -> Result<f64, SettingsError> {
         let mode = self.mode(&vehicle.platform, &vehicle.name)?;
         let method = vehicle.estimator.method;
@@ -149,11 +152,11 @@ impl Platform {
         })
     }
 
-    /// The vehicle with what it leaves to others written out: its wake-up times to the platform, how it wakes
-    /// up and whether it mistrusts its sources to the localizer.
+    /// Returns the vehicle with all defaults filled in: wake-up times from the platform, wake-up
+    /// policy and integrity monitoring from the localizer.
     ///
     /// # Errors
-    /// As [`base_wake_up_s`](Self::base_wake_up_s).
+    /// Those of [`base_wake_up_s`](Self::base_wake_up_s).
     pub fn resolve(&self, vehicle: &Vehicle) -> Result<Vehicle, SettingsError> {
         let mut resolved = vehicle.clone();
         let mut wake_up = vehicle.wake_up_policy();

@@ -1,4 +1,4 @@
-//! What the parts of an onboard computer draw: board, receiver, cores, and in which power modes.
+//! Power of the onboard computer's parts: board, receiver, cores, and power modes.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use super::receiver::EstimatorMethod;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct IdleSettings {
-    /// Whether idle power counts as part of a run's energy.
+    /// Whether idle power is part of a run's energy.
     pub counted: bool,
     /// Idle power in watts.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -23,15 +23,15 @@ pub struct IdleSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReceiverPower {
-    /// Whether the receiver's power counts as part of a run's energy.
+    /// Whether the receiver's power is part of a run's energy.
     pub counted: bool,
-    /// How long it is on for one SSB burst, in ms.
+    /// Receiver on-time for one SSB burst, in ms.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub on_time_ms: f64,
-    /// How long it is on before that, until oscillator and gain have settled, in ms.
+    /// Receiver on-time before the burst, until oscillator and gain have settled, in ms.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub settling_ms: Option<Quantity>,
-    /// Its power in watts.
+    /// Power of the receiver in watts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub power_w: Option<Figure>,
 }
@@ -47,38 +47,40 @@ impl Default for ReceiverPower {
     }
 }
 
-/// `[cpu]`: an execution takes its cycles at the mode's clock, at the power of one busy core.
+/// `[cpu]`: an estimate takes a number of cycles at the mode's clock frequency, at the power of one
+/// busy core.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CpuSettings {
-    /// Cycles of one estimate, per method.
+    /// Cycles of one estimate, for each method.
     #[serde(default)]
     pub cycles_per_execution: BTreeMap<EstimatorMethod, Quantity>,
-    /// Cycles of receiving one SSB burst, whether or not an angle is estimated from it.
+    /// Cycles for the reception of one SSB burst, with or without an angle estimate.
     pub cycles_per_burst: Quantity,
-    /// Power of a busy core, for modes that do not state it.
+    /// Power of a busy core, for modes without a value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub core: Option<CorePower>,
 }
 
-/// `[cpu.core]`: `P·(f / f_ref)^n`
+/// `[cpu.core]`: power of a busy core, `P·(f / f_ref)^n`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CorePower {
     /// Power of one busy core above idle, at `reference_mhz`, in watts.
     pub power_w: Figure,
-    /// Clock that `power_w` is stated for, in MHz.
+    /// Clock frequency of `power_w`, in MHz.
     #[schemars(range(min = 1.0, max = 1e5))]
     pub reference_mhz: f64,
-    /// Power of the clock that it grows with: 1 at constant voltage, 3 where the voltage follows.
+    /// Exponent n of the clock frequency: 1 at constant voltage, 3 if the voltage scales with the
+    /// clock.
     pub exponent: Quantity,
 }
 
 impl CorePower {
-    /// Power of a busy core at a clock, in watts.
+    /// Returns the power of a busy core at a clock frequency, in watts.
     pub(super) fn at(&self, cpu_mhz: f64, extent: Extent) -> f64 {
         let clock = cpu_mhz / self.reference_mhz;
-        // Below the reference clock, the greater exponent makes for the smaller power.
+        // Below the reference clock, the larger exponent gives the smaller power.
         let end = if clock < 1.0 {
             extent.opposite()
         } else {
@@ -88,13 +90,13 @@ impl CorePower {
     }
 }
 
-/// `[suspend]`: the board sleeps whenever the next burst that it listens to is far enough.
+/// `[suspend]`: the board suspends if the time to the next received burst exceeds the transition.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SuspendSettings {
-    /// Power asleep in watts.
+    /// Power in the suspend state, in watts.
     pub power_w: Figure,
-    /// Time to fall asleep and wake up again, at idle power, in ms.
+    /// Time to suspend and resume, at idle power, in ms.
     pub transition_ms: Quantity,
 }
 
@@ -102,37 +104,38 @@ pub struct SuspendSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PowerMode {
-    /// Its number.
+    /// Number of the power mode.
     pub mode: u32,
-    /// Its name in the maker's configuration.
+    /// Name of the power mode in the manufacturer's configuration.
     pub name: String,
     /// CPU frequency in MHz.
     #[schemars(range(min = 1.0, max = 1e5))]
     pub cpu_mhz: f64,
-    /// CPU cores online.
+    /// Number of CPU cores online.
     #[schemars(range(min = 1, max = 4096))]
     pub cores: u32,
-    /// Memory clock in MHz; without it, the board's maximum.
+    /// Memory clock in MHz. Default: the board's maximum.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub memory_mhz: Option<f64>,
-    /// CPU frequency in MHz as the paper prints it, where it differs.
+    /// CPU frequency in MHz as printed in the paper, if it differs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub paper_cpu_mhz: Option<f64>,
-    /// Power of the board in this mode whether or not anything is estimated, in watts; without, the
-    /// platform's.
+    /// Idle power of the board in this mode, in watts. Default: that of the platform.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub idle_power_w: Option<Figure>,
-    /// Power of one busy core above idle, in watts; without, that of `cpu.core` at the clock.
+    /// Power of one busy core above idle, in watts. Default: that of `cpu.core` at this clock.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub core_power_w: Option<Figure>,
-    /// Shortest time between two estimates in ms, per method; without, the cycles at the clock.
+    /// Minimum time between two estimates in ms, for each method. Default: cycles divided by the
+    /// clock frequency.
     #[serde(default)]
     #[schemars(inner(range(min = 1e-3, max = 3.6e6)))]
     pub base_wake_up_ms: BTreeMap<EstimatorMethod, f64>,
-    /// Energy of one estimate in joules, per method; without, the cycles at a core's power.
+    /// Energy of one estimate in joules, for each method. Default: duration times the power of a
+    /// busy core.
     #[serde(default)]
     pub energy_per_execution_j: BTreeMap<EstimatorMethod, Figure>,
-    /// Power of the whole board with all cores busy, in watts.
+    /// Power of the board with all cores busy, in watts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub full_load_power_w: Option<Figure>,
 }

@@ -1,4 +1,4 @@
-//! Radio heads and the SSBs they send.
+//! Radio heads and their SSBs.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,13 +7,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RadioHeadSettings {
-    /// Name for people.
+    /// Display name.
     #[serde(default)]
     pub name: String,
-    /// Surveyed place `[x, y, z]` in metres; z is the height, counted as the vehicle's array's is.
+    /// Surveyed position `[x, y, z]` in metres. The height z has the same datum as that of the
+    /// vehicle's array.
     #[schemars(inner(range(min = -1e7, max = 1e7)))]
     pub position_m: [f64; 3],
-    /// Standard deviation of the survey in each of x and y, in metres.
+    /// Standard deviation of the surveyed x and y, each in metres.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub position_std_m: f64,
@@ -21,24 +22,24 @@ pub struct RadioHeadSettings {
     #[serde(default)]
     #[schemars(range(min = 0, max = 1007))]
     pub pci: u16,
-    /// Index of its SSB in the burst.
+    /// Index of the radio head's SSB in the burst.
     #[serde(default)]
     #[schemars(range(min = 0, max = 63))]
     pub ssb_index: u8,
-    /// Transmit power and antenna gain together (EIRP), in dBm.
+    /// Equivalent isotropically radiated power (EIRP) in dBm: transmit power plus antenna gain.
     #[serde(default = "small_cell")]
     #[schemars(range(min = Self::LEAST_EIRP_DBM, max = Self::MOST_EIRP_DBM))]
     pub eirp_dbm: f64,
-    /// Standard deviation of that, in dB.
+    /// Standard deviation of the EIRP, in dB.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 40.0))]
     pub eirp_std_db: f64,
 }
 
 impl RadioHeadSettings {
-    /// Least that a radio head transmits (dBm).
+    /// Minimum EIRP of a radio head (dBm).
     pub const LEAST_EIRP_DBM: f64 = -150.0;
-    /// Most that it transmits (dBm).
+    /// Maximum EIRP of a radio head (dBm).
     pub const MOST_EIRP_DBM: f64 = 120.0;
 }
 

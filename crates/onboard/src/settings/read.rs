@@ -1,4 +1,4 @@
-//! From TOML text to settings, with errors that name the key.
+//! Conversion of TOML text to settings, with errors that name the key.
 
 use serde::de::DeserializeOwned;
 use serde_path_to_error::Segment;
@@ -21,7 +21,7 @@ pub fn parse(text: &str, file: &str) -> Result<Table, SettingsError> {
         })
 }
 
-/// What to write where the line of a syntax error has a decimal comma: `speed = 3,5`.
+/// Returns a hint if the line of a syntax error contains a decimal comma, as in `speed = 3,5`.
 fn comma_hint(text: &str, at: usize) -> String {
     let start = text
         .get(..at)
@@ -44,14 +44,14 @@ fn comma_hint(text: &str, at: usize) -> String {
     found.map(|hint| format!("\n{hint}")).unwrap_or_default()
 }
 
-/// What to write for a number with a decimal comma; nothing for what is none.
+/// Returns the hint for a number with a decimal comma, or an empty string.
 fn with_point(number: &str) -> Option<String> {
     let point = number.replacen(',', ".", 1);
     let is_number = number.contains(',') && point.parse::<f64>().is_ok();
     is_number.then(|| format!("numbers take a decimal point: write {point}, not {number}"))
 }
 
-/// Turns a parsed table into settings.
+/// Converts a parsed table to settings.
 ///
 /// # Errors
 /// [`SettingsError`] naming the key.
@@ -64,26 +64,26 @@ pub fn from_table<T: DeserializeOwned>(table: Table, file: &str) -> Result<T, Se
     })
 }
 
-/// What serde says is wrong, and where as far as it knows.
+/// Error of serde, and its location as far as known.
 struct Defect {
     path: Vec<Step>,
     message: String,
 }
 
-/// One step from a table or list into it.
+/// Step of a path: a table key or a list index.
 #[derive(Clone)]
 enum Step {
     Key(String),
     Index(usize),
 }
 
-/// Tables of more keys than any has that is meant are not searched for the offender.
+/// Maximum number of keys of a table that is searched for the invalid key.
 const MOST_KEYS: usize = 200;
 
 fn read<T: DeserializeOwned>(value: &Value) -> Result<T, Defect> {
     serde_path_to_error::deserialize(value.clone()).map_err(|error| Defect {
         path: error.path().iter().map_while(step).collect(),
-        // The TOML reader adds the path on a second line, less precisely.
+        // The TOML reader appends a less precise path on a second line.
         message: (error.inner().to_string().lines().next())
             .unwrap_or_default()
             .to_owned(),
@@ -98,8 +98,8 @@ fn step(segment: &Segment) -> Option<Step> {
     }
 }
 
-/// The path of the offending key. serde's own path ends at tables with a tag, which it reads ahead
-/// as a whole; inside them the offender is the key without which this defect is gone.
+/// Returns the path of the invalid key. serde's path ends at a table with a tag, because serde
+/// buffers the whole table. The invalid key is the one whose removal changes the error.
 fn precise_path<T: DeserializeOwned>(value: &Value, defect: &Defect) -> Vec<Step> {
     let mut path = defect.path.clone();
     while let Some(Value::Table(table)) = at(value, &path) {
@@ -139,7 +139,7 @@ fn without(value: &Value, path: &[Step], key: &str) -> Value {
     copy
 }
 
-/// A path as `radio_heads[0].pci`.
+/// Returns a path in the form `radio_heads[0].pci`.
 fn written(path: &[Step]) -> String {
     path.iter().fold(String::new(), |path, step| match step {
         Step::Index(index) => format!("{path}[{index}]"),
@@ -147,14 +147,14 @@ fn written(path: &[Step]) -> String {
     })
 }
 
-/// serde says what it expected in words; put them into the error's fields.
+/// Converts serde's message to the fields of the error.
 fn explain(file: &str, path: &str, message: &str) -> SettingsError {
     let mut names = message.split('`').skip(1).step_by(2).map(str::to_owned);
     if message.starts_with("unknown field") {
         let name = names.next().unwrap_or_default();
         let allowed: Vec<String> = names.collect();
         let nearest = nearest(&name, allowed.iter().map(String::as_str));
-        // Inside tagged tables the path ends at the table.
+        // Inside a tagged table the path ends at the table.
         let key = if path == name || path.ends_with(&format!(".{name}")) {
             path.to_owned()
         } else {
@@ -197,7 +197,7 @@ fn explain(file: &str, path: &str, message: &str) -> SettingsError {
     }
 }
 
-/// What to write where a list is too long for its commas, or a number stands in quotes.
+/// Returns a hint if a list has too many commas, or a number is in quotes.
 fn number_hint(message: &str) -> String {
     let hint = if message.starts_with("invalid length") {
         Some("numbers take a decimal point: write 3.5, not 3,5".to_owned())

@@ -1,4 +1,4 @@
-//! The vehicle's receiver, and how it estimates an angle.
+//! Receiver of the vehicle, and estimator of the angle.
 
 use std::fmt;
 
@@ -18,30 +18,29 @@ pub struct ReceiverSettings {
     /// Bandwidth of one snapshot in MHz.
     #[schemars(range(min = 1e-3, max = 2000.0))]
     pub bandwidth_mhz: f64,
-    /// What the receiver knows of the transmitted signal.
+    /// Part of the transmitted signal that the receiver knows.
     pub pilots: Pilots,
-    /// Snapshots of each SSB where `pilots` is "blind".
+    /// Number of snapshots of each SSB if `pilots` is "blind".
     #[schemars(range(min = 1, max = 64))]
     pub snapshots: u16,
-    /// Standard deviation of the sensed SNR in dB.
+    /// Standard deviation of the measured SNR in dB.
     #[schemars(range(min = 0.0, max = 40.0))]
     pub snr_noise_db: f64,
-    /// How much older than its time stamp an angle is, in seconds.
+    /// Time offset of an angle: its time stamp minus the time of its measurement, in seconds.
     #[schemars(range(min = -1.0, max = 0.4))]
     pub lateness_s: f64,
-    /// Standard deviation of that, within which it is found while driving, in seconds; without, 0
-    /// on a road and 0.1 s for a differential drive, and of recorded drives it is found beforehand,
-    /// up to 1.5 s. 0 says that the clocks are one.
+    /// Standard deviation of the time offset, in seconds; 0 means that the clocks agree. The offset
+    /// is estimated while driving. Default: 0 on a road, 0.1 s for a differential drive. In
+    /// recorded drives, an offset of up to 1.5 s is estimated in advance.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 0.5))]
     pub lateness_std_s: Option<f64>,
-    /// Standard deviation of the error of the electrical angle that stays from look to look, in
-    /// radians.
+    /// Standard deviation of the time-correlated part of the electrical angle's error, in radians.
     #[schemars(range(min = 0.0, max = 3.2))]
     pub phase_bias_std_rad: f64,
-    /// Largest share of an angle's stated variance that stays so; how much does is found while driving.
-    /// 0.25 for logged angles where it is not stated, and 0 for the receiver's own, whose deviation
-    /// is that of thermal noise.
+    /// Maximum fraction of an angle's variance that is time-correlated; the actual fraction is
+    /// estimated while driving. Default: 0.25 for logged angles, 0 for angles of the receiver,
+    /// whose variance is that of thermal noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub phase_bias_share: Option<f64>,
@@ -51,13 +50,13 @@ pub struct ReceiverSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub phase_bias_probability: Option<f64>,
-    /// Time over which that error is forgotten, in seconds, provided that the vehicle moves.
+    /// Correlation time of the time-correlated error, in seconds, while the vehicle moves.
     #[schemars(range(min = 1e-3, max = 1e9))]
     pub phase_bias_correlation_s: f64,
-    /// Distance over which that error is forgotten, in metres.
+    /// Correlation distance of the time-correlated error, in metres.
     #[schemars(range(min = 1e-3, max = 1e9))]
     pub phase_bias_correlation_m: f64,
-    /// Cells to listen to; all that the site has without.
+    /// Physical cell identities that are received. Default: all of the site.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pci_allow_list: Option<Vec<u16>>,
 }
@@ -84,37 +83,39 @@ impl Default for ReceiverSettings {
 }
 
 impl ReceiverSettings {
-    /// Whether it listens to a cell.
+    /// Whether the receiver processes a cell.
     pub fn hears(&self, pci: u16) -> bool {
         let list = self.pci_allow_list.as_ref();
         list.is_none_or(|list| list.contains(&pci))
     }
 }
 
-/// Which resource elements of the SSB the receiver knows and despreads (TS 38.211, 7.4.3).
+/// Resource elements of the SSB that the receiver knows and despreads (TS 38.211, 7.4.3).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pilots {
-    /// None: snapshots of an unknown signal, as in the paper.
+    /// No known resource elements: snapshots of an unknown signal, as in the paper.
     Blind,
     /// The primary synchronization signal.
     Pss,
     /// Both synchronization signals.
     #[serde(rename = "pss+sss")]
     PssSss,
-    /// All of it, the broadcast channel having been decoded.
+    /// The whole SSB, after the PBCH has been decoded.
     #[default]
     Ssb,
 }
 
 impl Pilots {
-    /// Known resource elements in each OFDM symbol of the SSB that has any; `None` when blind.
+    /// Returns the number of known resource elements in each OFDM symbol of the SSB that contains
+    /// any; `None` if `pilots` is "blind".
     pub const fn per_symbol(self) -> Option<&'static [u16]> {
         match self {
             Self::Blind => None,
             Self::Pss => Some(&[127]),
             Self::PssSss => Some(&[127, 127]),
-            // Symbols 1 and 3 are PBCH throughout, symbol 2 holds SSS between two 48-wide parts.
+            // Symbols 1 and 3 contain PBCH only; symbol 2 contains the SSS between two PBCH parts
+            // of 48 subcarriers.
             Self::Ssb => Some(&[127, 240, 127 + 96, 240]),
         }
     }
@@ -124,10 +125,10 @@ impl Pilots {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EstimatorSettings {
-    /// The method.
+    /// Estimation method.
     pub method: EstimatorMethod,
-    /// MUSIC's angles are those of a grid from the array's axis on, so many degrees apart; without it
-    /// its maximum is refined.
+    /// Step of MUSIC's grid, in degrees, starting at the array axis. Default: the maximum of the
+    /// pseudospectrum is refined.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.01, max = 10.0))]
     pub music_grid_deg: Option<f64>,
@@ -144,7 +145,7 @@ impl fmt::Display for EstimatorMethod {
     }
 }
 
-/// How an angle of arrival is estimated from a covariance.
+/// Estimation method of the angle of arrival from a covariance matrix.
 #[derive(
     Debug,
     Clone,
@@ -161,13 +162,13 @@ impl fmt::Display for EstimatorMethod {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorMethod {
-    /// Multiple signal classification.
+    /// Multiple signal classification (MUSIC).
     Music,
-    /// Its polynomial form.
+    /// Root-MUSIC, the polynomial form of MUSIC.
     RootMusic,
-    /// Estimation of signal parameters by rotational invariance.
+    /// Estimation of signal parameters via rotational invariance techniques (ESPRIT).
     Esprit,
-    /// One-source maximum likelihood.
+    /// Maximum likelihood for one source.
     #[default]
     MaximumLikelihood,
 }

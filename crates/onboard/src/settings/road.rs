@@ -1,4 +1,4 @@
-//! The road.
+//! Road of a site.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
@@ -10,69 +10,69 @@ use super::toml_file::Library;
 use crate::geometry::{Point, Pose};
 use crate::road::{Road, RoadError, Segment};
 
-/// `[road]`: exactly one of `segments`, `polyline_m` and `file` gives its shape.
+/// `[road]`: exactly one of `segments`, `polyline_m` and `file` defines the centre line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RoadSettings {
     /// Width in metres.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub width_m: f64,
-    /// Standard deviation across the road of where it is said to be, in metres.
+    /// Standard deviation of the road's position, perpendicular to the road, in metres.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub position_std_m: f64,
-    /// Radius by which the corners of a polyline are rounded, in metres. Without, the road runs
-    /// smoothly through its points, as closely as they were surveyed.
+    /// Radius of the arcs that replace the corners of a polyline, in metres. Default: a smooth
+    /// curve through the points, within their standard deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.01, max = 1e5))]
     pub corner_radius_m: Option<f64>,
-    /// Where `segments` begin.
+    /// Start pose of `segments`.
     pub start: Pose,
-    /// Lines and arcs that join without a kink.
+    /// Straight lines and arcs, joined with a continuous heading.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub segments: Option<Vec<SegmentSettings>>,
     /// Surveyed points `[x, y]` in metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(inner(range(min = -1e7, max = 1e7))))]
     pub polyline_m: Option<Vec<[f64; 2]>>,
-    /// A CSV file with the columns `x_m`, `y_m`, or a GeoJSON `LineString` (projected onto the
-    /// tangent plane of its first point), relative to the site's own place. Its points are
-    /// taken over into `polyline_m` on reading.
+    /// CSV file with the columns `x_m` and `y_m`, or GeoJSON `LineString` (projected onto the
+    /// tangent plane of its first point). The path is relative to the site file. Its points are
+    /// copied to `polyline_m` when the site is read.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
 }
 
-/// A line or an arc.
+/// Straight line or arc.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "WrittenSegment")]
 pub struct SegmentSettings {
     /// Length in metres.
     pub length_m: f64,
-    /// Turn over this length in radians; left is positive.
+    /// Heading change over this length in radians; positive to the left.
     pub turn_rad: f64,
-    /// Whether the road is known to lie there.
+    /// Whether the position of this segment is known.
     pub surveyed: bool,
 }
 
-/// A segment as it may be written: a bend by its length, or by its radius.
+/// Segment in the file format: an arc has a length or a radius.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "SegmentSettings")]
 struct WrittenSegment {
-    /// Length in metres; of a bend its radius may be given instead.
+    /// Length in metres; an arc may have `radius_m` instead.
     #[schemars(range(min = 1e-6, max = 1e5))]
     length_m: Option<f64>,
-    /// Radius of a bend in metres.
+    /// Radius of an arc in metres.
     #[schemars(range(min = 0.01, max = 1e5))]
     radius_m: Option<f64>,
-    /// Turn over this length in radians; left is positive.
+    /// Heading change over this length in radians; positive to the left.
     #[schemars(range(min = -100.0, max = 100.0))]
     turn_rad: Option<f64>,
-    /// The same in degrees.
+    /// Heading change over this length in degrees; positive to the left.
     #[schemars(range(min = -5000.0, max = 5000.0))]
     turn_deg: Option<f64>,
-    /// Whether the road is known to lie there. What is given of a stretch that was not surveyed
-    /// is a guess, such as the chord between the ends of the survey, and must be straight. A
-    /// tracker does not keep to it; a simulated vehicle does.
+    /// Whether the segment was surveyed [true]. The geometry of an unsurveyed segment is a guess,
+    /// such as the chord between surveyed segments, and must be straight. The tracker does not use
+    /// it as a constraint; a simulated vehicle follows it.
     #[serde(default = "surveyed")]
     surveyed: bool,
 }
@@ -115,7 +115,7 @@ impl JsonSchema for SegmentSettings {
     }
 }
 
-/// Standard deviation of points that nothing is stated of (m).
+/// Standard deviation of drawn points, if none is specified (m).
 const DRAWN_STD_M: f64 = 0.02;
 
 const fn surveyed() -> bool {
@@ -137,10 +137,10 @@ impl Default for RoadSettings {
 }
 
 impl RoadSettings {
-    /// Reads `file` into `polyline_m`, so that a resolved road stands on its own.
+    /// Reads `file` into `polyline_m`, so that the resolved road does not depend on other files.
     ///
     /// # Errors
-    /// [`SettingsError`] where the library does not have it, or it has no points.
+    /// [`SettingsError`] if the library does not contain the file, or it contains no points.
     pub fn resolve(
         table: &mut Table,
         key: &str,
@@ -164,18 +164,18 @@ impl RoadSettings {
         Ok(())
     }
 
-    /// Standard deviation across the road of where it is: as stated, or that of points that somebody
-    /// drew.
+    /// Returns the standard deviation of the road's position: as specified, otherwise that of drawn
+    /// points.
     pub fn survey_std_m(&self) -> f64 {
         let is_drawn = self.polyline_m.is_some() && self.corner_radius_m.is_none();
         let least_m = if is_drawn { DRAWN_STD_M } else { 0.0 };
         self.position_std_m.max(least_m)
     }
 
-    /// Builds the road; errors name `key` as its own.
+    /// Builds the road. Errors name `key` as the path of the table.
     ///
     /// # Errors
-    /// [`SettingsError::Value`] when it has no shape, more than one, or an impossible one.
+    /// [`SettingsError::Value`] if the road has no shape, more than one, or an impossible one.
     pub fn build(&self, key: &str, check: Check<'_>) -> Result<Road, SettingsError> {
         let (shape, road) = match (&self.segments, &self.polyline_m) {
             (Some(segments), None) => {

@@ -1,9 +1,9 @@
-//! The library that comes with the product, and nothing beside it.
+//! Library of the files that are part of the product.
 
 use super::error::SettingsError;
 use super::toml_file::{Library, NamedText};
 
-/// Shipped files by their names; it opens no other.
+/// Shipped files by name; no other files are opened.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Shipped;
 

@@ -1,4 +1,4 @@
-//! A site: what is known of a plant, one file for the whole fleet.
+//! Site: model of a plant, one file for the whole fleet.
 
 use nr_ssb::band::likely_lmax;
 use nr_ssb::{Lmax, SubcarrierSpacing};
@@ -16,37 +16,38 @@ use super::walls::WallSettings;
 use crate::geometry::Point;
 use crate::road::Road;
 
-/// A site file.
+/// Site file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Site {
     /// Short name.
     pub name: String,
-    /// What the site is.
+    /// Description of the site.
     #[serde(default)]
     pub description: String,
-    /// Carrier frequency of the cells, at the SSBs' centre, in MHz.
+    /// Carrier frequency of the SSBs' centre, in MHz.
     #[serde(default = "mid_band")]
     #[schemars(range(min = 100.0, max = 100_000.0))]
     pub carrier_mhz: f64,
-    /// Rician K to be expected, in dB: power of the line of sight over that of the scatter.
+    /// Expected Rician K-factor in dB: power of the line of sight divided by the power of the
+    /// scatter.
     #[serde(default = "fair_weather")]
     #[schemars(range(min = -30.0, max = 200.0))]
     pub rician_k_db: f64,
-    /// The SSBs that the cells send.
+    /// SSBs that the cells transmit.
     #[serde(default)]
     pub ssb: SsbSettings,
-    /// The road; none where vehicles roam.
+    /// Road. Omitted if vehicles move freely.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub road: Option<RoadSettings>,
     /// The radio heads.
     #[schemars(length(min = 1, max = 1000))]
     pub radio_heads: Vec<RadioHeadSettings>,
-    /// Walls in lines of sight.
+    /// Walls that obstruct lines of sight.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 1000))]
     pub walls: Vec<WallSettings>,
-    /// A picture under its maps.
+    /// Background image of the maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub underlay: Option<UnderlaySettings>,
 }
@@ -68,8 +69,8 @@ impl Site {
         SPEED_OF_LIGHT_MPS / (self.carrier_mhz * 1e6)
     }
 
-    /// How many SSB indices a burst can have at its carrier: as many as TS 38.213, 4.1, gives the
-    /// subcarrier spacing, and the more where bands there differ.
+    /// Returns the number of SSB indices per burst at the site's carrier, from the subcarrier
+    /// spacing (TS 38.213, 4.1). If bands at this carrier differ, the larger number is returned.
     pub fn ssb_indices(&self) -> u8 {
         let spacing = match self.ssb.subcarrier_spacing_khz as u16 {
             15 => SubcarrierSpacing::Khz15,
@@ -86,10 +87,10 @@ impl Site {
         most.count()
     }
 
-    /// The road, where there is one.
+    /// Returns the road, if the site has one.
     ///
     /// # Errors
-    /// [`SettingsError`] when the site has been changed by hand into an impossible one; never after
+    /// [`SettingsError`] if the site was modified into an impossible one; never directly after
     /// reading.
     pub fn build_road(&self) -> Result<Option<Road>, SettingsError> {
         let road = self.road.as_ref();

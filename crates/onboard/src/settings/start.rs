@@ -1,4 +1,4 @@
-//! How well the initial pose is known.
+//! Initial pose and its uncertainty.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,19 +9,19 @@ use crate::geometry::Pose;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StartSettings {
-    /// Whether it is known at all. If not, the vehicle is found along the road by two radio heads or
-    /// more, elsewhere by three.
+    /// Whether the initial pose is known. Otherwise a search locates the vehicle, on a road with at
+    /// least two radio heads, elsewhere with three.
     pub known: bool,
-    /// Whether a vehicle that is to be found may also drive against the road's direction.
+    /// Whether the search also considers vehicles that drive against the road's direction.
     pub either_direction: bool,
-    /// Standard deviation in each of x and y, in metres.
+    /// Standard deviation of x and y, each in metres.
     #[schemars(range(min = 0.0, max = 10_000.0))]
     pub position_std_m: f64,
     /// Standard deviation of the heading in radians.
     #[schemars(range(min = 0.0, max = 6.3))]
     pub heading_std_rad: f64,
-    /// Where the drive starts, as far as it is the same for every drive. A simulated drive starts
-    /// where its motion says.
+    /// Initial pose, if it is identical in every drive. A simulated run starts at the start of its
+    /// motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pose: Option<Pose>,
 }

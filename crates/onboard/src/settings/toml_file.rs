@@ -1,4 +1,4 @@
-//! A kind of settings file: read, checked, changed and written in one way.
+//! Settings files: one way to read, check, modify and write them.
 
 use std::any::type_name;
 use std::collections::HashMap;
@@ -16,24 +16,24 @@ use super::limits::check_limits;
 use super::overlay::{ends_in_tag, lay_over, set};
 use super::read::{from_table, parse};
 
-/// Files that are `like` one another must end somewhere.
+/// Maximum length of a chain of `like` keys.
 const MOST_LIKES: usize = 8;
 
-/// A file's text and what errors call it.
+/// Text of a file, and its name for error messages.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedText {
-    /// Its path, or the shipped name.
+    /// Path of the file, or name of the shipped file.
     pub origin: String,
-    /// Its TOML.
+    /// TOML text.
     pub text: String,
 }
 
-/// Where the files come from that others name. What runs on the vehicle opens none by itself.
+/// Source of the files that other files name. Code on the vehicle opens no files itself.
 pub trait Library {
-    /// The file `name` of a kind, as named in the file `beside`.
+    /// Returns the file `name` of this kind, as named in the file `beside`.
     ///
     /// # Errors
-    /// [`SettingsError`] where there is none, or it cannot be read.
+    /// [`SettingsError`] if the file does not exist or cannot be read.
     fn text(
         &self,
         what: &'static str,
@@ -42,40 +42,39 @@ pub trait Library {
         beside: &str,
     ) -> Result<NamedText, SettingsError>;
 
-    /// Points of a survey file, as named in the file `beside`.
+    /// Returns the points of a survey file, as named in the file `beside`.
     ///
     /// # Errors
-    /// [`SettingsError`] where there is none, or it cannot be read.
+    /// [`SettingsError`] if the file does not exist or cannot be read.
     fn points_m(&self, name: &str, beside: &str) -> Result<Vec<[f64; 2]>, SettingsError>;
 
-    /// The whole path of a file that the file `beside` names and that nobody here opens; as it was
-    /// named where there is no file system.
+    /// Returns the full path of a file that the file `beside` names and that is not opened here.
+    /// Without a file system, the name is returned unchanged.
     fn path(&self, name: &str, _beside: &str) -> String {
         name.to_owned()
     }
 }
 
-/// A kind of settings file. Any of them may say `like = "another"` and lay its own keys over those
-/// of that other file.
+/// Kind of settings file. A file with `like = "another"` overrides keys of that other file.
 pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
-    /// What errors call it: "site".
+    /// Name of this kind of file in error messages, such as "site".
     const WHAT: &'static str;
-    /// Names and texts of those that come with the product.
+    /// Names and texts of the shipped files.
     const SHIPPED: &'static [(&'static str, &'static str)];
 
-    /// Its short name.
+    /// Returns the short name of the file.
     fn name(&self) -> &str;
 
-    /// Refuses values that contradict each other.
+    /// Returns an error if values contradict each other.
     ///
     /// # Errors
     /// [`SettingsError::Value`] naming the key and what is allowed.
     fn check(&self, check: Check<'_>) -> Result<(), SettingsError>;
 
-    /// Puts in place what the file only names.
+    /// Replaces references to other files by their contents.
     ///
     /// # Errors
-    /// [`SettingsError`] where the library has it not.
+    /// [`SettingsError`] if the library does not contain the file.
     fn resolve(
         _table: &mut Table,
         _origin: &str,
@@ -84,21 +83,21 @@ pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
         Ok(())
     }
 
-    /// Names of the shipped ones.
+    /// Returns the names of the shipped files.
     fn names() -> impl Iterator<Item = &'static str> + Clone {
         Self::SHIPPED.iter().map(|(name, _)| *name)
     }
 
-    /// The file of this name in a library.
+    /// Returns the file of this name from a library.
     ///
     /// # Errors
-    /// [`SettingsError`] when there is none, or when what there is cannot be used.
+    /// [`SettingsError`] if the file does not exist or is invalid.
     fn from_library(name: &str, library: &dyn Library) -> Result<Self, SettingsError> {
         let named = library.text(Self::WHAT, Self::SHIPPED, name, "")?;
         Self::from_toml(&named.text, &named.origin, library)
     }
 
-    /// Reads TOML. `origin` is the file that errors name, and beside which other files lie.
+    /// Parses TOML. `origin` is the name of the file in errors; relative paths start at its folder.
     ///
     /// # Errors
     /// [`SettingsError`] naming the key and what is allowed.
@@ -133,12 +132,12 @@ pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
         Ok(settings)
     }
 
-    /// This with single keys set: `("array.elements", 5)`, `("radio_heads[0].eirp_dbm", 0.0)`.
-    /// Setting a table replaces it whole; setting a tag (`wake_up.policy`, `localizer.kind`) to
-    /// another variant drops the old one's keys.
+    /// Returns a copy with modified keys, such as `("array.elements", 5)` or
+    /// `("radio_heads[0].eirp_dbm", 0.0)`. A table is replaced as a whole. If a tag
+    /// (`wake_up.policy`, `localizer.kind`) changes, the keys of the previous variant are removed.
     ///
     /// # Errors
-    /// [`SettingsError`] as for a file.
+    /// [`SettingsError`], like those of a file.
     fn with_overrides<'a>(
         &self,
         overrides: impl IntoIterator<Item = (&'a str, Value)>,
@@ -154,24 +153,24 @@ pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
         Self::from_table(table, &origin, library)
     }
 
-    /// TOML with every default written out.
+    /// Returns TOML text with every default written out.
     fn to_toml(&self) -> String {
-        // Checked settings hold finite numbers, strings and tables: all of them valid TOML.
+        // Checked settings contain finite numbers, strings and tables only, which are valid TOML.
         toml::to_string_pretty(self).unwrap_or_default()
     }
 
-    /// JSON with every default written out.
+    /// Returns JSON text with every default written out.
     fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).unwrap_or_default()
     }
 
-    /// The JSON Schema of such a file.
+    /// Returns the JSON Schema of this kind of file.
     fn schema_json() -> String {
         serde_json::to_string_pretty(&schema::<Self>()).unwrap_or_default()
     }
 }
 
-/// Names become names of files and parts of pages.
+/// Whether a name is valid as a part of file names and pages.
 fn is_usable_name(name: &str) -> bool {
     let allowed = |sign: char| sign.is_alphanumeric() || ['.', '-', '_', ' '].contains(&sign);
     name.chars().count() <= 64
@@ -180,7 +179,7 @@ fn is_usable_name(name: &str) -> bool {
         && !name.ends_with(' ')
 }
 
-/// Lays a table over the file that it says it is like.
+/// Applies a table as an override to the file that its `like` key names.
 fn take_after_likes<T: TomlFile>(
     table: &mut Table,
     origin: &str,
@@ -207,7 +206,7 @@ fn take_after_likes<T: TomlFile>(
     Err(Check { file: origin }.error("like", "endless", &allowed))
 }
 
-/// The schema of a type, made once.
+/// Returns the schema of a type, computed once.
 fn schema<T: JsonSchema>() -> Json {
     static MADE: Mutex<Option<HashMap<&'static str, Json>>> = Mutex::new(None);
     let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -217,7 +216,7 @@ fn schema<T: JsonSchema>() -> Json {
         .clone()
 }
 
-/// Files may say what they are like; their types need not know.
+/// Adds the key `like` to a schema; the types do not contain it.
 fn with_like(mut schema: Json) -> Json {
     let like = serde_json::json!({
         "type": "string",

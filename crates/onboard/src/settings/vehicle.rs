@@ -1,4 +1,4 @@
-//! A vehicle: what it is built of and how it is set.
+//! Vehicle: components and configuration.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,16 +15,16 @@ use super::start::StartSettings;
 use super::toml_file::TomlFile;
 use super::wake_up::{UncertaintySettings, WakeUpSettings};
 
-/// A vehicle file.
+/// Vehicle file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Vehicle {
     /// Short name.
     pub name: String,
-    /// What the vehicle is.
+    /// Description of the vehicle.
     #[serde(default)]
     pub description: String,
-    /// What its kinematics allow.
+    /// Drive type, which determines the possible motions.
     #[serde(default)]
     pub drive: DriveKind,
     /// Top speed in km/h.
@@ -35,44 +35,44 @@ pub struct Vehicle {
     #[serde(default = "gentle")]
     #[schemars(range(min = 0.01, max = 20.0))]
     pub acceleration_mps2: f64,
-    /// Yaw rate in rad/s that it cannot exceed, unless its lane keeping says so; what is read beyond
-    /// is refused.
+    /// Maximum yaw rate in rad/s, unless the lane keeping specifies one. Larger measured yaw rates
+    /// are rejected.
     #[serde(default = "half_a_turn")]
     #[schemars(range(min = 0.01, max = 100.0))]
     pub top_yaw_rate_radps: f64,
-    /// How it keeps to the middle of a road.
+    /// Lane keeping of the vehicle.
     #[serde(default)]
     pub lane_keeping: LaneKeepingSettings,
-    /// Its antennas.
+    /// Antenna array.
     #[serde(default)]
     pub array: ArraySettings,
-    /// Its receiver.
+    /// Receiver.
     #[serde(default)]
     pub receiver: ReceiverSettings,
-    /// Its odometer.
+    /// Odometer.
     #[serde(default)]
     pub odometer: OdometerSettings,
-    /// Its gyroscope, where it has one.
+    /// Gyroscope, if the vehicle has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gyroscope: Option<GyroscopeSettings>,
-    /// How well the initial pose is known.
+    /// Uncertainty of the initial pose.
     #[serde(default)]
     pub start: StartSettings,
-    /// How an angle is estimated.
+    /// Estimator of the angle.
     #[serde(default)]
     pub estimator: EstimatorSettings,
-    /// How angles and odometry become a pose.
+    /// Localizer: computation of a pose from angles and odometry.
     #[serde(default)]
     pub localizer: LocalizerSettings,
-    /// Whether and how sources are mistrusted. Without it the tracker mistrusts them by the defaults;
-    /// dead reckoning cannot.
+    /// Integrity monitoring. Default: the tracker is monitored with default values; dead reckoning
+    /// is not monitored.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub integrity: Option<IntegritySettings>,
-    /// When an angle is estimated. Without it a tracker wakes up by its own error, dead reckoning at every
-    /// SSB, and a recorded drive is located by all its angles.
+    /// Wake-up policy. Default: the tracker's own covariance determines the wake-ups, dead
+    /// reckoning uses every SSB, and a recorded drive uses all its angles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wake_up: Option<WakeUpSettings>,
-    /// On which computer.
+    /// Onboard computer.
     #[serde(default)]
     pub platform: PlatformSettings,
 }
@@ -93,9 +93,9 @@ const fn gentle() -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlatformSettings {
-    /// A shipped platform's name, or the path of a platform file.
+    /// Name of a shipped platform, or path of a platform file.
     pub name: String,
-    /// Power mode by its number in the platform file.
+    /// Number of the power mode in the platform file.
     pub mode: u32,
 }
 
@@ -114,12 +114,13 @@ impl Vehicle {
         self.top_speed_kmh / 3.6
     }
 
-    /// Whether its localizer knows its own error.
+    /// Whether the localizer computes its own covariance.
     const fn tracks(&self) -> bool {
         matches!(self.localizer, LocalizerSettings::Tracker(_))
     }
 
-    /// When it wakes up: as is set, else by its own error where it knows that.
+    /// Returns the wake-up policy: as configured, otherwise determined by the localizer's
+    /// covariance if it has one.
     pub fn wake_up_policy(&self) -> WakeUpSettings {
         self.wake_up.unwrap_or(if self.tracks() {
             WakeUpSettings::Uncertainty(UncertaintySettings::default())
@@ -128,13 +129,14 @@ impl Vehicle {
         })
     }
 
-    /// What mistrusts the tracker's sources, unless it is switched off; dead reckoning has none.
+    /// Returns the integrity settings of the tracker unless monitoring is switched off; `None` for
+    /// dead reckoning.
     pub fn integrity_monitor(&self) -> Option<IntegritySettings> {
         let settings = self.integrity.unwrap_or_default();
         (self.tracks() && settings.enabled).then_some(settings)
     }
 
-    /// Whether its localizer follows a road where the site has one.
+    /// Whether the localizer uses the site's road, if there is one.
     pub fn follows_road(&self) -> bool {
         let maps = matches!(&self.localizer, LocalizerSettings::Tracker(tracker) if tracker.map);
         maps && self.drive == DriveKind::Road
@@ -206,7 +208,7 @@ impl TomlFile for Vehicle {
     }
 }
 
-/// Refuses a vehicle that cannot serve on a site.
+/// Returns an error if the vehicle cannot operate at the site.
 ///
 /// # Errors
 /// [`SettingsError::Value`] naming the key of the vehicle and what the site has.

@@ -1,4 +1,4 @@
-//! When an angle is estimated.
+//! Wake-up policy: when an angle is estimated.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,18 +10,18 @@ use super::error::SettingsError;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "policy", rename_all = "kebab-case")]
 pub enum WakeUpSettings {
-    /// At a fixed interval.
+    /// Fixed interval.
     Fixed(FixedSettings),
-    /// The paper's Algorithm 1.
+    /// Algorithm 1 of the paper.
     Pid(PidSettings),
-    /// An estimate that is due waits for an SSB that is not below a set point.
+    /// A due estimate is deferred until an SSB reaches the SNR threshold.
     Gated(GatedSettings),
-    /// As late as a bound on the error allows; needs the tracker.
+    /// Estimates as late as the target error permits; requires the tracker.
     Uncertainty(UncertaintySettings),
 }
 
 impl WakeUpSettings {
-    /// At every SSB: none comes more often than that.
+    /// At every SSB, which is the maximum rate.
     pub const EVERY_SSB: Self = Self::Fixed(FixedSettings {
         interval_ms: Some(1.0),
         serving_ssb: ServingSsb::FirstAfter,
@@ -32,23 +32,23 @@ impl WakeUpSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FixedSettings {
-    /// Interval in ms; without it, the base wake-up time of the platform's mode.
+    /// Interval in ms. Default: base wake-up time of the platform's power mode.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub interval_ms: Option<f64>,
-    /// Which SSB serves an estimate that falls due between two.
+    /// SSB that is used if an estimate becomes due between two SSBs.
     #[serde(skip_serializing_if = "ServingSsb::is_first_after")]
     pub serving_ssb: ServingSsb,
 }
 
-/// Which SSB serves an estimate that falls due, so long after the last one, between two SSBs.
+/// SSB that is used if an estimate becomes due between two SSBs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ServingSsb {
-    /// The first at or after that: never sooner than the wake-up time, up to an SSB period later.
+    /// First SSB at or after the due time: never early, up to one SSB period late.
     #[default]
     FirstAfter,
-    /// The last at or before it: never later, up to an SSB period sooner.
+    /// Last SSB at or before the due time: never late, up to one SSB period early.
     LastBefore,
 }
 
@@ -58,7 +58,7 @@ impl ServingSsb {
         matches!(self, Self::FirstAfter)
     }
 
-    /// How much sooner than the wake-up time an SSB serves it, below this, in seconds.
+    /// Returns the maximum time by which an SSB may precede the due time, exclusive, in seconds.
     pub const fn lead_s(self, period_s: f64) -> f64 {
         match self {
             Self::FirstAfter => 0.0,
@@ -67,23 +67,23 @@ impl ServingSsb {
     }
 }
 
-/// `policy = "pid"`: Algorithm 1 and the choices it leaves open.
+/// `policy = "pid"`: Algorithm 1 of the paper, and the parameters that the paper does not specify.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PidSettings {
-    /// Shortest wake-up time in ms; without it, the base wake-up time of the platform's mode.
+    /// Minimum wake-up time in ms. Default: base wake-up time of the platform's power mode.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub base_ms: Option<f64>,
-    /// Longest wake-up time in ms; without it, the time in which the vehicle covers
-    /// `position_uncertainty_m` at its top speed.
+    /// Maximum wake-up time in ms. Default: time in which the vehicle drives
+    /// `position_uncertainty_m` at top speed.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub t_max_ms: Option<f64>,
-    /// Bound on the position uncertainty between two estimates in metres, the paper's x̃_max.
+    /// Bound on the position uncertainty between two estimates in metres; x̃_max of the paper.
     #[schemars(range(min = 1e-3, max = 1e4))]
     pub position_uncertainty_m: f64,
-    /// Which SSB serves an estimate that falls due between two.
+    /// SSB that is used if an estimate becomes due between two SSBs.
     #[serde(skip_serializing_if = "ServingSsb::is_first_after")]
     pub serving_ssb: ServingSsb,
     /// Proportional gain.
@@ -101,19 +101,19 @@ pub struct PidSettings {
     /// Weight of the velocity error.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub weight_velocity: f64,
-    /// The SNR at which the SNR error is zero.
+    /// SNR at which the SNR error is zero.
     pub snr_set_point: SnrSetPoint,
-    /// SNR shortfall that counts as an error of 1, in dB.
+    /// SNR deficit that corresponds to an SNR error of 1, in dB.
     #[schemars(range(min = 0.01, max = 1e3))]
     pub snr_scale_db: f64,
-    /// When the controller's inputs are sensed.
+    /// Times at which the inputs of the controller are measured.
     pub sensing: SensingMode,
-    /// What Algorithm 1 takes for Δt.
+    /// Definition of Δt in Algorithm 1.
     pub delta_t: DeltaT,
-    /// What u = 1 adds to the wake-up time, in ms.
+    /// Increase of the wake-up time for u = 1, in ms.
     #[schemars(range(min = 1e-3, max = 3.6e6))]
     pub u_unit_ms: f64,
-    /// Bound on the magnitude of the integral term's sum; 0 removes it.
+    /// Bound on the magnitude of the integral; 0 means unbounded.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub integral_clamp: f64,
 }
@@ -141,16 +141,17 @@ impl Default for PidSettings {
 }
 
 impl PidSettings {
-    /// Longest wake-up time in seconds: x̃_max = v · t_max, unless it is stated.
+    /// Returns the maximum wake-up time in seconds: as specified, otherwise from x̃_max = v ·
+    /// t_max.
     pub fn t_max_s(&self, top_speed_mps: f64) -> f64 {
         let stated_s = self.t_max_ms.map(|ms| ms * 1e-3);
         stated_s.unwrap_or(self.position_uncertainty_m / top_speed_mps)
     }
 
-    /// Refuses a longest wake-up time below the shortest, which `base` names.
+    /// Returns an error if the maximum wake-up time is below the minimum, whose key is `base`.
     ///
     /// # Errors
-    /// [`SettingsError::Value`] at the key of `place` that states the longest.
+    /// [`SettingsError::Value`] at the key of the maximum wake-up time, in the table `place`.
     pub fn check_t_max(
         &self,
         base_s: f64,
@@ -181,14 +182,13 @@ impl PidSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GatedSettings {
-    /// No angle is estimated from an SSB that is weaker.
+    /// SNR threshold: no angle is estimated from a weaker SSB.
     pub snr_set_point: SnrSetPoint,
-    /// Longest time from one estimate to the next in ms, however weak the SSB is then; without it,
-    /// a good SSB is waited for as long as it takes.
+    /// Maximum time between two estimates in ms, whatever the SNR. Default: unbounded.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub latest_ms: Option<f64>,
-    /// What makes an estimate due.
+    /// Trigger: condition that makes an estimate due.
     pub due: DueSettings,
 }
 
@@ -202,27 +202,27 @@ impl Default for GatedSettings {
     }
 }
 
-/// What makes an estimate due, so long after the last one.
+/// Trigger of an estimate, based on the time since the previous one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "policy", rename_all = "kebab-case")]
 pub enum DueSettings {
-    /// A constant time.
+    /// Constant time.
     Fixed(FixedSettings),
-    /// The paper's Algorithm 1.
+    /// Algorithm 1 of the paper.
     Pid(PidSettings),
 }
 
-/// The SNR at which the SNR error is zero.
+/// SNR at which the SNR error is zero.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum SnrSetPoint {
-    /// What the link budget promises at the estimated place, and so much more.
+    /// SNR predicted by the link budget at the estimated position, plus an offset.
     Expected {
         /// Offset in dB.
         #[schemars(range(min = -60.0, max = 60.0))]
         offset_db: f64,
     },
-    /// One value for the whole route.
+    /// Constant SNR for the whole route.
     Absolute {
         /// SNR in dB.
         #[schemars(range(min = -60.0, max = 100.0))]
@@ -230,25 +230,25 @@ pub enum SnrSetPoint {
     },
 }
 
-/// When the controller's inputs are sensed.
+/// Times at which the inputs of the controller are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensingMode {
-    /// At each SSB: the receiver listens always and estimates sometimes.
+    /// Every SSB: the receiver is always on, and angles are estimated at wake-ups.
     #[default]
     EverySsb,
-    /// At wake-ups only: the receiver sleeps in between.
+    /// Wake-ups only: the receiver is off in between.
     WakeUp,
 }
 
-/// What Algorithm 1 takes for Δt, over which it integrates and by which it divides.
+/// Definition of Δt in Algorithm 1, which integrates over it and divides by it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DeltaT {
-    /// The time since the inputs were sensed before, in seconds.
+    /// Time since the previous measurement of the inputs, in seconds.
     #[default]
     Seconds,
-    /// One for every time that they are sensed.
+    /// 1 for each measurement of the inputs.
     Steps,
 }
 
@@ -256,34 +256,32 @@ pub enum DeltaT {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct UncertaintySettings {
-    /// Horizontal error at which it wakes up, in metres: the paper's x̃_max. The next angles are
-    /// estimated as late, and as few of them, as keep the error below it by the localizer's own
-    /// covariance. A set point of the wake-ups, not the error that a drive reaches: where the
-    /// covariance is too small or no radio head is in reach, errors are larger. `access-av tune`
-    /// finds the set point for an error that is to be reached.
+    /// Target horizontal error at which the vehicle wakes up, in metres; x̃_max of the paper.
+    /// Angles are estimated as late and as rarely as possible so that the localizer's covariance
+    /// stays below it. The actual error exceeds the target if the covariance is too small or no
+    /// radio head is in range. `access-av tune` finds the target for a required error.
     #[schemars(range(min = 1e-3, max = 1e3))]
     pub bound_m: f64,
-    /// Probability that the error is below `bound_m` at a wake-up, if the covariance is right.
+    /// Probability that the error is below `bound_m` at a wake-up, given a correct covariance.
     #[schemars(range(min = 0.01, max = 0.999_999))]
     pub confidence: f64,
-    /// Shortest time from one wake-up to the next in ms: what the computer needs for an estimate.
-    /// Without it, a wake-up may follow at the next SSB.
+    /// Minimum time between two wake-ups in ms: duration of one estimate. Default: one SSB period.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub base_ms: Option<f64>,
-    /// Energy of a wake-up before its first angle, in executions: the receiver's, and of receiving a
-    /// burst. Without it, what the platform says of both; where it says nothing, 0.5.
+    /// Energy of a wake-up before its first angle (receiver on-time and burst reception), in units
+    /// of one estimate. Default: computed from the platform, or 0.5 if the platform has no values.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e9))]
     pub wake_up_cost: Option<f64>,
-    /// Variance in m² that makes a wake-up for one angle worth its energy before the bound demands
-    /// it, and that it must take away where the bound is out of reach; one for several angles must
-    /// take away as much more as it costs more.
+    /// Minimum reduction of the position variance, in m², for which a wake-up with one angle is
+    /// made before the target requires it. It also applies where the target cannot be reached. A
+    /// wake-up with several angles needs a reduction in proportion to its energy.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub least_gain_m2: f64,
-    /// How much stronger than by the link budget an SSB may come, in dB. With it the receiver
-    /// listens wherever an SSB as strong as that would be worth its energy, and what is sensed
-    /// decides; without it all goes by the link budget, which keeps the receiver off for longer.
+    /// Maximum SNR above the link budget's prediction, in dB. With this key, the receiver is on
+    /// wherever an SSB of that SNR would justify its energy, and the measured SNR decides. Default:
+    /// the link budget decides, which keeps the receiver off for longer.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 40.0))]
     pub snr_headroom_db: Option<f64>,
@@ -303,7 +301,7 @@ impl Default for UncertaintySettings {
 }
 
 impl WakeUpSettings {
-    /// The settings of Algorithm 1, where it is what makes an estimate due.
+    /// Returns the settings of Algorithm 1, if it is the trigger.
     pub const fn pid_mut(&mut self) -> Option<&mut PidSettings> {
         match self {
             Self::Pid(pid)
@@ -315,7 +313,7 @@ impl WakeUpSettings {
         }
     }
 
-    /// The key of the wake-up time that may be left to the platform.
+    /// Returns the key of the wake-up time that has a default from the platform.
     pub(super) const fn base_key(&self) -> &'static str {
         match self {
             Self::Fixed(_) => "wake_up.interval_ms",
@@ -328,7 +326,7 @@ impl WakeUpSettings {
         }
     }
 
-    /// The wake-up time that a vehicle's settings may leave to its platform, if there is one.
+    /// Returns the wake-up time that has a default from the platform, if any.
     pub(super) const fn base_ms(&mut self) -> Option<&mut Option<f64>> {
         match self {
             Self::Fixed(fixed) => Some(&mut fixed.interval_ms),

@@ -1,18 +1,19 @@
-//! Algorithm 1 as a policy.
+//! Algorithm 1 of the paper as a wake-up policy.
 
 use super::due::Due;
 use super::policy::{Situation, WakeUpPolicy};
 use crate::BoxError;
 use crate::observation::SensedSsb;
 
-/// Estimates an angle once the wake-up time of Algorithm 1 has passed since the last estimate.
+/// Wake-up policy that estimates an angle when the wake-up time of Algorithm 1 has elapsed since
+/// the previous estimate.
 #[derive(Debug)]
 pub struct Adaptive {
     due: Due,
 }
 
 impl Adaptive {
-    /// At the times that are due.
+    /// Creates the policy from a wake-up clock.
     pub const fn new(due: Due) -> Self {
         Self { due }
     }
@@ -23,7 +24,7 @@ impl WakeUpPolicy for Adaptive {
         Ok(self.due.listens(now.time_s))
     }
 
-    /// Judges by the strongest SSB that is on the map.
+    /// Decides with the strongest SSB of a known radio head.
     fn decide(
         &mut self,
         now: &Situation<'_>,

@@ -1,4 +1,4 @@
-//! The policy that a vehicle's settings choose.
+//! Construction of the wake-up policy from the settings.
 
 use super::adaptive::Adaptive;
 use super::controller::Controller;
@@ -13,17 +13,18 @@ use crate::settings::{
     UncertaintySettings, Vehicle, WakeUpSettings,
 };
 
-/// Energy of a wake-up before its first angle, in executions, where no platform knows.
+/// Energy of a wake-up before its first angle, in units of one estimate, for a platform without
+/// values.
 const UNKNOWN_WAKE_UP_COST: f64 = 0.5;
 
-/// What a shortest wake-up time is called that the platform has.
+/// Name of the platform's minimum wake-up time in error messages.
 const BASE: &str = "the base wake-up time";
 
-/// The policy of a vehicle at a site, base wake-up times being the platform's where the settings
-/// leave them to it.
+/// Returns the wake-up policy of a vehicle at a site. Wake-up times without a value are those of
+/// the platform.
 ///
 /// # Errors
-/// [`SettingsError`] when the platform lacks what the settings ask of it.
+/// [`SettingsError`] if the platform lacks a required value.
 pub fn built_in(
     site: &Site,
     vehicle: &Vehicle,
@@ -76,10 +77,10 @@ pub fn built_in(
     })
 }
 
-/// The vehicle with everything written out that its wake-up leaves to the platform.
+/// Returns the vehicle with all defaults of the wake-up policy filled in.
 ///
 /// # Errors
-/// As [`built_in`].
+/// Those of [`built_in`].
 pub fn resolve(vehicle: &Vehicle, platform: &Platform) -> Result<Vehicle, SettingsError> {
     let mut resolved = platform.resolve(vehicle)?;
     match &mut resolved.wake_up {
@@ -96,7 +97,7 @@ pub fn resolve(vehicle: &Vehicle, platform: &Platform) -> Result<Vehicle, Settin
     Ok(resolved)
 }
 
-/// Energy of a wake-up before its first angle, in executions.
+/// Returns the energy of a wake-up before its first angle, in units of one estimate.
 fn wake_up_cost(
     settings: &UncertaintySettings,
     vehicle: &Vehicle,

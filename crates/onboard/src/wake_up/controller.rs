@@ -1,4 +1,4 @@
-//! What Algorithm 1 is told of radio and drive.
+//! Inputs of Algorithm 1.
 
 use super::pid::Pid;
 use super::policy::Situation;
@@ -7,8 +7,8 @@ use crate::observation::SensedSsb;
 use crate::radio_head::RadioHead;
 use crate::settings::{DeltaT, PidSettings, SnrSetPoint};
 
-/// Algorithm 1 with its inputs: the SNR error is positive when the signal is too weak, the velocity
-/// error the shortfall from the top speed, 0 when cruising and 1 when standing.
+/// Algorithm 1 with its inputs. The SNR error is positive if the SNR is below the set point. The
+/// velocity error is the difference from the top speed: 0 at top speed, 1 at standstill.
 #[derive(Debug)]
 pub struct Controller {
     pid: Pid,
@@ -20,7 +20,7 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// Algorithm 1 from the base wake-up time on.
+    /// Creates the controller with the base wake-up time as its first output.
     pub fn new(settings: &PidSettings, base_s: f64, top_speed_mps: f64) -> Self {
         Self {
             pid: Pid::new(settings, base_s, settings.t_max_s(top_speed_mps)),
@@ -32,10 +32,11 @@ impl Controller {
         }
     }
 
-    /// The wake-up time after an SSB; `None` after the first, which has no interval before it.
+    /// Returns the wake-up time after an SSB; `None` after the first SSB, which has no preceding
+    /// interval.
     ///
     /// # Errors
-    /// Whatever the localizer fails with.
+    /// Errors of the localizer.
     pub fn sense(
         &mut self,
         now: &Situation<'_>,

@@ -1,4 +1,4 @@
-//! When the next estimate is due.
+//! Wake-up clock: time of the next estimate.
 
 use super::controller::Controller;
 use super::policy::{SAME_TIME_S, Situation};
@@ -7,20 +7,21 @@ use crate::observation::SensedSsb;
 use crate::radio_head::RadioHead;
 use crate::settings::SensingMode;
 
-/// So long after the last estimate as Algorithm 1, or a constant, says: the one clock of all policies
-/// that go by a wake-up time.
+/// Wake-up clock: an estimate is due when a constant time, or that of Algorithm 1, has elapsed
+/// since the previous one. All policies with a wake-up time share it.
 #[derive(Debug)]
 pub struct Due {
     controller: Option<Controller>,
     sensing: SensingMode,
     wake_up_time_s: f64,
-    /// How much sooner an SSB serves it, below this.
+    /// Maximum time by which an SSB may precede the due time, exclusive.
     lead_s: f64,
     last_estimate_s: Option<f64>,
 }
 
 impl Due {
-    /// A constant wake-up time; see [`ServingSsb`](crate::settings::ServingSsb) for `lead_s`.
+    /// Creates a clock with a constant wake-up time. See
+    /// [`ServingSsb`](crate::settings::ServingSsb) for `lead_s`.
     pub const fn constant(wake_up_time_s: f64, lead_s: f64) -> Self {
         Self {
             controller: None,
@@ -31,7 +32,7 @@ impl Due {
         }
     }
 
-    /// What a controller says of the SSBs that are sensed.
+    /// Creates a clock whose wake-up time is the controller's output.
     pub const fn controlled(controller: Controller, sensing: SensingMode, lead_s: f64) -> Self {
         Self {
             controller: Some(controller),
@@ -42,27 +43,27 @@ impl Due {
         }
     }
 
-    /// The wake-up time in force, in seconds.
+    /// Returns the current wake-up time in seconds.
     pub const fn wake_up_time_s(&self) -> f64 {
         self.wake_up_time_s
     }
 
-    /// Whether the receiver is to listen: always, or from the wake-up time on.
+    /// Whether the receiver is on: always, or once the wake-up time has elapsed.
     pub fn listens(&self, time_s: f64) -> bool {
         self.sensing == SensingMode::EverySsb || self.is_due(time_s)
     }
 
-    /// Takes in an SSB and says whether an estimate is due.
+    /// Processes an SSB and returns whether an estimate is due.
     ///
     /// # Errors
-    /// Whatever the localizer fails with.
+    /// Errors of the localizer.
     pub fn sense(
         &mut self,
         now: &Situation<'_>,
         ssb: &SensedSsb,
         head: &RadioHead,
     ) -> Result<bool, BoxError> {
-        // Asleep until due, the controller learns of this SSB only once it is awake.
+        // In sleep until due, the controller measures this SSB only after the wake-up.
         let due_before = self.is_due(now.time_s);
         if let Some(controller) = &mut self.controller
             && let Some(wake_up_time_s) = controller.sense(now, ssb, head)?
@@ -75,21 +76,21 @@ impl Due {
         })
     }
 
-    /// Notes that an angle is estimated.
+    /// Records that an angle is estimated.
     pub const fn estimated(&mut self, time_s: f64) {
         self.last_estimate_s = Some(time_s);
     }
 
-    /// Whether so much time has passed since the last estimate, or there was none.
+    /// Whether `interval_s` has elapsed since the previous estimate, or there was none.
     pub fn has_passed(&self, time_s: f64, interval_s: f64) -> bool {
         self.last_estimate_s
             .is_none_or(|last_s| time_s - last_s + SAME_TIME_S >= interval_s)
     }
 
-    /// Whether an estimate is due at the SSB at `time_s`.
+    /// Whether an estimate is due at the SSB of `time_s`.
     pub fn is_due(&self, time_s: f64) -> bool {
         if self.lead_s > 0.0 {
-            // The SSB after it would come after the wake-up time.
+            // The following SSB would be after the due time.
             let last_s = self.last_estimate_s.unwrap_or(f64::NEG_INFINITY);
             time_s - last_s + self.lead_s - SAME_TIME_S > self.wake_up_time_s
         } else {
@@ -97,7 +98,7 @@ impl Due {
         }
     }
 
-    /// When the last angle was estimated, in seconds.
+    /// Returns the time of the previous estimate in seconds.
     pub const fn last_estimate_s(&self) -> Option<f64> {
         self.last_estimate_s
     }

@@ -1,20 +1,19 @@
-//! Wake-up at a fixed interval.
+//! Wake-up policy with a fixed interval.
 
 use super::due::Due;
 use super::policy::{Situation, WakeUpPolicy};
 use crate::BoxError;
 use crate::observation::{BURST_S, SensedSsb};
 
-/// Due a constant time after the last estimate, on the same clock as Algorithm 1. What comes late,
-/// from before the last estimate or along with it, is taken: whether it would have served is not
-/// remembered.
+/// Wake-up policy with a constant time between estimates, on the clock of Algorithm 1. A late SSB
+/// (at or before the previous estimate) is accepted.
 #[derive(Debug)]
 pub struct FixedInterval {
     due: Due,
 }
 
 impl FixedInterval {
-    /// At the times that are due.
+    /// Creates the policy from a wake-up clock.
     pub const fn new(due: Due) -> Self {
         Self { due }
     }
@@ -25,7 +24,7 @@ impl FixedInterval {
         self.due.is_due(time_s) || last_s.is_some_and(|last_s| time_s < last_s + BURST_S)
     }
 
-    /// Takes the SSB at `time_s` if an estimate is due.
+    /// Accepts the SSB at `time_s` if an estimate is due.
     fn take(&mut self, time_s: f64) -> bool {
         let due = self.is_due(time_s);
         if self.due.is_due(time_s) {
@@ -57,7 +56,7 @@ mod tests {
 
     fn executions(interval_s: f64, lead_s: f64) -> usize {
         let mut policy = FixedInterval::new(Due::constant(interval_s, lead_s));
-        // The 80.33 s trip, on to the first SSB that finds the vehicle at its end.
+        // Trip of 80.33 s, up to the first SSB after its end.
         (0..=4017)
             .filter(|&k| policy.take(f64::from(k) * 0.02))
             .count()
@@ -81,7 +80,7 @@ mod tests {
     fn what_comes_late_is_taken_and_shifts_nothing() {
         let mut policy = FixedInterval::new(Due::constant(0.08, 0.0));
         assert!(policy.take(0.0) && policy.take(0.16));
-        // From before, and another SSB of the burst that served.
+        // A late SSB, and another SSB of the burst that was used.
         assert!(policy.take(0.02) && policy.take(0.163));
         assert!(!policy.take(0.18) && !policy.take(0.22));
         assert!(policy.take(0.24));

@@ -1,8 +1,9 @@
-//! An estimate that is due waits for an SSB that is worth it.
+//! Wake-up policy with an SNR threshold.
 //!
-//! The paper says that "under unfavorable conditions, the controller adaptively defers" estimates,
-//! and its Algorithm 1 does so by nothing but a longer wake-up time. This policy reads it otherwise:
-//! whatever makes an estimate due, no angle is estimated from an SSB below a set point.
+//! According to the paper, "under unfavorable conditions, the controller adaptively defers"
+//! estimates. Its Algorithm 1 only lengthens the wake-up time. This policy is another
+//! interpretation: no angle is estimated from an SSB below a threshold, whatever triggers the
+//! estimate.
 
 use super::due::Due;
 use super::policy::{Situation, WakeUpPolicy};
@@ -10,7 +11,7 @@ use crate::BoxError;
 use crate::observation::SensedSsb;
 use crate::settings::SnrSetPoint;
 
-/// Estimates an angle at the first SSB that is due and not below the set point.
+/// Wake-up policy that estimates an angle at the first due SSB above the SNR threshold.
 #[derive(Debug)]
 pub struct Gated {
     due: Due,
@@ -19,7 +20,7 @@ pub struct Gated {
 }
 
 impl Gated {
-    /// Waits until `latest_s` after the last estimate, and no longer.
+    /// Creates the policy. After `latest_s` without an estimate, the threshold is ignored.
     pub const fn new(due: Due, set_point: SnrSetPoint, latest_s: f64) -> Self {
         Self {
             due,
@@ -34,7 +35,7 @@ impl WakeUpPolicy for Gated {
         Ok(self.due.listens(now.time_s))
     }
 
-    /// Judges by the strongest SSB that is on the map.
+    /// Decides with the strongest SSB of a known radio head.
     fn decide(
         &mut self,
         now: &Situation<'_>,

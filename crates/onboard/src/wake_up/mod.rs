@@ -1,5 +1,5 @@
-//! When an angle of arrival is worth its energy. [`WakeUpPolicy`] is the door for others; the paper's
-//! Algorithm 1 stands in `pid.rs` alone.
+//! Wake-up policies: when an angle of arrival is estimated. [`WakeUpPolicy`] is the interface for
+//! plug-ins; `pid.rs` contains the paper's Algorithm 1.
 
 mod adaptive;
 mod choose;

@@ -1,13 +1,14 @@
-//! The paper's Algorithm 1, and nothing else. What feeds it is `controller.rs`, what obeys it
-//! `adaptive.rs`; that an estimate waits for a better SSB is another policy, `gated.rs`.
+//! The paper's Algorithm 1. Its inputs are in `controller.rs`, and `adaptive.rs` is its wake-up
+//! policy. Deferring an estimate until a better SSB is another policy, in `gated.rs`.
 
 use crate::settings::PidSettings;
 
-/// Algorithm 1: "Adaptive Wake-Up Time Calculation". Numbers in comments are the paper's lines.
+/// Algorithm 1: "Adaptive Wake-Up Time Calculation". Numbers in comments are the paper's line
+/// numbers.
 ///
-/// The paper gives neither the unit of `u` nor that of Δt. The unit of `u` stands in the settings
-/// (seconds move the wake-up time across [t_base, t_max] within the errors that occur); Δt is the
-/// caller's.
+/// The paper specifies neither the unit of `u` nor that of Δt. The settings contain the unit of
+/// `u`; with seconds, errors of the usual size move the wake-up time across [t_base, t_max]. The
+/// caller determines Δt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pid {
     kp: f64,
@@ -37,8 +38,8 @@ impl Pid {
             base_s,                                    // 5
             max_s,                                     // 5
             u_unit_s: settings.u_unit_ms * 1e-3,
-            // Not in the paper: a shortfall that lasts would otherwise keep the wake-up time at
-            // its bound long after it has passed.
+            // Anti-windup, which the paper does not have: after a persistent deficit the wake-up
+            // time would otherwise stay at its bound for long.
             integral_clamp: if settings.integral_clamp > 0.0 {
                 settings.integral_clamp
             } else {

@@ -1,23 +1,25 @@
-//! Wake-up as late as a bound on the error allows, and earlier where information is cheap.
+//! Wake-up policy driven by the localizer's covariance: as late as a target error permits, and
+//! earlier where information is cheap.
 //!
-//! The paper's t_max keeps a position uncertainty x̃_max by a worst case: the distance driven at
-//! top speed. The filter knows its error and how it grows, so the rule can be exact: wake up at
-//! the last SSB before the error would, with the stated confidence, exceed the bound, and take the
-//! fewest angles that keep it. Where not even all of them do, the bound is out of reach there, and
-//! [`WakeUpPolicy::keeps_bound`] says so.
+//! The paper's t_max keeps the position uncertainty below x̃_max by a worst case: the distance
+//! driven at top speed. The filter computes its covariance and the growth of the covariance, so
+//! that the rule can be exact. The vehicle wakes up at the last SSB before the error exceeds the
+//! target at the specified confidence, and uses the minimum number of angles that keeps it. If all
+//! angles together are not sufficient, [`WakeUpPolicy::keeps_bound`] returns `false`.
 //!
-//! An angle is worth what it takes off the variance of the position a little further on, where
-//! what it says of heading and odometer has become position too. That depends on where the vehicle
-//! is: beside a radio head an angle is worth many of those from afar. Of a constant energy the most
-//! is made where the last angle bought everywhere takes away the same (equal marginal gains), so
-//! an angle of at least that worth, `least_gain_m2`, is taken before the bound demands it: the
-//! stretch ahead, where none is worth as much, then begins with a small error.
+//! The value of an angle is its reduction of the position variance a few metres ahead, because
+//! information about heading and odometer has become position information there. The value depends
+//! on the position: one angle close to a radio head has the value of many from a distance. A given
+//! energy is used best if the last angle has the same value everywhere (equal marginal gains). An
+//! angle with at least the value `least_gain_m2` is therefore used before the target requires it,
+//! so that the stretch ahead, where angles have less value, begins with a small error.
 //!
-//! A wake-up costs before its first angle: the receiver settles and is on for the burst, whatever is
-//! estimated from it. What that is in executions the platform knows; where it is many, all radio
-//! heads of a burst are heard at once and the next burst is farther off.
+//! A wake-up has a fixed energy: the receiver settles and is on for the burst. The platform
+//! expresses it in units of one estimate. If it is large, all radio heads of a burst are used at
+//! once, and the next wake-up is later.
 //!
-//! Of what an angle says the most depends on the SNR of its SSB, which a receiver that listens knows
+//! The value of an angle depends mainly on the SNR of its SSB, which an active receiver measures
+//! before any angle is estimated. With `snr_headroom_db`, the measured SNR determines the value.
 //! before any angle is estimated. Given `snr_headroom_db`, an angle's worth is judged by that.
 
 use super::policy::{SAME_TIME_S, Situation, WakeUpPolicy};
@@ -30,16 +32,16 @@ use crate::radio_head::RadioHead;
 use crate::settings::{Site, UncertaintySettings, Vehicle};
 use crate::thermal::ThermalNoise;
 
-/// Longest wake-up time it looks ahead for, in seconds.
+/// Maximum look-ahead for a wake-up time, in seconds.
 const HORIZON_S: f64 = 20.0;
 
-/// How much further on an angle's worth is judged, in metres.
+/// Distance ahead at which the value of an angle is evaluated, in metres.
 const LOOK_AHEAD_M: f64 = 10.0;
 
-/// Most radio heads among which it chooses.
+/// Maximum number of radio heads to choose from.
 const MOST_HEADS: usize = 64;
 
-/// The uncertainty-driven policy.
+/// Wake-up policy driven by the covariance.
 #[derive(Clone, Debug)]
 pub struct UncertaintyDriven {
     bound_m: f64,
@@ -54,8 +56,8 @@ pub struct UncertaintyDriven {
 }
 
 impl UncertaintyDriven {
-    /// The policy for a site's SSBs. `wake_up_cost` is the energy of a wake-up before its first
-    /// angle, in executions.
+    /// Creates the policy for a site's SSBs. `wake_up_cost` is the energy of a wake-up before its
+    /// first angle, in units of one estimate.
     pub fn new(
         settings: &UncertaintySettings,
         wake_up_cost: f64,
@@ -75,14 +77,16 @@ impl UncertaintyDriven {
         }
     }
 
-    /// Whether the error keeps the bound until the SSB after `time_s` without another angle.
+    /// Whether the error stays below the target until the SSB after `time_s`, without another
+    /// angle.
     pub fn keeps(&self, ekf: &Ekf, time_s: f64) -> bool {
         self.error_m(ekf, time_s + self.period_s) <= self.bound_m
     }
 
-    /// The angles to take, one bit for each radio head: as many as make the most of the energy of
-    /// the wake-up, if they are worth it or demanded, and more where only more keep the bound until
-    /// the next SSB. Where nothing keeps it, those worth their energy. `snr_db` is what a radio head at a distance is received with.
+    /// Returns the angles to use, one bit for each radio head: the number with the best reduction
+    /// per energy, if its value is sufficient or the target requires it, and more if the target
+    /// requires more. If no number is sufficient, those whose value justifies their energy.
+    /// `snr_db` returns the SNR of a radio head at a distance.
     fn choice(
         &self,
         ekf: &Ekf,
@@ -124,7 +128,7 @@ impl UncertaintyDriven {
                 (best, most_m2) = (taken, gain_m2);
             }
             if !kept && keeps(&belief) {
-                // The angles are taken in the same order for either purpose.
+                // Both criteria add the angles in the same order.
                 best |= taken;
                 kept = true;
             }
@@ -139,8 +143,8 @@ impl UncertaintyDriven {
         }
     }
 
-    /// Time from `time_s` on for which the bound holds without another angle, in seconds: the
-    /// latest wake-up.
+    /// Returns the time after `time_s` for which the error stays below the target without another
+    /// angle, in seconds: the latest wake-up.
     fn wake_up_time_s(&self, ekf: &Ekf, time_s: f64) -> f64 {
         let holds =
             |periods: f64| self.error_m(ekf, time_s + periods * self.period_s) <= self.bound_m;
@@ -165,10 +169,10 @@ impl UncertaintyDriven {
     }
 }
 
-/// A localizer that is no such filter, or does not know yet where it is, takes every angle.
+/// Another localizer, or one whose position is unknown, uses every angle.
 impl WakeUpPolicy for UncertaintyDriven {
-    /// Whether the error would exceed the bound at the SSB after, or an angle is worth its energy
-    /// anyway.
+    /// Whether the error would exceed the target at the following SSB, or the value of an angle
+    /// justifies its energy.
     fn listens(&mut self, now: &Situation<'_>) -> Result<bool, BoxError> {
         let is_free = |last_s: f64| now.time_s - last_s + SAME_TIME_S >= self.base_s;
         if !self.last_wake_up_s.is_none_or(is_free) {
