@@ -1,15 +1,15 @@
-//! SSBs that belong together, as the pipeline hears them.
+//! SSBs of one burst, as inputs of the pipeline.
 
 use crate::BoxError;
 use crate::localize::AngleMeasurement;
 use crate::observation::{BURST_S, SensedSsb, SsbObservation};
 use crate::pipeline::{Observed, SsbSource};
 
-/// Something that came with one SSB.
+/// Item that contains one SSB.
 pub trait OfSsb {
-    /// The SSB.
+    /// Returns the SSB.
     fn ssb(&self) -> &SensedSsb;
-    /// What the pipeline is to make an angle of.
+    /// Returns the observation from which the pipeline obtains an angle.
     fn observed(&self) -> Observed<'_>;
 }
 
@@ -33,7 +33,7 @@ impl OfSsb for (SensedSsb, AngleMeasurement) {
     }
 }
 
-/// A burst that was received.
+/// Received burst.
 pub struct Burst<'a, T>(pub &'a [T]);
 
 impl<T: OfSsb> SsbSource for Burst<'_, T> {
@@ -48,7 +48,7 @@ impl<T: OfSsb> SsbSource for Burst<'_, T> {
     }
 }
 
-/// Number of the first SSBs that are of one burst: within half a frame of the first.
+/// Returns the number of leading SSBs that belong to one burst: within half a frame of the first.
 pub fn first_burst<T: OfSsb>(ssbs: &[T]) -> usize {
     let Some(first_s) = ssbs.first().map(|first| first.ssb().time_s) else {
         return 0;

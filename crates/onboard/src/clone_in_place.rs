@@ -1,6 +1,7 @@
-//! Copying without allocation, where what is copied over has the same shape.
+//! Cloning without allocation into a value of the same shape.
 
-/// Implements [`Clone`] field by field, and [`Clone::clone_from`] too, which a derive leaves out.
+/// Implements [`Clone`] field by field, including [`Clone::clone_from`], which a derive does not
+/// implement.
 macro_rules! clone_in_place {
     (
         $(#[$meta:meta])*

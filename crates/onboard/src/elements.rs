@@ -1,4 +1,4 @@
-//! From a number of antennas that a file states to one that the compiler knows.
+//! Conversion of a configured number of antennas to a compile-time constant.
 
 /// Evaluates `$body` with the constant `$N` equal to `$count`, which a checked vehicle has between
 /// 2 and [`MAX_ELEMENTS`](crate::observation::MAX_ELEMENTS); a larger one counts as that.

@@ -1,76 +1,76 @@
-//! Energy of a run, line by line: what was counted and what was not.
+//! Energy of a run by component, with its boundary.
 //!
-//! Each burst that is listened to costs the receiver's on-time (settling, then the burst) and the
-//! cycles of receiving it; each estimate its own cycles; what remains of the run the board idles, or
-//! sleeps. Energies above idle add to one another and to at most one that holds the board's idle
-//! power: two of those would count it twice.
+//! Each received burst consumes the receiver's on-time (settling plus burst) and the cycles of its
+//! reception. Each estimate consumes its own cycles. For the remaining time the board idles or is
+//! suspended. Energies above idle are additive; at most one term may contain the board's idle
+//! power, because two would count it twice.
 
 use crate::settings::{
     Boundary, Extent, Figure, Platform, PowerMode, Provenance, SettingsError, Vehicle,
 };
 
-/// How the energy of a run follows from what happened in it.
+/// Energy model of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnergyModel {
     per_execution_j: f64,
     per_listening_j: f64,
-    /// How long the receiver is on for a burst, its settling included, in seconds.
+    /// Receiver on-time for one burst, including settling, in seconds.
     pub on_time_s: f64,
     idle_w: f64,
     sleep: Option<Sleep>,
-    /// What the sum of it counts.
+    /// Components that the total includes.
     pub boundary: Boundary,
-    /// Where the energy per execution comes from.
+    /// Provenance of the energy per estimate.
     pub provenance: Provenance,
 }
 
-/// What sleeping between wake-ups takes.
+/// Suspend state between wake-ups.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Sleep {
     power_w: f64,
-    /// Awake for each burst: transition, settling, burst, computation, in seconds.
+    /// Awake time for each burst: transition, settling, burst and computation, in seconds.
     awake_s: f64,
 }
 
-/// What one estimate takes.
+/// Cost of one estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum EstimateCost {
-    /// What the platform says of the vehicle's method.
+    /// The platform's value for the vehicle's method.
     #[default]
     OfMethod,
-    /// So many joules above idle, by an estimator of the user's own.
+    /// Energy above idle in joules, of a custom estimator.
     EnergyJ(f64),
-    /// So many seconds of one busy core, by an estimator of the user's own.
+    /// Duration on one busy core in seconds, of a custom estimator.
     TimeS(f64),
-    /// An estimator of the user's own that says nothing of it.
+    /// Unknown, for a custom estimator without values.
     Unknown,
 }
 
 /// Energy of a run in joules.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Energy {
-    /// Of estimating angles.
+    /// Energy of the angle estimates.
     pub executions_j: f64,
-    /// Of listening to SSBs, and of receiving them; 0 where the platform does not count it.
+    /// Energy of the reception of SSBs; 0 if the platform does not include it.
     pub listening_j: f64,
-    /// Of the idle board; 0 where the platform does not count it.
+    /// Idle energy of the board; 0 if the platform does not include it.
     pub idle_j: f64,
 }
 
 impl Energy {
-    /// All of it.
+    /// Returns the total energy.
     pub fn total_j(&self) -> f64 {
         self.executions_j + self.listening_j + self.idle_j
     }
 }
 
 impl EnergyModel {
-    /// The energy model of a vehicle's method on its platform and mode; `None` where the platform
-    /// has no energy figure for that method. `extent` says whether every figure is taken as it is,
-    /// or at the end of its range that makes for the least or the most energy.
+    /// Returns the energy model of a vehicle's method on its platform and power mode; `None` if the
+    /// platform has no energy value for the method. `extent` selects the nominal values, or the
+    /// ends of their ranges with the minimum or maximum energy.
     ///
     /// # Errors
-    /// [`SettingsError`] when the platform has no such mode, or counts the idle board twice.
+    /// [`SettingsError`] if the platform does not have this mode, or counts the idle board twice.
     pub fn new(
         vehicle: &Vehicle,
         platform: &Platform,
@@ -79,11 +79,11 @@ impl EnergyModel {
         Self::with_cost(EstimateCost::OfMethod, vehicle, platform, extent)
     }
 
-    /// The same where an estimate costs this; `None` where nobody knows, or where it is a time and
-    /// the platform does not say what a busy core draws.
+    /// Returns the energy model with a given cost of an estimate; `None` if the cost is unknown, or
+    /// is a duration and the platform has no power of a busy core.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// Those of [`new`](Self::new).
     pub fn with_cost(
         cost: EstimateCost,
         vehicle: &Vehicle,
@@ -115,7 +115,7 @@ impl EnergyModel {
             radio.map(|figure| figure.boundary),
             idle.map(|figure| figure.boundary),
         ])?;
-        // What is measured above idle at the rails is more at the wall.
+        // Power above idle at the rails is divided by the efficiency of the supply.
         let efficiency = platform.supply_efficiency.as_ref();
         let loss = match (efficiency, boundary) {
             (Some(efficiency), Boundary::Wall) => 1.0 / efficiency.at(extent.opposite()),
@@ -158,16 +158,18 @@ impl EnergyModel {
         }))
     }
 
-    /// What listening to a burst costs, in executions; `None` where those cost nothing.
+    /// Returns the energy of the reception of a burst in units of one estimate; `None` if an
+    /// estimate has no energy.
     pub fn listening_in_executions(&self) -> Option<f64> {
         (self.per_execution_j > 0.0).then(|| self.per_listening_j / self.per_execution_j)
     }
 
-    /// Energy of a run of so many executions, SSB bursts listened to, and seconds.
+    /// Returns the energy of a run from its numbers of estimates and received bursts, and its
+    /// duration.
     pub fn of_run(&self, executions: usize, listened: usize, duration_s: f64) -> Energy {
         let idle_j = match self.sleep {
             Some(sleep) if self.idle_w > 0.0 => {
-                // Bursts too close for a sleep in between keep the board awake.
+                // Bursts without time for a suspend keep the board awake.
                 let awake_s = (listened as f64 * sleep.awake_s).min(duration_s);
                 awake_s * self.idle_w + (duration_s - awake_s) * sleep.power_w
             }
@@ -181,7 +183,7 @@ impl EnergyModel {
     }
 }
 
-/// One estimate: as the mode states it, else its cycles at the mode's clock.
+/// Cost of one estimate: the value of the power mode, otherwise cycles at its clock frequency.
 struct Execution {
     energy_j: f64,
     time_s: f64,
@@ -220,7 +222,8 @@ impl Execution {
         })
     }
 
-    /// So long on a busy core; `None` where the platform does not say what one draws.
+    /// Returns the cost of a duration on a busy core; `None` if the platform has no power of a busy
+    /// core.
     fn of_time(time_s: f64, platform: &Platform, mode: &PowerMode, extent: Extent) -> Option<Self> {
         let (core_w, figure) = platform.core_power_w(mode, extent)?;
         Some(Self {
@@ -320,7 +323,8 @@ mod tests {
         let platform = Platform::from_toml(CONTROLLED, "test", &Shipped).unwrap();
         let model = model(&platform, Extent::Value);
         let energy = model.of_run(10, 100, 10.0);
-        // A core takes 0.5 W · 2³ = 4 W; an estimate 2 ms of it, a burst 1 ms and 10 ms of 1 W.
+        // Core power 0.5 W · 2³ = 4 W; an estimate takes 2 ms of it, a burst 1 ms of it and 10 ms
+        // of 1 W.
         assert!(
             (energy.executions_j - 10.0 * 8e-3).abs() < 1e-12,
             "{energy:?}"
@@ -344,7 +348,7 @@ mod tests {
         };
         let close = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-12;
         assert!(close(executions_j(EstimateCost::EnergyJ(0.3)), 3.0));
-        // A core takes 4 W.
+        // The power of a core is 4 W.
         assert!(close(executions_j(EstimateCost::TimeS(0.01)), 0.4));
         assert_eq!(executions_j(EstimateCost::Unknown), None);
     }
@@ -381,7 +385,7 @@ mod tests {
         );
         let platform = Platform::from_toml(&text, "test", &Shipped).unwrap();
         let model = model(&platform, Extent::Value);
-        // Awake 87 + 10 + 1 + 2 = 100 ms a burst.
+        // Awake time per burst: 87 + 10 + 1 + 2 = 100 ms.
         let energy = model.of_run(10, 10, 10.0);
         assert!(
             (energy.idle_j - (4.0 + 9.0 * 0.5)).abs() < 1e-9,

@@ -5,33 +5,34 @@ use std::f64::consts::{PI, TAU};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A place in the `map` frame.
+/// Position in the `map` frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Point {
-    /// East in metres.
+    /// East coordinate in metres.
     pub x_m: f64,
-    /// North in metres.
+    /// North coordinate in metres.
     pub y_m: f64,
 }
 
 impl Point {
-    /// The point at (`x_m`, `y_m`).
+    /// Creates the point (`x_m`, `y_m`).
     pub const fn new(x_m: f64, y_m: f64) -> Self {
         Self { x_m, y_m }
     }
 
-    /// The point so far east and north of it.
+    /// Returns the point displaced to the east and north.
     #[must_use]
     pub fn moved(self, [east_m, north_m]: [f64; 2]) -> Self {
         Self::new(self.x_m + east_m, self.y_m + north_m)
     }
 
-    /// Distance to another point in metres.
+    /// Returns the distance to another point in metres.
     pub fn distance_m(self, other: Self) -> f64 {
         (other.x_m - self.x_m).hypot(other.y_m - self.y_m)
     }
 
-    /// Direction to another point in radians from +x: the paper's angle of incoming signal, eq. 3.
+    /// Returns the bearing of another point in radians from +x: the angle of incoming signal in eq.
+    /// 3 of the paper.
     pub fn bearing_rad(self, other: Self) -> f64 {
         (other.y_m - self.y_m).atan2(other.x_m - self.x_m)
     }
@@ -43,7 +44,7 @@ impl From<[f64; 2]> for Point {
     }
 }
 
-/// A rectangle along the axes of the map.
+/// Axis-aligned rectangle in the map frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Area {
     from: Point,
@@ -51,7 +52,7 @@ pub struct Area {
 }
 
 impl Area {
-    /// The square with this middle.
+    /// Creates the square with this centre.
     pub fn around(middle: Point, half_side_m: f64) -> Self {
         Self {
             from: Point::new(middle.x_m - half_side_m, middle.y_m - half_side_m),
@@ -59,7 +60,7 @@ impl Area {
         }
     }
 
-    /// Where these points are, and a quarter of that to each side.
+    /// Returns the bounding box of points, extended by a quarter of its size on each side.
     pub fn about(points: impl Iterator<Item = Point>) -> Self {
         let [none, all] = [f64::INFINITY, f64::NEG_INFINITY].map(|it| Point::new(it, it));
         let (from, to) = points.fold((none, all), |(from, to), point| {
@@ -75,13 +76,13 @@ impl Area {
         }
     }
 
-    /// Distance between places of which there are at most so many, but at least `least_m`.
+    /// Returns the grid spacing for a maximum number of grid points, at least `least_m`.
     pub fn spacing_m(&self, most_places: f64, least_m: f64) -> f64 {
         let square_m2 = (self.to.x_m - self.from.x_m) * (self.to.y_m - self.from.y_m);
         (square_m2 / most_places).sqrt().max(least_m)
     }
 
-    /// The middles of its squares.
+    /// Returns the centres of the grid cells.
     pub fn places(&self, spacing_m: f64) -> impl Iterator<Item = Point> {
         let count = move |length_m: f64| (length_m / spacing_m).ceil().max(1.0) as u32;
         let middle = move |number: u32| (f64::from(number) + 0.5) * spacing_m;
@@ -93,29 +94,29 @@ impl Area {
     }
 }
 
-/// Place and heading in the `map` frame.
+/// Position and heading in the `map` frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Pose {
-    /// East in metres.
+    /// East coordinate in metres.
     #[schemars(range(min = -1e7, max = 1e7))]
     pub x_m: f64,
-    /// North in metres.
+    /// North coordinate in metres.
     #[schemars(range(min = -1e7, max = 1e7))]
     pub y_m: f64,
-    /// Counter-clockwise from +x in radians.
+    /// Heading counter-clockwise from +x, in radians.
     #[schemars(range(min = -100.0, max = 100.0))]
     pub heading_rad: f64,
 }
 
 impl Pose {
-    /// The place without the heading.
+    /// Returns the position.
     #[must_use]
     pub const fn point(self) -> Point {
         Point::new(self.x_m, self.y_m)
     }
 
-    /// How far another pose is from it: east and north (m), and counter-clockwise in (−π, π] (rad).
+    /// Returns another pose minus this pose: east and north (m), and heading in (−π, π] (rad).
     pub fn offset_of(self, other: Self) -> [f64; 3] {
         [
             other.x_m - self.x_m,
@@ -124,16 +125,18 @@ impl Pose {
         ]
     }
 
-    /// The pose after `length_m` along an arc of constant `curvature_per_m` (left is positive).
+    /// Returns the pose after `length_m` along an arc of constant `curvature_per_m` (positive to
+    /// the left).
     #[must_use]
     pub fn along_arc(self, length_m: f64, curvature_per_m: f64) -> Self {
         self.along_chord(length_m, length_m * curvature_per_m)
     }
 
-    /// The pose after `length_m` along an arc that turns by `turn_rad`; of no length, on the spot.
+    /// Returns the pose after `length_m` along an arc with the heading change `turn_rad`; with zero
+    /// length, a turn on the spot.
     #[must_use]
     pub fn along_chord(self, length_m: f64, turn_rad: f64) -> Self {
-        // The chord of an arc points along its mean heading and is sinc(turn/2) times as long.
+        // The chord of an arc has the arc's mean heading, and sinc(turn/2) times its length.
         let half_turn = 0.5 * turn_rad;
         let sinc = if half_turn.abs() < 1e-4 {
             1.0 - half_turn * half_turn / 6.0
@@ -148,7 +151,7 @@ impl Pose {
         }
     }
 
-    /// The point that lies so far forward and to the left of the pose.
+    /// Returns the point at `forward_m` and `left_m` in the frame of the pose.
     #[must_use]
     pub fn beside(self, forward_m: f64, left_m: f64) -> Point {
         let (sin, cos) = self.heading_rad.sin_cos();
@@ -158,7 +161,7 @@ impl Pose {
         )
     }
 
-    /// The pose moved `lateral_m` to the left of its heading.
+    /// Returns the pose displaced by `lateral_m` to the left.
     #[must_use]
     pub fn offset_left(self, lateral_m: f64) -> Self {
         let (sin, cos) = self.heading_rad.sin_cos();
@@ -170,7 +173,7 @@ impl Pose {
     }
 }
 
-/// Whether two straight lines, each given by its ends, cross or touch. Parallel ones do not.
+/// Whether two line segments cross or touch, each given by its ends. Parallel segments do not.
 pub fn cross([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
     let product = |from: Point, to: Point, other: Point| {
         (to.x_m - from.x_m) * (other.y_m - from.y_m) - (to.y_m - from.y_m) * (other.x_m - from.x_m)
@@ -180,7 +183,7 @@ pub fn cross([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
     turn != 0.0 && parted(a, b, c, d) && parted(c, d, a, b)
 }
 
-/// The angle in (−π, π] that differs from `angle_rad` by whole turns.
+/// Returns the angle in (−π, π] that is equal to `angle_rad` modulo 2π.
 pub fn wrap_angle(angle_rad: f64) -> f64 {
     if angle_rad > -PI && angle_rad <= PI {
         return angle_rad;
@@ -219,7 +222,7 @@ mod tests {
             (area.from, area.to),
             (Point::new(-4.0, -1.0), Point::new(8.0, 7.0))
         );
-        // 12 m by 8 m: at most so many squares, none smaller than asked.
+        // 12 m by 8 m: the maximum number of squares, and the minimum spacing.
         assert!((area.spacing_m(24.0, 1.0) - 2.0).abs() < 1e-12);
         assert!((area.spacing_m(1e6, 1.0) - 1.0).abs() < 1e-12);
         let places: Vec<Point> = area.places(2.0).collect();

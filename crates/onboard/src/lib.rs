@@ -1,14 +1,15 @@
-//! What runs on the vehicle: odometry and SSBs in; poses, verdicts and the next wake-up out.
+//! Software on the vehicle: inputs are odometry and SSBs; outputs are poses, verdicts and the next
+//! wake-up.
 //!
-//! The angle of arrival at the vehicle's antenna array, wheel odometry and the known place of the
-//! radio heads give a pose; a wake-up policy decides how often an angle is worth its energy.
-//! [`Onboard`] is the pipeline, the same in simulation, replay and on the vehicle. What it believes
-//! of plant and vehicle is in [`settings`]; nothing here knows what is really so, draws random
-//! numbers, starts threads or opens files.
+//! The pose is estimated from the angle of arrival at the vehicle's antenna array, wheel odometry
+//! and the known positions of the radio heads. A wake-up policy determines when an angle is
+//! estimated. [`Onboard`] is the pipeline, identical in simulation, replay and on the vehicle. Its
+//! nominal model of plant and vehicle is in [`settings`]. This crate does not access the truth of a
+//! simulation, and uses no random numbers, threads or files.
 //!
-//! SI units and radians throughout, with the unit in every name. Frames follow REP-103: `map` is
-//! right-handed, headings run counter-clockwise from +x. Angles of arrival are measured from the
-//! vehicle's forward axis.
+//! All quantities are in SI units and radians, and names contain the unit. Frames follow REP-103:
+//! `map` is right-handed, and headings are counter-clockwise from +x. Angles of arrival are
+//! relative to the vehicle's forward axis.
 
 pub mod burst;
 mod clone_in_place;
@@ -38,5 +39,5 @@ pub mod walls;
 pub use live::Live;
 pub use pipeline::{Custom, Execution, Heard, Observed, OdometryDefect, Onboard, SsbSource};
 
-/// Whatever a user's own code fails with.
+/// Error of user code.
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;

@@ -1,4 +1,4 @@
-//! Received power and noise (paper: "Path Loss and Fading Model").
+//! Received power and noise power (paper: "Path Loss and Fading Model").
 
 use std::f64::consts::PI;
 
@@ -8,7 +8,7 @@ use crate::settings::{Site, Vehicle};
 /// Boltzmann's constant in J/K (SI, exact).
 const BOLTZMANN_J_PER_K: f64 = 1.380_649e-23;
 
-/// The part of the link budget that belongs to the vehicle and the carrier.
+/// Link budget, without the properties of a radio head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkBudget {
     wavelength_m: f64,
@@ -17,7 +17,7 @@ pub struct LinkBudget {
 }
 
 impl LinkBudget {
-    /// The link budget between a site's cells and a vehicle.
+    /// Returns the link budget between a site's cells and a vehicle.
     pub fn new(site: &Site, vehicle: &Vehicle) -> Self {
         let receiver = &vehicle.receiver;
         let noise_w = BOLTZMANN_J_PER_K * receiver.temperature_k * receiver.bandwidth_mhz * 1e6;
@@ -28,17 +28,17 @@ impl LinkBudget {
         }
     }
 
-    /// Noise power in dBm: k·T·B and the noise figure.
+    /// Returns the noise power in dBm: k·T·B times the noise figure.
     pub const fn noise_dbm(&self) -> f64 {
         self.noise_dbm
     }
 
-    /// Free-space path loss in dB, 20·log₁₀(4πd/λ) (Friis).
+    /// Returns the free-space path loss in dB, 20·log₁₀(4πd/λ) (Friis).
     pub fn path_loss_db(&self, distance_m: f64) -> f64 {
         20.0 * (4.0 * PI * distance_m / self.wavelength_m).log10()
     }
 
-    /// SNR per antenna and sample in dB, before shadowing and fading.
+    /// Returns the SNR per antenna and sample in dB, without shadowing and fading.
     pub fn snr_db(&self, head: &RadioHead, distance_m: f64) -> f64 {
         head.eirp_dbm + self.rx_gain_dbi - self.path_loss_db(distance_m) - self.noise_dbm
     }
@@ -62,7 +62,7 @@ mod tests {
             eirp_dbm: -17.0,
             ..RadioHead::from(&site.radio_heads[0])
         };
-        // −27 + 10 + 5 − 83.329 + 103.412 = 8.08 dB at 100 m; 6.02 dB less at twice the distance.
+        // −27 + 10 + 5 − 83.329 + 103.412 = 8.08 dB at 100 m; minus 6.02 dB at twice the distance.
         assert!((budget.snr_db(&head, 100.0) - 8.083).abs() < 2e-3);
         assert!((budget.snr_db(&head, 200.0) - 2.063).abs() < 2e-3);
     }

@@ -1,4 +1,4 @@
-//! What the array receives from every direction, and what is measured with it.
+//! Array manifold, and the angle that an array measures.
 
 use std::fmt::Debug;
 
@@ -7,28 +7,27 @@ use aoa::{ArbitraryArray, Complex64, Direction, DirectionFinder, Manifold, Measu
 use crate::geometry::wrap_angle;
 use crate::settings::ArrayShape;
 
-/// An array of antennas that are not in a row. The azimuth of its directions is from the array's
-/// axis.
+/// Manifold of a non-linear array. Azimuths are relative to the array axis.
 #[derive(Debug, Clone)]
 pub enum ArrayManifold<const N: usize> {
-    /// By the places of the antennas.
+    /// Given by the positions of the antennas.
     Places(ArbitraryArray<N>),
-    /// By a table of responses.
+    /// Given by a table of responses.
     Measured(MeasuredManifold<N>),
 }
 
 impl<const N: usize> ArrayManifold<N> {
-    /// The manifold of antennas that stand so, on a circle with this spacing; `None` of a row, which
-    /// has a faster way.
+    /// Returns the manifold of an array shape (`spacing_wavelengths` applies to a circle); `None`
+    /// for a uniform linear array, which has faster algorithms.
     ///
     /// # Errors
-    /// [`aoa::Error`] for places or a table that make no array.
+    /// [`aoa::Error`] if the positions or the table do not form an array.
     pub fn new(shape: &ArrayShape, spacing_wavelengths: f64) -> Result<Option<Self>, aoa::Error> {
         let place = |[forward, left]: [f64; 2]| [forward, left, 0.0];
         Ok(Some(match shape {
             ArrayShape::UniformLinear {} => return Ok(None),
             ArrayShape::Circular {} => {
-                // Neighbours are a chord apart.
+                // The distance between neighbours is a chord of the circle.
                 let half_turn = std::f64::consts::PI / N as f64;
                 let radius = 0.5 * spacing_wavelengths / half_turn.sin();
                 Self::Places(ArbitraryArray::circular(radius)?)
@@ -54,15 +53,17 @@ impl<const N: usize> ArrayManifold<N> {
         }))
     }
 
-    /// Looks from the horizon upwards: antennas in a plane do not tell above from below.
+    /// Returns the direction finder for elevations from the horizon upwards: a planar array cannot
+    /// separate directions above and below its plane.
     ///
     /// # Errors
-    /// None for a valid manifold.
+    /// No error for a valid manifold.
     pub fn finder(self) -> Result<DirectionFinder<Self, N>, aoa::Error> {
         DirectionFinder::new(self, [0.0, std::f64::consts::FRAC_PI_2])
     }
 
-    /// `|aᴴu|²/aᴴa` of what the antennas receive, `u`, in the strongest direction `a`.
+    /// Returns `|aᴴu|²/aᴴa` for the received vector `u` and the steering vector `a` that maximises
+    /// it.
     pub fn strongest_beam(finder: &DirectionFinder<Self, N>, received: &[Complex64; N]) -> f64 {
         let found = finder.estimate_pilots(&[*received], Some(1.0));
         found.map_or(0.0, |found| {
@@ -92,13 +93,14 @@ impl<const N: usize> Manifold<N> for ArrayManifold<N> {
     }
 }
 
-/// A manifold of a number of antennas that is not known before a file is read.
+/// Manifold for a number of antennas that is known at run time only.
 pub trait AnyManifold: Debug + Send + Sync {
-    /// Adds what the antennas receive of a wave from `towards`: the horizontal part, along the
-    /// array's axis and to its left, of the unit vector to its source, which is not below the horizon.
+    /// Adds the received wave from the direction `towards` to `gains`. `towards` is the horizontal
+    /// part, along the array axis and to its left, of the unit vector to the source, which is not
+    /// below the horizon.
     fn add(&self, wave: Complex64, towards: [f64; 2], gains: &mut [Complex64]);
 
-    /// Where the antennas are, as far as that is all there is to it.
+    /// Returns the positions of the antennas, if they determine the manifold.
     fn places_wavelengths(&self) -> Option<Vec<[f64; 2]>>;
 }
 
@@ -120,29 +122,30 @@ impl<const N: usize> AnyManifold for ArrayManifold<N> {
     }
 }
 
-/// What is measured of a wave's direction, and how sharply.
+/// Angle that an array measures, and its sensitivity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Measurand {
-    /// The electrical angle ω = 2π(d/λ) cos θ between neighbours in a row.
+    /// Electrical angle ω = 2π(d/λ) cos θ between neighbouring antennas of a uniform linear array.
     ElectricalAngle {
         /// Number of antennas N.
         elements: u8,
-        /// Distance between neighbours in wavelengths, `d/λ`.
+        /// Distance between neighbouring antennas in wavelengths, `d/λ`.
         spacing_wavelengths: f64,
     },
-    /// The azimuth from the array's axis, counter-clockwise, the elevation being estimated along.
+    /// Azimuth, counter-clockwise from the array axis, with an unknown elevation.
     Azimuth {
         /// Number of antennas N.
         elements: u8,
-        /// `S = Σ (2π)² (p − p̄)(p − p̄)ᵀ` of the antennas' places `p` in wavelengths, along the axis
-        /// and to its left.
+        /// `S = Σ (2π)² (p − p̄)(p − p̄)ᵀ` of the antenna positions `p` in wavelengths, along the
+        /// array axis and to its left.
         moments: [[f64; 2]; 2],
     },
 }
 
 impl Measurand {
-    /// That of antennas that are not in a row, by their sharpness at the horizon: its mean over all
-    /// azimuths and its second harmonic, which of places are all there is.
+    /// Returns the azimuth measured by a non-linear array. Its sensitivity at the horizon is
+    /// represented by the mean over all azimuths and the second harmonic, which is exact for a
+    /// manifold given by positions.
     pub fn azimuth<const N: usize>(manifold: &ArrayManifold<N>) -> Self {
         Self::Azimuth {
             elements: N as u8,
@@ -150,14 +153,14 @@ impl Measurand {
         }
     }
 
-    /// Number of antennas.
+    /// Returns the number of antennas.
     pub const fn elements(&self) -> u8 {
         match self {
             Self::ElectricalAngle { elements, .. } | Self::Azimuth { elements, .. } => *elements,
         }
     }
 
-    /// The value from this azimuth, at an elevation of this cosine.
+    /// Returns the measured value for an azimuth and a cosine of the elevation (`level`).
     pub fn value_rad(&self, azimuth_rad: f64, level: f64) -> f64 {
         match self {
             Self::ElectricalAngle {
@@ -168,8 +171,8 @@ impl Measurand {
         }
     }
 
-    /// Its angle from the array's axis: 0..=π in a row, which does not tell left from right;
-    /// counter-clockwise in −π..=π else.
+    /// Returns the angle from the array axis: in 0..=π for a uniform linear array, which is
+    /// ambiguous between left and right; in −π..=π, counter-clockwise, otherwise.
     pub fn angle_rad(&self, value_rad: f64) -> f64 {
         match self {
             Self::ElectricalAngle {
@@ -183,12 +186,13 @@ impl Measurand {
         }
     }
 
-    /// What a look of SNR ρ tells, over 2ρ: `A` of the Cramér–Rao bound `1/(2ρA)` of the value.
+    /// Returns the aperture factor `A` of the Cramér–Rao bound `1/(2ρA)` of the measured value, for
+    /// one snapshot of SNR ρ.
     ///
-    /// In a row it is `N(N² − 1)/12`. In a plane, with `u` towards the source and `t` across, the
-    /// derivatives by azimuth and elevation are `cos ε (p·t)` and `−sin ε (p·u)`, and what is left
-    /// for the azimuth beside an unknown elevation is
-    /// `cos² ε (tᵀSt − (tᵀSu)²/uᵀSu) = cos² ε det S / uᵀSu`.
+    /// For a uniform linear array it is `N(N² − 1)/12`. For a planar array, let `u` point to the
+    /// source and `t` be perpendicular to it. The derivatives by azimuth and elevation are
+    /// `cos ε (p·t)` and `−sin ε (p·u)`. The information about the azimuth with an unknown
+    /// elevation is `cos² ε (tᵀSt − (tᵀSu)²/uᵀSu) = cos² ε det S / uᵀSu`.
     pub fn aperture(&self, azimuth_rad: f64, level: f64) -> f64 {
         match self {
             Self::ElectricalAngle { elements, .. } => row_aperture(*elements),
@@ -200,7 +204,8 @@ impl Measurand {
         }
     }
 
-    /// Its mean over all azimuths at the horizon, harmonic in a plane: of `uᵀSu` the mean is half the trace.
+    /// Returns the mean aperture factor over all azimuths at the horizon; for a planar array the
+    /// harmonic mean. The mean of `uᵀSu` is half the trace.
     pub fn mean_aperture(&self) -> f64 {
         match self {
             Self::ElectricalAngle { elements, .. } => row_aperture(*elements),
@@ -211,15 +216,15 @@ impl Measurand {
         }
     }
 
-    /// Variance (rad²) that the best estimate has for scatter of the given Rician K (power ratio) and
-    /// an aperture `A`, to the second order in 1/K.
+    /// Returns the variance (rad²) of the maximum-likelihood estimate under scatter of a Rician K
+    /// (power ratio) with aperture factor `A`, to second order in 1/K.
     ///
-    /// The maximum of `|Σ (1 + ε_n) e^{−jωm}|²` over ω, for scatter `ε_n` of variance 1/K and the
-    /// antennas' places `m` from their middle, expanded to the third order in ε, has the variance
-    /// `(1 + (1 + κ) / (2 N K))` times the bound, with `κ = N Σm⁴/(Σm²)²`, which is
-    /// `(9 N² − 21) / (5 (N² − 1))` in a row: 1.64 for four antennas. Around a circle it is 3/2, and
-    /// the bend of the responses over the azimuth adds another half to it (by simulation: of
-    /// `1 + κ`, 400,000 estimates with five antennas at K = 20 find 2.87 ± 0.12).
+    /// The maximum of `|Σ (1 + ε_n) e^{−jωm}|²` over ω, for scatter `ε_n` of variance 1/K and
+    /// antenna positions `m` relative to their centre, expanded to third order in ε, has the
+    /// variance `(1 + (1 + κ) / (2 N K))` times the bound, with `κ = N Σm⁴/(Σm²)²`. For a uniform
+    /// linear array `κ = (9 N² − 21) / (5 (N² − 1))`, which is 1.64 for four antennas. For a circle
+    /// it is 3/2, and the curvature of the responses over the azimuth adds another half (simulation
+    /// of `1 + κ` with 400,000 estimates, five antennas, K = 20: 2.87 ± 0.12).
     pub fn scatter_variance(&self, rician_k: f64, aperture: f64) -> f64 {
         let n = f64::from(self.elements());
         let kurtosis = match self {
@@ -229,11 +234,12 @@ impl Measurand {
         scatter_bound(rician_k, aperture) * (1.0 + (1.0 + kurtosis) / (2.0 * n * rician_k))
     }
 
-    /// Probability that scatter of the given Rician K (power ratio) makes another lobe the highest, so
-    /// that the angle is any: of N beams at right angles one has the signal, `N K` above the scatter
-    /// in each (noncoherent orthogonal signalling, Proakis and Salehi, Digital Communications, 4.5):
-    /// `Σ (−1)^{n+1} C(N−1, n) e^{−n N K/(n+1)} / (n+1)` over n from 1 to N − 1. Lobes lie between
-    /// these beams too: right to a factor of two.
+    /// Returns the probability that scatter of a Rician K (power ratio) makes a wrong lobe the
+    /// maximum, so that the angle is arbitrary. One of N orthogonal beams contains the signal, with
+    /// a power `N K` relative to the scatter in each beam (noncoherent orthogonal signalling,
+    /// Proakis and Salehi, Digital Communications, 4.5):
+    /// `Σ (−1)^{n+1} C(N−1, n) e^{−n N K/(n+1)} / (n+1)` for n from 1 to N − 1. Lobes also exist
+    /// between these beams, so that the result is accurate to a factor of two.
     pub fn wrong_lobe_probability(&self, rician_k: f64) -> f64 {
         let beams = f64::from(self.elements());
         let (mut sum, mut choices) = (0.0, -1.0);
@@ -246,9 +252,9 @@ impl Measurand {
     }
 }
 
-/// Least variance (rad²) of the angle that scatter of the given Rician K (power ratio) leaves in one
-/// look, however strong the signal: the Cramér–Rao bound of one snapshot at an SNR of K, `1/(2 K A)`,
-/// which is `1/(10 K)` for four antennas in a row.
+/// Returns the minimum variance (rad²) of an angle from one snapshot under scatter of a Rician K
+/// (power ratio), for any signal power: the Cramér–Rao bound at an SNR of K, `1/(2 K A)`. It is
+/// `1/(10 K)` for a uniform linear array of four antennas.
 pub fn scatter_bound(rician_k: f64, aperture: f64) -> f64 {
     0.5 / (rician_k * aperture)
 }
@@ -258,10 +264,11 @@ fn row_aperture(elements: u8) -> f64 {
     n * (n * n - 1.0) / 12.0
 }
 
-/// `S` of a manifold: `tᵀSt` is its sharpness `Re(dᴴPd)` in azimuth, scaled to antennas of unit gain.
+/// Returns `S` of a manifold. `tᵀSt` is the sensitivity `Re(dᴴPd)` in azimuth, scaled to unit
+/// antenna gain.
 fn moments<const N: usize>(manifold: &ArrayManifold<N>) -> [[f64; 2]; 2] {
     const AZIMUTHS: u32 = 360;
-    /// Of the one snapshot whose bound is taken: so large that noise does not weigh in.
+    /// SNR of the snapshot whose bound is computed: large enough to make noise negligible.
     const SNR: f64 = 1e9;
     let [mut mean, mut even, mut odd] = [0.0; 3];
     for number in 0..AZIMUTHS {

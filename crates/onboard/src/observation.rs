@@ -1,18 +1,18 @@
-//! What the vehicle's sensors deliver: wheel odometry and SSBs.
+//! Sensor data of the vehicle: wheel odometry and SSBs.
 
 use num_complex::Complex64;
 
-/// Most antennas of the vehicle's array.
+/// Maximum number of antennas.
 pub const MAX_ELEMENTS: usize = 16;
 
-/// Most snapshots (or despread blocks) one observation holds.
+/// Maximum number of snapshots (or despread blocks) of one observation.
 pub const MAX_SNAPSHOTS: usize = 64;
 
-/// All SSBs of a burst begin this close together: within half a frame (TS 38.213, 4.1), less their
-/// own length. Bursts may come every half frame.
+/// Maximum time between the first and last SSB of a burst: half a frame (TS 38.213, 4.1) minus the
+/// length of an SSB. The minimum burst period is half a frame.
 pub const BURST_S: f64 = 4.9e-3;
 
-/// Wheel odometry at one instant.
+/// Wheel odometry at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OdometrySample {
     /// Time in seconds.
@@ -21,12 +21,12 @@ pub struct OdometrySample {
     pub distance_m: f64,
     /// Speed in m/s.
     pub speed_mps: f64,
-    /// Yaw rate in rad/s, counter-clockwise, where the vehicle has a gyroscope.
+    /// Yaw rate in rad/s, counter-clockwise, if the vehicle measures it.
     pub yaw_rate_radps: Option<f64>,
 }
 
 impl OdometrySample {
-    /// One that has no distance: [`Live`](crate::Live) drives on by its speed.
+    /// Creates a sample without a distance: [`Live`](crate::Live) integrates its speed.
     pub const fn of_speed(time_s: f64, speed_mps: f64, yaw_rate_radps: Option<f64>) -> Self {
         Self {
             time_s,
@@ -36,7 +36,7 @@ impl OdometrySample {
         }
     }
 
-    /// Whether all its values are numbers.
+    /// Whether all values are finite.
     pub fn is_finite(&self) -> bool {
         self.time_s.is_finite()
             && self.distance_m.is_finite()
@@ -45,38 +45,38 @@ impl OdometrySample {
     }
 }
 
-/// What is known of an SSB before its angle is estimated: whose it is and how strong.
+/// Identity and SNR of an SSB, measured before its angle is estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensedSsb {
     /// Physical cell identity, 0..=1007 (TS 38.211, 7.4.2.1).
     pub pci: u16,
-    /// Index of the SSB in its burst, that is its beam.
+    /// Index of the SSB in its burst (beam).
     pub ssb_index: u8,
     /// Reception time in seconds.
     pub time_s: f64,
-    /// Sensed SNR per antenna and resource element, in dB.
+    /// Measured SNR per antenna and resource element, in dB.
     pub snr_db: f64,
 }
 
-/// An SSB as received by the array.
+/// SSB received by the array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SsbObservation {
-    /// Cell, beam, time and strength.
+    /// Cell, beam, time and SNR.
     pub ssb: SensedSsb,
-    /// Noise power per antenna and snapshot where the receiver knows it; the snapshots' scale.
+    /// Noise power per antenna and snapshot, in the scale of the snapshots, if known.
     pub noise_variance: Option<f64>,
     /// Carrier frequency offset in Hz.
     pub cfo_hz: f64,
-    /// Whether it is the first of its beam since a search has found that. Such a one is heard by itself:
-    /// the others of its burst may have been heard before the search was through.
+    /// Whether the SSB is the first of its beam after a search detected it. It is processed alone,
+    /// because the other SSBs of its burst may have been processed before the search ended.
     pub is_first: bool,
     elements: usize,
-    /// Snapshot after snapshot.
+    /// Snapshots, one after another.
     values: Vec<Complex64>,
 }
 
 impl SsbObservation {
-    /// A buffer for observations by so many antennas, 1..=[`MAX_ELEMENTS`], without snapshots yet.
+    /// Creates a buffer without snapshots for 1..=[`MAX_ELEMENTS`] antennas.
     pub fn new(elements: usize) -> Self {
         let elements = elements.clamp(1, MAX_ELEMENTS);
         Self {
@@ -94,8 +94,8 @@ impl SsbObservation {
         }
     }
 
-    /// Adds a snapshot: the same instant (or the same despread symbol) at every antenna. `false`
-    /// if there is no room left, or it is not of as many antennas.
+    /// Appends a snapshot: one value for each antenna at the same time (or of the same despread
+    /// symbol). Returns `false` if the buffer is full, or the number of antennas differs.
     pub fn push(&mut self, snapshot: &[Complex64]) -> bool {
         let fits = snapshot.len() == self.elements && self.count() < MAX_SNAPSHOTS;
         if fits {
@@ -104,7 +104,7 @@ impl SsbObservation {
         fits
     }
 
-    /// Removes every snapshot and takes up a new SSB, so that one buffer serves a whole drive.
+    /// Removes all snapshots and sets the SSB, so that one buffer can be reused.
     pub fn restart(&mut self, ssb: SensedSsb) {
         self.ssb = ssb;
         self.noise_variance = None;
@@ -112,7 +112,7 @@ impl SsbObservation {
         self.values.clear();
     }
 
-    /// Becomes a copy of another observation, in the memory there is.
+    /// Copies another observation without allocation.
     pub fn copy_from(&mut self, other: &Self) {
         self.values.clone_from(&other.values);
         (self.ssb, self.noise_variance) = (other.ssb, other.noise_variance);
@@ -130,7 +130,8 @@ impl SsbObservation {
         self.values.len() / self.elements
     }
 
-    /// The snapshots, in order of reception; none for another number of antennas than there are.
+    /// Returns the snapshots in order of reception; an empty slice if `N` is not the number of
+    /// antennas.
     pub fn snapshots<const N: usize>(&self) -> &[[Complex64; N]] {
         if N == self.elements {
             self.values.as_chunks().0
@@ -139,27 +140,29 @@ impl SsbObservation {
         }
     }
 
-    /// All values, snapshot after snapshot.
+    /// Returns all values, one snapshot after another.
     pub fn values(&self) -> &[Complex64] {
         &self.values
     }
 }
 
-/// An angle of arrival as a localizer takes it.
+/// Angle of arrival, the measurement of a localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngleMeasurement {
     /// Time in seconds.
     pub time_s: f64,
-    /// Electrical angle ω = 2π(d/λ)·cos θ between neighbouring antennas of a row, in radians; of any
-    /// other array the azimuth from its axis.
+    /// Electrical angle ω = 2π(d/λ)·cos θ between neighbouring antennas of a uniform linear array,
+    /// in radians; for other arrays the azimuth from the array axis.
     pub phase_rad: f64,
-    /// Its standard deviation from noise, in radians.
+    /// Standard deviation of `phase_rad` due to noise, in radians.
     pub phase_sigma_rad: f64,
-    /// Angle of arrival θ from the array's axis, in radians: 0..=π of a row, −π..=π of any other.
+    /// Angle of arrival θ from the array axis, in radians: in 0..=π for a uniform linear array, in
+    /// −π..=π otherwise.
     pub angle_rad: f64,
     /// SNR per antenna and snapshot, in dB.
     pub snr_db: f64,
-    /// Whether the estimator vouches for it: that it is Gaussian with this standard deviation.
+    /// Whether the error of the estimate is Gaussian with this standard deviation, according to the
+    /// estimator.
     pub resolved: bool,
 }
 

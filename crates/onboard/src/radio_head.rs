@@ -1,39 +1,39 @@
-//! Radio heads as the vehicle knows them.
+//! Radio heads of the nominal model.
 
 use crate::geometry::Point;
 use crate::settings::{RadioHeadSettings, Site, Vehicle};
 
-/// A surveyed radio head and the SSB it sends.
+/// Surveyed radio head and its SSB.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RadioHead {
     /// Physical cell identity.
     pub pci: u16,
     /// Index of its SSB in the burst.
     pub ssb_index: u8,
-    /// Its place.
+    /// Position.
     pub position: Point,
-    /// Its height in metres.
+    /// Height in metres.
     pub height_m: f64,
-    /// Standard deviation of its place in each of x and y, in metres.
+    /// Standard deviation of x and y, each in metres.
     pub position_std_m: f64,
-    /// Transmit power and antenna gain together (EIRP), in dBm.
+    /// Equivalent isotropically radiated power (EIRP) in dBm: transmit power plus antenna gain.
     pub eirp_dbm: f64,
 }
 
 impl RadioHead {
-    /// Whether this SSB of this cell is the one it sends.
+    /// Whether this radio head transmits an SSB with this cell identity and index.
     pub const fn sends(&self, pci: u16, ssb_index: u8) -> bool {
         self.pci == pci && self.ssb_index == ssb_index
     }
 
-    /// Distance in metres from a place at this height.
+    /// Returns the distance in metres from a position at a height.
     pub fn distance_m(&self, place: Point, height_m: f64) -> f64 {
         place
             .distance_m(self.position)
             .hypot(self.height_m - height_m)
     }
 
-    /// The radio heads of a site that a vehicle listens to.
+    /// Returns the radio heads of a site that a vehicle receives.
     pub fn heard(site: &Site, vehicle: &Vehicle) -> Vec<Self> {
         let heads = site.radio_heads.iter();
         heads

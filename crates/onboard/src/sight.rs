@@ -1,11 +1,11 @@
-//! Angles at which radio heads are seen from a pose.
+//! Predicted angles of radio heads from a pose.
 
 use crate::geometry::{Pose, wrap_angle};
 use crate::manifold::Measurand;
 use crate::radio_head::RadioHead;
 use crate::settings::Vehicle;
 
-/// Where radio heads are seen from a pose.
+/// Measurement model of the angle of a radio head.
 #[derive(Debug, Clone)]
 pub struct Sight {
     measurand: Measurand,
@@ -14,7 +14,7 @@ pub struct Sight {
 }
 
 impl Sight {
-    /// By the array of a vehicle.
+    /// Creates the model of a vehicle's array.
     pub fn new(vehicle: &Vehicle) -> Self {
         Self {
             measurand: vehicle.array.measurand(),
@@ -23,12 +23,12 @@ impl Sight {
         }
     }
 
-    /// What is measured with the array.
+    /// Returns the angle that the array measures.
     pub const fn measurand(&self) -> &Measurand {
         &self.measurand
     }
 
-    /// A measured value minus the one at which a radio head is seen from `pose` (rad).
+    /// Returns a measured value minus the predicted value for a radio head and a pose (rad).
     pub fn residual_rad(&self, pose: Pose, head: &RadioHead, value_rad: f64) -> f64 {
         let [forward_m, left_m, up_m] = self.position_m;
         let array = pose.beside(forward_m, left_m);

@@ -1,8 +1,8 @@
-//! Walls in lines of sight.
+//! Walls that obstruct lines of sight.
 //!
-//! A wall takes its penetration loss from the direct wave; scatter comes round it. Where the direct
-//! wave is left weaker than the scatter, angles say nothing of where a radio head stands, and it
-//! does not count as in sight. Walls are higher than any line of sight.
+//! A wall attenuates the direct wave by its penetration loss; scatter is not attenuated. If the
+//! direct wave is weaker than the scatter, the angles contain no information about the radio head,
+//! which then counts as out of sight. Walls are higher than any line of sight.
 
 use std::sync::Arc;
 
@@ -10,14 +10,14 @@ use crate::geometry::{Point, cross};
 use crate::radio_head::RadioHead;
 use crate::settings::Site;
 
-/// The walls of a site.
+/// Walls of a site.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Walls {
     segments: Arc<[Segment]>,
     rician_k: f64,
 }
 
-/// A straight wall.
+/// Straight wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Segment {
     from: Point,
@@ -26,7 +26,7 @@ struct Segment {
 }
 
 impl Walls {
-    /// Those of a site.
+    /// Creates the walls of a site.
     pub fn new(site: &Site) -> Self {
         let segments = site.walls.iter().flat_map(|wall| {
             let loss_db = wall.loss_db.unwrap_or_else(|| concrete_db(site));
@@ -45,20 +45,21 @@ impl Walls {
         }
     }
 
-    /// Whether there are none.
+    /// Whether the site has no walls.
     pub fn is_empty(&self) -> bool {
         self.segments.is_empty()
     }
 
-    /// What is left of the direct wave's power behind all walls between two places; 1 without any.
+    /// Returns the fraction of the direct wave's power that passes all walls between two positions;
+    /// 1 without walls.
     pub fn passing(&self, from: Point, to: Point) -> f64 {
         let blocking = self.segments.iter();
         let blocking = blocking.filter(|wall| cross([from, to], [wall.from, wall.to]));
         10f64.powf(-0.1 * blocking.fold(0.0, |sum, wall| sum + wall.loss_db))
     }
 
-    /// A radio head as it is received at a place: with so much less power as walls take of it.
-    /// `None` where it is not in sight.
+    /// Returns a radio head with its EIRP reduced by the walls between it and a position; `None` if
+    /// it is out of sight.
     pub fn seen(&self, head: &RadioHead, place: Point) -> Option<RadioHead> {
         if self.is_empty() {
             return Some(*head);
@@ -71,7 +72,7 @@ impl Walls {
     }
 }
 
-/// Penetration loss of concrete at a site's carrier (TR 38.901, table 7.4.3-1).
+/// Returns the penetration loss of concrete at a site's carrier (TR 38.901, table 7.4.3-1).
 fn concrete_db(site: &Site) -> f64 {
     5.0 + 4.0 * 1e-3 * site.carrier_mhz
 }
@@ -99,7 +100,7 @@ mod tests {
         };
         site.walls = vec![wall(None)];
         let concrete = Walls::new(&site);
-        // 5 + 4 · 3.5 dB, and twice that through both of its sides.
+        // 5 + 4 · 3.5 dB, and twice that through two walls of the building.
         let passing_db = |to| 10.0 * concrete.passing(head.position, to).log10();
         assert!((passing_db(behind) + 19.0).abs() < 1e-9);
         assert!((passing_db(Point::new(6.0, -4.0)) + 38.0).abs() < 1e-9);

@@ -1,40 +1,40 @@
-//! The door for estimators.
+//! Interface of angle estimators.
 
 use crate::BoxError;
 use crate::observation::SsbObservation;
 
-/// What turns the snapshots of an SSB into an angle. To write one, copy
-/// [`ArrayEstimator`](super::ArrayEstimator).
+/// Estimator of an angle from the snapshots of an SSB. [`ArrayEstimator`](super::ArrayEstimator) is
+/// an example.
 pub trait AngleEstimator: Send {
-    /// The electrical angle of an SSB; `None` where its snapshots carry none (all zero, not finite,
-    /// none at all).
+    /// Returns the angle of an SSB; `None` if the snapshots contain no angle (all zero, not finite,
+    /// or no snapshots).
     ///
     /// # Errors
-    /// Whatever the estimator fails with; it ends the drive.
+    /// Errors of the estimator; an error ends the drive.
     fn estimate(
         &mut self,
         observation: &SsbObservation,
     ) -> Result<Option<EstimatedAngle>, BoxError>;
 }
 
-/// What an estimator says of the electrical angle ω = 2π(d/λ)·cos θ between neighbours in a row, or of
-/// the azimuth from the axis of any other array ([`Measurand`](crate::manifold::Measurand)).
+/// Estimate of the electrical angle ω = 2π(d/λ)·cos θ between neighbouring antennas of a uniform
+/// linear array, or of the azimuth from the array axis otherwise
+/// ([`Measurand`](crate::manifold::Measurand)).
 #[derive(Debug, Clone, PartialEq)]
 pub enum EstimatedAngle {
     /// One angle.
     Angle {
         /// Electrical angle, or azimuth, in radians.
         phase_rad: f64,
-        /// Its standard deviation from noise, in radians; without it, the Cramér–Rao bound at the
-        /// SSB's SNR is taken.
+        /// Standard deviation due to noise, in radians. Default: the Cramér–Rao bound at the SNR of
+        /// the SSB.
         phase_sigma_rad: Option<f64>,
-        /// SNR per antenna and snapshot in dB, as far as it was estimated along.
+        /// SNR per antenna and snapshot in dB, if it was estimated.
         snr_db: Option<f64>,
-        /// Whether the estimator vouches for it: that it is Gaussian with this standard deviation.
+        /// Whether the error is Gaussian with this standard deviation, according to the estimator.
         resolved: bool,
     },
-    /// The logarithm of its likelihood, up to a constant, at equally many and equally spaced
-    /// such angles from −π (included) to π (not included). The localizer takes its mean and
-    /// spread on the circle.
+    /// Log-likelihood, up to a constant, at equally spaced angles from −π (included) to π
+    /// (excluded). The localizer uses its circular mean and standard deviation.
     LogLikelihood(Vec<f64>),
 }

@@ -1,4 +1,4 @@
-//! The estimators of the `aoa` crate, for the vehicle's array.
+//! Estimators of the `aoa` crate for the vehicle's array.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,7 +13,7 @@ use crate::manifold::{ArrayManifold, Measurand};
 use crate::observation::{SensedSsb, SsbObservation};
 use crate::settings::{EstimatorMethod, Vehicle};
 
-/// A method of the `aoa` crate on `N` antennas in a row.
+/// Estimation method of the `aoa` crate for a uniform linear array of `N` antennas.
 #[derive(Debug, Clone)]
 pub struct ArrayEstimator<const N: usize> {
     array: Array<N>,
@@ -22,7 +22,7 @@ pub struct ArrayEstimator<const N: usize> {
 }
 
 impl<const N: usize> ArrayEstimator<N> {
-    /// The electrical angle of the nearest point of the grid, if there is one.
+    /// Returns the electrical angle of the nearest grid point, if there is a grid.
     fn on_grid(&self, phase_rad: f64) -> f64 {
         let Some(step_rad) = self.grid_rad else {
             return phase_rad;
@@ -33,14 +33,14 @@ impl<const N: usize> ArrayEstimator<N> {
     }
 }
 
-/// Maximum likelihood in azimuth and elevation on `N` antennas that are not in a row.
+/// Maximum likelihood in azimuth and elevation for a non-linear array of `N` antennas.
 #[derive(Debug, Clone)]
 pub struct AzimuthEstimator<const N: usize>(DirectionFinder<ArrayManifold<N>, N>);
 
-/// The estimator that a vehicle's settings choose.
+/// Returns the estimator of a vehicle's settings.
 ///
 /// # Errors
-/// When the array is not one that the `aoa` crate accepts.
+/// [`aoa::Error`] if the array is invalid.
 pub fn built_in(vehicle: &Vehicle) -> Result<Box<dyn AngleEstimator>, aoa::Error> {
     let method = match vehicle.estimator.method {
         EstimatorMethod::Music => Method::Music,
@@ -76,7 +76,7 @@ impl<const N: usize> AngleEstimator for ArrayEstimator<N> {
         };
         Ok(estimate.ok().map(|estimate| EstimatedAngle::Angle {
             phase_rad: self.on_grid(estimate.phase_rad),
-            // Scatter, which makes a model misfit, is in the site's deviation of the angles.
+            // Scatter, which violates the signal model, is part of the site's angle noise.
             phase_sigma_rad: Some(estimate.phase_noise_sigma_rad),
             snr_db: Some(estimate.snr_db),
             resolved: estimate.is_resolved(),
@@ -95,7 +95,7 @@ impl<const N: usize> AngleEstimator for AzimuthEstimator<N> {
             phase_rad: estimate.direction.azimuth_rad,
             phase_sigma_rad: Some(estimate.noise_covariance[0][0].sqrt()),
             snr_db: Some(estimate.snr_db),
-            // Near the horizon it is the elevation that is not known.
+            // Near the horizon only the elevation is uncertain.
             resolved: matches!(
                 estimate.verdict,
                 Verdict::Resolved | Verdict::Unresolved(Reason::EdgeOfElevations)
@@ -104,8 +104,9 @@ impl<const N: usize> AngleEstimator for AzimuthEstimator<N> {
     }
 }
 
-/// What the localizer takes of an estimate; `bound_rad` is what an estimate without standard
-/// deviation gets, `measurand` what the array measures. `None` where the estimate carries no angle.
+/// Returns the measurement for the localizer; `None` if the estimate contains no angle. `bound_rad`
+/// is the standard deviation of an estimate without one, `measurand` the angle that the array
+/// measures.
 pub fn measurement(
     ssb: &SensedSsb,
     estimated: EstimatedAngle,

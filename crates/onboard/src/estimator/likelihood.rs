@@ -1,9 +1,9 @@
-//! A likelihood over the circle as the Gaussian that a filter takes.
+//! Gaussian approximation of a likelihood on the circle.
 
 use std::f64::consts::{PI, TAU};
 
-/// Mean direction and standard deviation (rad) of a likelihood over the circle, given as its
-/// logarithm at equally spaced angles from −π on: `m = Σ w e^{jω} / Σ w`, mean `arg m`, standard
+/// Returns the mean direction and standard deviation (rad) of a likelihood on the circle, given as
+/// its logarithm at equally spaced angles from −π: `m = Σ w e^{jω} / Σ w`, mean `arg m`, standard
 /// deviation `√(−2 ln |m|)` (Mardia and Jupp, Directional Statistics, 2.3). `None` for a list
 /// without a finite maximum.
 pub fn circular_gaussian(log_likelihood: &[f64]) -> Option<(f64, f64)> {
@@ -21,7 +21,7 @@ pub fn circular_gaussian(log_likelihood: &[f64]) -> Option<(f64, f64)> {
         im += weight * sin;
     }
     let length = re.hypot(im) / total;
-    // A single point of the grid stands for its own width.
+    // A single grid point has the variance of its cell.
     let variance = (-2.0 * length.min(1.0).ln()).max(step_rad * step_rad / 12.0);
     Some((im.atan2(re), variance.sqrt()))
 }

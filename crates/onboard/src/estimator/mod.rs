@@ -1,4 +1,4 @@
-//! From an SSB's snapshots to its angle of arrival.
+//! Angle of arrival from the snapshots of an SSB.
 
 mod angle_estimator;
 mod array_estimator;

@@ -1,22 +1,23 @@
-//! A Gaussian belief of fixed size: mean and covariance, moved by a linearised motion and
-//! corrected by scalar measurements. No allocation, no general linear algebra.
+//! Gaussian distribution of fixed size: mean and covariance with linearised prediction and scalar
+//! measurement updates. No allocation, no general linear algebra.
 
 use std::f64::consts::TAU;
 
-/// Deviations beyond which chance is ruled out: 0.27 % of a Gaussian.
+/// Number of standard deviations that random errors rarely exceed: 0.27 % for a Gaussian.
 pub const CERTAIN_SIGMAS: f64 = 3.0;
 
-/// Square matrix, row major.
+/// Square matrix in row-major order.
 pub type Matrix<const N: usize> = [[f64; N]; N];
 
-/// Variances of a covariance `[[xx, xy], [xy, yy]]` along its principal axes, larger first.
+/// Returns the variances of a covariance `[[xx, xy], [xy, yy]]` along its principal axes, larger
+/// first.
 pub fn principal_variances(xx: f64, xy: f64, yy: f64) -> [f64; 2] {
     let half = (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
     let mean = 0.5 * (xx + yy);
     [mean + half, (mean - half).max(0.0)]
 }
 
-/// The identity.
+/// Returns the identity matrix.
 pub fn identity<const N: usize>() -> Matrix<N> {
     let mut matrix = [[0.0; N]; N];
     for (i, row) in matrix.iter_mut().enumerate() {
@@ -25,7 +26,7 @@ pub fn identity<const N: usize>() -> Matrix<N> {
     matrix
 }
 
-/// Inner product.
+/// Returns the inner product.
 pub fn dot<const N: usize>(left: &[f64; N], right: &[f64; N]) -> f64 {
     left.iter()
         .zip(right)
@@ -33,7 +34,7 @@ pub fn dot<const N: usize>(left: &[f64; N], right: &[f64; N]) -> f64 {
         .sum()
 }
 
-/// Matrix product.
+/// Returns the matrix product.
 pub fn product<const N: usize>(left: &Matrix<N>, right: &Matrix<N>) -> Matrix<N> {
     let mut product = [[0.0; N]; N];
     for i in 0..N {
@@ -46,8 +47,9 @@ pub fn product<const N: usize>(left: &Matrix<N>, right: &Matrix<N>) -> Matrix<N>
     product
 }
 
-/// A covariance in other coordinates, `J P Jᵀ`. Its diagonal takes on top what rounding may have
-/// taken from its rows, so that it is positive definite (Gershgorin) also where `P` has no width.
+/// Returns a covariance in other coordinates, `J P Jᵀ`. The bound of the rounding errors of each
+/// row is added to its diagonal, so that the result is positive definite (Gershgorin) even if `P`
+/// is singular.
 pub fn transformed<const N: usize>(jacobian: &Matrix<N>, covariance: &Matrix<N>) -> Matrix<N> {
     let mut made = [[0.0; N]; N];
     for i in 0..N {
@@ -60,7 +62,7 @@ pub fn transformed<const N: usize>(jacobian: &Matrix<N>, covariance: &Matrix<N>)
                     magnitude += f64::abs(term);
                 }
             }
-            // N² terms of two products each, added up.
+            // Rounding error of N² terms with two products each.
             let rounding = (N * N + 2) as f64 * f64::EPSILON * magnitude;
             made[i][j] += sum;
             made[i][i] += rounding;
@@ -78,41 +80,43 @@ pub fn transformed<const N: usize>(jacobian: &Matrix<N>, covariance: &Matrix<N>)
 pub struct Gaussian<const N: usize> {
     /// Expected state.
     pub mean: [f64; N],
-    /// Covariance, symmetric and positive semidefinite; a state that is switched off has a row
-    /// and column of zeros and is never moved by an update.
+    /// Covariance, symmetric and positive semidefinite. A disabled state has a row and column of
+    /// zeros, and no update changes it.
     pub covariance: Matrix<N>,
 }
 
-/// What one scalar measurement said about the belief it met.
+/// Innovation of a scalar measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Innovation {
-    /// Measured minus predicted.
+    /// Residual: measured minus predicted value.
     pub residual: f64,
-    /// Variance of the residual under the belief, `H P Hᵀ + R`.
+    /// Variance of the innovation, `H P Hᵀ + R`.
     pub variance: f64,
-    /// The measurement's part of it, `R`.
+    /// Variance of the measurement, `R`.
     pub measurement_variance: f64,
 }
 
 impl Innovation {
-    /// Squared Mahalanobis distance, χ² with one degree of freedom when the model holds.
+    /// Returns the squared Mahalanobis distance; χ² distributed with one degree of freedom if the
+    /// model is correct.
     pub fn mahalanobis2(&self) -> f64 {
         self.residual * self.residual / self.variance
     }
 
-    /// Probability density of the residual, one over its unit.
+    /// Returns the probability density of the residual, in the inverse of its unit.
     pub fn density(&self) -> f64 {
         (-0.5 * self.mahalanobis2()).exp() / (TAU * self.variance).sqrt()
     }
 }
 
-/// Probability density (1/rad) of an angle that has this one or, with the probability `outliers`, comes from anywhere.
+/// Returns the density (1/rad) of an angle that has the given density or, with probability
+/// `outliers`, is uniformly distributed.
 pub fn with_outliers(density: f64, outliers: f64) -> f64 {
     outliers / TAU + (1.0 - outliers) * density
 }
 
 impl<const N: usize> Gaussian<N> {
-    /// Belief with independent states.
+    /// Creates a Gaussian with independent states.
     pub fn independent(mean: [f64; N], sigma: [f64; N]) -> Self {
         let mut covariance = [[0.0; N]; N];
         for i in 0..N {
@@ -121,10 +125,10 @@ impl<const N: usize> Gaussian<N> {
         Self { mean, covariance }
     }
 
-    /// Covariance through a linearised motion, `P ← F P Fᵀ + Q`. The mean is the caller's, who
-    /// knows the motion itself and not only its Jacobian.
+    /// Predicts the covariance with a linearised motion, `P ← F P Fᵀ + Q`. The caller predicts the
+    /// mean with the non-linear motion.
     pub fn spread(&mut self, jacobian: &Matrix<N>, noise: &Matrix<N>) {
-        // `(F P)ᵀ`: jacobians of motion are nearly identity, most products are skipped.
+        // `(F P)ᵀ`: Jacobians of motion are almost the identity, so that most products are skipped.
         let mut left = [[0.0; N]; N];
         for i in 0..N {
             let mut row = [0.0; N];
@@ -157,7 +161,7 @@ impl<const N: usize> Gaussian<N> {
         }
     }
 
-    /// `P Hᵀ` for one measurement row.
+    /// Returns `P Hᵀ` for one measurement row.
     pub fn cross(&self, row: &[f64; N]) -> [f64; N] {
         let mut cross = [0.0; N];
         for i in 0..N {
@@ -168,12 +172,12 @@ impl<const N: usize> Gaussian<N> {
         cross
     }
 
-    /// Variance of `H x` under the belief.
+    /// Returns the variance of `H x`.
     pub fn variance_along(&self, row: &[f64; N]) -> f64 {
         dot(row, &self.cross(row)).max(0.0)
     }
 
-    /// The innovation a measurement would bring, without applying it.
+    /// Returns the innovation of a measurement without an update.
     pub fn innovation(&self, residual: f64, row: &[f64; N], variance: f64) -> Innovation {
         Innovation {
             residual,
@@ -182,9 +186,8 @@ impl<const N: usize> Gaussian<N> {
         }
     }
 
-    /// Kalman update by one scalar measurement, covariance in Joseph form
-    /// `(I − K H) P (I − K H)ᵀ + K R Kᵀ`, written out for one row so that it costs one pass.
-    /// Returns the gain K.
+    /// Updates mean and covariance with one scalar measurement. The covariance has the Joseph form
+    /// `(I − K H) P (I − K H)ᵀ + K R Kᵀ`, computed in one pass. Returns the gain K.
     pub fn update(&mut self, residual: f64, row: &[f64; N], variance: f64) -> [f64; N] {
         let cross = self.cross(row);
         let total = (0..N).map(|i| row[i] * cross[i]).sum::<f64>().max(0.0) + variance;
@@ -228,7 +231,7 @@ mod tests {
         let (residual, variance) = (0.7, 0.4);
         let prior = belief;
         belief.update(residual, &row, variance);
-        // P⁺ (P⁻¹ + Hᵀ R⁻¹ H) = I, checked as P⁺ + P⁺ Hᵀ R⁻¹ H P⁻ = P⁻.
+        // P⁺ (P⁻¹ + Hᵀ R⁻¹ H) = I, tested as P⁺ + P⁺ Hᵀ R⁻¹ H P⁻ = P⁻.
         let after = belief.cross(&row);
         let before = prior.cross(&row);
         for i in 0..3 {
@@ -243,7 +246,7 @@ mod tests {
 
     #[test]
     fn a_covariance_without_width_stays_positive_in_other_coordinates() {
-        // Heading and course cancel: the third variance is nothing but rounding.
+        // Heading and course cancel, so that the third variance is a rounding error.
         for curvature in [0.3, -0.07, 1e-3, 12.7] {
             let (cos, sin) = (0.3_f64.cos(), 0.3_f64.sin());
             let jacobian = [[cos, -sin, 0.0], [sin, cos, 0.0], [curvature, 0.0, 1.0]];

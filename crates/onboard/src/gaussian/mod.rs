@@ -1,5 +1,5 @@
-//! Gaussians of fixed size, without allocation but for the smoother: the belief that a linearised motion spreads and
-//! scalar measurements correct, its fixed-interval smoother, and quantiles. What they are of, nobody here knows.
+//! Gaussian distributions of fixed size: prediction, scalar updates, fixed-interval smoother and
+//! quantiles. Only the smoother allocates memory. The states have no meaning here.
 
 mod belief;
 mod quantile;

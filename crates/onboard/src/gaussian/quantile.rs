@@ -1,23 +1,23 @@
-//! How far a Gaussian error in the plane goes with a stated risk.
+//! Radial quantile of a Gaussian error in the plane.
 
 use std::f64::consts::FRAC_PI_2;
 
-/// Nodes over the ratio of the error ellipse's axes.
+/// Number of nodes for the ratio of the error ellipse's axes.
 const NODES: usize = 33;
 
-/// Points of the quadrature over a quarter turn.
+/// Number of quadrature points over a quarter turn.
 const QUADRATURE: usize = 400;
 
-/// Radius, in units of the larger standard deviation, that a zero-mean Gaussian error in the plane
-/// exceeds with a given probability. It depends on the ratio ρ of the two standard deviations and
-/// is tabulated over it, so that asking costs an interpolation.
+/// Radius that a zero-mean Gaussian error in the plane exceeds with a given probability, in units
+/// of the larger standard deviation. It depends on the ratio ρ of the two standard deviations, and
+/// is interpolated in a table over ρ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RadialQuantile {
     factors: [f64; NODES],
 }
 
 impl RadialQuantile {
-    /// The quantile for a risk in (0, 1).
+    /// Creates the table for an exceedance probability in (0, 1).
     pub fn new(risk: f64) -> Self {
         let mut factors = [0.0; NODES];
         for (node, factor) in factors.iter_mut().enumerate() {
@@ -26,7 +26,7 @@ impl RadialQuantile {
         Self { factors }
     }
 
-    /// The radius for an error with these variances along its principal axes, larger first.
+    /// Returns the radius for an error with these variances along its principal axes, larger first.
     pub fn radius(&self, variances: [f64; 2]) -> f64 {
         let [large, small] = variances;
         if large <= 0.0 {
@@ -42,12 +42,13 @@ impl RadialQuantile {
     }
 }
 
-/// The value that a standard normal variable exceeds with the given probability, in (0, 0.5].
+/// Returns the value that a standard normal variable exceeds with the given probability, in (0,
+/// 0.5].
 pub fn normal_quantile(risk: f64) -> f64 {
     radius(0.0, 2.0 * risk)
 }
 
-/// The `k` for which [`exceedance`] is `risk`, by bisection.
+/// Returns the `k` for which [`exceedance`] is `risk`, by bisection.
 fn radius(ratio: f64, risk: f64) -> f64 {
     let risk = risk.clamp(1e-15, 1.0);
     let variances = variances(ratio);
@@ -66,8 +67,8 @@ fn radius(ratio: f64, risk: f64) -> f64 {
     high
 }
 
-/// `cos² t + ρ² sin² t` at the points of the quadrature. Apart from [`exceedance`], which is asked
-/// thousands of times for a table: the sines would take half of the time to make one.
+/// Returns `cos² t + ρ² sin² t` at the quadrature points. Computed once per table entry, because
+/// [`exceedance`] is evaluated thousands of times and the sines would take half of that time.
 fn variances(ratio: f64) -> [f64; QUADRATURE] {
     let step = FRAC_PI_2 / QUADRATURE as f64;
     std::array::from_fn(|i| {
@@ -76,8 +77,8 @@ fn variances(ratio: f64) -> [f64; QUADRATURE] {
     })
 }
 
-/// `P(|e| > k σ₁)` for standard deviations σ₁ and ρσ₁: Craig's formula carried to an ellipse,
-/// `2/π ∫₀^{π/2} exp(−k² / (2 (cos² t + ρ² sin² t))) dt`. It is `2 Q(k)` for ρ = 0 and
+/// Returns `P(|e| > k σ₁)` for the standard deviations σ₁ and ρσ₁, by Craig's formula for an
+/// ellipse: `2/π ∫₀^{π/2} exp(−k² / (2 (cos² t + ρ² sin² t))) dt`. It equals `2 Q(k)` for ρ = 0 and
 /// `exp(−k²/2)` for ρ = 1.
 fn exceedance(variances: &[f64; QUADRATURE], k: f64) -> f64 {
     let step = FRAC_PI_2 / QUADRATURE as f64;

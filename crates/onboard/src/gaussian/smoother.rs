@@ -1,22 +1,21 @@
-//! Where the vehicle was, as seen from the end of the drive: a fixed-interval smoother.
+//! Fixed-interval smoother: states of a drive, given all its measurements.
 //!
-//! The smoother of Rauch, Tung and Striebel (1965) over the steps that a filter took, in the form of
-//! Bryson and Frazier (Bierman 1973): what the rest of the drive says of a state is carried
-//! backwards as a vector λ and a matrix Λ, and the smoothed state is
-//! `x − P λ` with covariance `P − P Λ P`. In exact arithmetic that is Rauch's result; but no
-//! covariance is inverted, so that states known exactly do no harm, and noise that a filter adds
-//! between two steps need not be told.
+//! Smoother of Rauch, Tung and Striebel (1965) in the form of Bryson and Frazier (Bierman 1973).
+//! The information of later measurements is propagated backwards as a vector λ and a matrix Λ. The
+//! smoothed state is `x − P λ` with covariance `P − P Λ P`, which is Rauch's result in exact
+//! arithmetic. No covariance is inverted, so that exactly known states are permitted, and process
+//! noise between two steps need not be recorded.
 //!
-//! Through a motion with Jacobian `F`: `λ ← Fᵀ λ`, `Λ ← Fᵀ Λ F`. Through a measurement with row `h`,
-//! gain `k`, residual `y` and its variance `s`, backwards:
-//! `λ ← λ − h (kᵀλ + y/s)`, `Λ ← (I − k h)ᵀ Λ (I − k h) + hᵀh/s`.
+//! Through a motion with Jacobian `F`: `λ ← Fᵀ λ`, `Λ ← Fᵀ Λ F`. Through a measurement with row
+//! `h`, gain `k`, residual `y` and its variance `s`, backwards: `λ ← λ − h (kᵀλ + y/s)`,
+//! `Λ ← (I − k h)ᵀ Λ (I − k h) + hᵀh/s`.
 //!
-//! Beside the state there may be errors of the measurements that are estimated with it, each measurement's
-//! one: `n` states and errors together, of which motions move the states only.
+//! Measurement errors that are estimated together with the state extend it, one error for each
+//! measurement: `n` states and errors in total, of which motions change the states only.
 
 use super::belief::{Gaussian, Matrix};
 
-/// What a filter did, in order of time.
+/// Steps of a filter, in order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Journal<const N: usize> {
     entries: Vec<Entry<N>>,
@@ -33,9 +32,9 @@ enum Entry<const N: usize> {
 #[derive(Clone, Debug, PartialEq)]
 struct Measurement<const N: usize> {
     row: [f64; N],
-    /// The error that is measured along.
+    /// Index of the measurement's error, if it is estimated.
     error: Option<usize>,
-    /// Of states and errors.
+    /// Gains of states and errors.
     gain: Vec<f64>,
     residual: f64,
     variance: f64,
@@ -57,7 +56,7 @@ struct Asked<const N: usize> {
 }
 
 impl<const N: usize> Measurement<N> {
-    /// How it depends on states and errors.
+    /// Returns the measurement row for states and errors.
     fn whole_row(&self) -> Vec<f64> {
         let mut row = vec![0.0; self.gain.len()];
         for (value, by) in row.iter_mut().zip(self.row) {
@@ -72,20 +71,21 @@ impl<const N: usize> Measurement<N> {
 }
 
 impl<const N: usize> Journal<N> {
-    /// The state moved by a motion with this Jacobian.
+    /// Records a motion with this Jacobian.
     pub fn moved(&mut self, jacobian: &Matrix<N>) {
         self.entries.push(Entry::Moved(Box::new(*jacobian)));
     }
 
-    /// An error is a share of what it was, and what `row` makes of the state.
+    /// Records that an error was propagated: the fraction `kept` of its previous value, plus `row`
+    /// times the state.
     pub fn redrawn(&mut self, error: usize, kept: f64, row: &[f64; N]) {
         let row = *row;
         let redrawn = Redrawn { error, kept, row };
         self.entries.push(Entry::Redrawn(Box::new(redrawn)));
     }
 
-    /// State, and errors where there are such, were updated by a scalar measurement, with these gains of
-    /// both. The variance is the innovation's.
+    /// Records a scalar measurement update of the state, and of the errors if there are any, with
+    /// its gains. The variance is that of the innovation.
     pub fn measured(
         &mut self,
         row: &[f64; N],
@@ -103,8 +103,8 @@ impl<const N: usize> Journal<N> {
         })));
     }
 
-    /// The belief at `time_s` is one that the smoother is to improve; the errors' covariances with it are
-    /// told.
+    /// Requests the smoothed state at `time_s`. `errors` are the covariances of the errors with the
+    /// state.
     pub fn asked(
         &mut self,
         time_s: f64,
@@ -118,7 +118,7 @@ impl<const N: usize> Journal<N> {
         })));
     }
 
-    /// The beliefs that were asked for and their times in seconds, by everything up to the end.
+    /// Returns the requested times in seconds and smoothed states, given all measurements.
     pub fn smoothed(&self) -> Vec<(f64, Gaussian<N>)> {
         let sizes = self.entries.iter().map(|entry| match entry {
             Entry::Measured(measurement) => measurement.gain.len(),
@@ -143,7 +143,7 @@ impl<const N: usize> Journal<N> {
     }
 }
 
-/// What the rest of the drive says of states and errors: λ and Λ.
+/// Information of later measurements about states and errors: λ and Λ.
 struct Rest {
     vector: Vec<f64>,
     matrix: Vec<Vec<f64>>,
@@ -156,7 +156,7 @@ impl Rest {
         let mut half = vec![[0.0; N]; size]; // Λ F
         for k in 0..N {
             for j in 0..N {
-                // Jacobians of motion are nearly identity: most products are skipped.
+                // Jacobians of motion are almost the identity: most products are skipped.
                 if jacobian[k][j] != 0.0 {
                     vector[j] += jacobian[k][j] * self.vector[k];
                     for i in 0..size {
@@ -189,7 +189,7 @@ impl Rest {
 
     fn before_redrawing<const N: usize>(&mut self, seen: &Redrawn<N>) {
         let (error, size) = (N + seen.error, self.vector.len());
-        // A column of Λ F, and a row of Fᵀ Λ F, at a time.
+        // One column of Λ F, and one row of Fᵀ Λ F, at a time.
         for i in 0..size {
             for j in 0..N {
                 self.matrix[i][j] += self.matrix[i][error] * seen.row[j];
@@ -268,7 +268,7 @@ mod tests {
     const STEPS: usize = 7;
     const SIZE: usize = 2 * STEPS;
 
-    /// Inverse by Gauss and Jordan, pivots in place: for positive definite matrices.
+    /// Returns the inverse of a positive definite matrix (Gauss–Jordan in place).
     fn inverse(mut a: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let n = a.len();
         for (i, row) in a.iter_mut().enumerate() {
@@ -306,7 +306,7 @@ mod tests {
         }
     }
 
-    /// Updates a belief by a measurement, and tells the journal.
+    /// Updates a Gaussian with a measurement, and records it in the journal.
     fn measure<const N: usize>(
         journal: &mut Journal<N>,
         belief: &mut Gaussian<N>,
@@ -321,7 +321,7 @@ mod tests {
 
     #[test]
     fn a_linear_drive_is_smoothed_as_by_least_squares_over_all_of_it() {
-        // Place and speed; the speed is disturbed, the place too, and a mixture of both is seen.
+        // Position and speed with noise on both; a mixture of both is measured.
         let f = [[1.0, 0.5], [-0.1, 0.9]];
         let q = [[0.04, 0.0], [0.0, 0.3]];
         let prior = Gaussian {
@@ -358,7 +358,7 @@ mod tests {
                     observe(&mut information, &mut right, &row, 0.0, q[i][i]);
                 }
             }
-            // Asked before the measurement of the same time.
+            // Requested before the measurement of the same time.
             journal.asked(step as f64, &belief, std::iter::empty());
             let (value, variance) = seen(step);
             let row = [1.0, 0.4];
@@ -410,7 +410,7 @@ mod tests {
             let error = [whole.covariance[0][2], whole.covariance[1][2]];
             beside.asked(step as f64, &state, std::iter::once(error));
             within.asked(step as f64, &whole, std::iter::empty());
-            // Once along with the error, once the state alone.
+            // Alternately with the error and without it.
             let error = (step % 2 == 0).then_some(0);
             let row = [1.0, 0.4, error.map_or(0.0, |_| 1.0)];
             let residual = (step as f64 * 1.7).sin();
@@ -438,7 +438,8 @@ mod tests {
         journal.asked(0.0, &belief, std::iter::empty());
         let smoothed = journal.smoothed();
         assert_eq!(smoothed[1].1, belief);
-        // Nothing moved between: both are one state, and what is known exactly remains so.
+        // Without a motion in between, both states are equal, and exactly known states are
+        // unchanged.
         assert!((smoothed[0].1.mean[0] - belief.mean[0]).abs() < 1e-15);
         assert!((smoothed[0].1.covariance[0][0] - belief.covariance[0][0]).abs() < 1e-15);
         assert_eq!(

@@ -1,6 +1,7 @@
-//! The angle of one SSB, for arrays of any number of antennas that the crates know.
+//! Angle of one SSB, for any supported number of antennas.
 //!
-//! Here and not where it is used, as the estimators of each number of antennas are compiled here anyway.
+//! This module is part of the crate because the estimators of every number of antennas are compiled
+//! here anyway.
 
 use aoa::{
     AngleEstimate, Array, Calibration, DirectionEstimate, DirectionFinder,
@@ -16,14 +17,14 @@ use crate::manifold::ArrayManifold;
 use crate::observation::MAX_ELEMENTS;
 use crate::settings::{ArrayShape, Pilots};
 
-/// The receiving array.
+/// Receiving array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArraySetup {
-    /// How the antennas stand.
+    /// Array geometry.
     pub shape: ArrayShape,
-    /// Distance between neighbouring antennas in wavelengths, in a row or around a circle.
+    /// Distance between neighbouring antennas in wavelengths, along the row or the circle.
     pub spacing_wavelengths: f64,
-    /// Complex gain of each channel, by which it is divided; ideal channels without.
+    /// Complex gain of each channel. Samples are divided by it. Default: ideal channels.
     pub calibration: Option<Vec<Complex64>>,
 }
 
@@ -37,17 +38,17 @@ impl Default for ArraySetup {
     }
 }
 
-/// What an array tells of where an SSB comes from.
+/// Direction of an SSB, as far as the array measures it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FoundAngle {
-    /// Antennas in a row: the angle from it.
+    /// Uniform linear array: the angle from its axis.
     FromRow(AngleEstimate),
-    /// Any others: azimuth from the array's axis, and elevation.
+    /// Other arrays: azimuth from the array axis, and elevation.
     Direction(DirectionEstimate),
 }
 
 impl FoundAngle {
-    /// What antennas in a row tell.
+    /// Returns the angle of a uniform linear array.
     pub const fn from_row(self) -> Option<AngleEstimate> {
         match self {
             Self::FromRow(estimate) => Some(estimate),
@@ -56,29 +57,30 @@ impl FoundAngle {
     }
 }
 
-/// Angle, and the array's response as it was received, calibration taken out.
+/// Angle of an SSB, and the received array response with the calibration applied.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
-    /// Where it comes from.
+    /// Direction of the SSB.
     pub angle: FoundAngle,
-    /// One snapshot per OFDM symbol, noise power one.
+    /// One snapshot per OFDM symbol, with unit noise power.
     pub blocks: Vec<Vec<Complex64>>,
 }
 
-/// Angles of SSBs that a search has found, or a receiver has heard.
+/// Estimator of the angle of SSBs from a search or a receiver.
 pub trait ArrayView: Send + Sync {
-    /// Looks at an SSB, all of whose known elements are pilots.
+    /// Returns the angle of an SSB, using all its known resource elements as pilots.
     fn view(&self, ssb: &ReceivedSsb<'_>) -> Option<View>;
 
-    /// Looks at what the pilots of each symbol say together, in noise of so much variance on each antenna.
+    /// Returns the angle from the despread pilots of each symbol. `noise_variance` contains that of
+    /// each antenna.
     fn of_blocks(&self, blocks: &[Vec<Complex64>], noise_variance: &[f64]) -> Option<View>;
 }
 
-/// The view of an array of so many antennas; `None` for a single one.
+/// Returns the estimator for a number of antennas; `None` for one antenna.
 ///
 /// # Errors
-/// [`aoa::Error`] for an impossible spacing or gain; [`aoa::Error::CalibrationGain`] of the first
-/// missing channel where the calibration is too short.
+/// [`aoa::Error`] for an invalid spacing or gain. [`aoa::Error::CalibrationGain`] with the first
+/// missing channel if the calibration is too short.
 pub fn array_view(
     antennas: usize,
     setup: &ArraySetup,
@@ -91,7 +93,7 @@ pub fn array_view(
 
 struct Looker<const A: usize> {
     array: Array<A>,
-    /// Of antennas that are not in a row.
+    /// Direction finder of a non-linear array.
     finder: Option<DirectionFinder<ArrayManifold<A>, A>>,
     calibration: Calibration<A>,
 }
@@ -112,14 +114,15 @@ impl<const A: usize> Looker<A> {
         })
     }
 
-    /// What brings noise of the mean of these variances to power one, and equals the channels.
+    /// Returns the gain of each antenna that calibrates the channels and normalises the mean noise
+    /// variance to one.
     fn gains(&self, noise_variance: &[f64]) -> [Complex64; A] {
         let noise = noise_variance.iter().sum::<f64>() / A as f64;
         let scale = noise.max(f64::MIN_POSITIVE).sqrt().recip();
         self.calibration.gains().map(|gain| scale / gain)
     }
 
-    /// The angle of the blocks that are looked at, beside all.
+    /// Returns the angle from `looked_at`, together with all blocks.
     fn seen(&self, looked_at: &[[Complex64; A]], blocks: &[[Complex64; A]]) -> Option<View> {
         let angle = if let Some(finder) = &self.finder {
             FoundAngle::Direction(finder.estimate_pilots(looked_at, Some(1.0)).ok()?)

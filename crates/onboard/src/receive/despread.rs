@@ -1,4 +1,4 @@
-//! Known resource elements of one SSB, despread in groups of subcarriers.
+//! Despreading of one SSB's known resource elements in groups of subcarriers.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -9,27 +9,28 @@ use num_complex::Complex64;
 
 use crate::settings::Pilots;
 
-/// Groups that the 240 subcarriers are despread in.
+/// Number of groups of the 240 subcarriers.
 pub const GROUPS: usize = 24;
-/// Subcarriers of a group.
+/// Subcarriers in a group.
 pub const GROUP: usize = SUBCARRIERS / GROUPS;
-/// Size of the transform that a delay in samples refers to.
+/// FFT size that defines a delay in samples.
 pub const FFT_SIZE: f64 = 256.0;
-/// Subcarriers of PSS and SSS (TS 38.211, 7.4.3.1), in symbols 0 and 2.
+/// Subcarriers of PSS and SSS (TS 38.211, 7.4.3.1) in symbols 0 and 2.
 const SYNC: Range<usize> = 56..183;
 
-/// What `A` antennas received of the known elements: for each symbol and group Σ y s*, the noise
-/// of each term having the variance that it has on a resource element.
+/// Despread known elements of `A` antennas: Σ y s* for each symbol and group. The noise of each
+/// term has the variance of one resource element.
 #[derive(Debug, Clone)]
 pub struct Despread<const A: usize> {
     /// Σ y s* of each antenna, `[symbol][group]`.
     pub sums: [[[Complex64; A]; GROUPS]; SYMBOLS],
-    /// Σ |s|²: the number of known elements.
+    /// Σ |s|²: number of known elements.
     pub counts: [[f64; GROUPS]; SYMBOLS],
 }
 
 impl<const A: usize> Despread<A> {
-    /// Despreads what `pilots` names of the known elements; `delay` samples are taken out.
+    /// Despreads the known elements that `pilots` selects, and compensates a delay of `delay`
+    /// samples.
     pub fn new(
         elements: [&[[Complex32; SUBCARRIERS]; SYMBOLS]; A],
         known: &SsbGrid,
@@ -66,7 +67,7 @@ impl<const A: usize> Despread<A> {
         result
     }
 
-    /// The same with each antenna multiplied by a gain.
+    /// Returns the sums with each antenna multiplied by a gain.
     #[must_use]
     pub fn scaled(mut self, gains: &[Complex64; A]) -> Self {
         for sum in self.sums.iter_mut().flatten() {
@@ -77,8 +78,8 @@ impl<const A: usize> Despread<A> {
         self
     }
 
-    /// One block per symbol that has pilots, over the whole band: the sum over the root of the
-    /// number of elements, so that the noise keeps its variance.
+    /// Returns one block per symbol with pilots, over the whole band: the sum divided by the square
+    /// root of the number of elements, so that the noise variance is unchanged.
     pub fn blocks(&self) -> impl Iterator<Item = [Complex64; A]> {
         let symbols = self.sums.iter().zip(&self.counts);
         symbols.filter_map(|(sums, counts)| {
@@ -93,7 +94,7 @@ impl<const A: usize> Despread<A> {
     }
 }
 
-/// Subcarriers that count as pilots in symbol `l`.
+/// Returns the subcarriers of symbol `l` that are pilots.
 fn subcarriers(pilots: Pilots, l: usize) -> Range<usize> {
     match (pilots, l) {
         (Pilots::Ssb, _) => 0..SUBCARRIERS,

@@ -1,5 +1,5 @@
-//! From samples to observations: a [`StreamReceiver`], or a [`Receiver`] of windows, keeps to the cells of a
-//! site while the vehicle drives, and makes an observation of each of their SSBs.
+//! Reception: a [`StreamReceiver`] of a sample stream, or a [`Receiver`] of windows, tracks the
+//! cells of a site and creates an observation of each of their SSBs.
 
 pub mod array_view;
 pub mod despread;

@@ -1,8 +1,8 @@
-//! The vehicle's receiver: an [`SsbObservation`] of every SSB of the site's cells.
+//! Receiver of the vehicle: an [`SsbObservation`] of every SSB of the site's cells.
 //!
-//! What finds cells and keeps to them is [`nr_ssb::receiver`]. [`Receiver`] takes windows at the base rate
-//! (256 samples to a symbol), as the simulator makes them around each burst, [`StreamReceiver`] a stream of
-//! any rate.
+//! [`nr_ssb::receiver`] detects and tracks the cells. [`Receiver`] processes windows at the base
+//! rate (256 samples per symbol) around each burst, as in simulations. [`StreamReceiver`] processes
+//! a sample stream of any rate.
 
 use aoa::DirectionFinder;
 use nr_ssb::grid::{SUBCARRIERS, SYMBOLS};
@@ -19,39 +19,39 @@ use crate::manifold::ArrayManifold;
 use crate::observation::{SensedSsb, SsbObservation};
 use crate::settings::{ArraySettings, Pilots, Site, Vehicle};
 
-/// Samples of an SSB at the base rate: four symbols of 256 with a cyclic prefix of 18.
+/// Samples of an SSB at the base rate: four symbols of 256 samples with a cyclic prefix of 18.
 pub const SSB_SAMPLES: usize = 4 * 274;
 
-/// Largest error of the receiver's oscillator in parts per million, over its carrier: three times
-/// the standard deviation that a scenario may give it.
+/// Maximum error of the receiver's oscillator in ppm: three times the maximum standard deviation of
+/// a scenario.
 const OSCILLATOR_PPM: f64 = 60.0;
 
-/// What a receiver is told.
+/// Receiver configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReceiverConfig {
     /// Absolute frequency of the SSB's centre in Hz.
     pub ssb_freq_hz: f64,
-    /// Its subcarrier spacing.
+    /// Subcarrier spacing of the SSB.
     pub spacing: SubcarrierSpacing,
     /// Period of the SSB burst in seconds.
     pub period_s: f64,
-    /// Which resource elements are used.
+    /// Resource elements that are used.
     pub pilots: Pilots,
-    /// Snapshots of each SSB where none is known (`pilots` is blind).
+    /// Number of snapshots of each SSB if no resource element is known (`pilots` is blind).
     pub snapshots: usize,
-    /// The antennas, and the complex gain of each one's channel, by which it is divided.
+    /// Antenna array, including the complex gain of each channel.
     pub array: ArraySettings,
-    /// Cells to listen to; all without.
+    /// Cells that are received; `None` for all.
     pub cells: Option<Vec<u16>>,
-    /// Cell and index of each SSB that there is, where that is known: while all of them come, none is searched
-    /// for. Empty otherwise.
+    /// Cell and index of every transmitted SSB, if known. While all of them are received, no search
+    /// takes place. Empty if unknown.
     pub beams: Vec<(u16, u8)>,
-    /// How often a receiver that has cells looks for others, in seconds.
+    /// Interval of the search for further cells, in seconds.
     pub search_every_s: f64,
 }
 
 impl ReceiverConfig {
-    /// The receiver of a vehicle, for the cells of a site that it listens to.
+    /// Returns the configuration of a vehicle for the cells of a site.
     pub fn new(site: &Site, vehicle: &Vehicle) -> Self {
         let spacing = if site.ssb.subcarrier_spacing_khz == 30.0 {
             SubcarrierSpacing::Khz30
@@ -74,7 +74,7 @@ impl ReceiverConfig {
         }
     }
 
-    /// What the receiver of SSBs is told of it.
+    /// Returns the configuration of the SSB receiver.
     fn of_ssbs(&self) -> ssb::ReceiverConfig {
         let antennas = self.array.elements.into();
         let widest_ppm = ssb::ReceiverConfig::widest_ppm(self.ssb_freq_hz, self.spacing);
@@ -93,44 +93,44 @@ impl ReceiverConfig {
 /// Samples at the base rate.
 #[derive(Debug, Clone, Copy)]
 pub struct Window<'a> {
-    /// Number of the first sample, counted by the receiver's clock.
+    /// Index of the first sample, in samples of the receiver's clock.
     pub start: u64,
     /// Time of the first sample in seconds.
     pub time_s: f64,
-    /// The samples of each antenna, equally many.
+    /// Samples of each antenna, with equal lengths.
     pub antennas: &'a [&'a [Complex32]],
 }
 
-/// What makes receiving impossible.
+/// Reason why reception is impossible.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ReceiveError {
-    /// Settings, rate, frequency or samples do not suit.
+    /// Settings, rate, frequency or samples do not match.
     #[error(transparent)]
     Ssb(#[from] ReceiverError),
-    /// Samples of another number of antennas than it was told of.
+    /// The number of antennas differs from the configuration.
     #[error("{found} channels; the vehicle's array has {elements}")]
     Antennas {
-        /// Number of antennas that there are samples of.
+        /// Number of antennas of the samples.
         found: usize,
-        /// Number that it was told of.
+        /// Configured number of antennas.
         elements: usize,
     },
-    /// Antennas that make no array.
+    /// The antennas do not form an array.
     #[error(transparent)]
     Array(#[from] aoa::Error),
-    /// A channel gain of zero or not finite.
+    /// A channel gain is zero or not finite.
     #[error("gain of channel {0} is not a finite number other than zero")]
     Calibration(usize),
 }
 
-/// A receiver on one frequency, of windows.
+/// Receiver of windows at one frequency.
 pub struct Receiver(Box<dyn OfWindows>);
 
 impl Receiver {
-    /// A receiver that knows no cell yet.
+    /// Creates a receiver without cells.
     ///
     /// # Errors
-    /// [`ReceiveError::Ssb`] or [`ReceiveError::Calibration`] for impossible settings.
+    /// [`ReceiveError::Ssb`] or [`ReceiveError::Calibration`] for invalid settings.
     pub fn new(config: ReceiverConfig) -> Result<Self, ReceiveError> {
         let told = config.of_ssbs();
         for_elements!(config.array.elements, A => {
@@ -139,21 +139,22 @@ impl Receiver {
         })
     }
 
-    /// Number of SSBs that are tracked.
+    /// Returns the number of tracked SSBs.
     pub fn tracked(&self) -> usize {
         self.0.tracked()
     }
 
-    /// Number of windows that were searched for cells.
+    /// Returns the number of windows in which cells were searched for.
     pub fn searches(&self) -> u64 {
         self.0.searches()
     }
 
-    /// Looks for cells where it is time to, and hands every SSB that lies in the window to `take`, in order
-    /// of time.
+    /// Searches for cells if a search is due, and passes every SSB in the window to `take`, in
+    /// order of time.
     ///
     /// # Errors
-    /// [`ReceiveError`] where the antennas are not as many as it was told of, or not equally long.
+    /// [`ReceiveError`] if the number of antennas differs from the configuration, or their lengths
+    /// differ.
     pub fn receive(
         &mut self,
         window: &Window<'_>,
@@ -163,14 +164,14 @@ impl Receiver {
     }
 }
 
-/// A receiver on one frequency, of a stream.
+/// Receiver of a sample stream at one frequency.
 pub struct StreamReceiver(Box<dyn OfStream>);
 
 impl StreamReceiver {
-    /// A receiver that knows no cell yet, for samples of a rate around a frequency.
+    /// Creates a receiver without cells, for samples of a rate and centre frequency.
     ///
     /// # Errors
-    /// As [`Receiver::new`].
+    /// Those of [`Receiver::new`].
     pub fn new(
         config: ReceiverConfig,
         sample_rate_hz: f64,
@@ -183,28 +184,30 @@ impl StreamReceiver {
         })
     }
 
-    /// Number of SSBs that are tracked.
+    /// Returns the number of tracked SSBs.
     pub fn tracked(&self) -> usize {
         self.0.tracked()
     }
 
-    /// Up to which sample of the input all SSBs that begin before have been handed over.
+    /// Returns the input sample before which all SSBs have been passed on.
     pub fn heard_until(&self) -> f64 {
         self.0.heard_until()
     }
 
-    /// Number of SSBs that a search has found; all others came where they were expected.
+    /// Returns the number of SSBs that a search has detected; all others were received at their
+    /// expected time.
     pub fn found(&self) -> u64 {
         self.0.found()
     }
 
-    /// Takes the next samples and hands every SSB that they complete to `take`, in order of time. `time_s`
-    /// says when a sample of the input was received, the first of all being number 0; beside the
-    /// observation `take` gets the samples that were missing untold before it, in seconds, and are
-    /// counted in its time.
+    /// Processes the next samples and passes every completed SSB to `take`, in order of time.
+    /// `time_s` returns the reception time of an input sample; the index of the first sample is 0.
+    /// `take` also receives the duration of the unreported missing samples before the observation,
+    /// in seconds, which is included in its time.
     ///
     /// # Errors
-    /// [`ReceiveError`] where the antennas are not as many as it was told of, or not equally long.
+    /// [`ReceiveError`] if the number of antennas differs from the configuration, or their lengths
+    /// differ.
     pub fn push(
         &mut self,
         antennas: &[&[Complex32]],
@@ -214,10 +217,11 @@ impl StreamReceiver {
         self.0.push(antennas, time_s, take)
     }
 
-    /// The next sample of the input is this one, those before are missing. Hands over what was held back.
+    /// Sets the index of the next input sample; the samples before it are missing. Passes on
+    /// pending SSBs.
     ///
     /// # Errors
-    /// None that [`push`](Self::push) has not.
+    /// Those of [`push`](Self::push).
     pub fn gap_to(
         &mut self,
         sample: u64,
@@ -227,13 +231,13 @@ impl StreamReceiver {
         self.0.gap_to(sample, time_s, take)
     }
 
-    /// Forgets cells and samples, for a stream that begins anew at sample 0.
+    /// Removes cells and samples, for a stream that restarts at sample 0.
     pub fn reset(&mut self) {
         self.0.reset();
     }
 }
 
-/// Windows of any number of antennas.
+/// Receiver of windows for any number of antennas.
 trait OfWindows: Send {
     fn tracked(&self) -> usize;
     fn searches(&self) -> u64;
@@ -270,7 +274,7 @@ impl<const A: usize> OfWindows for (WindowReceiver<A>, Observer<A>) {
     }
 }
 
-/// A stream of any number of antennas.
+/// Receiver of a stream for any number of antennas.
 trait OfStream: Send {
     fn tracked(&self) -> usize;
     fn heard_until(&self) -> f64;
@@ -345,14 +349,14 @@ fn check_antennas<const A: usize>(antennas: &[&[Complex32]]) -> Result<(), Recei
     Err(ReceiveError::Antennas { found, elements: A })
 }
 
-/// Makes observations of what a receiver has seen.
+/// Converter of received SSBs to observations.
 struct Observer<const A: usize> {
     config: ReceiverConfig,
     calibration: [Complex64; A],
-    /// Of antennas that are not in a row.
+    /// Direction finder of a non-linear array.
     finder: Option<DirectionFinder<ArrayManifold<A>, A>>,
     observation: SsbObservation,
-    /// SSBs that a search has found.
+    /// Number of SSBs that a search has detected.
     found: u64,
 }
 
@@ -376,7 +380,7 @@ impl<const A: usize> Observer<A> {
         })
     }
 
-    /// What was seen, received at a time.
+    /// Returns the observation of a received SSB with its reception time.
     fn observe(&mut self, seen: &Seen<'_, A>, time_s: f64) -> &SsbObservation {
         self.found += u64::from(!seen.is_followed);
         let (config, finder) = (&self.config, self.finder.as_ref());
@@ -407,7 +411,7 @@ impl<const A: usize> Observer<A> {
     }
 }
 
-/// Makes an observation of a tracked SSB: noise of unit power, channels calibrated.
+/// Fills an observation of a tracked SSB: unit noise power, calibrated channels.
 fn fill<const A: usize>(
     into: &mut SsbObservation,
     config: &ReceiverConfig,
@@ -445,7 +449,7 @@ fn fill<const A: usize>(
     }
 }
 
-/// What every antenna received of the last SSB.
+/// Returns the received signal of every antenna for the last SSB.
 fn received<const A: usize>(
     tracker: &Tracker<A>,
 ) -> Option<[&[[Complex32; SUBCARRIERS]; SYMBOLS]; A]> {
@@ -456,14 +460,14 @@ fn received<const A: usize>(
     Some(elements)
 }
 
-/// Resource elements of the broadcast channel as snapshots of a signal that is not known.
+/// Fills resource elements of the PBCH as snapshots of an unknown signal.
 fn fill_blind<const A: usize>(
     into: &mut SsbObservation,
     config: &ReceiverConfig,
     tracker: &Tracker<A>,
     gains: [Complex64; A],
 ) {
-    /// Symbol of the SSB that holds nothing but the broadcast channel.
+    /// Symbol of the SSB that contains the PBCH only.
     const PBCH_SYMBOL: usize = 1;
     let Some(elements) = received(tracker) else {
         return;

@@ -1,21 +1,22 @@
-//! The line of sight told from scatter that varies over the band.
+//! Separation of the line of sight from frequency-selective scatter.
 //!
-//! Scatter that arrives late varies over the subcarriers; the line of sight, its delay taken out,
-//! does not. Over the groups of subcarriers `b` and the antennas `n` the channel is taken as
+//! Delayed scatter varies over the subcarriers; the line of sight, with its delay compensated, does
+//! not. Over the groups of subcarriers `b` and the antennas `n` the channel model is
 //!
-//! `z_nb = g a_n(ω) exp(−j2πk_b δ/256) + h_nb + noise`,
+//! `z_nb = g a_n(ω) exp(−j2πk_b δ/256) + h_nb + noise`.
 //!
-//! with `h` Gaussian, independent from antenna to antenna, its power `P` decaying exponentially over
-//! the delay with time constant τ from the line of sight on, so that over the band
-//! `E[h_b h*_b'] = P / (1 + j2π(k_b − k_b')τ/256)` (the dense multipath of A. Richter, "Estimation
-//! of radio channel parameters", TU Ilmenau 2005). With `C` the covariance over the band of scatter
-//! and noise together, the likelihood of (δ, τ, P), maximised over `g`, is
+//! `h` is Gaussian, independent between antennas. Its power `P` decays exponentially over the delay
+//! with time constant τ, starting at the line of sight, so that over the band
+//! `E[h_b h*_b'] = P / (1 + j2π(k_b − k_b')τ/256)` (dense multipath of A. Richter, "Estimation of
+//! radio channel parameters", TU Ilmenau 2005). With `C` the covariance of scatter plus noise over
+//! the band, the log-likelihood of (δ, τ, P), maximised over `g`, is
 //!
-//! `−N ln|C| − Σ_n z_nᴴ C⁻¹ z_n + max_ω |Σ_n a_n* u_n|² / (N e)`,  `u_n = 1ᴴ C⁻¹ z_n`, `e = 1ᴴ C⁻¹ 1`,
+//! `−N ln|C| − Σ_n z_nᴴ C⁻¹ z_n + max_ω |Σ_n a_n* u_n|² / (N e)`,  `u_n = 1ᴴ C⁻¹ z_n`,
+//! `e = 1ᴴ C⁻¹ 1`.
 //!
-//! and at its maximum `u / √e` is one despread block whose noise, scatter included, has variance
-//! one. Where the channel does not vary by more than noise explains, there is no such block: the
-//! plain sum over the band is the best there is, and its scatter cannot be told from the signal.
+//! At its maximum `u / √e` is one despread block whose noise, including scatter, has unit variance.
+//! If noise explains the variation of the channel, this block does not exist: the sum over the band
+//! is optimal, and its scatter cannot be separated from the signal.
 
 use std::f64::consts::TAU;
 
@@ -25,41 +26,43 @@ use num_complex::Complex64;
 use super::despread::{Despread, FFT_SIZE, GROUP, GROUPS};
 use crate::manifold::ArrayManifold;
 
-/// Time constants tried, in samples at the base rate.
+/// Grid of time constants, in samples at the base rate.
 const DECAYS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
-/// How far before and after the delay of the most power the line of sight is looked for, in samples.
+/// Range of the line of sight's delay relative to the delay of the maximum power, in samples.
 const EARLIEST: f64 = -1.0;
 const LATEST: f64 = 0.5;
-/// Delays tried for each time constant, then halvings of their distance.
+/// Number of delays for each time constant, and of subsequent bisections of their spacing.
 const DELAYS: usize = 6;
 const HALVINGS: i32 = 4;
-/// Standard deviations by which the channel must vary more than noise explains: once in 10⁵ SSBs
-/// of a flat channel it does.
+/// Threshold of the channel variation in standard deviations of the noise: exceeded by one of 10⁵
+/// SSBs of a flat channel.
 const VARIES: f64 = 5.0;
-/// Noise of a group without known elements, over that of an element: no information.
+/// Noise of a group without known elements relative to that of an element: no information.
 const UNKNOWN: f64 = 1e9;
 
 type Band = [Complex64; GROUPS];
 
-/// What is left when the line of sight is told from scatter over the band.
+/// Line of sight, separated from scatter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineOfSight<const A: usize> {
-    /// The array's response; noise and scatter together have variance one.
+    /// Array response; noise plus scatter has unit variance.
     pub block: [Complex64; A],
-    /// Power of the scatter over that of the noise on a resource element.
+    /// Power of the scatter relative to the noise of a resource element.
     pub scatter: f64,
-    /// Time constant of its decay, in samples.
+    /// Time constant of the scatter's decay, in samples.
     pub decay: f64,
 }
 
-/// The line of sight, where the channel varies over the band. The noise on an element has variance
-/// one and the channels are calibrated; `finder` is of antennas that are not in a row.
+/// Returns the line of sight if the channel varies over the band. The noise of an element has unit
+/// variance and the channels are calibrated; `finder` is the direction finder of a non-linear
+/// array.
 pub fn line_of_sight<const A: usize>(
     despread: &Despread<A>,
     finder: Option<&DirectionFinder<ArrayManifold<A>, A>>,
 ) -> Option<LineOfSight<A>> {
     let channel = Channel::new(despread, 0);
-    // Another cell's PSS may be the same: late, it looks like a path. It is not believed alone.
+    // A delayed PSS of another cell with the same sequence resembles a path, so that the PSS alone
+    // is not sufficient evidence.
     let others = Channel::new(despread, 1);
     let others = if others.known() > 0.0 {
         others
@@ -86,7 +89,7 @@ pub fn line_of_sight<const A: usize>(
         let mut delays = (0..DELAYS).map(|step| EARLIEST + spacing * step as f64);
         best = better(best, fit(decay, power, &mut delays));
     }
-    // Nearer in all three, one after the other.
+    // Refine the three parameters, one after another.
     for halving in 1..=HALVINGS {
         let (_, delay, decay, power) = best?;
         let near = spacing * 0.5_f64.powi(halving);
@@ -118,22 +121,22 @@ pub fn line_of_sight<const A: usize>(
     })
 }
 
-/// Likelihood, delay, time constant, power.
+/// Log-likelihood, delay, time constant, power.
 type Fit = (f64, f64, f64, f64);
 
-/// The channel as the symbols together show it.
+/// Channel estimate from all symbols.
 #[derive(Clone)]
 struct Channel<const A: usize> {
-    /// Mean over the known elements of each group, per antenna.
+    /// Mean over the known elements of each group, for each antenna.
     antennas: [Band; A],
-    /// Their number.
+    /// Number of known elements.
     counts: [f64; GROUPS],
 }
 
 impl<const A: usize> Channel<A> {
-    /// Brings the symbols from number `from` on to one phase and adds them up.
+    /// Aligns the phases of the symbols, starting at symbol `from`, and adds the symbols.
     fn new(despread: &Despread<A>, from: usize) -> Self {
-        // The symbol that knows most is the one whose phase the others take.
+        // The symbol with the most known elements is the phase reference.
         let known = |counts: &[f64; GROUPS]| counts.iter().sum::<f64>();
         let symbols = despread.sums.iter().zip(&despread.counts).skip(from);
         let first = symbols
@@ -172,8 +175,8 @@ impl<const A: usize> Channel<A> {
         self.counts.iter().sum()
     }
 
-    /// Energy per antenna by which the channel varies more over the band than noise does; `None`
-    /// where noise explains it.
+    /// Returns the energy per antenna of the channel's variation over the band in excess of noise;
+    /// `None` if noise explains the variation.
     fn variation(&self) -> Option<f64> {
         let groups = self.counts.iter().filter(|count| **count > 0.0).count();
         let energy = |antenna: &Band| {
@@ -185,12 +188,13 @@ impl<const A: usize> Channel<A> {
             all - sum.norm_sqr() / self.known()
         };
         let measured: f64 = self.antennas.iter().map(energy).sum();
-        // Of noise it has a gamma distribution with one degree per group and antenna but the mean's.
+        // For noise alone it is gamma distributed, with one degree of freedom per group and
+        // antenna, minus those of the mean.
         let noise = (A * groups.saturating_sub(1)) as f64;
         (measured > noise + VARIES * noise.sqrt()).then_some((measured - noise) / A as f64)
     }
 
-    /// What [`variation`](Self::variation) is of scatter of power one.
+    /// Returns the [`variation`](Self::variation) for scatter of unit power.
     fn variable_share(&self, decay: f64) -> f64 {
         let mut flat = 0.0;
         for (i, a) in self.counts.iter().enumerate() {
@@ -201,7 +205,7 @@ impl<const A: usize> Channel<A> {
         self.known() - flat / self.known()
     }
 
-    /// `u` and `e`.
+    /// Returns `u` and `e`.
     fn response(&self, scatter: &Scatter, delay: f64) -> ([Complex64; A], f64) {
         let response = self.antennas.map(|antenna| {
             let white = scatter.whitened(&delayed(&antenna, delay));
@@ -230,12 +234,12 @@ impl<const A: usize> Channel<A> {
     }
 }
 
-/// A covariance over the band, factorised.
+/// Factorised covariance over the band.
 struct Scatter {
-    /// Lower Cholesky factor, its diagonal inverted.
+    /// Lower Cholesky factor with an inverted diagonal.
     factor: [Band; GROUPS],
     log_determinant: f64,
-    /// The line of sight, whitened, and its energy `e`.
+    /// Whitened line of sight, and its energy `e`.
     line_of_sight: Band,
     energy: f64,
 }
@@ -286,13 +290,13 @@ impl Scatter {
     }
 }
 
-/// Correlation of scatter of power one between two groups.
+/// Returns the correlation of scatter with unit power between two groups.
 fn correlation(i: usize, j: usize, decay: f64) -> Complex64 {
     let apart = (i as f64 - j as f64) * GROUP as f64;
     Complex64::new(1.0, TAU * apart * decay / FFT_SIZE).inv()
 }
 
-/// The band with a delay taken out.
+/// Returns the band with a delay compensated.
 fn delayed(band: &Band, delay: f64) -> Band {
     let cycles = delay * GROUP as f64 / FFT_SIZE;
     let step = Complex64::cis(TAU * cycles);
@@ -309,7 +313,7 @@ fn product(a: &Band, b: &Band) -> Complex64 {
     a.iter().zip(b).map(|(a, b)| a.conj() * b).sum()
 }
 
-/// The strongest beam of antennas in a row, `max |Σ u_n e^{−jωn}|² / N` over ω.
+/// Returns the maximum beam power of a uniform linear array, `max |Σ u_n e^{−jωn}|² / N` over ω.
 fn beam_of_a_row<const A: usize>(received: &[Complex64; A]) -> f64 {
     let found = maximum_likelihood_pilots(&[*received], Some(1.0), &Array::half_wavelength());
     found.map_or(0.0, |found| {
@@ -332,7 +336,7 @@ mod tests {
 
     const A: usize = 4;
     const TRUTH: f64 = 0.7;
-    /// Known elements of a group: the whole SSB's 830, evenly.
+    /// Known elements of a group: the 830 of the whole SSB, evenly distributed.
     const COUNT: f64 = 830.0 / (SYMBOLS * GROUPS) as f64;
 
     fn normal(rng: &mut ChaCha8Rng) -> Complex64 {
@@ -340,7 +344,8 @@ mod tests {
         Complex64::new(part(), part())
     }
 
-    /// An SSB of unit noise with a line of sight from `TRUTH`, `delay` samples late, and scatter.
+    /// Returns an SSB with unit noise, a line of sight from `TRUTH` delayed by `delay` samples, and
+    /// scatter.
     fn ssb(rng: &mut ChaCha8Rng, snr: f64, k: f64, decay: f64, delay: f64) -> Despread<A> {
         let ramp = |k_b: f64, delay: f64| Complex64::cis(-TAU * k_b * delay / FFT_SIZE);
         let rays: Vec<_> = (0..A * 64)
@@ -379,14 +384,15 @@ mod tests {
         bound: f64,
     }
 
-    /// Mean squares of the errors of many SSBs, told and flat.
+    /// Returns the mean squared errors over many SSBs, with separated scatter and with the flat
+    /// model.
     fn errors(trials: u32, snr_db: f64, k_db: f64, decay: f64) -> Errors {
         let array = Array::half_wavelength();
         let (snr, k) = (10f64.powf(0.1 * snr_db), 10f64.powf(0.1 * k_db));
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let mut sums = [0.0; 3];
         for _ in 0..trials {
-            // The receiver follows the delay of the most power.
+            // The receiver tracks the delay of the maximum power.
             let ssb = ssb(&mut rng, snr, k, decay, -0.1);
             let told = line_of_sight(&ssb, None).expect("the channel varies");
             let seen = maximum_likelihood_pilots(&[told.block], Some(1.0), &array).unwrap();
@@ -417,7 +423,8 @@ mod tests {
     #[test]
     fn scatter_that_varies_over_the_band_is_averaged_out_and_owned_up_to() {
         let trials = 300;
-        // A mean square of Gaussian errors has a relative deviation of √(2/n); four of them.
+        // A mean square of n Gaussian errors has a relative standard deviation of √(2/n); the bound
+        // is four of them.
         let bound = 4.0 * (2.0 / f64::from(trials)).sqrt();
         // 300 ns are 1.15 samples at 15 kHz and 2.3 at 30 kHz.
         for (snr_db, k_db, decay) in [(0.0, 5.0, 1.15), (20.0, 5.0, 2.3), (10.0, 0.0, 2.3)] {

@@ -1,31 +1,31 @@
-//! Roads from what a survey gives: segments, or points.
+//! Roads from segments or surveyed points.
 
 use thiserror::Error;
 
 use super::course::{Gap, Piece, Road};
 use crate::geometry::{Point, Pose, wrap_angle};
 
-/// A line or arc as it is described: its length and by how much it turns.
+/// Description of a line or arc: length and heading change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
     /// Length in metres.
     pub length_m: f64,
-    /// Turn over that length in radians; left is positive, a line has none.
+    /// Heading change over this length in radians; positive to the left, zero for a line.
     pub turn_rad: f64,
-    /// Whether the road is known to lie there; else this is a guess, which must be straight.
+    /// Whether the position was surveyed; otherwise it is a guess, which must be straight.
     pub surveyed: bool,
 }
 
-/// No vehicle drives farther; who mistakes the order of latitude and longitude does (m).
+/// Maximum length of a road (m). Exchanged latitude and longitude produce longer ones.
 const LONGEST_M: f64 = 1e6;
 
-/// Why a road cannot be built.
+/// Reason why a road is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum RoadError {
     /// No segment, or fewer than two points.
     #[error("a road needs at least one segment or two points")]
     Empty,
-    /// A length that is not a positive number.
+    /// The length is not a positive number.
     #[error("segment {index} has a length of {length_m} m; it must be positive")]
     Length {
         /// Index of the segment.
@@ -33,30 +33,30 @@ pub enum RoadError {
         /// Its length in metres.
         length_m: f64,
     },
-    /// A guess that bends: beside a bend the road's coordinates end at its centre, and nothing
-    /// says how far from a guess the vehicle is.
+    /// An unsurveyed segment is curved. The road's coordinates end at the centre of a curve, so
+    /// that the distance of a vehicle from a guessed curve is undefined.
     #[error(
         "segment {index} is not surveyed and turns by {turn_rad} rad; a guess must be straight"
     )]
     BentGuess {
         /// Index of the segment.
         index: usize,
-        /// Its turn in radians.
+        /// Heading change in radians.
         turn_rad: f64,
     },
-    /// Two successive points in one place.
+    /// Two successive points are equal.
     #[error("points {index} and {} of the polyline are in one place", index + 1)]
     RepeatedPoint {
-        /// Index of the first of the two.
+        /// Index of the first of the two points.
         index: usize,
     },
-    /// Farther than any vehicle drives.
+    /// The road is longer than any vehicle drives.
     #[error("the road is {length_m:.0} m long; the longest allowed is 1000 km")]
     TooLong {
         /// Its length in metres.
         length_m: f64,
     },
-    /// A polyline that turns back on itself.
+    /// The polyline reverses its direction.
     #[error("the polyline turns back on itself at point {index}")]
     Reversal {
         /// Index of the point.
@@ -65,7 +65,7 @@ pub enum RoadError {
 }
 
 impl RoadError {
-    /// Whether a road of this length can be.
+    /// Returns an error if a road of this length is invalid.
     pub(super) fn check_length(length_m: f64) -> Result<(), Self> {
         if length_m > LONGEST_M {
             return Err(Self::TooLong { length_m });
@@ -75,10 +75,10 @@ impl RoadError {
 }
 
 impl Road {
-    /// A road of lines and arcs that join without a kink.
+    /// Creates a road of lines and arcs, joined with a continuous heading.
     ///
     /// # Errors
-    /// [`RoadError`] when there is no segment, or a length is not positive or too large.
+    /// [`RoadError`] if there is no segment, or a length is not positive or too large.
     pub fn from_segments(
         start: Pose,
         segments: &[Segment],
@@ -130,11 +130,11 @@ impl Road {
         })
     }
 
-    /// A road through surveyed points: straight between them, each corner rounded by an arc of
-    /// radius `corner_radius_m`, or by as large a one as half of the shorter neighbour permits.
+    /// Creates a road through surveyed points: straight lines, with each corner replaced by an arc
+    /// of radius `corner_radius_m`, or of the maximum radius for half of the shorter adjacent line.
     ///
     /// # Errors
-    /// [`RoadError`] when points repeat, the line turns back on itself, or is too long.
+    /// [`RoadError`] if points repeat, the line reverses its direction, or is too long.
     pub fn from_polyline(
         points: &[Point],
         corner_radius_m: f64,
@@ -164,7 +164,7 @@ impl Road {
                     if turn_rad.abs() > 0.999 * std::f64::consts::PI {
                         return Err(RoadError::Reversal { index: index + 1 });
                     }
-                    // An arc tangent to both legs begins R·tan(turn/2) before their corner.
+                    // An arc tangent to both lines begins R·tan(turn/2) before their corner.
                     let tangent = (0.5 * turn_rad.abs()).tan();
                     let cut_m = (corner_radius_m * tangent).min(0.5 * leg.0.min(next.0));
                     (tangent > 1e-12).then(|| (cut_m, cut_m / tangent * turn_rad.abs(), turn_rad))

@@ -1,8 +1,8 @@
-//! The road as driven along: a chain of straight lines and circular arcs, in closed form.
+//! Road as a chain of straight lines and circular arcs, in closed form.
 
 use crate::geometry::{Point, Pose, wrap_angle};
 
-/// A road as pieces of constant curvature, parametrised by the distance `s` along it.
+/// Road of pieces with constant curvature, parametrised by the distance `s` along the road.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Road {
     pub(super) pieces: Vec<Piece>,
@@ -11,17 +11,16 @@ pub struct Road {
     pub(super) width_m: f64,
 }
 
-/// A stretch of the road that was not surveyed: the road leaves at one end and comes back at the
-/// other, and what lies between is a guess.
+/// Unsurveyed stretch of a road. The ends are known, and the geometry in between is a guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {
-    /// Where it begins, along the road in metres.
+    /// Start, along the road in metres.
     pub from_m: f64,
-    /// Where it ends.
+    /// End, along the road in metres.
     pub to_m: f64,
 }
 
-/// A line or arc where it lies.
+/// Line or arc with its position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Piece {
     pub start_m: f64,
@@ -30,29 +29,29 @@ pub(super) struct Piece {
     pub start: Pose,
 }
 
-/// How the road bends where it is known only to a deviation: the curvature, linearised statistically.
+/// Curvature of the road at an uncertain position, by statistical linearisation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bending {
-    /// Its mean (1/m).
+    /// Mean curvature (1/m).
     pub mean_per_m: f64,
-    /// By how much it grows per metre along the road (1/m²).
+    /// Derivative of the curvature along the road (1/m²).
     pub slope_per_m2: f64,
-    /// What is not linear in the place makes of the turn: rad² per metre, as it stays for about two
-    /// deviations of the place.
+    /// Variance of the heading change per metre (rad²/m) due to the non-linear part, which is
+    /// correlated over about two standard deviations of the position.
     pub variance_rad2_per_m: f64,
 }
 
-/// A point in the road's own coordinates.
+/// Point in the road's own coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projection {
-    /// Distance along the road to the nearest point on it, in metres.
+    /// Distance along the road to its nearest point, in metres.
     pub along_m: f64,
-    /// Distance from it, in metres; left is positive.
+    /// Distance from the road in metres; positive to the left.
     pub lateral_m: f64,
 }
 
 impl Road {
-    /// The same road driven the other way.
+    /// Returns the road in the opposite direction.
     #[must_use]
     pub fn reversed(&self) -> Self {
         let mut start_m = 0.0;
@@ -92,7 +91,8 @@ impl Road {
         self.width_m
     }
 
-    /// Place and direction of the road at `along_m`; beyond its ends it goes on straight.
+    /// Returns position and heading of the road at `along_m`; beyond its ends the road is extended
+    /// by straight lines.
     pub fn pose(&self, along_m: f64) -> Pose {
         let piece = self.piece(along_m);
         let local_m = along_m - piece.start_m;
@@ -100,7 +100,7 @@ impl Road {
         piece.pose(inside_m).along_arc(local_m - inside_m, 0.0)
     }
 
-    /// Curvature of the road at `along_m` in 1/m; a left bend is positive.
+    /// Returns the curvature of the road at `along_m` in 1/m; positive to the left.
     pub fn curvature_per_m(&self, along_m: f64) -> f64 {
         if along_m < 0.0 || along_m > self.length_m {
             return 0.0;
@@ -108,12 +108,13 @@ impl Road {
         self.piece(along_m).curvature_per_m
     }
 
-    /// How the road bends at `along_m`, known to a standard deviation (Gauss–Hermite, three points).
+    /// Returns the curvature at `along_m` with a standard deviation of the position (Gauss–Hermite,
+    /// three points).
     pub fn bending(&self, along_m: f64, std_m: f64) -> Bending {
         let here = self.curvature_per_m(along_m);
         let aside_m = 3.0_f64.sqrt() * std_m;
         let [before, after] = [-aside_m, aside_m].map(|by_m| self.curvature_per_m(along_m + by_m));
-        // Differences first: on a line or arc what is left is nothing, not rounding.
+        // Differences are computed first, so that the result is exactly zero on a line or arc.
         let (down, up) = (before - here, after - here);
         let offset = (down + up) / 6.0;
         let slope_per_m2 = if std_m > 0.0 {
@@ -130,19 +131,19 @@ impl Road {
         }
     }
 
-    /// The first stretch between `from_m` and `to_m` along the road that was not surveyed.
+    /// Returns the first unsurveyed stretch between `from_m` and `to_m` along the road.
     pub fn gap_between(&self, from_m: f64, to_m: f64) -> Option<Gap> {
         let mut gaps = self.gaps.iter().copied();
         gaps.find(|gap| gap.from_m <= to_m && gap.to_m >= from_m)
     }
 
-    /// The nearest point of the road.
+    /// Returns the projection of a point onto the nearest point of the road.
     pub fn project(&self, point: Point) -> Projection {
         self.project_between(point, f64::NEG_INFINITY, f64::INFINITY)
     }
 
-    /// The nearest point of the road within `window_m` of `near_m` along it: where a road crosses
-    /// itself, the branch the vehicle is on.
+    /// Returns the projection of a point onto the road within `window_m` of `near_m` along it.
+    /// Where a road crosses itself, this selects the branch of the vehicle.
     pub fn project_near(&self, point: Point, near_m: f64, window_m: f64) -> Projection {
         self.project_between(point, near_m - window_m, near_m + window_m)
     }
@@ -164,7 +165,7 @@ impl Road {
                 let road = piece.pose(local_m);
                 let (sin, cos) = road.heading_rad.sin_cos();
                 let (dx_m, dy_m) = (point.x_m - road.x_m, point.y_m - road.y_m);
-                // Beyond the road's ends it goes on straight.
+                // Beyond its ends the road is extended by straight lines.
                 let ahead_m = cos * dx_m + sin * dy_m;
                 let beyond_m = if (local_m <= 0.0 && piece.start_m <= 0.0)
                     || (local_m >= piece.length_m
@@ -190,7 +191,7 @@ impl Road {
     }
 
     fn piece(&self, along_m: f64) -> Piece {
-        // A road has at least one piece, by construction.
+        // A road contains at least one piece.
         self.pieces
             .get(self.piece_index(along_m))
             .copied()
@@ -204,12 +205,13 @@ impl Road {
 }
 
 impl Piece {
-    /// Place and direction so far into the piece.
+    /// Returns position and heading at a distance along the piece.
     pub fn pose(&self, local_m: f64) -> Pose {
         self.start.along_arc(local_m, self.curvature_per_m)
     }
 
-    /// Distance along this piece to its point nearest to `point`, and the distance between them.
+    /// Returns the distance along the piece to its point nearest to `point`, and the distance
+    /// between the two.
     fn nearest(&self, point: Point) -> (f64, f64) {
         let (sin, cos) = self.start.heading_rad.sin_cos();
         let (dx_m, dy_m) = (point.x_m - self.start.x_m, point.y_m - self.start.y_m);
@@ -217,7 +219,7 @@ impl Piece {
         let local_m = if self.curvature_per_m.abs() < 1e-9 {
             ahead_m
         } else {
-            // Seen from the circle's centre, (0, 1/κ) in the piece's own frame.
+            // Relative to the circle's centre, (0, 1/κ) in the frame of the piece.
             let (across, along) = (
                 1.0 - self.curvature_per_m * left_m,
                 self.curvature_per_m * ahead_m,
@@ -226,7 +228,7 @@ impl Piece {
         };
         let at = |local_m: f64| self.pose(local_m).point().distance_m(point);
         let inside_m = local_m.clamp(0.0, self.length_m);
-        // On an arc the nearer end may be the other one than where clamping leads.
+        // The nearer end of an arc may differ from the clamped one.
         [inside_m, 0.0, self.length_m]
             .into_iter()
             .map(|candidate_m| (candidate_m, at(candidate_m)))

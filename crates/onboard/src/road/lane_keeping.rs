@@ -1,38 +1,38 @@
-//! How a vehicle strays from the middle of its lane and comes back.
+//! Lane keeping: stochastic model of the lateral deviation.
 
 use std::f64::consts::TAU;
 
-/// Largest damping ratio that still swings.
+/// Maximum damping ratio of an oscillation.
 const MOST_DAMPING: f64 = 0.99;
 
-/// Share of the wavelength below which a step is short.
+/// Fraction of the wavelength below which a step is short.
 const SHORT: f64 = 0.05;
 
-/// Abscissas and weights of the Gauss–Legendre rule of three points on [0, 1].
+/// Abscissas and weights of the three-point Gauss–Legendre rule on [0, 1].
 const GAUSS_LEGENDRE: [[f64; 2]; 3] = [
     [0.112_701_665_379_258_3, 5.0 / 18.0],
     [0.5, 4.0 / 9.0],
     [0.887_298_334_620_741_7, 5.0 / 18.0],
 ];
 
-/// The offset `d` from the middle of the lane as a damped oscillator over the distance travelled,
-/// driven by white noise: `d″ + 2ζΩ d′ + Ω² d = w`, the heading against the lane being `ψ = d′`.
+/// Lateral deviation `d` from the lane centre as a damped oscillator over the distance driven, with
+/// white noise as input: `d″ + 2ζΩ d′ + Ω² d = w`. The heading relative to the lane is `ψ = d′`.
 ///
-/// It is Gaussian and Markov, with stationary deviations `σ_d` and `Ω σ_d`, and a step of any
-/// length has a closed form: `Φ = e^{Al}`, `Q = P∞ − Φ P∞ Φᵀ`.
+/// The process is Gaussian and Markov, with the stationary standard deviations `σ_d` and `Ω σ_d`. A
+/// step of any length has a closed form: `Φ = e^{Al}`, `Q = P∞ − Φ P∞ Φᵀ`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LaneKeeping {
-    /// Stationary deviation across the lane, `σ_d`, in metres.
+    /// Stationary standard deviation of the lateral deviation, `σ_d`, in metres.
     pub rms_m: f64,
-    /// Wavelength of the wander, `2π/Ω`, in metres.
+    /// Wavelength of the oscillation, `2π/Ω`, in metres.
     pub wavelength_m: f64,
-    /// Damping ratio ζ, in (0, 1): how soon one swing forgets the last.
+    /// Damping ratio ζ, in (0, 1).
     pub damping: f64,
 }
 
 impl LaneKeeping {
-    /// `Φ` of (d, ψ) over the length; backwards, a negative one, that of the reversed process,
-    /// `P∞ Φᵀ P∞⁻¹`, which forgets as well.
+    /// Returns the transition matrix `Φ` of (d, ψ) over a length. For a negative length it is that
+    /// of the time-reversed process, `P∞ Φᵀ P∞⁻¹`, which decays as well.
     #[must_use]
     pub fn transition(&self, length_m: f64) -> [[f64; 2]; 2] {
         let natural = TAU / self.wavelength_m;
@@ -51,7 +51,7 @@ impl LaneKeeping {
         ]
     }
 
-    /// Stationary variances of offset (m²) and heading (rad²).
+    /// Returns the stationary variances of deviation (m²) and heading (rad²).
     #[must_use]
     pub fn stationary(&self) -> [f64; 2] {
         let variance = self.rms_m * self.rms_m;
@@ -59,25 +59,25 @@ impl LaneKeeping {
         [variance, natural * natural * variance]
     }
 
-    /// Random walk of the heading over a length short against the wavelength (rad per √m): the root
-    /// of the density of `w`, `4ζΩ³σ_d²`.
+    /// Returns the random walk of the heading over lengths far below the wavelength (rad per √m):
+    /// the square root of the spectral density of `w`, `4ζΩ³σ_d²`.
     #[must_use]
     pub fn steering_rad_per_sqrt_m(&self) -> f64 {
         let natural = TAU / self.wavelength_m;
         (4.0 * self.damping * natural.powi(3)).sqrt() * self.rms_m
     }
 
-    /// How far the way along the lane strays from the way driven, in m² per metre, when the heading
-    /// is known to a variance P: `ψ²/2` has the variance `P²/2`, which is forgotten as the square of
-    /// the swing is, over `1/(2ζΩ)`.
+    /// Returns the variance per metre (m²/m) of the distance along the lane relative to the
+    /// distance driven, for a heading variance P: `ψ²/2` has the variance `P²/2`, with the
+    /// correlation length of the squared oscillation, `1/(2ζΩ)`.
     #[must_use]
     pub fn shortening_m2_per_m(&self, heading_variance: f64) -> f64 {
         let natural = TAU / self.wavelength_m;
         heading_variance * heading_variance / (4.0 * self.damping * natural)
     }
 
-    /// The oscillator that is like this one and another together: with both their variances of
-    /// offset and heading, and the white noise of both.
+    /// Returns the oscillator that is equivalent to the sum of this one and another: variances of
+    /// deviation and heading, and the noise, are added.
     #[must_use]
     pub fn and(&self, other: &Self) -> Self {
         let sum = |moment: &dyn Fn(&Self) -> f64| moment(self) + moment(other);
@@ -95,19 +95,19 @@ impl LaneKeeping {
         }
     }
 
-    /// Stationary deviation of the curvature with which the vehicle steers back (1/m), that of
-    /// `2ζΩ ψ + Ω² d`.
+    /// Returns the stationary standard deviation of the curvature with which the vehicle steers
+    /// back (1/m), that of `2ζΩ ψ + Ω² d`.
     #[must_use]
     pub fn pull_per_m(&self) -> f64 {
         let natural = TAU / self.wavelength_m;
         natural * natural * self.rms_m * (2.0 * self.damping).hypot(1.0)
     }
 
-    /// `Q` of a step of this length, negative backwards.
+    /// Returns the process noise `Q` of a step of this length, which may be negative.
     ///
-    /// Over a short step the difference `P∞ − Φ P∞ Φᵀ` cancels down to rounding, which need not be
-    /// a covariance. There it is `∫ Φ(s) (0, 1)ᵀ S (0, 1) Φ(s)ᵀ ds` by the Gauss–Legendre rule of
-    /// three points: a sum of positive terms, with a relative error below 1e-5.
+    /// For a short step the difference `P∞ − Φ P∞ Φᵀ` cancels to rounding errors, which may not
+    /// form a covariance. It is then computed as `∫ Φ(s) (0, 1)ᵀ S (0, 1) Φ(s)ᵀ ds` by the
+    /// three-point Gauss–Legendre rule: a sum of positive terms, with a relative error below 1e-5.
     #[must_use]
     pub fn noise(&self, length_m: f64) -> [[f64; 2]; 2] {
         let distance_m = length_m.abs();

@@ -1,4 +1,4 @@
-//! The road, and how a vehicle keeps to it.
+//! Road geometry and lane keeping.
 
 mod build;
 mod course;

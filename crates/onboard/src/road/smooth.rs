@@ -1,10 +1,10 @@
 //! Roads of continuous curvature through surveyed points at any spacing.
 //!
 //! A cubic smoothing spline over the length of the polyline minimises
-//! `Σ |p_i − f(t_i)|² + λ ∫ |f″|² dt`, λ as large as the survey's deviation lets it be (Reinsch, Numer.
-//! Math. 10, 1967; the banded form is Green and Silverman's, 1994, 2.3). Where a leg is long against
-//! the bend at its end the bend is near its end: points are put in between, so that the leg stays
-//! straight.
+//! `Σ |p_i − f(t_i)|² + λ ∫ |f″|² dt`, with λ as large as the standard deviation of the survey
+//! permits (Reinsch, Numer. Math. 10, 1967; banded form of Green and Silverman, 1994, 2.3). If a
+//! leg is long relative to the bend at its end, points are inserted so that the leg remains
+//! straight and the bend remains at its end.
 
 use std::f64::consts::PI;
 
@@ -12,31 +12,32 @@ use super::build::RoadError;
 use super::course::{Piece, Road};
 use crate::geometry::{Point, Pose, wrap_angle};
 
-/// Most by which the road may bulge from a leg towards the outside of a bend (m).
+/// Maximum deviation of the road from a leg towards the outside of a bend (m).
 const BULGE_M: f64 = 0.5;
 
-/// How much longer than its neighbour a leg of the same bend may be.
+/// Maximum ratio of the lengths of neighbouring legs of one bend.
 const GROWTH: f64 = 1.5;
 
-/// Turn at one point from which on it is a corner and not a point of a bend (rad), and the radius
-/// by which a vehicle gets round it (m).
+/// Minimum heading change at one point for a corner instead of a point of a bend (rad), and the
+/// radius of the arc that replaces it (m).
 const CORNER_RAD: f64 = 0.7;
 const CORNER_RADIUS_M: f64 = 5.0;
 
-/// Chords by which its arc is drawn.
+/// Number of chords of the arc that replaces a corner.
 const CORNER_CHORDS: u32 = 8;
 
-/// Length of the arcs by which the spline is driven along (m).
+/// Length of the arcs that approximate the spline (m).
 const PIECE_M: f64 = 0.5;
 
-/// Steps of the search for λ, each a factor of two.
+/// Number of bisection steps for λ, each a factor of two.
 const HALVINGS: u32 = 50;
 
 impl Road {
-    /// A road of continuous curvature through points that were surveyed to `position_std_m`.
+    /// Creates a road of continuous curvature through points with the standard deviation
+    /// `position_std_m`.
     ///
     /// # Errors
-    /// [`RoadError`] when points repeat, the line turns back on itself, or is too long.
+    /// [`RoadError`] if points repeat, the line reverses its direction, or is too long.
     pub fn through_points(
         points: &[Point],
         position_std_m: f64,
@@ -86,14 +87,14 @@ impl Road {
     }
 }
 
-/// Length and direction from each point to the next.
+/// Returns length and direction from each point to the next.
 fn legs(points: &[Point]) -> Vec<(f64, f64)> {
     let pairs = points.iter().zip(points.iter().skip(1));
     let leg = |(from, to): (&Point, &Point)| (from.distance_m(*to), from.bearing_rad(*to));
     pairs.map(leg).collect()
 }
 
-/// The points, each corner as points of an arc.
+/// Returns the points, with each corner replaced by points of an arc.
 fn with_round_corners(points: &[Point]) -> Result<Vec<Point>, RoadError> {
     let legs = legs(points);
     RoadError::check_length(legs.iter().map(|leg| leg.0).sum())?;
@@ -137,11 +138,12 @@ fn with_round_corners(points: &[Point]) -> Result<Vec<Point>, RoadError> {
     Ok(rounded)
 }
 
-/// The points, and more of them on legs that are long against the bends at their ends: away from a
-/// bend they lie wider and wider apart, so that the spline leaves it without swinging.
+/// Returns the points, with additional points on legs that are long relative to the bends at their
+/// ends. Their spacing grows with the distance from a bend, so that the spline leaves the bend
+/// without oscillation.
 fn with_straights(points: &[Point]) -> Vec<Point> {
     let legs = legs(points);
-    // From a point of a bend, how far off the next has to be.
+    // Minimum distance of the next point from a point of a bend.
     let reach_m = |index: usize| {
         let before = index.checked_sub(1).and_then(|before| legs.get(before));
         let (Some(before), Some(after)) = (before, legs.get(index)) else {
@@ -179,8 +181,8 @@ fn with_straights(points: &[Point]) -> Vec<Point> {
     dense
 }
 
-/// How far points scatter about what their neighbours say: root mean square distance of each from
-/// the cubic through the two before and the two after it, as independent errors would leave it.
+/// Returns the standard deviation of the points, estimated from their distances to the cubic
+/// through the two previous and the two following points, for independent errors.
 fn scatter_m(points: &[Point]) -> f64 {
     let mut along_m = vec![0.0];
     for pair in points.windows(2) {
@@ -215,9 +217,9 @@ fn scatter_m(points: &[Point]) -> f64 {
     (median / std::f64::consts::LN_2).sqrt()
 }
 
-/// A cubic spline over a parameter that grows by the distance between its points.
+/// Cubic spline over a parameter that increases by the distance between points.
 struct Spline {
-    /// Growth of the parameter from each point to the next.
+    /// Increase of the parameter from each point to the next.
     steps: Vec<f64>,
     points: Vec<Point>,
     /// Second derivatives at the points.
@@ -225,13 +227,13 @@ struct Spline {
 }
 
 impl Spline {
-    /// The smoothest spline that leaves a root mean square distance of `std_m` from the points.
+    /// Returns the smoothest spline with a root mean square distance of `std_m` from the points.
     fn new(points: &[Point], std_m: f64) -> Self {
         let steps: Vec<f64> = legs(points).iter().map(|leg| leg.0).collect();
         let std_m = std_m.min(scatter_m(points));
         let most = std_m * std_m * points.len() as f64;
         let mut best = Self::with_penalty(points, &steps, 0.0);
-        // λ has the dimension of a length cubed.
+        // The dimension of λ is the cube of a length.
         let (mut low, mut high) = (-20.0, 20.0);
         for _ in 0..HALVINGS {
             let middle: f64 = 0.5 * (low + high);
@@ -248,18 +250,18 @@ impl Spline {
         best
     }
 
-    /// Solves `(R + λ Qᵀ Q) γ = Qᵀ p` for the second derivatives γ at the inner points; the spline
-    /// then passes `p − λ Q γ`.
+    /// Solves `(R + λ Qᵀ Q) γ = Qᵀ p` for the second derivatives γ at the inner points. The spline
+    /// passes through `p − λ Q γ`.
     fn with_penalty(points: &[Point], steps: &[f64], penalty: f64) -> Self {
         let count = points.len();
         let inner = count.saturating_sub(2);
         let step = |index: usize| steps.get(index).copied().unwrap_or(1.0);
-        // Column j of Q has these three entries at rows j, j + 1 and j + 2.
+        // Column j of Q has these three entries in rows j, j + 1 and j + 2.
         let column = |j: usize| {
             let (a, c) = (step(j).recip(), step(j + 1).recip());
             [a, -a - c, c]
         };
-        // Bands of the matrix: its diagonal and the two beside it.
+        // Bands of the matrix: the diagonal and two subdiagonals.
         let mut bands = vec![[0.0; 3]; inner];
         let mut right = vec![[0.0; 2]; inner];
         for j in 0..inner {
@@ -300,7 +302,7 @@ impl Spline {
         }
     }
 
-    /// Place and direction at a share of the way from one point to the next.
+    /// Returns position and heading at a fraction of the leg from one point to the next.
     fn pose(&self, leg: usize, share: f64) -> Pose {
         let point = |index: usize| self.points.get(index).copied().unwrap_or_default();
         let second = |index: usize| self.seconds.get(index).copied().unwrap_or_default();
@@ -328,7 +330,7 @@ impl Spline {
     }
 }
 
-/// Solves a symmetric positive definite system of bandwidth two by its factors L D Lᵀ.
+/// Solves a symmetric positive definite system of bandwidth two by its factorisation L D Lᵀ.
 #[allow(
     clippy::indexing_slicing,
     reason = "every index is below the length all three share"
