@@ -1,21 +1,20 @@
-//! Synchronization signal blocks (SSBs) of 5G NR: what every cell broadcasts, searched
-//! for, tracked, decoded and built.
+//! Synchronization signal blocks (SSBs) of 5G NR: search, tracking, decoding and generation.
 //!
-//! An SSB is 240 subcarriers × 4 OFDM symbols: the primary and secondary synchronization signals
-//! (PSS, SSS), which say the cell's identity, and the physical broadcast channel (PBCH) with its
-//! reference signal (DM-RS), which says the time and the master information block (MIB). This crate
-//! follows TS 38.104, 38.211 to 38.213, 38.215 and 38.331; each item names its clause.
+//! An SSB is 240 subcarriers × 4 OFDM symbols. The primary and secondary synchronization signals
+//! (PSS, SSS) encode the cell identity. The physical broadcast channel (PBCH) with its reference
+//! signal (DM-RS) encodes the time and the master information block (MIB). This crate follows TS
+//! 38.104, 38.211 to 38.213, 38.215 and 38.331; each item names its clause.
 //!
 //! # Receive
-//! A [`Receiver`](receiver::Receiver) takes samples of any rate in blocks of any length and gives SSBs
-//! with the channel of every antenna: it searches until it has found a cell and then tracks its
-//! beams. What it is made of can be used by itself:
+//! A [`Receiver`](receiver::Receiver) processes samples of any rate in blocks of any length, and
+//! returns SSBs with the channel of every antenna. It searches until a cell is detected, then
+//! tracks the beams of the cell. Its parts can be used separately:
 //!
 //! # Search for cells
-//! A recording goes through the [front end](front_end), which brings the SSB to 0 Hz and the samples to
-//! 256 a symbol, 7.68 Msps at 30 kHz spacing. There a [`Searcher`](search::Searcher) finds every SSB
-//! of every cell, in a recording at once or in a stream block by block: whose it is, which beam, when,
-//! how far off in frequency, how strong, and what its PBCH says.
+//! The [front end](front_end) shifts the SSB to 0 Hz and resamples a recording to 256 samples per
+//! symbol, 7.68 Msps at 30 kHz spacing. A [`Searcher`](search::Searcher) detects every SSB of every
+//! cell at this rate, in a whole recording or block by block in a stream. It returns cell, beam,
+//! time, frequency offset, power and the PBCH message.
 //!
 //! ```
 //! # use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
@@ -42,13 +41,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Where the frequency or the spacing is not known, [`raster::scan`] looks everywhere in the recorded
-//! band. [`diagnose`] says beforehand what is wrong with a recording's channels.
+//! If the frequency or the spacing is unknown, [`raster::scan`] searches the recorded band.
+//! [`diagnose`] reports faults of a recording's channels.
 //!
 //! # Track a cell
-//! Once a cell is known, a [`Tracker`](track::Tracker) needs a small part of a search's time for each
-//! further SSB: it says which beam came, when, and with which complex number at each antenna, from
-//! which an array tells the direction.
+//! A [`Tracker`](track::Tracker) processes further SSBs of a known cell in a fraction of a search's
+//! time. It returns the beam, the time, and one complex amplitude per antenna, from which an array
+//! estimates the direction.
 //!
 //! ```
 //! # use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
@@ -77,13 +76,14 @@
 //! ```
 //!
 //! # Conventions
-//! Resource elements are flattened with the subcarrier fastest, index k + 240·l, and k = 120 is the
+//! Resource elements are stored with the subcarrier as the fastest index, k + 240·l; k = 120 is the
 //! SSB's centre. Samples are [`Complex32`] with the SSB's centre at 0 Hz. Log-likelihood ratios are
-//! positive for bit 0. Bit strings in integers have their first bit most significant.
+//! positive for bit 0. In integers, the first bit of a bit string is the most significant one.
 //!
 //! # Build a burst
-//! A cell sends its SSBs, one per beam, in a half frame of 5 ms; [`Burst`] writes them at any multiple
-//! of the 256-point rate (3.84 Msps at 15 kHz, 7.68 at 30, 30.72 at 120, 61.44 at 240).
+//! A cell transmits its SSBs, one per beam, in a half frame of 5 ms. [`Burst`] generates them at
+//! any multiple of the 256-point rate (3.84 Msps at 15 kHz, 7.68 at 30, 30.72 at 120, 61.44 at
+//! 240).
 //!
 //! ```
 //! use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci};
@@ -103,9 +103,10 @@
 //! # Ok::<(), nr_ssb::Error>(())
 //! ```
 //!
-//! # Read an SSB by hand
-//! Where an SSB begins is known here; a search finds it. Each symbol is demodulated, its phase of
-//! TS 38.211 §5.4 taken out, and the PBCH's elements become log-likelihood ratios.
+//! # Decode an SSB step by step
+//! The start of the SSB is known in this example; a search would detect it. Each symbol is
+//! demodulated, its phase of TS 38.211 §5.4 is removed, and log-likelihood ratios of the PBCH
+//! elements are computed.
 //!
 //! ```
 //! # use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci};
@@ -138,34 +139,35 @@
 //! ```
 //!
 //! # The parts
-//! | to | see |
+//! | task | item |
 //! |---|---|
-//! | have all that follows in one | [`receiver`] |
+//! | receive SSBs from a sample stream | [`receiver`] |
 //! | find the SSBs at a known frequency | [`search`] |
-//! | look at a known cell again and again | [`track`] |
+//! | process further SSBs of a known cell | [`track`] |
 //! | find SSBs anywhere in a band | [`raster`] |
-//! | bring a recording to the search's rate | [`front_end`] |
-//! | see what is wrong with its channels | [`diagnose`] |
-//! | see its DC offset and interfering tones, which searches and receivers remove | [`tones`](fn@tones) |
-//! | know what SS-RSRP, SS-RSRQ, SS-SINR mean here | [`measure`] |
-//! | name a cell | [`Pci`] |
-//! | lay SSBs out in time | [`Case`], [`Lmax`], [`Numerology`] |
-//! | lay them out in frequency | [`grid`] |
-//! | know a band's raster and burst set size | [`band`] |
+//! | resample a recording to the rate of the search | [`front_end`] |
+//! | diagnose the channels of a recording | [`diagnose`] |
+//! | list the DC offset and interfering tones, which searches and receivers remove |
+//! [`tones`](fn@tones) |
+//! | definitions of SS-RSRP, SS-RSRQ and SS-SINR | [`measure`] |
+//! | identify a cell | [`Pci`] |
+//! | positions of SSBs in time | [`Case`], [`Lmax`], [`Numerology`] |
+//! | positions of SSBs in frequency | [`grid`] |
+//! | synchronization raster and burst set size of a band | [`band`] |
 //! | generate sequences | [`mod@pss`], [`mod@sss`], [`mod@dmrs`], [`gold`] |
 //! | read and write the MIB | [`Mib`], [`BchPayload`] |
-//! | code and decode the PBCH | [`pbch`]; its parts [`crc`], [`polar`], [`rate_matching`] |
+//! | encode and decode the PBCH | [`pbch`]; its parts [`crc`], [`polar`], [`rate_matching`] |
 //! | combine the PBCHs of several periods | [`pbch::Decoder::combine`] |
-//! | go between subcarriers and samples | [`Ofdm`] |
+//! | convert between subcarriers and samples | [`Ofdm`] |
 //!
 //! # Errors
-//! Everything that can be wrong with an input is an [`Error`]; with a recording, a search or a cell to
-//! be tracked a [`FrontEndError`](front_end::FrontEndError), a [`SearchError`](search::SearchError), a
-//! [`ScanError`](raster::ScanError), a [`TrackError`](track::TrackError), with a receiver a [`ReceiverError`](receiver::ReceiverError).
-//! Nothing panics.
+//! Invalid inputs return an [`Error`]. Errors of a recording, a search or a tracked cell are a
+//! [`FrontEndError`](front_end::FrontEndError), a [`SearchError`](search::SearchError), a
+//! [`ScanError`](raster::ScanError) or a [`TrackError`](track::TrackError); those of a receiver are
+//! a [`ReceiverError`](receiver::ReceiverError). This crate does not panic.
 
-// Each folder uses only those before it: numeric, standard; transmit, dsp; input, one_ssb; search;
-// track, raster; receiver.
+// Each folder depends on the previous ones only: numeric, standard; transmit, dsp; input, one_ssb;
+// search; track, raster; receiver.
 mod dsp;
 mod error;
 mod input;

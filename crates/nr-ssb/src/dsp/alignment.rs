@@ -1,24 +1,24 @@
-//! Where an SSB lies in time and frequency.
+//! Position of an SSB in time and frequency.
 
 use num_complex::{Complex32, Complex64};
 
 use super::base_rate::{SYMBOL_FFT, SYMBOL_SAMPLES};
 use crate::standard::grid::SYMBOLS;
 
-/// Where an SSB lies in time and frequency, as the receiver found it.
+/// Position of an SSB in time and frequency, estimated by the receiver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Alignment {
-    /// First sample of the PSS without cyclic prefix, and the fraction beyond it.
+    /// First sample of the PSS without cyclic prefix; `delay` is the fraction of a sample after it.
     pub(crate) start: usize,
     pub(crate) delay: f64,
-    /// Carrier frequency offset, cycles per sample.
+    /// Carrier frequency offset, in cycles per sample.
     pub(crate) cfo_cycles: f64,
-    /// Phase from symbol to symbol that remains once the offset is taken out, radians.
+    /// Residual phase step per symbol after the offset is removed, in radians.
     pub(crate) phase_step: f64,
 }
 
 impl Alignment {
-    /// Phasors that bring the four symbols to one phase.
+    /// Returns phasors that align the phases of the four symbols.
     pub(crate) fn symbol_phases(&self) -> [Complex32; SYMBOLS] {
         std::array::from_fn(|symbol| {
             let phasor = Complex64::cis(-self.phase_step * symbol as f64);
@@ -26,7 +26,7 @@ impl Alignment {
         })
     }
 
-    /// Moves by `delay` samples, keeping the fraction within half a sample.
+    /// Shifts the position by `delay` samples; the fraction remains within half a sample.
     pub(crate) fn shift(&mut self, delay: f64) -> Option<()> {
         let total = self.delay + delay;
         let whole = total.round();
@@ -35,7 +35,7 @@ impl Alignment {
         Some(())
     }
 
-    /// First sample of the SSB, its cyclic prefix included, as a real number.
+    /// Returns the first sample of the SSB including its cyclic prefix, as a real number.
     pub(crate) fn first_sample(&self) -> f64 {
         self.start as f64 + self.delay - (SYMBOL_SAMPLES - SYMBOL_FFT) as f64
     }

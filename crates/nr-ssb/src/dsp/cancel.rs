@@ -1,4 +1,4 @@
-//! Takes a received SSB out of the samples, so that a weaker cell under it shows.
+//! Subtraction of a received SSB from the samples, so that weaker cells can be detected.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use super::base_rate::{CYCLIC_PREFIX, SYMBOL_FFT, SYMBOL_SAMPLES};
 use crate::numeric::phasors::fill_phasors;
 use crate::standard::grid::{SUBCARRIERS, SYMBOLS, SsbGrid};
 
-/// Remodulator that subtracts.
+/// Remodulator for the subtraction of an SSB.
 pub(crate) struct Canceller {
     fft: Arc<dyn Fft<f32>>,
     spectrum: Vec<Complex32>,
@@ -31,7 +31,7 @@ impl Canceller {
         }
     }
 
-    /// Subtracts `reference`, sent through `channel` and aligned so, from one antenna's samples.
+    /// Subtracts `reference`, filtered by `channel` and aligned, from the samples of one antenna.
     pub(crate) fn subtract(
         &mut self,
         samples: &mut [Complex32],

@@ -1,10 +1,11 @@
-//! Carrier frequency offset: coarse from inside the symbols, fine from the phase between them.
+//! Carrier frequency offset (CFO): a coarse estimate within symbols, and a fine one from the phase
+//! between symbols.
 //!
-//! Symbol `l` of an SSB seen at its own centre carries `exp(−j2π f_SSB t_l)` besides the offset,
-//! because the transmitter resets its carrier at each symbol (TS 38.211 §5.4). Estimates from
-//! inside one symbol (cyclic prefix against its copy, first against second half of the PSS) do not
-//! see that; the far more precise phase step from symbol to symbol does, so that the absolute
-//! frequency of the SSB has to be known there.
+//! Symbol `l` of an SSB at its own centre frequency contains `exp(−j2π f_SSB t_l)` in addition to
+//! the offset, because the transmitter resets its carrier phase at each symbol (TS 38.211 §5.4).
+//! Estimates within one symbol (cyclic prefix and its copy, both halves of the PSS) do not depend
+//! on this phase. The far more precise phase step between symbols does, and requires the absolute
+//! frequency of the SSB.
 
 use std::f64::consts::TAU;
 
@@ -14,10 +15,10 @@ use super::base_rate::{CYCLIC_PREFIX, SYMBOL_FFT, SYMBOL_SAMPLES};
 use crate::numeric::phasors::{fill_phasors, wrap};
 use crate::standard::grid::SYMBOLS;
 
-/// Coarse offset in cycles per sample, of an SSB whose PSS begins at `start`: the mean of the
-/// cyclic-prefix estimate (unambiguous to ± half a subcarrier) and that from the two halves of the
-/// PSS (± one subcarrier), the second choosing the alias of the first. `pss` is the PSS in time,
-/// `hypothesis_cycles` the offset it was found at.
+/// Returns the coarse offset in cycles per sample, of an SSB whose PSS begins at `start`. It is the
+/// mean of the cyclic-prefix estimate (unambiguous within ± half a subcarrier) and the estimate
+/// from the two halves of the PSS (± one subcarrier), which also resolves the ambiguity of the
+/// first. `pss` is the PSS in the time domain, `hypothesis_cycles` the offset of its detection.
 pub(crate) fn coarse<S: AsRef<[Complex32]>>(
     antennas: &[S],
     start: usize,
@@ -60,12 +61,13 @@ pub(crate) fn coarse<S: AsRef<[Complex32]>>(
     0.5 * (from_halves + from_prefix + alias * spacing)
 }
 
-/// The step of phase per symbol, radians, from the correlations `r[l][m]` of symbols `l` and `m`.
+/// Returns the phase step per symbol in radians, from the correlations `r[l][m]` of symbols `l` and
+/// `m`.
 ///
-/// The PSS–SSS phase (distance 2, 127 elements each) is taken, as a receiver with nothing else
-/// would; all pairs together, `max Re Σ r[l][m] exp(−jθ(m−l))`, say which of its two aliases.
-/// (Weighting all pairs into the value itself gains little in noise, and with the phase noise of
-/// real oscillators moves it by 10 Hz from what other receivers call the offset.)
+/// It is the phase between PSS and SSS (distance 2, 127 elements each). All pairs together,
+/// `max Re Σ r[l][m] exp(−jθ(m−l))`, resolve its ambiguity. (A weighted estimate from all pairs is
+/// hardly more precise in noise, and differs by 10 Hz from the offset of other receivers under
+/// oscillator phase noise.)
 pub(crate) fn symbol_phase_step(pairs: &SymbolPairs) -> f64 {
     const GRID: usize = 32;
     let value = |step: f64| -> f64 {
@@ -89,7 +91,7 @@ pub(crate) fn symbol_phase_step(pairs: &SymbolPairs) -> f64 {
 /// Correlations `Σ z*_l z_m` between the symbols of an SSB, `[l][m]` with `l < m`.
 pub(crate) type SymbolPairs = [[Complex64; SYMBOLS]; SYMBOLS];
 
-/// The step of phase per symbol that TS 38.211 §5.4 makes at an SSB frequency, radians.
+/// Returns the phase step per symbol due to TS 38.211 §5.4 at an SSB frequency, in radians.
 pub(crate) fn carrier_reset_step(ssb_freq_hz: f64, base_rate_hz: f64) -> f64 {
     let cycles = ssb_freq_hz * SYMBOL_SAMPLES as f64 / base_rate_hz;
     wrap(-TAU * cycles.fract())

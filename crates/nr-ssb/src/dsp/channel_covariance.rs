@@ -1,4 +1,4 @@
-//! How the noise of a channel estimate hangs together from subcarrier to subcarrier.
+//! Covariance of a channel estimate's noise over the subcarriers.
 
 use num_complex::{Complex32, Complex64};
 
@@ -9,19 +9,21 @@ use crate::standard::grid::SUBCARRIERS;
 /// Taps of the channel model, one per sample at the base rate.
 pub(crate) const TAPS: usize = 16;
 
-/// Delay of the first tap, samples.
+/// Delay of the first tap, in samples.
 pub(crate) const FIRST_TAP: i32 = -4;
 
-/// Covariance of the noise of a channel estimate between its subcarriers, where the noise on a resource element has
-/// the variance one. It is the same on every antenna, as all are smoothed alike, and between antennas there is none.
+/// Covariance of a channel estimate's noise between subcarriers, for a noise variance of one on a
+/// resource element. It is equal for all antennas, which have the same smoothing; the noise of
+/// different antennas is independent.
 ///
-/// The estimate is linear in what was received once the powers of the taps are chosen: with `G` the taps' Gram matrix on
-/// the known elements and `D` noise over power, the noise of the taps is `(G + D)^-1 G (G + D)^-1`, of rank 16 at most
-/// over the 240 subcarriers. That the powers are learned from the same elements is left out.
+/// The estimate is linear in the received elements for given tap powers. With `G` the Gram matrix
+/// of the taps on the known elements and `D` the ratio of noise to tap power, the covariance of the
+/// taps' noise is `(G + D)^-1 G (G + D)^-1`, of rank 16 at most over the 240 subcarriers. The
+/// estimation of the tap powers from the same elements is neglected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelCovariance {
     pub(super) taps: Matrix<TAPS>,
-    /// What was taken out of the estimate since, samples.
+    /// Delay that was removed from the estimate, in samples.
     delay: f64,
 }
 
@@ -33,16 +35,16 @@ impl ChannelCovariance {
         }
     }
 
-    /// That of the estimate with a delay taken out of it, in samples.
+    /// Returns the covariance of the estimate after the removal of a delay, in samples.
     #[must_use]
     pub(crate) fn delayed(mut self, delay: f64) -> Self {
         self.delay += delay;
         self
     }
 
-    /// Its rows, one per subcarrier.
+    /// Returns the rows of the covariance, one per subcarrier.
     pub fn rows(&self) -> Vec<[Complex32; SUBCARRIERS]> {
-        // What each tap is on the subcarriers.
+        // Response of each tap on the subcarriers.
         let responses: [[Complex32; SUBCARRIERS]; TAPS] = std::array::from_fn(|tap| {
             let delay = f64::from(tap as i32 + FIRST_TAP);
             timing::ramp(self.delay - delay)

@@ -1,11 +1,11 @@
-//! Channel of each antenna over the 240 subcarriers from the known resource elements.
+//! Channel estimate of each antenna over the 240 subcarriers, from the known resource elements.
 //!
-//! The channel is a sum of few paths: `h(k) = Σ_τ g(τ) exp(−j2πk'τ/256)`, `k' = k − 120`, with taps
-//! at whole samples from −4 to +11 around the strongest path. Their powers are learned from the
-//! data (all antennas share them) and the taps are the linear minimum-mean-square-error estimate
-//! given those powers, so that a line-of-sight channel is averaged over the whole band and a
-//! dispersive one is still followed. (Empirical Bayes; MacKay, "Bayesian interpolation", Neural
-//! Computation 1992.)
+//! The channel model is a sum of taps, `h(k) = Σ_τ g(τ) exp(−j2πk'τ/256)`, `k' = k − 120`, at
+//! integer delays from −4 to +11 samples relative to the strongest path. The tap powers are
+//! estimated from the data (common to all antennas), and the taps are the linear
+//! minimum-mean-square-error estimate for these powers. A line-of-sight channel is therefore
+//! averaged over the whole band, and a dispersive channel is still resolved. (Empirical Bayes;
+//! MacKay, "Bayesian interpolation", Neural Computation 1992.)
 
 use std::f64::consts::TAU;
 
@@ -19,27 +19,28 @@ use crate::numeric::hermitian;
 use crate::numeric::sums::{complex_product, energy};
 use crate::standard::grid::{SUBCARRIERS, SYMBOLS, SsbGrid};
 
-/// Times the tap powers are learned anew.
+/// Iterations of the tap power estimate.
 const ITERATIONS: usize = 3;
 
-/// Noise that is assumed at the least, over the strongest path: −60 dB.
+/// Minimum noise relative to the strongest path: −60 dB.
 const NOISE_FLOOR: f64 = 1e-6;
 
-/// Channel estimator with its buffers; results are read from the fields.
+/// Channel estimator with its buffers. The fields contain the results.
 pub(crate) struct ChannelEstimator {
     /// exp(j2πk'τ/256), `[tap][k]`.
     steering: Vec<[Complex32; SUBCARRIERS]>,
-    /// Per antenna: received times conjugated known elements, summed over the symbols.
+    /// Received elements times conjugated known elements, summed over the symbols, for each
+    /// antenna.
     pub(crate) rows: Vec<[Complex32; SUBCARRIERS]>,
-    /// Known elements per subcarrier.
+    /// Number of known elements per subcarrier.
     counts: [f32; SUBCARRIERS],
-    /// Per antenna: the estimate.
+    /// Channel estimate of each antenna.
     pub(crate) channel: Vec<[Complex32; SUBCARRIERS]>,
-    /// Per antenna: variance of the noise on a resource element.
+    /// Noise variance of a resource element, for each antenna.
     pub(crate) noise_variance: Vec<f64>,
     matched: Vec<[Complex64; TAPS]>,
     taps: Vec<[Complex64; TAPS]>,
-    /// Noise over power of each tap, by which it was estimated last.
+    /// Ratio of noise to power of each tap in the last estimate.
     damping: [f64; TAPS],
 }
 
@@ -66,8 +67,8 @@ impl ChannelEstimator {
         }
     }
 
-    /// Collects the known elements of `reference` (zero where unknown, unit power elsewhere) from
-    /// the received grids into `rows`, symbol `l` turned by `phases[l]`.
+    /// Accumulates the known elements of `reference` (zero if unknown, otherwise with unit power)
+    /// from the received grids into `rows`, with symbol `l` rotated by `phases[l]`.
     pub(crate) fn fold(
         &mut self,
         grids: &[ReceivedGrid],
@@ -95,14 +96,14 @@ impl ChannelEstimator {
         }
     }
 
-    /// Noise of each antenna from the folded rows alone, into `noise_variance`: from the second
-    /// difference over the subcarriers, which a smooth channel hardly has (a path 10 samples late
-    /// adds −32 dB of its power).
+    /// Estimates the noise variance of each antenna from `rows`: from the second difference over
+    /// the subcarriers, to which a smooth channel hardly contributes (a path with a delay of 10
+    /// samples adds −32 dB of its power).
     pub(crate) fn estimate_noise(&mut self) {
         let inverse = self
             .counts
             .map(|count| if count > 0.0 { 1.0 / count } else { 0.0 });
-        // Where one of three neighbours is unknown, the difference is left out.
+        // The difference is omitted if one of the three neighbours is unknown.
         let mut used = [0.0_f32; SUBCARRIERS];
         let mut weight = 0.0_f64;
         for k in 1..SUBCARRIERS - 1 {
@@ -128,7 +129,7 @@ impl ChannelEstimator {
         }
     }
 
-    /// Fits the channel to the rows folded from these grids; results in `channel` and
+    /// Fits the channel to the folded rows of these grids; results in `channel` and
     /// `noise_variance`.
     pub(crate) fn fit(&mut self, grids: &[ReceivedGrid], reference: &SsbGrid) {
         let known: f64 = self.counts.iter().map(|count| f64::from(*count)).sum();
@@ -148,11 +149,12 @@ impl ChannelEstimator {
             let power = self.matched.iter().map(|m| m[tap].norm_sqr()).sum::<f64>() / antennas;
             power / (known * known)
         });
-        // Without noise the taps, closer than the band can tell apart, would be undetermined.
+        // Without noise, the taps would be undetermined, because their spacing is below the
+        // resolution of the band.
         let least = NOISE_FLOOR * received.iter().copied().fold(0.0, f64::max);
         let mean_noise = self.noise_variance.iter().sum::<f64>() / antennas;
         let mean_noise = mean_noise.max(least).max(1e-30);
-        // A tap that explains less than this is noise.
+        // A tap with less power is noise.
         let floor = 1e-3 * mean_noise / known;
         let mut powers = received.map(|power| (power - mean_noise / known).max(floor));
         for _ in 0..ITERATIONS {
@@ -181,7 +183,7 @@ impl ChannelEstimator {
         }
     }
 
-    /// Factor of the system that the taps solve.
+    /// Returns the Cholesky factor of the taps' linear system.
     fn factor(&self, gram: &Matrix) -> Option<Matrix> {
         let mut system = *gram;
         for (tap, damping) in self.damping.iter().enumerate() {
@@ -190,12 +192,13 @@ impl ChannelEstimator {
         hermitian::cholesky(&system)
     }
 
-    /// How the noise of the last estimate hangs together; nothing where there was none.
+    /// Returns the covariance of the last estimate's noise; zero if there is none.
     pub(crate) fn covariance(&self) -> ChannelCovariance {
         let mut taps = [[Complex64::ZERO; TAPS]; TAPS];
         let gram = self.gram();
         if let Some(factor) = self.factor(&gram) {
-            // W G W, W being Hermitian as G is: what W makes of the rows of G, and of the columns of that.
+            // W G W with Hermitian W and G: W times the rows of G, then times the columns of the
+            // result.
             let half = gram.map(|row| hermitian::solve(&factor, &row.map(|it| it.conj())));
             for (i, row) in taps.iter_mut().enumerate() {
                 *row = hermitian::solve(&factor, &half.map(|of| of[i].conj()));
@@ -207,10 +210,10 @@ impl ChannelEstimator {
         ChannelCovariance::new(&taps)
     }
 
-    /// Correlations between the symbols, from which the step of phase per symbol is read: known
-    /// elements weighted with the conjugated channel and summed over antennas and those subcarriers
-    /// that both symbols know. (On other subcarriers the channel has another
-    /// phase, which an imperfect estimate would turn into a step.)
+    /// Returns the correlations between symbols, from which the phase step per symbol is computed.
+    /// Known elements are multiplied by the conjugated channel, and summed over the antennas and
+    /// the subcarriers that are known in both symbols. (Other subcarriers have a different channel
+    /// phase, which an inaccurate estimate would convert to a phase step.)
     pub(crate) fn symbol_pairs(&self, grids: &[ReceivedGrid], reference: &SsbGrid) -> SymbolPairs {
         let mut combined = [[Complex32::ZERO; SUBCARRIERS]; SYMBOLS];
         for ((grid, channel), noise) in grids.iter().zip(&self.channel).zip(&self.noise_variance) {
@@ -237,7 +240,8 @@ impl ChannelEstimator {
                     sums[1] += late[k] * both;
                     count += both;
                 }
-                // Per element, so that each pair counts by the information it holds.
+                // Normalised by the number of elements, so that each pair is weighted by its
+                // information.
                 let product = sums[0].conj() * sums[1] / count.max(1.0);
                 result[l][m] = Complex64::new(f64::from(product.re), f64::from(product.im));
             }
@@ -245,7 +249,7 @@ impl ChannelEstimator {
         result
     }
 
-    /// Taps to subcarriers; taps that were found empty cost nothing.
+    /// Computes the channel on the subcarriers from the taps; taps without power are skipped.
     fn expand(&mut self, antenna: usize) {
         let channel = &mut self.channel[antenna];
         channel.fill(Complex32::ZERO);
@@ -264,10 +268,11 @@ impl ChannelEstimator {
         }
     }
 
-    /// Gram matrix of the taps on the known elements: Toeplitz, `Σ_k n(k) exp(j2πk'(τ−τ')/256)`.
+    /// Returns the Gram matrix of the taps on the known elements: Toeplitz,
+    /// `Σ_k n(k) exp(j2πk'(τ−τ')/256)`.
     fn gram(&self) -> Matrix {
         let lags: [Complex64; TAPS] = std::array::from_fn(|lag| {
-            // The steering vector of delay `lag` is in the table from tap −FIRST_TAP on.
+            // The table contains the steering vector of delay `lag` at tap −FIRST_TAP + lag.
             let cycles = lag as f64 / SYMBOL_FFT as f64;
             let step = Complex64::cis(TAU * cycles);
             let mut phasor = Complex64::cis(-TAU * cycles * 120.0);
@@ -292,7 +297,7 @@ impl ChannelEstimator {
 
 type Matrix = hermitian::Matrix<TAPS>;
 
-/// Received energy on the known elements.
+/// Returns the received energy of the known elements.
 fn known_energy(grid: &ReceivedGrid, reference: &SsbGrid) -> f64 {
     let symbols = grid.iter().zip(reference.symbols());
     symbols
@@ -304,7 +309,7 @@ fn known_energy(grid: &ReceivedGrid, reference: &SsbGrid) -> f64 {
         .sum()
 }
 
-/// Σ|z − Σ_τ g e|² over the known elements.
+/// Returns Σ|z − Σ_τ g e|² over the known elements.
 fn residual_energy(
     energy: f64,
     gram: &Matrix,

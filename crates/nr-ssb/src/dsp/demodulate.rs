@@ -1,4 +1,4 @@
-//! From samples at the base rate to the SSB's resource elements, for all antennas.
+//! Demodulation of the SSB's resource elements from samples at the base rate, for all antennas.
 
 use std::sync::Arc;
 
@@ -11,11 +11,11 @@ use super::received_grid::ReceivedGrid;
 use crate::numeric::phasors::fill_phasors;
 use crate::standard::grid::SUBCARRIERS;
 
-/// How far into the cyclic prefix the transform's window is moved, so that neither a path before
-/// the strongest one nor a sample of timing error lets in the neighbouring symbol.
+/// Shift of the FFT window into the cyclic prefix, which avoids interference of the neighbouring
+/// symbol for paths before the strongest one and timing errors of one sample.
 const BACK_OFF: usize = 6;
 
-/// OFDM demodulator for SSBs: four transforms per antenna.
+/// OFDM demodulator for SSBs: four FFTs per antenna.
 pub struct Demodulator {
     fft: Arc<dyn Fft<f32>>,
     window: Vec<Complex32>,
@@ -25,7 +25,7 @@ pub struct Demodulator {
 }
 
 impl Demodulator {
-    /// Plans the transform.
+    /// Creates the FFT plan.
     pub fn new() -> Self {
         let fft = FftPlanner::new().plan_fft_forward(SYMBOL_FFT);
         let scratch = fft.get_inplace_scratch_len();
@@ -38,12 +38,12 @@ impl Demodulator {
         }
     }
 
-    /// Resource elements of the SSB that is aligned so, its carrier offset taken out and its
-    /// fraction of a sample of delay as well, as a phase ramp over the subcarriers. The phase that
-    /// steps from symbol to symbol is left in. The scale is that of an unnormalised transform: a
-    /// tone of amplitude one has 256.
+    /// Demodulates the resource elements of an aligned SSB. The carrier offset is compensated in
+    /// the time domain, the fractional delay as a phase ramp over the subcarriers. The phase step
+    /// between symbols remains. The scale is that of an unnormalised DFT: a tone of amplitude one
+    /// has 256.
     ///
-    /// Returns `None`, with the grids untouched, when the SSB does not lie inside the samples.
+    /// Returns `None` without changing the grids if the SSB is not completely within the samples.
     pub(crate) fn run<S: AsRef<[Complex32]>>(
         &mut self,
         antennas: &[S],
@@ -66,7 +66,7 @@ impl Demodulator {
             CYCLIC_PREFIX as f64 * cfo_cycles,
             -cfo_cycles,
         );
-        // Subcarrier 120 is 0 Hz; the window begins BACK_OFF samples before the symbol.
+        // Subcarrier 120 is at 0 Hz; the window begins BACK_OFF samples before the symbol.
         let cycles = (BACK_OFF as f64 + delay) / SYMBOL_FFT as f64;
         fill_phasors(&mut self.ramp, -120.0 * cycles, cycles);
 

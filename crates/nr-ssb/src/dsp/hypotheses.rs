@@ -1,7 +1,7 @@
-//! The carrier frequency offsets that the matched filter tries.
+//! Carrier frequency offsets of the matched filter.
 
-/// Offsets from −range to +range, no further apart than `step_hz`, so placed that each answers for
-/// the same width.
+/// Returns offsets from −range to +range with equal spacing of at most `step_hz`, each at the
+/// centre of its interval.
 pub(crate) fn cfo_hypotheses(range_hz: f64, step_hz: f64) -> Vec<f64> {
     let count = (2.0 * range_hz / step_hz).ceil().max(1.0);
     let width = 2.0 * range_hz / count;

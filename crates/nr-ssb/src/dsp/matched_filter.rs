@@ -1,19 +1,19 @@
 //! PSS matched filter: overlap-save correlation of all antennas with the three PSS at several
 //! carrier frequency offsets, normalised by the energy under the window.
 //!
-//! Per antenna `a` and start sample `n` the statistic is
-//! `T_a = 240 |Σ p*(i) x_a(n+i)|² / Σ |x_a(n+i)|²` with `‖p‖ = 1`: in noise over the SSB's 240
-//! subcarriers exponentially distributed with mean one whatever the level (a beta distribution, to
-//! be exact, whose tail is the thinner), and about 127 × SNR where the PSS is. Antennas are summed
-//! non-coherently, so in noise the sum of `A` of them follows a gamma distribution of shape `A`; where
-//! they hear the same interference they are whitened first, block by block.
+//! For antenna `a` and start sample `n` the statistic is
+//! `T_a = 240 |Σ p*(i) x_a(n+i)|² / Σ |x_a(n+i)|²` with `‖p‖ = 1`. In noise over the SSB's 240
+//! subcarriers it is exponentially distributed with mean one, whatever the noise power (exactly: a
+//! beta distribution, with a thinner tail). At the PSS it is about 127 × SNR. The sum over `A`
+//! antennas is non-coherent and follows a gamma distribution of shape `A` in noise. Antennas with
+//! common interference are whitened first, block by block.
 //!
-//! The PSS fills 127 of 256 bins, so its correlation is computed at half the base rate; the lags
-//! between are the sums of their neighbours, `(c(n−1) + c(n+1))/√2`, which carry noise of the same
-//! variance and lose no more of a peak (0.9 dB at worst) than sampling at the base rate does.
+//! The PSS occupies 127 of 256 bins, so that its correlation is computed at half the base rate. The
+//! lags in between are the sums of their neighbours, `(c(n−1) + c(n+1))/√2`, with the same noise
+//! variance. The loss at a peak is at most 0.9 dB, as with sampling at the base rate.
 //!
-//! A frequency offset shifts the spectrum, so that a hypothesis is but another choice of bins, a
-//! sixteenth of a subcarrier apart, before the transform back.
+//! A frequency offset shifts the spectrum, so that a hypothesis is a selection of bins, with a
+//! resolution of a sixteenth of a subcarrier, before the inverse transform.
 
 use std::sync::Arc;
 
@@ -25,64 +25,65 @@ use super::pss_symbol::pss_symbol;
 use super::received_grid::MAX_ANTENNAS;
 use super::whitening::whitening;
 
-/// Length of a transform of the overlap-save scheme.
+/// Length of an overlap-save transform.
 const BLOCK: usize = 4096;
-/// Length of the transform back: the PSS's half of the spectrum.
+/// Length of the inverse transform: the half of the spectrum that contains the PSS.
 const HALF_BLOCK: usize = BLOCK / 2;
 /// Bins on each side of a hypothesis.
 const QUARTER: usize = HALF_BLOCK / 2;
 /// Bins of a block's spectrum per subcarrier.
 const BINS_PER_SUBCARRIER: usize = BLOCK / SYMBOL_FFT;
-/// Correlation lags that one block yields.
+/// Number of correlation lags per block.
 const HOP: usize = BLOCK - SYMBOL_FFT;
-/// Two maxima of one PSS closer than this are one candidate.
+/// Minimum distance of two candidates of one PSS, in samples.
 const CANDIDATE_SPACING: usize = 12;
-/// Part of a block's energy that rings under other windows, with a margin that keeps its statistic
-/// below that of noise: 5e-8 of the energy, times 240.
+/// Fraction of a block's energy that leaks into other windows: 5e-8 of the energy, times 240, with
+/// a margin that keeps the statistic below that of noise.
 const RINGING: f64 = 1.2e-5;
-/// Resource elements that share a window's energy when the whole SSB band is occupied.
+/// Number of resource elements that share the energy of a window if the whole SSB band is occupied.
 const OCCUPIED: f32 = 240.0;
 
-/// A maximum of the matched filter above the threshold.
+/// Maximum of the matched filter above the threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PssCandidate {
     /// N_ID^(2), 0..=2.
     pub n_id_2: u8,
     /// First sample of the PSS without its cyclic prefix.
     pub sample: usize,
-    /// Carrier frequency offset of the hypothesis, Hz.
+    /// Carrier frequency offset of the hypothesis, in Hz.
     pub cfo_hz: f64,
-    /// Σ_a T_a; see the module.
+    /// Σ_a T_a, defined in the module documentation.
     pub statistic: f32,
 }
 
-/// Correlator with its transforms, replicas and buffers.
+/// Correlator with its FFT plans, replicas and buffers.
 pub struct MatchedFilter {
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
     bin_hz: f64,
-    /// Frequency offsets looked at, bins from the centre.
+    /// Hypotheses of the frequency offset, in bins relative to `centre`.
     hypotheses: Vec<isize>,
-    /// The frequency offset that they lie around, bins.
+    /// Central frequency offset of the hypotheses, in bins.
     centre: isize,
     /// Conjugated spectrum of each PSS.
     replicas: [Vec<Complex32>; 3],
     block: Vec<Complex32>,
     /// Spectrum of the block per antenna, lowest frequency first.
     spectra: Vec<Vec<Complex32>>,
-    /// 240 / energy under the window, per antenna and pair of lags.
+    /// 240 divided by the energy under the window, for each antenna and pair of lags.
     inverse_energy: Vec<Vec<f32>>,
     product: Vec<Complex32>,
     scratch: Vec<Complex32>,
-    /// Statistics of one hypothesis, then the best and whose it is: even lags, then odd ones.
+    /// Statistics of one hypothesis; maximum over the hypotheses; index of the maximum. Even lags
+    /// precede odd ones.
     sum: Vec<f32>,
     best: Vec<f32>,
     best_hypothesis: Vec<u32>,
 }
 
 impl MatchedFilter {
-    /// Correlator for `antennas` channels at 256 samples a symbol; offsets in Hz at subcarrier
-    /// spacing `scs_hz`, at most 64 subcarriers, each moved to the nearest bin.
+    /// Creates a correlator for `antennas` channels at 256 samples per symbol. Offsets are in Hz at
+    /// subcarrier spacing `scs_hz`, at most 64 subcarriers, rounded to the nearest bin.
     pub fn new(scs_hz: f64, cfo_hypotheses_hz: &[f64], antennas: usize) -> Self {
         let mut planner = FftPlanner::new();
         let forward = planner.plan_fft_forward(BLOCK);
@@ -93,7 +94,7 @@ impl MatchedFilter {
             forward.process(&mut replica);
             let (positive, negative) = (&replica[..QUARTER], &replica[BLOCK - QUARTER..]);
             let bins = positive.iter().chain(negative);
-            // The forward transform multiplies by BLOCK in the end.
+            // The forward transform has a gain of BLOCK, which is removed here.
             bins.map(|bin| bin.conj() / BLOCK as f32).collect()
         });
         let bin_hz = scs_hz / BINS_PER_SUBCARRIER as f64;
@@ -120,15 +121,15 @@ impl MatchedFilter {
         }
     }
 
-    /// Moves the hypotheses to lie around this offset; with it they reach 64 subcarriers at most.
+    /// Sets the central frequency offset of the hypotheses; all must remain within 64 subcarriers.
     pub fn centre(&mut self, cfo_hz: f64) {
         let widest = self.hypotheses.iter().map(|it| it.abs()).max().unwrap_or(0);
         let reach = QUARTER as isize - widest;
         self.centre = ((cfo_hz / self.bin_hz).round() as isize).clamp(-reach, reach);
     }
 
-    /// Appends to `candidates` the maxima above `threshold` whose PSS starts in
-    /// `first..end`; the PSS must lie inside the samples.
+    /// Appends to `candidates` the maxima above `threshold` of PSS that start in `first..end`; the
+    /// PSS must be within the samples.
     pub fn run<S: AsRef<[Complex32]>>(
         &mut self,
         antennas: &[S],
@@ -166,7 +167,7 @@ impl MatchedFilter {
         }
     }
 
-    /// The window of an antenna, or of the whitened channel in its place.
+    /// Loads the window of an antenna, or of its whitened channel.
     fn load_block(
         &mut self,
         antenna: usize,
@@ -188,12 +189,12 @@ impl MatchedFilter {
         }
     }
 
-    /// Spectrum of the block and the energy under the window at each pair of lags.
+    /// Computes the spectrum of the block and the energy under the window at each pair of lags.
     fn load_antenna(&mut self, antenna: usize) {
         let pair_energy =
             |pair: &[Complex32; 2]| f64::from(pair[0].norm_sqr() + pair[1].norm_sqr());
         let (pairs, _) = self.block.as_chunks::<2>();
-        // Silence beside a signal holds the signal's ringing: the spectrum is cut at half the band.
+        // Silence next to a signal contains the ringing of the band limitation.
         let silence = RINGING * pairs.iter().map(pair_energy).sum::<f64>();
         let mut energy: f64 = pairs[..SYMBOL_FFT / 2].iter().map(pair_energy).sum();
         let moves = pairs.iter().zip(&pairs[SYMBOL_FFT / 2..]);
@@ -209,7 +210,7 @@ impl MatchedFilter {
         negative.copy_from_slice(&self.block[BLOCK / 2..]);
     }
 
-    /// Leaves the largest statistic over the frequency hypotheses in `best`.
+    /// Computes the maximum statistic over the frequency hypotheses in `best`.
     fn correlate(&mut self, n_id_2: usize) {
         let (above, below) = self.replicas[n_id_2].split_at(QUARTER);
         for (hypothesis, shift) in self.hypotheses.iter().enumerate() {
@@ -247,7 +248,7 @@ impl MatchedFilter {
         candidates: &mut Vec<PssCandidate>,
     ) {
         for lag in 0..lags {
-            // Even lags come first, then odd ones.
+            // Even lags precede odd ones.
             let slot = lag / 2 + (lag % 2) * (HOP / 2);
             let (statistic, hypothesis) = (self.best[slot], self.best_hypothesis[slot]);
             if statistic < threshold {
@@ -272,7 +273,7 @@ impl MatchedFilter {
     }
 }
 
-/// Elementwise product; what `a` and `b` hold beyond the product's length is left.
+/// Elementwise product; further elements of `a` and `b` are ignored.
 fn multiply(product: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
     let n = product.len();
     let (a, b) = (&a[..n], &b[..n]);
@@ -284,10 +285,9 @@ fn multiply(product: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
     }
 }
 
-/// Adds the statistic of one antenna at the even and the odd lags, from the correlation at the
-/// even ones.
+/// Adds the statistic of one antenna at even and odd lags, from the correlation at even lags.
 fn add_power(even: &mut [f32], odd: &mut [f32], correlation: &[Complex32], inverse_energy: &[f32]) {
-    // Lengths made equal, so that the loop needs no checks.
+    // Equal lengths eliminate bounds checks in the loop.
     let lags = inverse_energy.len();
     let (even, odd) = (&mut even[..lags], &mut odd[..lags]);
     let (here, next) = (&correlation[..lags], &correlation[1..=lags]);
@@ -299,7 +299,7 @@ fn add_power(even: &mut [f32], odd: &mut [f32], correlation: &[Complex32], inver
     }
 }
 
-/// Keeps the larger statistic and whose it is, without a branch: lanes as wide as the statistics'.
+/// Keeps the larger statistic and its hypothesis, without a branch, so that the loop is vectorised.
 fn keep_best(best: &mut [f32], index: &mut [u32], sum: &[f32], hypothesis: u32) {
     let n = sum.len();
     let (best, index) = (&mut best[..n], &mut index[..n]);

@@ -1,4 +1,4 @@
-//! Signal processing of one SSB: filter, transform, offset, delay, channel, and how to undo them.
+//! Signal processing of one SSB: filter, transform, offset, delay, channel, and subtraction.
 
 pub(crate) mod alignment;
 pub(crate) mod base_rate;

@@ -1,17 +1,18 @@
-//! PSS anywhere in a band, at whatever frequency.
+//! PSS detection anywhere in a band, at any frequency.
 //!
-//! The three PSS are one m-sequence from three places on. Cut there it gives three segments of some
-//! 43 subcarriers, and each PSS holds all of them in another order. So a segment is correlated once
-//! at every subcarrier of the band, at a third of the PSS's rate, and the powers of three segments
-//! are added for each PSS at each frequency: nine times fewer samples are transformed back than by
-//! a matched filter for each PSS. (The powers added instead of the amplitudes cost 0.8 dB.)
+//! The three PSS are cyclic shifts of one m-sequence. Cut at the shifts, it has three segments of
+//! about 43 subcarriers, and each PSS contains all of them in another order. A segment is therefore
+//! correlated once at every subcarrier of the band, at a third of the PSS's rate. The powers of
+//! three segments are added for each PSS at each frequency. The inverse transforms have nine times
+//! fewer samples than those of a matched filter for each PSS. (Adding powers instead of amplitudes
+//! loses 0.8 dB.)
 //!
-//! Frequencies half way between two subcarriers, and lags half way between two samples, are the sums
-//! of their neighbours over √2, as of the lags in the [matched filter](super::matched_filter): a
-//! quarter off, the most there is, 0.9 dB are lost in frequency and 0.7 dB in time.
+//! Frequencies halfway between subcarriers, and lags halfway between samples, are the sums of their
+//! neighbours divided by √2, like the lags of the [matched filter](super::matched_filter). At the
+//! maximum distance of a quarter, the loss is 0.9 dB in frequency and 0.7 dB in time.
 //!
-//! Normalised by the energy under the window in the 48 subcarriers around a segment, each is in noise
-//! exponentially distributed with mean one.
+//! Each power is normalised by the energy under the window in the 48 subcarriers around the
+//! segment, and is exponentially distributed with mean one in noise.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -23,54 +24,58 @@ use super::base_rate::SYMBOL_FFT;
 use crate::numeric::phasors::fill_phasors;
 use crate::standard::sequence::pss::{SYNC_LEN, pss};
 
-/// Length of a transform of the overlap-save scheme, at the base rate.
+/// Length of an overlap-save transform, at the base rate.
 const BLOCK: usize = 2048;
 const BINS_PER_SUBCARRIER: usize = BLOCK / SYMBOL_FFT;
-/// Lags that one block yields, at the base rate.
+/// Number of lags per block, at the base rate.
 pub(crate) const HOP: usize = BLOCK - SYMBOL_FFT;
-/// Subcarriers around a segment that are transformed back.
+/// Number of subcarriers around a segment in an inverse transform.
 const WIDTH: usize = 48;
 const NARROW: usize = WIDTH * BINS_PER_SUBCARRIER;
-/// Samples at the base rate per narrow sample.
+/// Samples at the base rate per sample of the inverse transform.
 const STEP: f64 = BLOCK as f64 / NARROW as f64;
-/// Lags of a block in narrow samples.
+/// Number of lags per block, in samples of the inverse transform.
 const LAGS: usize = HOP * NARROW / BLOCK;
-/// Even and odd lags on a subcarrier, then those half a subcarrier above.
+/// Even and odd lags on a subcarrier, followed by those half a subcarrier above.
 const PLANE: usize = 4 * LAGS;
 /// First chip of each segment.
 const SEGMENTS: [usize; 3] = [0, 43, 86];
-/// The subcarrier in its middle.
+/// Central subcarrier of a segment.
 const MIDDLE: isize = 21;
-/// Subcarriers from the first of a PSS to its centre, and to its last segment's first at most.
+/// Number of subcarriers from the first of a PSS to its centre, and to the first of its last
+/// segment.
 const TO_CENTRE: isize = 64;
 const TO_LAST: isize = 86;
-/// Segment positions that a PSS needs, and one that is being filled.
+/// Number of segment positions of a PSS, plus one that is being filled.
 const RING: usize = TO_LAST as usize + 2;
-/// Subcarriers from one measurement of the energy to the next: all of a segment's lie inside the
-/// nearest, so that a strong neighbour at its edge is counted too.
+/// Subcarriers between measurements of the energy. The nearest one contains all subcarriers of a
+/// segment, so that a strong neighbour at its edge is included.
 const ENERGY_STEP: usize = 3;
-/// Cut to 48 subcarriers, a segment reaches out of its window: most of it this many narrow samples to
-/// either side, ...
+/// Number of samples on either side of the window into which most of a segment leaks, because it is
+/// limited to 48 subcarriers, ...
 const BESIDE: usize = 3;
-/// ... where up to 0.6 % of its energy lie. With 48 times that much of the energy there added to
-/// the window's, a strong signal beside a window of silence makes a statistic of one at most.
+/// ... up to 0.6 % of its energy. With 48 times this fraction of the neighbouring energy added to
+/// that of the window, a strong signal next to a silent window has a statistic of one at most.
 const LEAK: f32 = 0.29;
-/// The same of what lies further away, 7e-5 of a segment's energy, and of all the block's.
+/// Fraction for leakage beyond that distance, 7e-5 of a segment's energy, applied to the energy of
+/// the whole block.
 const FAR_LEAK: f32 = 1.2e-5;
 
-/// Most segment positions in a tile: 192 of 43 subcarriers lie inside the front end's 240.
+/// Maximum number of segment positions in a tile: 192 positions of 43 subcarriers are within the
+/// 240 of the front end.
 const TILE_POSITIONS: usize = 192;
 
-/// First subcarriers of segments that one tuning of the front end shows.
+/// First subcarriers of the segments that are visible with one tuning of the front end.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tile {
-    /// Subcarrier that is tuned to 0 Hz.
+    /// Subcarrier at 0 Hz.
     pub(crate) centre: isize,
     first: isize,
     positions: usize,
 }
 
-/// Tiles that show all PSS whose centre lies up to `reach` subcarriers off the band's.
+/// Returns tiles that contain all PSS with a centre up to `reach` subcarriers from that of the
+/// band.
 pub(crate) fn tiles(reach: usize) -> Vec<Tile> {
     let all = 2 * reach + TO_LAST as usize + 1;
     let count = all.div_ceil(TILE_POSITIONS);
@@ -89,37 +94,38 @@ pub(crate) fn tiles(reach: usize) -> Vec<Tile> {
         .collect()
 }
 
-/// A maximum.
+/// Maximum of the statistic.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SegmentMaximum {
     pub(crate) statistic: f32,
-    /// Where the PSS begins, without its cyclic prefix, in samples at the base rate.
+    /// Start of the PSS without its cyclic prefix, in samples at the base rate.
     pub(crate) sample: f64,
-    /// Subcarriers from the band's centre to the PSS's.
+    /// Subcarriers from the centre of the band to that of the PSS.
     pub(crate) subcarriers: f64,
 }
 
-/// Evaluations per lag at the base rate and subcarrier.
+/// Number of evaluations per lag at the base rate and subcarrier.
 pub(crate) const TRIALS: f64 = 3.0 * 4.0 / STEP;
 
-/// See the module; owns its transforms and buffers.
+/// PSS detector of the module documentation. It owns its FFT plans and buffers.
 pub(crate) struct SegmentFilter {
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
-    /// Conjugated spectrum of each segment, its middle at 0 Hz.
+    /// Conjugated spectrum of each segment, with its centre at 0 Hz.
     replicas: [Vec<Complex32>; 3],
-    /// Turns the correlation of the next subcarrier to that of this one, half way between them.
+    /// Phasors that align the correlation of the next subcarrier with that of the current one, for
+    /// the sum halfway between both.
     half_turns: Vec<Complex32>,
     block: Vec<Complex32>,
     scratch: Vec<Complex32>,
     /// Spectrum of each antenna's block, lowest frequency first.
     spectra: Vec<Vec<Complex32>>,
-    /// Per antenna and place of measurement: 48 / energy under the window.
+    /// 48 divided by the energy under the window, for each antenna and measurement.
     inverse_energy: Vec<Vec<[f32; LAGS]>>,
-    /// Per antenna and segment the correlation at the last subcarrier and at this one.
+    /// Correlation at the previous and the current subcarrier, for each antenna and segment.
     last: Vec<[Vec<Complex32>; 3]>,
     here: Vec<Complex32>,
-    /// Per position, modulo the ring, and segment: summed powers.
+    /// Summed powers for each position (modulo the ring) and segment.
     planes: Vec<[[f32; PLANE]; 3]>,
 }
 
@@ -132,7 +138,7 @@ impl SegmentFilter {
             .get_inplace_scratch_len()
             .max(inverse.get_inplace_scratch_len());
         let mut half_turns = vec![Complex32::ZERO; NARROW];
-        // Half a turn in the middle of the window, and one turn a symbol.
+        // Half a turn at the centre of the window, and one turn per symbol.
         fill_phasors(&mut half_turns, 0.5, 1.0 / WIDTH as f64);
         let narrow = vec![Complex32::ZERO; NARROW];
         Self {
@@ -153,8 +159,8 @@ impl SegmentFilter {
         }
     }
 
-    /// Appends the maxima above `threshold` of PSS that begin in `first..end`, samples at the base
-    /// rate; `bases` are the antennas' as each tile shows them.
+    /// Appends the maxima above `threshold` of PSS that begin in `first..end`, in samples at the
+    /// base rate. `bases` contains the samples of the antennas for each tile.
     pub(crate) fn run(
         &mut self,
         tiles: &[Tile],
@@ -188,11 +194,11 @@ impl SegmentFilter {
                 self.load(antenna, samples.get(start..).unwrap_or_default());
                 self.measure(antenna, tile);
             }
-            // One more, for what lies half way to it.
+            // One more position, for the frequency halfway to it.
             for number in 0..=tile.positions {
                 let position = tile.first + number as isize;
                 self.correlate(tile, position, number);
-                // All that a PSS needs which ends with the position before.
+                // All segments of the PSS that ends at the previous position are available.
                 let centre = position - 1 - (TO_LAST - TO_CENTRE);
                 if number > 0 && position - 1 - origin >= TO_LAST {
                     self.collect(centre, (start, narrow_lags), threshold, maxima);
@@ -201,7 +207,7 @@ impl SegmentFilter {
         }
     }
 
-    /// Spectrum of the block that begins with `samples`.
+    /// Computes the spectrum of the block that begins with `samples`.
     fn load(&mut self, antenna: usize, samples: &[Complex32]) {
         let length = samples.len().min(BLOCK);
         self.block[..length].copy_from_slice(&samples[..length]);
@@ -213,7 +219,7 @@ impl SegmentFilter {
         negative.copy_from_slice(&self.block[BLOCK / 2..]);
     }
 
-    /// Energy under the window around every so many positions of the tile.
+    /// Computes the energy under the window at every `ENERGY_STEP`-th position of the tile.
     fn measure(&mut self, antenna: usize, tile: &Tile) {
         for (number, slot) in self.inverse_energy[antenna].iter_mut().enumerate() {
             let position = tile.first + (number * ENERGY_STEP) as isize;
@@ -237,7 +243,8 @@ impl SegmentFilter {
                     })
                     .sum();
                 let all = energy as f32 + LEAK * beside;
-                // The sum over narrow samples, in samples at the base rate.
+                // Converts the sum over samples of the inverse transform to samples at the base
+                // rate.
                 let scale = WIDTH as f32 / STEP as f32;
                 *slot = if all > far.max(f32::MIN_POSITIVE) {
                     scale / all
@@ -249,7 +256,8 @@ impl SegmentFilter {
         }
     }
 
-    /// Powers of the segments that begin at a position, and half a subcarrier above the one before.
+    /// Computes the powers of the segments at a position, and half a subcarrier above the previous
+    /// one.
     fn correlate(&mut self, tile: &Tile, position: isize, number: usize) {
         let Some(centre) = bin(tile, position) else {
             return;
@@ -287,7 +295,8 @@ impl SegmentFilter {
         }
     }
 
-    /// Maxima of the three PSS whose centre is on this subcarrier or half above.
+    /// Collects the maxima of the three PSS with a centre on this subcarrier or half a subcarrier
+    /// above.
     fn collect(
         &self,
         centre: isize,
@@ -338,19 +347,20 @@ impl SegmentFilter {
     }
 }
 
-/// Bin of the middle of the segment that begins at a position, in a spectrum that begins with its
-/// lowest frequency; `None` where the segment's surroundings reach out of it.
+/// Returns the bin of the centre of the segment at a position, in a spectrum in ascending order of
+/// frequency; `None` if its 48 subcarriers are not within the spectrum.
 fn bin(tile: &Tile, position: isize) -> Option<usize> {
     let off = (position + MIDDLE - tile.centre) * BINS_PER_SUBCARRIER as isize;
     let centre = (BLOCK / 2).checked_add_signed(off)?;
     (centre >= NARROW / 2 && centre + NARROW / 2 <= BLOCK).then_some(centre)
 }
 
-/// Conjugated spectrum of a segment that lasts a symbol, lowest frequency first.
+/// Returns the conjugated spectrum of a segment with the duration of a symbol, in ascending order
+/// of frequency.
 fn replica(segment: usize) -> Vec<Complex32> {
     let end = SEGMENTS.get(segment + 1).copied().unwrap_or(SYNC_LEN);
     let chips = &pss(0)[SEGMENTS[segment]..end];
-    // Unit energy in 256 samples, and the transforms' factors against those of the energy.
+    // Unit energy in 256 samples, and the scale of the transforms relative to that of the energy.
     let scale = (SYMBOL_FFT as f64 / chips.len() as f64).sqrt();
     (0..NARROW)
         .map(|bin| {
@@ -381,7 +391,7 @@ fn multiply(product: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
     }
 }
 
-/// Adds the powers of a correlation at even lags and at the odd ones between; `fresh`: to nothing.
+/// Adds the powers of a correlation at even and odd lags; with `fresh`, the plane is overwritten.
 fn add_powers(plane: &mut [f32], correlation: &[Complex32], energy: &[f32; LAGS], fresh: bool) {
     let (even, odd) = plane.split_at_mut(LAGS);
     let (here, next) = (&correlation[..LAGS], &correlation[1..=LAGS]);
@@ -399,7 +409,7 @@ mod tests {
     use super::*;
     use crate::dsp::pss_symbol::pss_symbol;
 
-    /// Each PSS, in noise 10 dB below it and anywhere in the tiles, stands out where it is.
+    /// Detects each PSS at its position, in noise 10 dB below it, anywhere in the tiles.
     #[test]
     fn a_pss_is_seen_where_it_is() {
         let mut filter = SegmentFilter::new(1);
@@ -430,7 +440,7 @@ mod tests {
                 .map(|tile| {
                     let off = subcarriers - tile.centre as f64;
                     let mut samples = noise.clone();
-                    // The front end shows no more.
+                    // Limit of the front end's band.
                     if off.abs() < 183.0 {
                         for (n, chip) in symbol.iter().enumerate() {
                             let turn = 2.0 * PI * off * (at + n) as f64 / 256.0;

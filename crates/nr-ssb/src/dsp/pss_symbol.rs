@@ -1,4 +1,4 @@
-//! The PSS in time.
+//! PSS in the time domain.
 
 use num_complex::Complex32;
 use rustfft::FftPlanner;
@@ -6,7 +6,7 @@ use rustfft::FftPlanner;
 use super::base_rate::SYMBOL_FFT;
 use crate::standard::sequence::pss::pss;
 
-/// PSS in time, 256 samples of unit energy together, without cyclic prefix.
+/// Returns the PSS in the time domain: 256 samples with unit energy, without cyclic prefix.
 pub(crate) fn pss_symbol(n_id_2: u8) -> Vec<Complex32> {
     let mut symbol = vec![Complex32::ZERO; SYMBOL_FFT];
     for (n, chip) in pss(n_id_2).iter().enumerate() {

@@ -1,10 +1,10 @@
-//! What the antennas received of an SSB, as resource elements.
+//! Received resource elements of an SSB.
 
 use num_complex::Complex32;
 
 use crate::standard::grid::{SUBCARRIERS, SYMBOLS};
 
-/// Largest number of antennas.
+/// Maximum number of antennas.
 pub const MAX_ANTENNAS: usize = 16;
 
 /// Received resource elements of one antenna, `[symbol][subcarrier]`.

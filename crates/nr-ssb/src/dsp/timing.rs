@@ -1,4 +1,4 @@
-//! Timing to a fraction of a sample from the phase slope over the subcarriers.
+//! Fractional timing from the phase slope over the subcarriers.
 
 use std::f64::consts::TAU;
 
@@ -8,12 +8,12 @@ use super::base_rate::SYMBOL_FFT;
 use crate::numeric::phasors::fill_phasors;
 use crate::standard::grid::SUBCARRIERS;
 
-/// Groups of subcarriers that a small delay is estimated from.
+/// Number of subcarrier groups for the estimation of a small delay.
 const GROUPS: usize = 30;
 
-/// Delay in samples that maximises `Σ_r |Σ_k z_r(k) exp(j2πk'τ/256)|²`, `k' = k − 120`, over rows
-/// whose phases are unrelated (antennas, or antennas × symbols): the maximum-likelihood delay of
-/// one path. Looks in `±reach` samples on a grid of `1/4`, then by Newton's method.
+/// Returns the delay in samples that maximises `Σ_r |Σ_k z_r(k) exp(j2πk'τ/256)|²`, `k' = k − 120`,
+/// over rows with unrelated phases (antennas, or antennas × symbols): the maximum-likelihood delay
+/// of one path. The search covers `±reach` samples on a grid of `1/4`, followed by Newton's method.
 pub(crate) fn delay(rows: &[[Complex32; SUBCARRIERS]], reach: f64) -> f64 {
     let steps = (reach * 4.0).ceil() as i32;
     let mut best = (f64::NEG_INFINITY, 0.0);
@@ -27,8 +27,8 @@ pub(crate) fn delay(rows: &[[Complex32; SUBCARRIERS]], reach: f64) -> f64 {
     refine(rows, best.1, 3)
 }
 
-/// Newton's method for the maximum of [`delay`] from a near start; a step is at most 0.3 samples.
-/// `N` sums over equal groups of subcarriers serve as well as the 240.
+/// Newton's method for the maximum of [`delay`] from a nearby start, with steps of at most 0.3
+/// samples. `N` sums over equal groups of subcarriers are as accurate as 240 subcarriers.
 pub(crate) fn refine<const N: usize>(
     rows: &[[Complex32; N]],
     start: f64,
@@ -37,7 +37,7 @@ pub(crate) fn refine<const N: usize>(
     let mut delay = start;
     for _ in 0..iterations {
         let moments = moments(rows, delay);
-        // Beyond the inflection, half a sample away, uphill is all that is known.
+        // Beyond the inflection point, half a sample away, only the direction of ascent is known.
         delay += if moments.curvature < 0.0 {
             (-moments.slope / moments.curvature).clamp(-0.3, 0.3)
         } else {
@@ -47,10 +47,10 @@ pub(crate) fn refine<const N: usize>(
     delay
 }
 
-/// The same for a delay within half a sample of zero that is known to a tenth: the antennas are
-/// first combined by their sums over the subcarriers, and groups of eight subcarriers, over which
-/// such a delay turns the phase by less than 0.1 rad, are added up. Both cost less than 0.1 % of
-/// the information.
+/// Returns the delay if it is within half a sample of zero and known within a tenth. The antennas
+/// are combined by their sums over the subcarriers. Groups of eight subcarriers are added, over
+/// which the phase changes by less than 0.1 rad. Both simplifications lose less than 0.1 % of the
+/// information.
 pub(crate) fn refine_combined(rows: &[[Complex32; SUBCARRIERS]], near: f64) -> f64 {
     let mut combined = [[Complex32::ZERO; GROUPS]];
     for row in rows {
@@ -65,7 +65,7 @@ pub(crate) fn refine_combined(rows: &[[Complex32; SUBCARRIERS]], near: f64) -> f
     refine(&combined, near, 2)
 }
 
-/// Σ a, in two strands.
+/// Returns Σ a, in two strands.
 fn total<const N: usize>(a: &[Complex32; N]) -> Complex32 {
     let mut strands = [Complex32::ZERO; 2];
     for (i, z) in a.iter().enumerate() {
@@ -74,12 +74,12 @@ fn total<const N: usize>(a: &[Complex32; N]) -> Complex32 {
     strands[0] + strands[1]
 }
 
-/// `exp(j2πk'τ/256)`: takes a delay of τ samples out of the subcarriers.
+/// Returns `exp(j2πk'τ/256)`, which removes a delay of τ samples from the subcarriers.
 pub(crate) fn ramp(delay: f64) -> [Complex32; SUBCARRIERS] {
     group_ramp(delay)
 }
 
-/// The same at the centres of `N` groups.
+/// Returns the phase ramp at the centres of `N` groups.
 fn group_ramp<const N: usize>(delay: f64) -> [Complex32; N] {
     let mut ramp = [Complex32::ZERO; N];
     let cycles = delay / SYMBOL_FFT as f64;
@@ -87,12 +87,12 @@ fn group_ramp<const N: usize>(delay: f64) -> [Complex32; N] {
     ramp
 }
 
-/// Subcarriers of one of `groups` groups.
+/// Returns the number of subcarriers of one of `groups` groups.
 fn width(groups: usize) -> f64 {
     (SUBCARRIERS / groups) as f64
 }
 
-/// The middle of a group, in subcarriers from the SSB's centre.
+/// Returns the centre of a group, in subcarriers relative to the SSB's centre.
 fn centre(groups: usize, group: usize) -> f64 {
     (group as f64 + 0.5) * width(groups) - 0.5 - 120.0
 }
@@ -103,7 +103,7 @@ struct Moments {
     curvature: f64,
 }
 
-/// The objective and its first two derivatives with respect to the delay.
+/// Computes the objective and its first two derivatives with respect to the delay.
 fn moments<const N: usize>(rows: &[[Complex32; N]], delay: f64) -> Moments {
     let ramp = group_ramp::<N>(delay);
     let omega = TAU / SYMBOL_FFT as f64;

@@ -1,6 +1,6 @@
-//! Antennas made independent witnesses. Of a loaded neighbour all of them hear one waveform, and what
-//! in it happens to be like a PSS is like one at every antenna; whitened over the antennas, it is so
-//! at one of them.
+//! Whitening over the antennas. The signal of a loaded neighbour cell is the same waveform at all
+//! antennas, so that its accidental correlation with a PSS occurs at every antenna. After
+//! whitening, it occurs at one channel only.
 
 use num_complex::{Complex32, Complex64};
 
@@ -8,21 +8,21 @@ use super::base_rate::SSB_SAMPLES;
 use super::received_grid::MAX_ANTENNAS;
 use crate::numeric::hermitian::cholesky;
 
-/// The covariance is measured on every so many samples ...
+/// Step between samples for the covariance estimate, ...
 const STRIDE: usize = 4;
-/// ... in the quietest quarter of so many parts of a block: there a loaded neighbour is heard, and the
-/// SSBs that are looked for are not. Whitened too, a strong one would no longer stand before the weak
-/// ones that it covers.
+/// ... in the quietest quarter of this number of parts of a block. They contain a loaded neighbour
+/// cell, but not the SSBs that are searched for. If a strong SSB were whitened too, it would no
+/// longer be separated from weaker ones below it.
 const PARTS: usize = 64;
-/// Squared coherence of two antennas from which on it matters; noise has one in the number of
-/// samples.
+/// Squared coherence of two antennas above which whitening is applied; that of noise is the inverse
+/// of the number of samples.
 const COHERENT: f64 = 0.05;
 
 /// Rows of weights, one per whitened channel.
 pub(crate) type Weights = [[Complex32; MAX_ANTENNAS]; MAX_ANTENNAS];
 
-/// The inverse of the covariance's Cholesky factor, lower triangular; `None` where the antennas are
-/// independent as they are, and where there is little beside an SSB to tell it from.
+/// Returns the inverse of the covariance's Cholesky factor, lower triangular; `None` if the
+/// antennas are independent, or an SSB fills most of the block.
 pub(crate) fn whitening(antennas: &[&[Complex32]]) -> Option<Weights> {
     let count = antennas.len().min(MAX_ANTENNAS);
     let length = antennas.first()?.len();
@@ -48,7 +48,7 @@ pub(crate) fn whitening(antennas: &[&[Complex32]]) -> Option<Weights> {
             let sum: Complex32 = places.map(|n| antennas[i][n] * antennas[j][n].conj()).sum();
             covariance[i][j] = Complex64::new(f64::from(sum.re), f64::from(sum.im));
         }
-        // Channels that are copies of each other must not make the matrix singular.
+        // Keeps the matrix regular if channels are copies of each other.
         covariance[i][i] *= 1.0 + 1e-5;
         for j in 0..i {
             let powers = covariance[i][i].re * covariance[j][j].re;
@@ -81,7 +81,7 @@ pub(crate) fn whitening(antennas: &[&[Complex32]]) -> Option<Weights> {
 mod tests {
     use super::*;
 
-    /// Unit waveforms without likeness to each other.
+    /// Returns a unit waveform without correlation to those of other seeds.
     fn waveform(seed: u64) -> Vec<Complex32> {
         let mut state = seed;
         (0..4096)

@@ -1,59 +1,59 @@
-//! Diagnosis of recorded channels before anything is made of them.
+//! Diagnosis of recorded channels before processing.
 
 use num_complex::Complex32;
 
 use crate::numeric::decibel::decibel;
 
-/// Share of samples at the largest amplitude of a component from which on a channel counts as
-/// clipped. Noise reaches its largest value once.
+/// Minimum fraction of samples at the maximum amplitude of a component for a clipped channel. Noise
+/// reaches its maximum once.
 const CLIPPED_SHARE: f64 = 1e-3;
-/// Power below which a channel is silent: −140 dBFS, far below any converter's last bit.
+/// Maximum power of a silent channel: −140 dBFS, far below the resolution of any converter.
 const SILENT_DBFS: f64 = -140.0;
-/// Power below the strongest channel's from which on a channel counts as dead, dB.
+/// Minimum power difference from the strongest channel for a dead channel, in dB.
 const WEAK_DB: f64 = 40.0;
-/// Magnitude of the correlation coefficient from which on two channels are one: two antennas of
-/// one strong plane wave stay below it, because each has noise of its own.
+/// Minimum magnitude of the correlation coefficient of identical channels. Two antennas of one
+/// strong plane wave are below it, because their noise is independent.
 const DUPLICATE_CORRELATION: f64 = 1.0 - 1e-9;
 
-/// What is wrong with a channel.
+/// Fault of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
-    /// Samples that are not finite; the receiver takes them for zero.
+    /// Samples that are not finite; the receiver replaces them by zero.
     NotFinite {
-        /// How many.
+        /// Number of these samples.
         samples: usize,
     },
-    /// No signal at all.
+    /// No signal.
     Silent,
-    /// Far weaker than the strongest channel.
+    /// Power far below that of the strongest channel.
     Weak {
-        /// How much, dB.
+        /// Difference in dB.
         below_strongest_db: f64,
     },
-    /// Many samples at the largest amplitude.
+    /// Many samples at the maximum amplitude.
     Clipped {
-        /// Share of samples.
+        /// Fraction of samples.
         share: f64,
     },
-    /// The same samples as in another channel, but for a constant factor.
+    /// Samples identical to those of another channel, up to a constant factor.
     Duplicate {
-        /// The other channel, a lower number.
+        /// Index of the other channel, which is lower.
         of: usize,
     },
 }
 
-/// State of one channel.
+/// Diagnosis of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelDiagnosis {
-    /// Mean power, 0 dB for a tone of amplitude one.
+    /// Mean power; 0 dB for a tone of amplitude one.
     pub power_dbfs: f64,
-    /// What is wrong; empty for a healthy channel.
+    /// Faults; empty for a healthy channel.
     pub faults: Vec<Fault>,
 }
 
 impl ChannelDiagnosis {
-    /// Nothing is wrong.
+    /// Whether there are no faults.
     pub fn is_healthy(&self) -> bool {
         self.faults.is_empty()
     }
@@ -104,18 +104,19 @@ fn power_dbfs(samples: &[Complex32]) -> f64 {
     decibel(energy / samples.len().max(1) as f64)
 }
 
-/// Share of samples with a component within a thousandth of the largest.
+/// Returns the fraction of samples with a component within a thousandth of the maximum.
 fn share_at_largest(samples: &[Complex32]) -> f64 {
     let reach = |x: &Complex32| x.re.abs().max(x.im.abs());
     let largest = finite(samples).map(reach).fold(0.0, f32::max);
     let near = finite(samples)
         .filter(|x| reach(x) > 0.999 * largest)
         .count();
-    // A handful always is: the largest itself, and its equals in a recording of small integers.
+    // A few samples always are: the maximum itself, and equal values in a recording of small
+    // integers.
     near.saturating_sub(8) as f64 / samples.len().max(1) as f64
 }
 
-/// Magnitude of the correlation coefficient.
+/// Returns the magnitude of the correlation coefficient.
 fn correlation(a: &[Complex32], b: &[Complex32]) -> f64 {
     let (mut re, mut im, mut energy_a, mut energy_b) = (0.0, 0.0, 0.0, 0.0);
     for (x, y) in a
@@ -151,7 +152,7 @@ mod tests {
             state = state
                 .wrapping_mul(6364136223846793005)
                 .wrapping_add(1442695040888963407);
-            // The sum of four is near enough to a bell that its largest value is rare.
+            // The sum of four has a bell-shaped distribution, in which the maximum is rare.
             (0..4)
                 .map(|i| (state >> (16 * i) & 0xFFFF) as f32 / 65536.0 - 0.5)
                 .sum::<f32>()

@@ -1,11 +1,12 @@
-//! Front end: brings the SSB's centre to 0 Hz and the recording to the base rate of 256 samples a
-//! symbol, with everything outside the SSB's 240 subcarriers filtered away.
+//! Front end: shifts the SSB's centre to 0 Hz, resamples to the base rate of 256 samples per
+//! symbol, and filters everything outside the SSB's 240 subcarriers.
 //!
-//! Overlap-save in the frequency domain: a block of the input is transformed once, the bins around
-//! the SSB are weighted with a zero-phase raised-cosine low-pass and transformed back at the base
-//! rate. Mixing costs nothing (it is the choice of bins), and output sample `j` belongs exactly to
-//! input time `j · M / L`. What comes at the base rate with the SSB at 0 Hz passes as it is: the filter
-//! would take eight subcarriers off either side, which demodulation keeps apart anyway.
+//! Overlap-save method in the frequency domain: a block of the input is transformed once. The bins
+//! around the SSB are weighted with a zero-phase raised-cosine low-pass filter and transformed back
+//! at the base rate. Mixing is a selection of bins, without computation. Output sample `j`
+//! corresponds exactly to input time `j · M / L`. An input at the base rate with the SSB at 0 Hz is
+//! passed unchanged, because the filter would remove eight subcarriers on either side, which
+//! demodulation separates anyway.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -16,30 +17,31 @@ use rustfft::{Fft, FftPlanner};
 use crate::dsp::base_rate::SYMBOL_FFT;
 use crate::dsp::received_grid::MAX_ANTENNAS;
 
-/// Most that the input rate may be of the base rate.
+/// Maximum ratio of the input rate to the base rate.
 const MOST_OVERSAMPLING: f64 = 4096.0;
-/// Largest numerator of the fraction that the base rate is of the input rate.
+/// Maximum numerator of the ratio of base rate to input rate.
 const MOST_INTERPOLATION: usize = 1024;
-/// By how much that fraction may miss the rates, relative: a tenth of what good oscillators do.
+/// Maximum relative error of that ratio: a tenth of a good oscillator's error.
 const RATE_TOLERANCE: f64 = 1e-7;
-/// Most samples at the base rate in an output block of the overlap-save scheme.
+/// Maximum number of samples in an output block of the overlap-save method, at the base rate.
 const MOST_BLOCK: usize = 4096;
-/// Samples at the base rate dropped on each side of a block at least: the reach of the low-pass.
+/// Minimum number of samples that are discarded on each side of a block, at the base rate: the
+/// length of the low-pass filter.
 const LEAST_MARGIN: usize = 128;
-/// Carrier frequency offset that must pass the filter unharmed, in subcarriers.
+/// Carrier frequency offset within the passband of the filter, in subcarriers.
 const CFO_MARGIN_SUBCARRIERS: f64 = 0.7;
 
-/// What makes a front end impossible.
+/// Reason why a front end is impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrontEndError {
-    /// The input rate is not positive, or stands in no simple ratio to the base rate.
+    /// The input rate is not positive, or has no simple ratio to the base rate.
     #[error(
         "sample rate {input_hz} Hz: {base_hz} Hz must be a fraction of it, up to 1024 over any \
          integer, within 0.1 ppm (10, 20, 25, 50 Msps and all multiples of 3.84 Msps are)"
     )]
     Rate {
-        /// The recording's rate.
+        /// Sample rate of the recording.
         input_hz: f64,
         /// 256 × subcarrier spacing.
         base_hz: f64,
@@ -47,7 +49,7 @@ pub enum FrontEndError {
     /// The input rate is below the base rate of the numerology.
     #[error("sample rate {input_hz} Hz is below the {base_hz} Hz that the SSB needs")]
     RateTooLow {
-        /// The recording's rate.
+        /// Sample rate of the recording.
         input_hz: f64,
         /// 256 × subcarrier spacing.
         base_hz: f64,
@@ -55,44 +57,44 @@ pub enum FrontEndError {
     /// No antenna, or more than [`MAX_ANTENNAS`].
     #[error("{0} antennas: 1 to {MAX_ANTENNAS} are possible")]
     Antennas(usize),
-    /// The SSB lies outside the recorded band.
+    /// The SSB is outside the recorded band.
     #[error("an SSB {offset_hz} Hz off the centre does not fit a band of {input_hz} Hz")]
     OutOfBand {
         /// SSB centre minus recording centre.
         offset_hz: f64,
-        /// The recording's rate.
+        /// Sample rate of the recording.
         input_hz: f64,
     },
-    /// The number of antennas given differs from that announced.
+    /// The number of antennas differs from the configuration.
     #[error("{given} antennas given, {expected} expected")]
     AntennaCount {
         /// Number of channels passed.
         given: usize,
-        /// Number of channels the front end was made for.
+        /// Configured number of channels.
         expected: usize,
     },
-    /// The antennas' blocks differ in length.
+    /// The blocks of the antennas have different lengths.
     #[error("antennas hold different numbers of samples: {first} and {other}")]
     UnequalLengths {
         /// Length of antenna 0.
         first: usize,
-        /// A length that differs.
+        /// Length that differs.
         other: usize,
     },
 }
 
-/// Mixer, low-pass and rate conversion by L/M for all antennas of one receiver: L/M = 1/4 from 30.72
-/// to 7.68 Msps, 2/3 from 11.52, 48/125 from 20.
+/// Mixer, low-pass filter and rate conversion by L/M for all antennas of one receiver: L/M = 1/4
+/// from 30.72 to 7.68 Msps, 2/3 from 11.52, 48/125 from 20.
 pub struct FrontEnd {
     input_rate_hz: f64,
     scs_hz: f64,
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
-    /// Input samples that make one output block.
+    /// Number of input samples of one output block.
     input_block: usize,
-    /// Output samples dropped on each side of a block, a multiple of L.
+    /// Number of output samples that are discarded on each side of a block, a multiple of L.
     margin: usize,
-    /// Output samples per input block: L/M.
+    /// Numerator L of the rate ratio L/M.
     interpolation: usize,
     decimation: usize,
     tuning: Tuning,
@@ -100,25 +102,26 @@ pub struct FrontEnd {
     spectrum: Vec<Complex32>,
     block: Vec<Complex32>,
     scratch: Vec<Complex32>,
-    /// Per antenna, input not yet consumed; begins `margin` output samples before the next output.
+    /// Input that is not yet consumed, for each antenna; it begins `margin` output samples before
+    /// the next output.
     pending: Vec<Vec<Complex32>>,
-    /// Samples put in so far, per antenna.
+    /// Number of input samples so far, for each antenna.
     consumed_input: u64,
-    /// Samples given out so far, per antenna.
+    /// Number of output samples so far, for each antenna.
     produced: u64,
 }
 
-/// Which frequency becomes 0 Hz.
+/// Frequency that is shifted to 0 Hz.
 #[derive(Debug, Clone, Copy, Default)]
 struct Tuning {
     /// Bin of the input spectrum.
     centre_bin: i64,
-    /// What the choice of bins leaves, in cycles per output sample.
+    /// Residual of the selection of bins, in cycles per output sample.
     residual_cycles: f64,
 }
 
 impl FrontEnd {
-    /// A front end from `input_rate_hz` to `256 × scs_hz`, for an SSB whose centre lies
+    /// Creates a front end from `input_rate_hz` to `256 × scs_hz`, for an SSB whose centre is
     /// `offset_hz` above that of the recording.
     ///
     /// # Errors
@@ -169,8 +172,8 @@ impl FrontEnd {
         Ok(front_end)
     }
 
-    /// Moves to an SSB at another offset from the recording's centre. Between recordings only: in
-    /// the middle of a stream the phase would jump.
+    /// Sets another offset of the SSB from the recording's centre. Permitted between recordings
+    /// only, because the phase would jump within a stream.
     ///
     /// # Errors
     /// [`FrontEndError::OutOfBand`].
@@ -196,14 +199,14 @@ impl FrontEnd {
         })
     }
 
-    /// Input samples per output sample, M/L.
+    /// Returns the number of input samples per output sample, M/L.
     pub fn input_per_output(&self) -> f64 {
         self.decimation as f64 / self.interpolation as f64
     }
 
-    /// Takes the next samples of every antenna and appends what can be computed to `output`,
-    /// one vector per antenna. About 4096 samples at the base rate are held back where there is something
-    /// to convert.
+    /// Processes the next samples of every antenna and appends the available output to `output`,
+    /// one vector per antenna. With a rate conversion, about 4096 samples at the base rate are
+    /// delayed.
     ///
     /// # Errors
     /// [`FrontEndError::AntennaCount`], [`FrontEndError::UnequalLengths`].
@@ -242,14 +245,15 @@ impl FrontEnd {
         Ok(())
     }
 
-    /// Whether there is nothing to convert.
+    /// Whether the input is passed unchanged.
     fn passes(&self, tuning: &Tuning) -> bool {
         self.interpolation == self.decimation
             && tuning.centre_bin == 0
             && tuning.residual_cycles == 0.0
     }
 
-    /// Ends the stream: appends the samples held back. The front end is then ready for another.
+    /// Ends the stream and appends the delayed samples. The front end is then ready for another
+    /// stream.
     pub fn finish(&mut self, output: &mut [Vec<Complex32>]) {
         self.finish_at(&[self.tuning], &mut [output]);
     }
@@ -276,7 +280,7 @@ impl FrontEnd {
         self.produced = 0;
     }
 
-    /// A whole recording at once: [`push`](Self::push) and [`finish`](Self::finish).
+    /// Processes a whole recording: [`push`](Self::push) and [`finish`](Self::finish).
     ///
     /// # Errors
     /// As [`push`](Self::push).
@@ -290,8 +294,8 @@ impl FrontEnd {
         Ok(output)
     }
 
-    /// A whole recording brought to several offsets at once, each with its own output for every
-    /// antenna: the transform of the input, most of the work at high rates, is done only once.
+    /// Processes a whole recording at several offsets, each with its own output for every antenna.
+    /// The transform of the input, which takes most of the time at high rates, is computed once.
     ///
     /// # Errors
     /// As [`tune`](Self::tune) and [`push`](Self::push).
@@ -370,7 +374,8 @@ impl FrontEnd {
         }
     }
 
-    /// Leaves the part of `spectrum` around the tuning, filtered and at the base rate, in `block`.
+    /// Computes the part of `spectrum` around the tuning, filtered and at the base rate, in
+    /// `block`.
     fn filter_block(&mut self, tuning: &Tuning) {
         let length = self.block.len();
         let first = (tuning.centre_bin - (length / 2) as i64).rem_euclid(self.input_block as i64);
@@ -386,7 +391,8 @@ impl FrontEnd {
             .process_with_scratch(&mut self.block, &mut self.scratch);
     }
 
-    /// Phase of the mixer at the first sample of the next output hop, and its step per sample.
+    /// Returns the phase of the mixer at the first sample of the next output block, and its step
+    /// per sample.
     fn block_phase(&self, tuning: &Tuning) -> (Complex64, Complex64) {
         let hop_start = i128::from(self.produced) - self.margin as i128;
         let start_input = hop_start / self.interpolation as i128 * self.decimation as i128;
@@ -401,9 +407,9 @@ impl FrontEnd {
     }
 }
 
-/// Weights of the bins of an output block, lowest frequency first: one over the 240 subcarriers and
-/// the tolerated frequency offset, a raised-cosine edge down to the Nyquist frequency, and the scale
-/// of the transforms.
+/// Returns the weights of the bins of an output block, in ascending order of frequency: one over
+/// the 240 subcarriers and the tolerated frequency offset, a raised-cosine edge to the Nyquist
+/// frequency, and the scale of the transforms.
 fn low_pass(block: usize, input_block: usize) -> Vec<f32> {
     let bins_per_subcarrier = block as f64 / SYMBOL_FFT as f64;
     let pass = (120.5 + CFO_MARGIN_SUBCARRIERS) * bins_per_subcarrier;
@@ -417,7 +423,7 @@ fn low_pass(block: usize, input_block: usize) -> Vec<f32> {
         .collect()
 }
 
-/// L and M, the base rate being L/M of the input rate.
+/// Returns L and M; the base rate is L/M of the input rate.
 fn rate_ratio(input_hz: f64, base_hz: f64) -> Result<(usize, usize), FrontEndError> {
     if !(input_hz > 0.0 && base_hz > 0.0 && input_hz <= MOST_OVERSAMPLING * base_hz) {
         return Err(FrontEndError::Rate { input_hz, base_hz });

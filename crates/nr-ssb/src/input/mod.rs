@@ -1,4 +1,4 @@
-//! Recorded samples before anything is looked for in them.
+//! Recorded samples before any search.
 
 pub mod diagnose;
 pub mod front_end;

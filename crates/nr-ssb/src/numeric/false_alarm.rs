@@ -1,7 +1,7 @@
-//! Thresholds from the probability of a false alarm.
+//! Detection thresholds from the false-alarm probability.
 
-/// The threshold that the sum of `shape` independent unit exponentials exceeds with `probability`:
-/// the inverse of the gamma distribution's tail `e^{−t} Σ_{i<shape} t^i / i!`.
+/// Returns the threshold that the sum of `shape` independent unit exponentials exceeds with
+/// `probability`: the inverse of the gamma distribution's tail `e^{−t} Σ_{i<shape} t^i / i!`.
 pub(crate) fn exponential_sum_threshold(shape: usize, probability: f64) -> f64 {
     let log_tail = |t: f64| -> f64 {
         let (mut term, mut sum) = (1.0, 1.0);
@@ -35,7 +35,7 @@ mod tests {
 
     #[test]
     fn four_exponentials_match_the_gamma_tail() {
-        // P(Gamma(4) > 13.06224) = 1e-3: a chi-square of 8 degrees at 26.12448.
+        // P(Gamma(4) > 13.06224) = 1e-3: a χ² variable with 8 degrees of freedom at 26.12448.
         assert!((exponential_sum_threshold(4, 1e-3) - 13.06224).abs() < 1e-4);
     }
 }

@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 pub(crate) type Matrix<const N: usize> = [[Complex64; N]; N];
 
-/// Lower Cholesky factor, its diagonal inverted; `None` unless positive definite.
+/// Returns the lower Cholesky factor with an inverted diagonal; `None` unless positive definite.
 pub(crate) fn cholesky<const N: usize>(matrix: &Matrix<N>) -> Option<Matrix<N>> {
     let mut factor = [[Complex64::ZERO; N]; N];
     for i in 0..N {

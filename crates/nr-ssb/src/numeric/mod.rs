@@ -1,4 +1,4 @@
-//! Arithmetic that knows nothing of SSBs.
+//! Arithmetic without knowledge of SSBs.
 
 pub(crate) mod decibel;
 pub(crate) mod false_alarm;

@@ -1,16 +1,17 @@
-//! Angles, and numbers that turn.
+//! Phase wrapping and phasors.
 
 use std::f64::consts::TAU;
 
 use num_complex::{Complex32, Complex64};
 
-/// An angle brought into ±π.
+/// Wraps an angle into ±π.
 pub(crate) fn wrap(angle_rad: f64) -> f64 {
     angle_rad - TAU * (angle_rad / TAU).round()
 }
 
-/// `phasors[n] = exp(j2π (first + n · step))`, cycles. The recursion runs in four strands of
-/// double precision, so that its latency does not matter and its error stays below 1e-12.
+/// Fills `phasors[n] = exp(j2π (first + n · step))`, with `first` and `step` in cycles. The
+/// recursion has four interleaved strands in double precision, which hides its latency and keeps
+/// its error below 1e-12.
 pub(crate) fn fill_phasors(phasors: &mut [Complex32], first: f64, step: f64) {
     const STRANDS: usize = 4;
     let stride = Complex64::cis(TAU * step * STRANDS as f64);

@@ -1,10 +1,11 @@
-//! Sums over arrays in several strands: without them every addition waits for the one before.
+//! Sums over arrays in several interleaved strands, so that an addition does not wait for the
+//! previous one.
 
 use num_complex::Complex32;
 
 const STRANDS: usize = 8;
 
-/// Σ a b.
+/// Returns Σ a b.
 pub(crate) fn inner_product<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
     let (a_chunks, a_rest) = a.as_chunks::<STRANDS>();
     let (b_chunks, b_rest) = b.as_chunks::<STRANDS>();
@@ -21,7 +22,7 @@ pub(crate) fn inner_product<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
     sum
 }
 
-/// Σ a b, neither conjugated.
+/// Returns Σ a b without conjugation.
 pub(crate) fn complex_product<const N: usize>(a: &[Complex32; N], b: &[Complex32; N]) -> Complex32 {
     let (mut re, mut im) = ([0.0_f32; STRANDS], [0.0_f32; STRANDS]);
     for i in 0..N {
@@ -32,7 +33,7 @@ pub(crate) fn complex_product<const N: usize>(a: &[Complex32; N], b: &[Complex32
     Complex32::new(re.iter().sum(), im.iter().sum())
 }
 
-/// Σ |a|².
+/// Returns Σ |a|².
 pub(crate) fn energy<const N: usize>(a: &[Complex32; N]) -> f32 {
     let mut strands = [0.0_f32; STRANDS];
     for i in 0..N {

@@ -1,4 +1,4 @@
-//! From a PSS candidate to an identified, aligned and equalised SSB.
+//! Identification, alignment and equalisation of an SSB, starting from a PSS candidate.
 
 use num_complex::Complex32;
 
@@ -22,36 +22,37 @@ use crate::standard::sequence::dmrs::dmrs;
 use crate::standard::sequence::pss::{SYNC_LEN, pss};
 use crate::standard::sequence::sss::sss;
 
-/// An SSS below this is noise: the largest of 336 unit exponentials has 5.8 in the median.
+/// Threshold of the SSS statistic: the median of the maximum of 336 unit exponentials is 5.8.
 const SSS_FLOOR: f32 = 6.0;
-/// Samples around the matched filter's maximum in which the delay is looked for.
+/// Range of the delay search around the maximum of the matched filter, in samples.
 const DELAY_REACH: f64 = 2.0;
 
-/// An identified SSB.
+/// Identified SSB.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Acquired {
     pub(crate) pci: Pci,
     pub(crate) ibar_ssb: u8,
     pub(crate) alignment: Alignment,
-    /// Carrier frequency offset by the insides of the symbols alone, cycles per sample.
+    /// Carrier frequency offset estimated within the symbols, in cycles per sample.
     pub(crate) coarse_cfo_cycles: f64,
-    /// PSS, SSS and DM-RS statistics together: in noise a sum of `antennas + 4` exponentials.
+    /// Sum of the PSS, SSS and DM-RS statistics: in noise the sum of `antennas + 4` unit
+    /// exponentials.
     pub(crate) statistic: f32,
 }
 
-/// Identifies SSBs, and keeps the grids and the channel of the last one.
+/// Identifies SSBs, and stores the grids and the channel of the last one.
 pub(crate) struct Acquirer {
     sss: SssTable,
     pss_symbols: [Vec<Complex32>; 3],
     pub(crate) demodulator: Demodulator,
     pub(crate) estimate: ChannelEstimator,
     pub(crate) grids: Vec<ReceivedGrid>,
-    /// What is known of the SSB's resource elements.
+    /// Known resource elements of the SSB.
     pub(crate) reference: SsbGrid,
     base_rate_hz: f64,
-    /// Phase from symbol to symbol by TS 38.211 §5.4, when the SSB's frequency is known.
+    /// Phase step per symbol due to TS 38.211 §5.4, if the SSB's frequency is known.
     carrier_step: Option<f64>,
-    /// A PSS that stands out less than this, correlated noise allowed for, is none.
+    /// Minimum PSS statistic with whitened noise.
     pss_floor: f32,
 }
 
@@ -75,12 +76,12 @@ impl Acquirer {
         }
     }
 
-    /// Moves to an SSB at another frequency.
+    /// Sets another SSB frequency.
     pub(crate) fn tune(&mut self, ssb_freq_hz: Option<f64>) {
         self.carrier_step = ssb_freq_hz.map(|hz| cfo::carrier_reset_step(hz, self.base_rate_hz));
     }
 
-    /// Identifies the SSB behind a candidate; `None` where there is none, or not all of it.
+    /// Identifies the SSB of a candidate; `None` if there is none, or it is incomplete.
     pub(crate) fn acquire<S: AsRef<[Complex32]>>(
         &mut self,
         antennas: &[S],
@@ -96,7 +97,7 @@ impl Acquirer {
             cfo_cycles: coarse_cfo_cycles,
             phase_step: 0.0,
         };
-        // The PSS gives the channel that the SSS is judged with.
+        // The channel estimate for the SSS detection uses the PSS.
         self.know_pss(candidate.n_id_2);
         let flat = [Complex32::ONE; SYMBOLS];
         self.demodulator
@@ -116,7 +117,7 @@ impl Acquirer {
         if cell.statistic < SSS_FLOOR {
             return None;
         }
-        // PSS and SSS, brought to one phase, give the channel that the DM-RS is judged with.
+        // The channel estimate for the DM-RS detection uses PSS and SSS with aligned phases.
         let pci = cell.hypothesis;
         self.know_sss(pci);
         let phases = [
@@ -141,8 +142,8 @@ impl Acquirer {
         })
     }
 
-    /// With all of `reference`: frequency offset from the phase between symbols, delay from that
-    /// over the subcarriers, then the grids, the channel and the noise anew.
+    /// Aligns the SSB with all of `reference`: frequency offset from the phase between symbols,
+    /// delay from the phase over the subcarriers, then new grids, channel and noise.
     pub(crate) fn align<S: AsRef<[Complex32]>>(
         &mut self,
         antennas: &[S],
@@ -150,7 +151,7 @@ impl Acquirer {
     ) -> Option<()> {
         let mut step = self.phase_step();
         for _ in 0..2 {
-            // The grids, demodulated before, still have this step.
+            // The grids were demodulated before, and still contain this phase step.
             let phases = Alignment {
                 phase_step: step,
                 ..*alignment
@@ -176,8 +177,8 @@ impl Acquirer {
         Some(())
     }
 
-    /// Log-likelihood ratios of the 864 PBCH bits, positive for 0: maximum-ratio combining over the
-    /// antennas, then `2√2 Re`, `2√2 Im` of `Σ h* y / σ²`.
+    /// Computes the log-likelihood ratios of the 864 PBCH bits, positive for 0: maximum-ratio
+    /// combining over the antennas, then `2√2 Re`, `2√2 Im` of `Σ h* y / σ²`.
     pub(crate) fn log_likelihood_ratios(
         &self,
         pci: Pci,
@@ -196,12 +197,13 @@ impl Acquirer {
                 sum += product * weight as f32;
             }
             let soft = sum * phases[symbol] * (2.0 * std::f32::consts::SQRT_2);
-            // Bounded, so that a recording without noise still gives finite numbers.
+            // Clamped, so that a recording without noise has finite values.
             *pair = [soft.re.clamp(-1e4, 1e4), soft.im.clamp(-1e4, 1e4)];
         }
     }
 
-    /// Received power over noise of a resource element, summed over the antennas.
+    /// Returns the ratio of received power to noise of a resource element, summed over the
+    /// antennas.
     pub(crate) fn snr(&self) -> f64 {
         let channels = self
             .estimate
@@ -235,12 +237,12 @@ impl Acquirer {
         self.reference.put(*dmrs_indices(pci), dmrs(pci, ibar_ssb));
     }
 
-    /// Adds the decoded and encoded PBCH to what is known.
+    /// Adds the decoded and re-encoded PBCH to the known elements.
     pub(crate) fn know_pbch(&mut self, pci: Pci, symbols: &[Complex32; PBCH_LEN]) {
         self.reference.put(*pbch_indices(pci), *symbols);
     }
 
-    /// Forgets the PSS, which cells may share, and returns it.
+    /// Removes the PSS, which other cells may share, from the known elements and returns it.
     pub(crate) fn forget_pss(&mut self) -> [Complex32; SYNC_LEN] {
         let mut pss = [Complex32::ZERO; SYNC_LEN];
         let known = &mut self.reference.elements_mut()[pss_indices()];
@@ -249,7 +251,7 @@ impl Acquirer {
         pss
     }
 
-    /// Step of phase per symbol of the grids, by the last channel estimate.
+    /// Returns the phase step per symbol of the grids, with the last channel estimate.
     fn phase_step(&self) -> f64 {
         cfo::symbol_phase_step(&self.estimate.symbol_pairs(&self.grids, &self.reference))
     }

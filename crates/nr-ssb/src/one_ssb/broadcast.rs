@@ -1,4 +1,4 @@
-//! PBCH of an acquired SSB: which burst set size, and what it says.
+//! PBCH of an identified SSB: burst set size and message.
 
 use num_complex::Complex32;
 
@@ -11,40 +11,40 @@ use crate::standard::numerology::{Lmax, SubcarrierSpacing};
 use crate::standard::pbch::{self, Decoder, Period};
 use crate::standard::pci::Pci;
 
-/// Periods that are combined at most, the latest included.
+/// Maximum number of combined periods, including the latest.
 const PERIODS: usize = 4;
-/// PBCHs kept that did not decode alone.
+/// Maximum number of stored PBCHs that were not decodable alone.
 const KEPT: usize = 32;
-/// Half frames after which the SFN's high bits have changed for certain.
+/// Half frames after which the high bits of the SFN have changed.
 const LONGEST_HALF_FRAMES: f64 = 32.0;
-/// How far from a multiple of 5 ms a repetition may lie, samples: clock drift.
+/// Maximum deviation of a repetition from a multiple of 5 ms, in samples, due to clock drift.
 const PERIOD_TOLERANCE: f64 = 3.0;
 
-/// What a PBCH says, and the burst set size that it says it for.
+/// Message of a PBCH and its burst set size.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Broadcast {
     pub(crate) payload: BchPayload,
-    /// None where the PBCH says the same under another size, and the band leaves it open.
+    /// `None` if the message is also valid for another size, and the band permits either.
     pub(crate) lmax: Option<Lmax>,
-    /// Its resource elements, encoded again.
+    /// Re-encoded resource elements.
     pub(crate) symbols: [Complex32; PBCH_LEN],
 }
 
-/// A PBCH that did not decode alone.
+/// PBCH that was not decodable alone.
 struct Undecoded {
     pci: Pci,
     ibar_ssb: u8,
-    /// First sample of its SSB.
+    /// First sample of the SSB.
     time: f64,
     llrs: [f32; E],
 }
 
-/// PBCH decoder that tries the admissible burst set sizes, and combines periods of a weak cell.
+/// PBCH decoder that tries the possible burst set sizes, and combines periods of a weak cell.
 pub(crate) struct BroadcastDecoder {
     decoder: Decoder,
     llrs: [f32; E],
     spacing: SubcarrierSpacing,
-    /// The burst set size, when told.
+    /// Burst set size, if known.
     told: Option<Lmax>,
     size: LikelyLmax,
     undecoded: Vec<Undecoded>,
@@ -52,8 +52,8 @@ pub(crate) struct BroadcastDecoder {
 }
 
 impl BroadcastDecoder {
-    /// A decoder for SSBs of this spacing, `lmax` of them per burst set if that is known, at this
-    /// frequency if that is.
+    /// Creates a decoder for SSBs of a spacing, with the burst set size `lmax` and the frequency if
+    /// they are known.
     pub(crate) fn new(
         spacing: SubcarrierSpacing,
         lmax: Option<Lmax>,
@@ -70,28 +70,28 @@ impl BroadcastDecoder {
         }
     }
 
-    /// Moves to an SSB at another frequency.
+    /// Sets another SSB frequency.
     pub(crate) fn tune(&mut self, ssb_freq_hz: Option<f64>) {
         self.size = size(self.spacing, self.told, ssb_freq_hz);
         self.forget();
     }
 
-    /// Forgets the periods heard so far.
+    /// Removes the stored periods.
     pub(crate) fn forget(&mut self) {
         self.undecoded.clear();
     }
 
-    /// The likelier burst set size, before any PBCH has told.
+    /// Returns the more probable burst set size, before any PBCH was decoded.
     pub(crate) fn likely_lmax(&self) -> Lmax {
         self.size.likely
     }
 
-    /// The same where there can be no other.
+    /// Returns the burst set size if only one is possible.
     pub(crate) fn certain_lmax(&self) -> Option<Lmax> {
         self.size.certain.then_some(self.size.likely)
     }
 
-    /// Burst set sizes to try, the likelier first.
+    /// Returns the possible burst set sizes, the more probable one first.
     fn sizes(&self) -> impl Iterator<Item = Lmax> + use<> {
         let likely = self.size.likely;
         let other = match likely {
@@ -102,7 +102,7 @@ impl BroadcastDecoder {
         std::iter::once(likely).chain(other.filter(|_| self.told.is_none()))
     }
 
-    /// Decodes the SSB that the acquirer holds.
+    /// Decodes the PBCH of the acquirer's SSB.
     pub(crate) fn decode(&mut self, acquirer: &Acquirer, acquired: &Acquired) -> Option<Broadcast> {
         let &Acquired { pci, ibar_ssb, .. } = acquired;
         acquirer.log_likelihood_ratios(pci, &acquired.alignment, &mut self.llrs);
@@ -118,7 +118,7 @@ impl BroadcastDecoder {
         })
     }
 
-    /// Keeps the PBCH that [`decode`](Self::decode) just failed on, its SSB beginning at sample
+    /// Stores the PBCH that [`decode`](Self::decode) failed to decode, whose SSB begins at sample
     /// `time`, and decodes it together with up to three earlier ones of the same cell and beam.
     pub(crate) fn combine(&mut self, acquired: &Acquired, time: f64) -> Option<Broadcast> {
         let &Acquired { pci, ibar_ssb, .. } = acquired;
@@ -140,7 +140,7 @@ impl BroadcastDecoder {
                 && whole.abs() < LONGEST_HALF_FRAMES
                 && (samples - whole * half_frame).abs() < PERIOD_TOLERANCE
         };
-        // The latest examined, which need not be the latest received.
+        // The latest examined PBCH, which need not be the latest received one.
         let mut heard = [None; PERIODS];
         for (slot, other) in heard
             .iter_mut()
@@ -177,8 +177,8 @@ impl BroadcastDecoder {
         })
     }
 
-    /// What the same SSB says `samples` later (or, if negative, said before); `None` unless that is
-    /// a multiple of 5 ms.
+    /// Returns the message of the same SSB `samples` later (or earlier, if negative); `None` unless
+    /// that is a multiple of 5 ms.
     pub(crate) fn repeated(&self, payload: BchPayload, samples: f64) -> Option<BchPayload> {
         let half_frames = (samples / self.half_frame_samples).round();
         let off = (samples - half_frames * self.half_frame_samples).abs();
@@ -186,19 +186,20 @@ impl BroadcastDecoder {
     }
 }
 
-/// The size that a PBCH tells which decoded under `lmax`, `certain` where there can be but one. Of the
-/// first four SSBs of the first half frame, burst sets of 4 and of 8 send the same.
+/// Returns the burst set size implied by a PBCH that was decoded with `lmax`; `certain` is the size
+/// if only one is possible. The first four SSBs of the first half frame are identical in burst sets
+/// of 4 and 8.
 fn told_by(payload: &BchPayload, lmax: Lmax, ibar_ssb: u8, certain: Option<Lmax>) -> Option<Lmax> {
     let same = lmax != Lmax::L64 && ibar_ssb < 4 && !payload.half_frame;
     if same { certain } else { Some(lmax) }
 }
 
-/// With four SSBs the DM-RS tells the half frame, and must tell the PBCH's.
+/// Whether the half frame of the DM-RS, which encodes it for Lmax 4, is that of the PBCH.
 fn fits(payload: &BchPayload, lmax: Lmax, ibar_ssb: u8) -> bool {
     lmax != Lmax::L4 || payload.half_frame == (ibar_ssb >= 4)
 }
 
-/// The payload of the same SSB `half_frames` later.
+/// Returns the payload of the same SSB `half_frames` later.
 fn moved(payload: BchPayload, half_frames: i32) -> BchPayload {
     const SFN_CYCLE: i32 = 2048;
     let now = 2 * i32::from(payload.sfn()) + i32::from(payload.half_frame);

@@ -8,22 +8,23 @@ use crate::numeric::decibel::decibel;
 use crate::numeric::sums::energy;
 use crate::standard::grid::{SUBCARRIERS, SYMBOLS, pss_indices};
 
-/// Resource blocks of an SSB.
+/// Number of resource blocks of an SSB.
 const RESOURCE_BLOCKS: f64 = 20.0;
 
-/// Powers of one SSB at one antenna. 0 dBFS is the power of a tone of amplitude one.
+/// Power measurements of one SSB at one antenna. 0 dBFS is the power of a tone of amplitude one.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Measurement {
     /// SS-RSRP: power of a resource element of the SSS.
     pub ss_rsrp_dbfs: f64,
-    /// SS-RSRQ: 20 resource blocks × SS-RSRP over the total power in the SSB's band and symbols.
+    /// SS-RSRQ: 20 resource blocks × SS-RSRP divided by the total power in the SSB's band and
+    /// symbols.
     pub ss_rsrq_db: f64,
-    /// SS-SINR: SS-RSRP over noise and interference on a resource element.
+    /// SS-SINR: SS-RSRP divided by noise plus interference on a resource element.
     pub ss_sinr_db: f64,
 }
 
-/// Measures one antenna from what was received, the power of a resource element of the SSS and the
-/// variance of the noise on it, in the scale of an unnormalised transform.
+/// Computes the measurements of one antenna from the received elements, the SSS power per resource
+/// element and its noise variance, in the scale of an unnormalised DFT.
 pub(crate) fn measure(grid: &ReceivedGrid, rsrp: f64, noise_variance: f64) -> Measurement {
     let received: f32 = grid.iter().map(energy).sum();
     let rssi = f64::from(received) / SYMBOLS as f64;
@@ -35,9 +36,9 @@ pub(crate) fn measure(grid: &ReceivedGrid, rsrp: f64, noise_variance: f64) -> Me
     }
 }
 
-/// Power of the channel on the subcarriers of the SSS.
+/// Returns the power of the channel on the subcarriers of the SSS.
 pub(crate) fn sss_power(channel: &[Complex32; SUBCARRIERS]) -> f64 {
-    // The PSS has the same subcarriers, and symbol 0 makes their indices.
+    // The PSS has the same subcarriers, and its flat indices equal them because it is in symbol 0.
     mean_power(&channel[pss_indices()])
 }
 

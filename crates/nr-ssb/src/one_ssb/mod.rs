@@ -1,4 +1,4 @@
-//! One SSB, from a candidate in time to cell, beam, message and measurements.
+//! Processing of one SSB, from a candidate in time to cell, beam, message and measurements.
 
 pub(crate) mod acquire;
 pub(crate) mod broadcast;

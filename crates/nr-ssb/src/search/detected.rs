@@ -1,4 +1,4 @@
-//! What a search finds.
+//! Results of a search.
 
 use num_complex::Complex32;
 
@@ -10,68 +10,69 @@ use crate::standard::message::payload::BchPayload;
 use crate::standard::numerology::Lmax;
 use crate::standard::pci::Pci;
 
-/// One received SSB.
+/// Detected SSB.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DetectedSsb {
-    /// The cell.
+    /// Physical cell identity.
     pub pci: Pci,
-    /// ī_SSB of its DM-RS: with `lmax` the low bits of the SSB index.
+    /// ī_SSB of its DM-RS, which determines the low bits of the SSB index for a given `lmax`.
     pub ibar_ssb: u8,
-    /// SSB index; without a decoded PBCH as the DM-RS tells it for the likelier `lmax`, and of Lmax 64
-    /// its three low bits only.
+    /// SSB index. Without a decoded PBCH it is derived from the DM-RS for the more probable `lmax`;
+    /// for Lmax 64 it contains the three low bits only.
     pub ssb_index: u8,
-    /// Second half of the frame; unknown without a decoded PBCH at Lmax 8.
+    /// Whether the SSB is in the second half of the frame; unknown without a decoded PBCH for Lmax
+    /// 8.
     pub half_frame: Option<bool>,
-    /// Burst set size: told, by the PBCH of one of the cell's SSBs, or the only one of the bands there
-    /// (TS 38.213 §4.1). `None` where that leaves a doubt: of the first four SSBs of a frame, sets of
-    /// 4 and 8 send the same.
+    /// Burst set size: decoded from the PBCH of one of the cell's SSBs, or the only one of the
+    /// bands at this frequency (TS 38.213 §4.1). `None` if it is ambiguous: the first four SSBs of
+    /// a frame are identical in sets of 4 and 8.
     pub lmax: Option<Lmax>,
-    /// MIB, system frame number and half frame, if the checksum held.
+    /// MIB, system frame number and half frame, if the CRC is correct.
     pub payload: Option<BchPayload>,
-    /// First sample of the SSB, its cyclic prefix included, at the base rate, to a fraction of a
-    /// sample, from the first sample ever pushed.
+    /// First sample of the SSB including its cyclic prefix, at the base rate, with its fraction,
+    /// relative to the first sample of the stream.
     pub sample_start: f64,
-    /// Carrier frequency offset, Hz.
+    /// Carrier frequency offset in Hz.
     pub cfo_hz: f64,
-    /// Phase from symbol to symbol beyond that of the offset (TS 38.211 §5.4), radians.
+    /// Phase step between symbols in excess of that of the offset (TS 38.211 §5.4), in radians.
     pub symbol_phase_step_rad: f64,
-    /// SNR of a resource element, mean over the antennas, dB.
+    /// SNR of a resource element, mean over the antennas, in dB.
     pub snr_db: f64,
-    /// PSS, SSS and DM-RS detection statistics together.
+    /// Sum of the PSS, SSS and DM-RS detection statistics.
     pub statistic: f32,
-    /// Carrier frequency offset by the insides of the symbols alone, Hz.
+    /// Carrier frequency offset estimated within the symbols, in Hz.
     pub(crate) coarse_cfo_hz: f64,
     pub(super) measurements: [Measurement; MAX_ANTENNAS],
     pub(super) antennas: usize,
 }
 
 impl DetectedSsb {
-    /// SS-RSRP, SS-RSRQ and SS-SINR of every antenna.
+    /// Returns SS-RSRP, SS-RSRQ and SS-SINR of every antenna.
     pub fn measurements(&self) -> &[Measurement] {
         &self.measurements[..self.antennas]
     }
 }
 
-/// What was received of one SSB, stronger cells' taken out, delay and frequency offset too.
+/// Received resource elements of one SSB. Stronger cells, delay and frequency offset are removed.
 #[derive(Debug, Clone, Copy)]
 pub struct ReceivedSsb<'a> {
-    /// The resource elements of every antenna, `[symbol][subcarrier]`.
+    /// Resource elements of every antenna, `[symbol][subcarrier]`.
     pub elements: &'a [ReceivedGrid],
-    /// The elements that are known, zero elsewhere: pilots, and the PBCH if it decoded.
+    /// Known elements, zero elsewhere: pilots, and the PBCH if it was decoded.
     pub known: &'a SsbGrid,
-    /// The channel on the 240 subcarriers, per antenna.
+    /// Channel on the 240 subcarriers, for each antenna.
     pub channel: &'a [[Complex32; SUBCARRIERS]],
-    /// How its noise hangs together from subcarrier to subcarrier.
+    /// Covariance of the channel estimate's noise over the subcarriers.
     pub channel_covariance: &'a ChannelCovariance,
-    /// Variance of the noise on a resource element, per antenna.
+    /// Noise variance of a resource element, for each antenna.
     pub noise_variance: &'a [f64],
 }
 
-/// How far candidates came in the last block.
+/// Number of candidates at each stage in the last block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SearchCounts {
-    /// Maxima of the matched filter that were examined.
+    /// Number of examined maxima of the matched filter.
     pub pss_candidates: usize,
-    /// Of these, SSBs likely enough for their PBCH to be decoded.
+    /// Number of them whose PBCH was decoded, because they were probable SSBs.
     pub pbch_tried: usize,
 }

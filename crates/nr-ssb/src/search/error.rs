@@ -1,30 +1,30 @@
-//! What makes a search impossible.
+//! Errors of a search.
 
 use crate::dsp::received_grid::MAX_ANTENNAS;
 
-/// What makes a search impossible.
+/// Reason why a search is impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SearchError {
     /// No antenna, or more than [`MAX_ANTENNAS`].
     #[error("{0} antennas: 1 to {MAX_ANTENNAS} are possible")]
     Antennas(usize),
-    /// A setting outside its range.
+    /// Setting outside its range.
     #[error("{name} = {value}: {allowed}")]
     Setting {
-        /// Which setting.
+        /// Name of the setting.
         name: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
-        /// What it may be.
+        /// Allowed values.
         allowed: &'static str,
     },
-    /// The number of channels passed differs from that announced.
+    /// The number of channels differs from the configuration.
     #[error("{given} channels given, {expected} expected")]
     AntennaCount {
-        /// Channels passed.
+        /// Number of channels passed.
         given: usize,
-        /// Channels announced.
+        /// Configured number of channels.
         expected: usize,
     },
     /// Channels of different lengths.
@@ -32,10 +32,10 @@ pub enum SearchError {
     UnequalLengths {
         /// Length of channel 0.
         first: usize,
-        /// A length that differs.
+        /// Length that differs.
         other: usize,
     },
-    /// Less than one SSB.
+    /// Fewer samples than one SSB.
     #[error("{samples} samples are less than the {needed} of one SSB")]
     TooShort {
         /// Length of the recording at the base rate.

@@ -1,5 +1,4 @@
-//! What becomes of a candidate: an SSB that is identified, decoded, measured and taken out of the
-//! samples, or nothing.
+//! Examination of a candidate: identification, decoding, measurement and subtraction of its SSB.
 
 use std::f32::consts::SQRT_2;
 
@@ -21,25 +20,25 @@ use crate::standard::numerology::Lmax;
 use crate::standard::pci::Pci;
 use crate::standard::sequence::pss::SYNC_LEN;
 
-/// Part of the threshold for a cell from which on its PBCH is decoded.
+/// Fraction of the cell threshold above which the PBCH is decoded.
 const DECODE_FLOOR: f32 = 0.7;
-/// SNR after combining above which a PBCH always decodes (its block error rate is 1 % at −8 dB): a
-/// stronger "cell" whose PBCH does not decode, during another one's SSB, is what was left of that.
+/// SNR after combining above which a PBCH is always decodable (its block error rate is 1 % at −8
+/// dB). A stronger "cell" without a decodable PBCH, overlapping another SSB, is a residue of that
+/// SSB.
 const CERTAIN_DECODE_SNR_DB: f64 = -2.0;
-/// A cell whose PBCH does not decode, with the PSS of a cell so much stronger and so near to it in
-/// time, is taken for what was left of that one. Clipped at 0.3 to 1.5 times its RMS amplitude, a cell
-/// leaves what looks like another 15.4 to 31 dB below it (`tests/all/distorted.rs`).
+/// Power ratio in dB above which a cell without a decodable PBCH, at the time and with the PSS of a
+/// stronger cell, is a residue of the stronger cell. A cell clipped at 0.3 to 1.5 times its RMS
+/// amplitude leaves an apparent cell 15.4 to 31 dB below it (`tests/all/distorted.rs`).
 const RESIDUE_DB: f64 = 15.0;
 const RESIDUE_SAMPLES: f64 = 1.0;
-/// Two detections of one cell closer than this, in samples, are one SSB.
+/// Maximum distance of two detections of one SSB, in samples.
 const SAME_SSB_SAMPLES: f64 = CYCLIC_PREFIX as f64;
 
-/// Examines candidates, and keeps the SSBs found in a block.
+/// Examines candidates, and stores the SSBs of a block.
 pub(super) struct Examiner {
     antennas: usize,
     base_rate_hz: f64,
-    /// Carrier frequency offset that is searched around, and the largest distance from it that is
-    /// believed, Hz.
+    /// Central carrier frequency offset of the search, and the maximum distance from it, in Hz.
     centre_hz: f64,
     tolerated_hz: f64,
     cell_threshold: f32,
@@ -48,13 +47,13 @@ pub(super) struct Examiner {
     canceller: Canceller,
     found: Vec<DetectedSsb>,
     counts: SearchCounts,
-    /// The last SSBs of the block before, to know them again.
+    /// Last SSBs of the previous block, to recognise repeated detections.
     recent: Vec<(Pci, f64)>,
 }
 
 impl Examiner {
-    /// A PSS that stands out less than `pss_floor` is none, nor a cell whose statistics together
-    /// stay below `cell_threshold`.
+    /// Creates an examiner. Candidates with a PSS statistic below `pss_floor` or a total statistic
+    /// below `cell_threshold` are rejected.
     pub(super) fn new(config: &SearchConfig, pss_floor: f32, cell_threshold: f32) -> Self {
         let &SearchConfig {
             spacing,
@@ -81,26 +80,25 @@ impl Examiner {
         }
     }
 
-    /// Moves to an SSB at another frequency.
+    /// Sets another SSB frequency.
     pub(super) fn tune(&mut self, ssb_freq_hz: Option<f64>) {
         self.acquirer.tune(ssb_freq_hz);
         self.decoder.tune(ssb_freq_hz);
     }
 
-    /// Moves to cells around another carrier frequency offset.
+    /// Sets another central carrier frequency offset.
     pub(super) fn centre(&mut self, cfo_centre_hz: f64) {
         self.centre_hz = cfo_centre_hz;
     }
 
-    /// Forgets the stream so far.
+    /// Removes the state of the stream.
     pub(super) fn forget(&mut self) {
         self.found.clear();
         self.recent.clear();
         self.decoder.forget();
     }
 
-    /// Of what was found in the last block keeps what lies near the beginning, at sample
-    /// `block_start`, of the next.
+    /// Starts a block at sample `block_start`, and keeps the previous SSBs close to its start.
     pub(super) fn begin_block(&mut self, block_start: f64) {
         self.counts = SearchCounts::default();
         self.recent.clear();
@@ -113,7 +111,7 @@ impl Examiner {
         self.found.clear();
     }
 
-    /// The SSBs found in this block, in order of time.
+    /// Returns the SSBs of this block, in order of time.
     pub(super) fn found_in_order(&mut self) -> &[DetectedSsb] {
         self.settle_lmax();
         self.found
@@ -121,7 +119,7 @@ impl Examiner {
         &self.found
     }
 
-    /// One SSB of a cell tells the burst set size of all.
+    /// Applies the burst set size of one SSB of a cell to all its SSBs.
     fn settle_lmax(&mut self) {
         for index in 0..self.found.len() {
             let DetectedSsb { pci, lmax, .. } = self.found[index];
@@ -135,14 +133,15 @@ impl Examiner {
         }
     }
 
-    /// What became of the candidates in this block.
+    /// Returns the number of candidates at each stage in this block.
     pub(super) fn counts(&self) -> SearchCounts {
         self.counts
     }
 
-    /// Identifies, decodes, measures and removes the SSB of a candidate.
+    /// Identifies, decodes, measures and subtracts the SSB of a candidate.
     ///
-    /// The samples are those of a block, per antenna, the first of them number `block_start`.
+    /// The samples are those of a block, for each antenna; the index of the first sample is
+    /// `block_start`.
     pub(super) fn examine(
         &mut self,
         (samples, block_start): (&mut [Vec<Complex32>], f64),
@@ -200,15 +199,15 @@ impl Examiner {
         Some(acquired.alignment)
     }
 
-    /// Whether an SSB that begins then overlaps in time with one that was found.
+    /// Whether an SSB that begins at `time` overlaps a detected one.
     fn is_overlaid(&self, time: f64) -> bool {
         let found = self.found.iter().map(|ssb| ssb.sample_start);
         let mut starts = found.chain(self.recent.iter().map(|(_, start)| *start));
         starts.any(|start| (start - time).abs() < SSB_SAMPLES as f64)
     }
 
-    /// Whether an SSB may be what a clipped or otherwise distorted stronger one has left: with its
-    /// PSS, in its place, and far below it.
+    /// Whether an SSB may be the residue of a clipped or otherwise distorted stronger SSB: same
+    /// PSS, same time, and far weaker.
     fn is_residue(&self, pci: Pci, time: f64) -> bool {
         let snr_db = decibel(self.acquirer.snr() / self.antennas as f64);
         self.found.iter().any(|ssb| {
@@ -260,7 +259,8 @@ impl Examiner {
         });
     }
 
-    /// Gives earlier SSBs of the same beam, not decoded by themselves, what they must have said.
+    /// Completes earlier SSBs of the same beam, which were not decodable alone, with the message
+    /// implied for their time.
     fn complete_earlier(&mut self, acquired: &Acquired, broadcast: &Broadcast, time: f64) {
         let same = |ssb: &&mut DetectedSsb| {
             ssb.payload.is_none() && ssb.pci == acquired.pci && ssb.ibar_ssb == acquired.ibar_ssb
@@ -276,7 +276,7 @@ impl Examiner {
         }
     }
 
-    /// Subtracts the SSB. Its channel is estimated without the PSS, which other cells share.
+    /// Subtracts the SSB. Its channel estimate does not use the PSS, which other cells may share.
     fn remove(&mut self, samples: &mut [Vec<Complex32>], alignment: &Alignment) {
         let phases = alignment.symbol_phases();
         let pss = self.acquirer.forget_pss();
@@ -297,8 +297,9 @@ impl Examiner {
     }
 }
 
-/// How much stronger than the rest of its SSB a PSS comes, as amplitude: 0 dB or 3 dB, both of which TS
-/// 38.213 §4.1 allows. No other values, so that little is taken from another cell's that is the same.
+/// Returns the amplitude of the PSS relative to the rest of its SSB: 0 dB or 3 dB, the values of TS
+/// 38.213 §4.1. Other values are excluded, because they would subtract parts of another cell's
+/// identical PSS.
 fn pss_amplitude(
     grids: &[ReceivedGrid],
     channels: &[[Complex32; SUBCARRIERS]],

@@ -1,7 +1,8 @@
 //! Cell search: every SSB of every cell on one raster point, from any number of antennas.
 //!
-//! The matched filter proposes, strongest first; SSS, DM-RS and the PBCH's checksum dispose. A
-//! found SSB is taken out of the samples, and what it hid is looked for again.
+//! The matched filter proposes candidates in descending order of strength. SSS, DM-RS and the CRC
+//! of the PBCH verify them. A detected SSB is subtracted from the samples, and weaker ones are
+//! searched for again.
 
 mod detected;
 mod error;

@@ -1,34 +1,33 @@
-//! What a search is told.
+//! Search configuration.
 
 use super::error::SearchError;
 use crate::dsp::received_grid::MAX_ANTENNAS;
 use crate::standard::numerology::{Lmax, SubcarrierSpacing};
 
-/// What a search is told.
+/// Search configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchConfig {
     /// Subcarrier spacing of the SSB.
     pub spacing: SubcarrierSpacing,
     /// Number of antennas, 1 to [`MAX_ANTENNAS`].
     pub antennas: usize,
-    /// Absolute frequency of the SSB's centre, Hz. Without it the frequency offset comes from
-    /// inside the symbols only (TS 38.211 §5.4 hides the rest) and is an order less precise. Zero
-    /// for signals made without that phase.
+    /// Absolute frequency of the SSB's centre, in Hz. Without it, the frequency offset is estimated
+    /// within symbols only (because of TS 38.211 §5.4), with a tenfold error. Zero for signals
+    /// without the phase of that clause.
     pub ssb_freq_hz: Option<f64>,
-    /// SSBs per burst set, when known. Else the one that the bands at the frequency have is tried
-    /// first.
+    /// Burst set size, if known. Otherwise the size of the bands at the frequency is tried first.
     pub lmax: Option<Lmax>,
-    /// Carrier frequency offset around which is searched, Hz: that of a receiver whose oscillator
-    /// is known from a cell it has found.
+    /// Central carrier frequency offset of the search, in Hz: that of a receiver whose oscillator
+    /// offset is known from a detected cell.
     pub cfo_centre_hz: f64,
-    /// Largest carrier frequency offset to either side of the centre, Hz.
+    /// Maximum carrier frequency offset on either side of the centre, in Hz.
     pub cfo_range_hz: f64,
-    /// Probability that 20 ms of noise make a cell.
+    /// Probability of a false cell in 20 ms of noise.
     pub false_alarm: f64,
 }
 
 impl SearchConfig {
-    /// Offsets up to half a subcarrier, false alarm 1e-3.
+    /// Offsets up to half a subcarrier, and a false-alarm probability of 1e-3.
     pub fn new(spacing: SubcarrierSpacing, antennas: usize) -> Self {
         Self {
             spacing,
@@ -41,7 +40,7 @@ impl SearchConfig {
         }
     }
 
-    /// Whether a search with these settings is possible.
+    /// Returns an error if a search with these settings is impossible.
     pub(crate) fn check(&self) -> Result<(), SearchError> {
         if self.antennas == 0 || self.antennas > MAX_ANTENNAS {
             return Err(SearchError::Antennas(self.antennas));
@@ -66,7 +65,7 @@ impl SearchConfig {
     }
 }
 
-/// Whether an SSB can be at this frequency.
+/// Returns an error if an SSB cannot have this frequency.
 pub(super) fn check_frequency(ssb_freq_hz: Option<f64>) -> Result<(), SearchError> {
     match ssb_freq_hz {
         Some(value) if !value.is_finite() => Err(SearchError::Setting {

@@ -1,4 +1,5 @@
-//! What the standard says of an SSB: identities, layout in time and frequency, sequences, coding.
+//! Definitions of the standard for an SSB: identities, positions in time and frequency, sequences,
+//! coding.
 
 pub mod band;
 pub mod coding;

@@ -14,10 +14,10 @@ use crate::error::Error;
 pub struct Pci(u16);
 
 impl Pci {
-    /// How many identities there are.
+    /// Number of physical cell identities.
     pub const COUNT: u16 = 1008;
 
-    /// The identity with number `value`.
+    /// Returns the identity with number `value`.
     ///
     /// # Errors
     /// [`Error::Pci`] beyond 1007.
@@ -29,22 +29,22 @@ impl Pci {
         }
     }
 
-    /// Every identity, in order.
+    /// Returns every identity, in order.
     pub fn all() -> impl ExactSizeIterator<Item = Self> {
         (0..Self::COUNT).map(Self)
     }
 
-    /// The number, 0 to 1007.
+    /// Returns the number, 0 to 1007.
     pub const fn get(self) -> u16 {
         self.0
     }
 
-    /// N_ID1, 0 to 335: which SSS.
+    /// Returns N_ID1, 0 to 335, which selects the SSS.
     pub const fn n_id_1(self) -> u16 {
         self.0 / 3
     }
 
-    /// N_ID2, 0 to 2: which PSS.
+    /// Returns N_ID2, 0 to 2, which selects the PSS.
     pub const fn n_id_2(self) -> u8 {
         (self.0 % 3) as u8
     }

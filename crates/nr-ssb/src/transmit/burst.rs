@@ -1,4 +1,4 @@
-//! SSB burst sets: what a cell transmits in one half frame.
+//! SSB burst sets: transmission of a cell in one half frame.
 
 use num_complex::Complex32;
 
@@ -13,7 +13,8 @@ use crate::standard::sequence::dmrs::{dmrs, ibar_ssb};
 use crate::standard::sequence::pss::pss;
 use crate::standard::sequence::sss::sss;
 
-/// The grid of one SSB (TS 38.211 §7.4.3), all signals at unit power per resource element.
+/// Returns the grid of one SSB (TS 38.211 §7.4.3), with unit power per resource element for all
+/// signals.
 ///
 /// ```
 /// use nr_ssb::{BchPayload, Lmax, Mib, Pci, burst::ssb_grid};
@@ -39,7 +40,7 @@ pub fn ssb_grid(pci: Pci, lmax: Lmax, payload: &BchPayload) -> Result<SsbGrid, E
     Ok(grid)
 }
 
-/// One transmitted SSB of a burst set.
+/// Transmitted SSB of a burst set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
     /// SSB index, 0 to Lmax − 1.
@@ -49,7 +50,7 @@ pub struct Beam {
 }
 
 impl Beam {
-    /// The SSB of index `ssb_index` at unit amplitude.
+    /// Creates the SSB of index `ssb_index` with unit amplitude.
     pub const fn new(ssb_index: u8) -> Self {
         Self {
             ssb_index,
@@ -58,7 +59,7 @@ impl Beam {
     }
 }
 
-/// One burst set: all SSBs of a cell in one half frame of 5 ms.
+/// Burst set: all SSBs of a cell in one half frame of 5 ms.
 ///
 /// ```
 /// use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci};
@@ -77,25 +78,25 @@ impl Beam {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Burst {
-    /// The cell.
+    /// Physical cell identity.
     pub pci: Pci,
-    /// Where its SSBs lie in the half frame.
+    /// Pattern of the SSBs in the half frame.
     pub case: Case,
-    /// How many SSB indices it has: [`Lmax::L4`] or [`Lmax::L8`] for the cases A to C,
-    /// [`Lmax::L64`] for D and E.
+    /// Burst set size: [`Lmax::L4`] or [`Lmax::L8`] for the cases A to C, [`Lmax::L64`] for D and
+    /// E.
     pub lmax: Lmax,
-    /// MIB, SFN and half frame; each beam puts its own SSB index in.
+    /// MIB, SFN and half frame; each beam sets its own SSB index.
     pub payload: BchPayload,
-    /// The SSBs that are sent.
+    /// Transmitted SSBs.
     pub beams: Vec<Beam>,
-    /// Absolute frequency of the SSB's centre in hertz, for the per-symbol phase of TS 38.211 §5.4
-    /// ([`symbol_phase`]); `None` leaves the phase out.
+    /// Absolute frequency of the SSB's centre in hertz, for the phase of each symbol (TS 38.211
+    /// §5.4, [`symbol_phase`]); `None` omits the phase.
     pub ssb_freq_hz: Option<f64>,
 }
 
 impl Burst {
-    /// First OFDM symbol (from the start of the half frame) and grid of every beam, gains and phases
-    /// not yet applied.
+    /// Returns the first OFDM symbol (relative to the start of the half frame) and the grid of
+    /// every beam, without gains and phases.
     ///
     /// # Errors
     /// [`Error::BurstSet`] for an `lmax` that the case does not have, else those of [`ssb_grid`].
@@ -106,7 +107,7 @@ impl Burst {
             .collect()
     }
 
-    /// The half frame as IQ samples, SSB centred at 0 Hz.
+    /// Returns the half frame as IQ samples, with the SSB centred at 0 Hz.
     ///
     /// # Errors
     /// Those of [`add_to`](Self::add_to).
@@ -116,7 +117,7 @@ impl Burst {
         Ok(samples)
     }
 
-    /// Add the burst to `half_frame`, the samples of 5 ms; several cells may share them.
+    /// Adds the burst to `half_frame`, 5 ms of samples, which several cells may share.
     ///
     /// # Errors
     /// [`Error::Spacing`] if `ofdm` has another subcarrier spacing than the burst's case,

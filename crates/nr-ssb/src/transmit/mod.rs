@@ -1,4 +1,4 @@
-//! From payloads to samples: what a cell sends.
+//! Generation of a cell's samples from payloads.
 
 pub mod burst;
 pub mod ofdm;

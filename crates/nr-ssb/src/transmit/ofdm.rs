@@ -1,7 +1,7 @@
 //! OFDM of the SSB's 240 subcarriers, its centre at 0 Hz (TS 38.211 §5.3.1 and §5.4).
 //!
-//! Modulation is the inverse DFT with its 1/N, demodulation the plain DFT, so that one undoes the
-//! other at any FFT size.
+//! Modulation is the inverse DFT with the factor 1/N, and demodulation is the DFT, so that they are
+//! inverse at any FFT size.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::standard::grid::SUBCARRIERS;
 use crate::standard::numerology::Numerology;
 
-/// Modulator and demodulator of single OFDM symbols; owns its plans and buffers.
+/// Modulator and demodulator of single OFDM symbols. It owns its FFT plans and buffers.
 ///
 /// ```
 /// use nr_ssb::{Complex32, Numerology, Ofdm, SubcarrierSpacing};
@@ -46,7 +46,7 @@ impl std::fmt::Debug for Ofdm {
 }
 
 impl Ofdm {
-    /// Plan the FFTs of `numerology`.
+    /// Creates the FFT plans of `numerology`.
     pub fn new(numerology: Numerology) -> Self {
         let size = numerology.fft_size();
         let mut planner = FftPlanner::new();
@@ -64,12 +64,12 @@ impl Ofdm {
         }
     }
 
-    /// The numerology planned for.
+    /// Returns the numerology.
     pub const fn numerology(&self) -> Numerology {
         self.numerology
     }
 
-    /// Write one symbol with its cyclic prefix: `samples` holds the prefix and N samples.
+    /// Writes one symbol with its cyclic prefix: `samples` contains the prefix and N samples.
     ///
     /// # Errors
     /// [`Error::Length`] if `samples` is shorter than N or longer than 2N.
@@ -92,8 +92,8 @@ impl Ofdm {
         Ok(())
     }
 
-    /// Add one symbol, times `gain`, behind a cyclic prefix of `cp_len` up to N, to the first of the
-    /// samples.
+    /// Adds one symbol, multiplied by `gain`, to `samples`: a cyclic prefix of `cp_len` (up to N),
+    /// then the symbol.
     pub(crate) fn add(
         &mut self,
         subcarriers: &[Complex32; SUBCARRIERS],
@@ -115,8 +115,8 @@ impl Ofdm {
         }
     }
 
-    /// The subcarriers of one symbol, from N samples that begin `early` samples before the end of the
-    /// cyclic prefix; the phase ramp of that early start is taken out.
+    /// Computes the subcarriers of one symbol from N samples that begin `early` samples before the
+    /// end of the cyclic prefix. The phase ramp of the early start is compensated.
     ///
     /// # Errors
     /// [`Error::Length`] unless `window` has N samples.
@@ -134,7 +134,7 @@ impl Ofdm {
                 expected: size,
             });
         }
-        // Turning the window back by `early` samples is exactly that phase ramp.
+        // A cyclic shift of the window by `early` samples is exactly this phase ramp.
         let early = early % size;
         self.spectrum[..size - early].copy_from_slice(&window[early..]);
         self.spectrum[size - early..].copy_from_slice(&window[..early]);
@@ -147,11 +147,12 @@ impl Ofdm {
     }
 }
 
-/// The phase exp(−j2π·f·t) that OFDM symbol `symbol` of a half frame carries when seen at `freq_hz`
-/// (TS 38.211 §5.4); t runs from the start of the symbol's subframe to the end of its cyclic prefix.
+/// Returns the phase exp(−j2π·f·t) of OFDM symbol `symbol` of a half frame at `freq_hz` (TS 38.211
+/// §5.4); t is the time from the start of the symbol's subframe to the end of its cyclic prefix.
 ///
-/// The transmitter's carrier begins anew in every symbol while a receiver's mixer runs on. Seen at the
-/// SSB's centre, `freq_hz` is the absolute frequency of that centre, wherever the carrier is.
+/// The transmitter resets its carrier phase in every symbol, whereas the mixer of a receiver is
+/// continuous. `freq_hz` is the absolute frequency of the SSB's centre, whatever the carrier
+/// frequency.
 pub fn symbol_phase(numerology: Numerology, symbol: usize, freq_hz: f64) -> Complex32 {
     let symbols_per_subframe = 2 * numerology.spacing().symbols_per_half_ms();
     let symbol = symbol % symbols_per_subframe;

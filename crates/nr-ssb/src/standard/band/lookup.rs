@@ -1,27 +1,27 @@
-//! Which bands are where, and how many SSBs a burst set has there.
+//! Operating bands at a frequency, and their number of SSBs per burst set.
 
 use super::operating_band::{Band, Spectrum, lmax};
 use super::table::BANDS;
 use crate::standard::numerology::{Case, Lmax, SubcarrierSpacing};
 
-/// All bands that this crate knows.
+/// Returns all known bands.
 pub const fn all() -> &'static [Band] {
     BANDS
 }
 
-/// The bands whose downlink holds `frequency_hz`.
+/// Returns the bands whose downlink contains `frequency_hz`.
 pub fn holding(frequency_hz: f64) -> impl Iterator<Item = &'static Band> {
     let mhz = 1e-6 * frequency_hz;
     let holds = move |band: &&Band| (band.downlink_mhz[0]..=band.downlink_mhz[1]).contains(&mhz);
     all().iter().filter(holds)
 }
 
-/// What size burst sets have at a frequency and subcarrier spacing.
+/// Burst set size at a frequency and subcarrier spacing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LikelyLmax {
-    /// The size, or the likelier of two.
+    /// Burst set size, or the more probable one of two.
     pub likely: Lmax,
-    /// Whether none of the bands there has another.
+    /// Whether all bands at this frequency have the same size.
     pub certain: bool,
 }
 

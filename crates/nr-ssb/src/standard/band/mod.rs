@@ -1,5 +1,4 @@
-//! The bands that cells are operated in, and what follows from them: where in frequency an SSB may
-//! lie, and how many a burst set has.
+//! Operating bands: possible SSB frequencies, and number of SSBs per burst set.
 
 mod lookup;
 mod operating_band;

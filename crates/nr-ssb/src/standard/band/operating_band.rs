@@ -1,17 +1,17 @@
-//! An operating band.
+//! Operating band.
 
 use crate::standard::numerology::{Case, Lmax};
 
-/// Whether uplink has a spectrum of its own. A band without uplink counts as paired.
+/// Whether the uplink has its own spectrum. A band without uplink counts as paired.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Spectrum {
-    /// Frequency division.
+    /// Frequency division duplex.
     Paired,
-    /// Time division.
+    /// Time division duplex.
     Unpaired,
 }
 
-/// An operating band.
+/// Operating band.
 ///
 /// ```
 /// use nr_ssb::{Case, band};
@@ -23,16 +23,16 @@ pub enum Spectrum {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Band {
-    /// The number after the n.
+    /// Band number: n followed by this number.
     pub number: u16,
-    /// Lowest and highest frequency of the downlink, MHz.
+    /// Lower and upper end of the downlink, in MHz.
     pub downlink_mhz: [f64; 2],
-    /// Whether uplink has a spectrum of its own.
+    /// Whether the uplink has its own spectrum.
     pub spectrum: Spectrum,
     pub(super) raster: &'static [(Case, Entries)],
 }
 
-/// Global synchronization channel numbers.
+/// Global synchronization channel numbers (GSCN).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Entries {
     /// First, step and last.
@@ -41,13 +41,13 @@ pub(super) enum Entries {
 }
 
 impl Band {
-    /// The patterns that the band's SSBs may have in time.
+    /// Returns the possible SSB patterns in time.
     pub fn cases(&self) -> impl Iterator<Item = Case> {
         self.raster.iter().map(|(case, _)| *case)
     }
 
-    /// The numbers of the raster's points where an SSB of this pattern may lie; the frequency of one
-    /// is that of its [`RasterPoint`](crate::raster::RasterPoint).
+    /// Returns the GSCNs of the raster points for SSBs of this pattern.
+    /// [`RasterPoint`](crate::raster::RasterPoint) contains the frequency of a GSCN.
     pub fn gscn(&self, case: Case) -> impl Iterator<Item = u16> {
         let of_case = self.raster.iter().filter(move |(it, _)| *it == case);
         of_case.flat_map(|(_, entries)| {
@@ -64,13 +64,13 @@ impl Band {
         })
     }
 
-    /// The size of a burst set of this pattern at `frequency_hz` (TS 38.213 §4.1).
+    /// Returns the burst set size of this pattern at `frequency_hz` (TS 38.213 §4.1).
     pub fn lmax(&self, case: Case, frequency_hz: f64) -> Lmax {
         lmax(case, self.spectrum, frequency_hz)
     }
 }
 
-/// The size of a burst set (TS 38.213 §4.1).
+/// Returns the burst set size (TS 38.213 §4.1).
 pub(super) fn lmax(case: Case, spectrum: Spectrum, frequency_hz: f64) -> Lmax {
     let four = match (case, spectrum) {
         (Case::D | Case::E, _) => return Lmax::L64,

@@ -1,8 +1,8 @@
-//! The operating bands and their synchronization raster, as the standard tabulates them.
+//! Operating bands and synchronization raster.
 //!
-//! Downlink of TS 38.104 V17 Tables 5.2-1 and 5.2-2, raster entries of Tables 5.4.3.3-1 and 5.4.3.3-2.
-//! n79 has the entries of its narrow channels, which hold those of the wide ones; so has n90.
-//! Without n263, whose SSBs may also have 480 and 960 kHz, and without bands of uplink only.
+//! Downlink of TS 38.104 V17 Tables 5.2-1 and 5.2-2, raster entries of Tables 5.4.3.3-1 and
+//! 5.4.3.3-2. The entries of n79 and n90 are those of narrow channels, which include those of wide
+//! channels. Bands with uplink only and n263, which also has 480 and 960 kHz, are omitted.
 
 use super::operating_band::Entries::{Listed, Steps};
 use super::operating_band::Spectrum::{Paired, Unpaired};

@@ -1,11 +1,11 @@
 //! Rate matching of the PBCH: N = 512 coded bits to E = 864 and back (TS 38.212 §5.4.1, §7.1.5).
 //!
-//! Sub-block interleaving, then the first 352 bits again; no interleaving of the coded bits
-//! (I_BIL = 0).
+//! Sub-block interleaving, followed by a repetition of the first 352 bits. The coded bits are not
+//! interleaved (I_BIL = 0).
 
 use super::polar::{Codeword, N};
 
-/// Bits on the air in one SSB, E.
+/// Number of transmitted bits in one SSB, E.
 pub const E: usize = 864;
 
 /// P(i): order of the 32 sub-blocks (TS 38.212 Table 5.4.1.1-1).
@@ -15,7 +15,7 @@ const P: [usize; 32] = [
 ];
 const SUB_BLOCK: usize = N / P.len();
 
-/// The E bits sent for a codeword, in order.
+/// Returns the E transmitted bits of a codeword, in order.
 pub fn rate_match(codeword: &Codeword) -> impl Iterator<Item = u8> {
     let interleaved = P.iter().flat_map(|&block| {
         let first = block * SUB_BLOCK;
@@ -25,7 +25,7 @@ pub fn rate_match(codeword: &Codeword) -> impl Iterator<Item = u8> {
     interleaved.cycle().take(E)
 }
 
-/// Log-likelihood ratios of the N coded bits: put back in order, repetitions added.
+/// Computes the log-likelihood ratios of the N coded bits: deinterleaves them and adds repetitions.
 pub(crate) fn rate_recover(llr: &[f32; E], coded: &mut [f32; N]) {
     let (first, repeated) = llr.split_at(N);
     for (sub_block, (&block, sent)) in P.iter().zip(first.chunks_exact(SUB_BLOCK)).enumerate() {

@@ -1,4 +1,4 @@
-//! The resource elements themselves.
+//! Resource elements of an SSB.
 
 use num_complex::Complex32;
 
@@ -9,32 +9,32 @@ use super::indices::{SUBCARRIERS, SYMBOLS};
 pub struct SsbGrid([Complex32; SUBCARRIERS * SYMBOLS]);
 
 impl SsbGrid {
-    /// A grid of zeros.
+    /// Returns a grid of zeros.
     pub const fn zeros() -> Self {
         Self([Complex32::ZERO; SUBCARRIERS * SYMBOLS])
     }
 
-    /// All elements, index k + 240·l.
+    /// Returns all elements, with index k + 240·l.
     pub const fn elements(&self) -> &[Complex32; SUBCARRIERS * SYMBOLS] {
         &self.0
     }
 
-    /// All elements, to be changed.
+    /// Returns all elements, mutable.
     pub const fn elements_mut(&mut self) -> &mut [Complex32; SUBCARRIERS * SYMBOLS] {
         &mut self.0
     }
 
-    /// The 240 subcarriers of each symbol, l = 0 to 3.
+    /// Returns the 240 subcarriers of each symbol, l = 0 to 3.
     pub fn symbols(&self) -> impl ExactSizeIterator<Item = &[Complex32; SUBCARRIERS]> {
         self.0.as_chunks().0.iter()
     }
 
-    /// The 240 subcarriers of each symbol, to be changed.
+    /// Returns the 240 subcarriers of each symbol, mutable.
     pub fn symbols_mut(&mut self) -> impl ExactSizeIterator<Item = &mut [Complex32; SUBCARRIERS]> {
         self.0.as_chunks_mut().0.iter_mut()
     }
 
-    /// Write `values` to the elements that `indices` name, in order.
+    /// Writes `values` to the elements `indices`, in order.
     pub fn put(
         &mut self,
         indices: impl IntoIterator<Item = usize>,

@@ -1,4 +1,4 @@
-//! Which resource elements belong to which signal.
+//! Resource elements of each signal.
 
 use std::ops::Range;
 
@@ -10,10 +10,10 @@ use crate::standard::sequence::m_sequence::SYNC_LEN;
 pub const SUBCARRIERS: usize = 240;
 /// OFDM symbols of an SSB.
 pub const SYMBOLS: usize = 4;
-/// Resource elements of the PBCH in one SSB, DM-RS not counted.
+/// Number of PBCH resource elements in one SSB, without DM-RS.
 pub const PBCH_LEN: usize = 432;
 
-/// Where PBCH and DM-RS lie.
+/// Index ranges of PBCH and DM-RS.
 const PBCH_AREAS: [Range<usize>; 4] = [240..480, 480..528, 672..720, 720..960];
 
 const DMRS_INDICES: [[usize; DMRS_LEN]; 4] =
@@ -25,7 +25,7 @@ const PBCH_INDICES: [[usize; PBCH_LEN]; 4] = [
     pick(3, false),
 ];
 
-/// The elements of the PBCH areas that are (`dmrs`), or are not, k = `v` mod 4.
+/// Returns the elements of the PBCH areas with k = `v` mod 4 (`dmrs`), or the other elements.
 const fn pick<const N: usize>(v: usize, dmrs: bool) -> [usize; N] {
     let mut indices = [0; N];
     let mut n = 0;
@@ -33,7 +33,7 @@ const fn pick<const N: usize>(v: usize, dmrs: bool) -> [usize; N] {
     while area < PBCH_AREAS.len() {
         let mut index = PBCH_AREAS[area].start;
         while index < PBCH_AREAS[area].end {
-            // 240 and the areas' borders are multiples of 4, so index mod 4 = k mod 4.
+            // 240 and the bounds of the areas are multiples of 4, so that index mod 4 = k mod 4.
             if (index % 4 == v) == dmrs {
                 indices[n] = index;
                 n += 1;
@@ -45,23 +45,23 @@ const fn pick<const N: usize>(v: usize, dmrs: bool) -> [usize; N] {
     indices
 }
 
-/// Flat indices of the PSS: k = 56…182, l = 0.
+/// Returns the flat indices of the PSS: k = 56…182, l = 0.
 pub const fn pss_indices() -> Range<usize> {
     56..56 + SYNC_LEN
 }
 
-/// Flat indices of the SSS: k = 56…182, l = 2.
+/// Returns the flat indices of the SSS: k = 56…182, l = 2.
 pub const fn sss_indices() -> Range<usize> {
     let start = 2 * SUBCARRIERS + 56;
     start..start + SYNC_LEN
 }
 
-/// Flat indices of the PBCH, in the order of its symbols.
+/// Returns the flat indices of the PBCH, in the order of its symbols.
 pub fn pbch_indices(pci: Pci) -> &'static [usize; PBCH_LEN] {
     &PBCH_INDICES[usize::from(pci.get() % 4)]
 }
 
-/// Flat indices of the PBCH DM-RS, in the order of [`dmrs`](crate::dmrs::dmrs).
+/// Returns the flat indices of the PBCH DM-RS, in the order of [`dmrs`](crate::dmrs::dmrs).
 pub fn dmrs_indices(pci: Pci) -> &'static [usize; DMRS_LEN] {
     &DMRS_INDICES[usize::from(pci.get() % 4)]
 }

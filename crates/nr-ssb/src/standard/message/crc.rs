@@ -1,6 +1,6 @@
 //! The 24-bit cyclic redundancy check of the BCH.
 
-/// g_CRC24C(D) without its leading D²⁴ (TS 38.212 §5.1).
+/// g_CRC24C(D) without its leading term D²⁴ (TS 38.212 §5.1).
 const POLYNOMIAL: u32 = 0xB2_B117;
 
 /// Remainder of each byte value times D²⁴.
@@ -20,10 +20,11 @@ const TABLE: [u32; 256] = {
     table
 };
 
-/// The 24 parity bits of 32 payload bits: CRC24C, register starting at zero (TS 38.212 §5.1, §7.1.3).
+/// Returns the 24 parity bits of 32 payload bits: CRC24C with an initial register of zero (TS
+/// 38.212 §5.1, §7.1.3).
 ///
-/// The first bit of the payload is the most significant one, and so is the first parity bit.
-/// Since the register starts at zero the map is linear: crc(a ⊕ b) = crc(a) ⊕ crc(b).
+/// The most significant bit is the first one, in the payload and in the parity bits. Because the
+/// register is initially zero, the map is linear: crc(a ⊕ b) = crc(a) ⊕ crc(b).
 pub const fn crc24c(payload: u32) -> u32 {
     let bytes = payload.to_be_bytes();
     let mut crc = 0;

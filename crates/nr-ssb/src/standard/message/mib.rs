@@ -2,8 +2,8 @@
 
 use crate::error::Error;
 
-/// Spacing of SIB1, Msg2/4 and paging, `subCarrierSpacingCommon`; the bit's meaning depends on the
-/// frequency range.
+/// Subcarrier spacing of SIB1, Msg2/4 and paging, `subCarrierSpacingCommon`. The meaning of the bit
+/// depends on the frequency range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum SubcarrierSpacingCommon {
     /// 15 kHz in frequency range 1, 60 kHz in range 2.
@@ -23,10 +23,10 @@ pub enum DmrsTypeAPosition {
     Pos3,
 }
 
-/// The master information block: what a cell broadcasts in every SSB.
+/// Master information block (MIB), which a cell broadcasts in every SSB.
 ///
-/// On the air it is the 24-bit BCCH-BCH message, unaligned PER: one choice bit (0), then the fields in
-/// this order.
+/// The MIB is transmitted as a 24-bit BCCH-BCH message in unaligned PER: one choice bit (0), then
+/// the fields in this order.
 ///
 /// ```
 /// use nr_ssb::Mib;
@@ -47,10 +47,10 @@ pub struct Mib {
     pub dmrs_type_a_position: DmrsTypeAPosition,
     /// `pdcch-ConfigSIB1`: `controlResourceSetZero` and `searchSpaceZero`, four bits each.
     pub pdcch_config_sib1: u8,
-    /// `cellBarred`: the cell may not be camped on. (Barred is bit 0 on the air.)
+    /// `cellBarred`: whether UEs must not camp on the cell. (Barred is transmitted as 0.)
     pub cell_barred: bool,
-    /// `intraFreqReselection`: if barred, another cell of this frequency may be tried. (Allowed is
-    /// bit 0 on the air.)
+    /// `intraFreqReselection`: whether another cell of this frequency may be selected if this one
+    /// is barred. (Allowed is transmitted as 0.)
     pub intra_freq_reselection: bool,
     /// The spare bit.
     pub spare: bool,
@@ -82,8 +82,8 @@ impl Mib {
         Ok(())
     }
 
-    /// The 24 bits of the BCCH-BCH message, the first in bit 23; of a field beyond its range
-    /// ([`check`](Self::check)) the low bits.
+    /// Returns the 24 bits of the BCCH-BCH message, the first in bit 23. For a field beyond its
+    /// range ([`check`](Self::check)) the low bits are used.
     pub fn bits(&self) -> u32 {
         u32::from(self.sfn_msb & 0x3F) << 17
             | u32::from(self.subcarrier_spacing_common == SubcarrierSpacingCommon::Scs30Or120) << 16
@@ -95,7 +95,7 @@ impl Mib {
             | u32::from(self.spare)
     }
 
-    /// The inverse of [`bits`](Self::bits).
+    /// Inverse of [`bits`](Self::bits).
     ///
     /// # Errors
     /// [`Error::MibTooLong`] beyond 24 bits; [`Error::MessageClassExtension`] if the choice bit is 1.
@@ -127,7 +127,7 @@ impl Mib {
         })
     }
 
-    /// The 24 bits as text, `0` and `1`, the first sent first.
+    /// Returns the 24 bits as text of `0` and `1`, in order of transmission.
     pub fn bit_string(&self) -> String {
         format!("{:024b}", self.bits())
     }

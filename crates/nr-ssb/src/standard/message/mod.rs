@@ -1,4 +1,4 @@
-//! What the PBCH says, the bits that say it, and their checksum.
+//! Content of the PBCH: message, bits and CRC.
 
 pub mod crc;
 pub mod mib;

@@ -1,7 +1,7 @@
-//! The BCH payload: MIB plus what changes within 80 ms, interleaved and scrambled
-//! (TS 38.212 §7.1.1 and §7.1.2).
+//! BCH payload: MIB and the time information within 80 ms, interleaved and scrambled (TS 38.212
+//! §7.1.1 and §7.1.2).
 //!
-//! Bit strings of 32 are `u32`, the first bit in bit 31.
+//! Bit strings of 32 bits are `u32`, with the first bit in bit 31.
 
 use super::mib::Mib;
 use crate::error::Error;
@@ -9,20 +9,20 @@ use crate::standard::numerology::Lmax;
 use crate::standard::pci::Pci;
 use crate::standard::sequence::gold::Gold;
 
-/// G(j): where the bits go (TS 38.212 Table 7.1.1-1).
+/// G(j): positions of the interleaved bits (TS 38.212 Table 7.1.1-1).
 const G: [u8; 32] = [
     16, 23, 18, 17, 8, 30, 10, 6, 24, 7, 0, 5, 3, 2, 1, 4, 9, 11, 12, 13, 14, 15, 19, 20, 21, 22,
     25, 26, 27, 28, 29, 31,
 ];
 
-/// Places after interleaving of the SFN's third and second least significant bits, of the half-frame
-/// bit, and of the three bits that are the SSB index's for Lmax 64.
+/// Positions after interleaving: the third and second least significant bit of the SFN, the
+/// half-frame bit, and three bits that contain the SSB index for Lmax 64.
 const SFN_BIT_2: u8 = G[7];
 const SFN_BIT_1: u8 = G[8];
 const HALF_FRAME: u8 = G[10];
 const INDEX_BITS: [u8; 3] = [G[11], G[12], G[13]];
 
-/// For input bit i, its place in the interleaved payload.
+/// Position of input bit i in the interleaved payload.
 const PLACE: [u8; 32] = {
     let mut place = [0; 32];
     let (mut sfn, mut index, mut other) = (0, 11, 14);
@@ -48,7 +48,7 @@ const PLACE: [u8; 32] = {
     place
 };
 
-/// What one PBCH says.
+/// Content of one PBCH.
 ///
 /// ```
 /// use nr_ssb::{BchPayload, Mib, Lmax};
@@ -59,21 +59,22 @@ const PLACE: [u8; 32] = {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct BchPayload {
-    /// The MIB, the six high bits of the SFN among its fields.
+    /// MIB, including the six most significant bits of the SFN.
     pub mib: Mib,
-    /// The four low bits of the SFN, 0 to 15.
+    /// Four least significant bits of the SFN, 0 to 15.
     pub sfn_lsb: u8,
-    /// Half frame of the SSB: `false` for the first 5 ms of the frame, `true` for the second.
+    /// Half frame of the SSB: `false` for the first 5 ms of the frame, `true` for the second 5 ms.
     pub half_frame: bool,
-    /// SSB index. Its three high bits are sent (Lmax 64 only); the low ones are told by DM-RS and
-    /// scrambling.
+    /// SSB index. The PBCH contains its three most significant bits (Lmax 64 only); DM-RS and
+    /// scrambling encode the others.
     pub ssb_index: u8,
     /// Most significant bit of k_SSB (Lmax 4 and 8 only).
     pub k_ssb_msb: bool,
 }
 
 impl BchPayload {
-    /// A payload for system frame `sfn`, whose high bits replace those in `mib`; k_SSB below 16.
+    /// Returns a payload of system frame `sfn`, whose high bits replace those in `mib`; k_SSB is
+    /// below 16.
     ///
     /// # Errors
     /// [`Error::Sfn`] beyond 1023, [`Error::MibField`] for a field beyond its bits,
@@ -104,7 +105,7 @@ impl BchPayload {
         Lmax::L64.check_index(self.ssb_index)
     }
 
-    /// The same payload in another system frame.
+    /// Returns the payload in another system frame.
     ///
     /// # Errors
     /// [`Error::Sfn`] beyond 1023.
@@ -117,18 +118,19 @@ impl BchPayload {
         Ok(self)
     }
 
-    /// System frame number, 0 to 1023.
+    /// Returns the system frame number, 0 to 1023.
     pub fn sfn(&self) -> u16 {
         u16::from(self.mib.sfn_msb) << 4 | u16::from(self.sfn_lsb)
     }
 
-    /// k_SSB, 0 to 31: subcarriers (of 15 kHz in frequency range 1) from a common resource block's
-    /// first one to the SSB's. From 24 on there is no SIB1 (TS 38.213 §4.1).
+    /// Returns k_SSB, 0 to 31: the number of subcarriers (of 15 kHz in frequency range 1) from the
+    /// first subcarrier of a common resource block to that of the SSB. A value of 24 or more means
+    /// that there is no SIB1 (TS 38.213 §4.1).
     pub fn k_ssb(&self) -> u8 {
         u8::from(self.k_ssb_msb) << 4 | self.mib.ssb_subcarrier_offset
     }
 
-    /// a̅ in the order of TS 38.212 §7.1.1: MIB, SFN LSBs, half frame, index or k_SSB bits.
+    /// Returns a̅ in the order of TS 38.212 §7.1.1: MIB, SFN LSBs, half frame, index or k_SSB bits.
     fn plain_bits(&self, lmax: Lmax) -> u32 {
         let last_three = match lmax {
             Lmax::L64 => u32::from(self.ssb_index >> 3 & 7),
@@ -140,7 +142,7 @@ impl BchPayload {
             | last_three
     }
 
-    /// The interleaved payload a (TS 38.212 §7.1.1).
+    /// Returns the interleaved payload a (TS 38.212 §7.1.1).
     pub fn bits(&self, lmax: Lmax) -> u32 {
         let plain = self.plain_bits(lmax);
         PLACE
@@ -151,7 +153,7 @@ impl BchPayload {
             })
     }
 
-    /// The inverse of [`bits`](Self::bits), for an SSB whose index ends in `index_lsb`
+    /// Inverse of [`bits`](Self::bits), for an SSB with the low index bits `index_lsb`
     /// ([`Lmax::index_lsb`]).
     ///
     /// # Errors
@@ -176,18 +178,18 @@ impl BchPayload {
     }
 }
 
-/// a′ from a, or a from a′: add the sequence that the cell and two bits of the SFN select
-/// (TS 38.212 §7.1.2).
+/// Converts a to a′, or a′ to a: adds the sequence that the cell and two bits of the SFN select (TS
+/// 38.212 §7.1.2).
 ///
-/// Those two bits, the half-frame bit and (Lmax 64) the SSB index bits stay as they are, so the
-/// operation is its own inverse.
+/// The two SFN bits, the half-frame bit and (Lmax 64) the SSB index bits are not scrambled, so that
+/// the operation is its own inverse.
 pub fn scramble(payload: u32, pci: Pci, lmax: Lmax) -> u32 {
     let bit = |place: u8| payload >> (31 - place) & 1;
     let v = 2 * bit(SFN_BIT_2) + bit(SFN_BIT_1);
     payload ^ scrambling_sequence(pci, v, lmax)
 }
 
-/// s(0)…s(31) for v = 0 to 3.
+/// Returns s(0)…s(31) for v = 0 to 3.
 fn scrambling_sequence(pci: Pci, v: u32, lmax: Lmax) -> u32 {
     let clear = clear_places(lmax);
     let scrambled_count = clear.count_zeros();
@@ -201,7 +203,7 @@ fn scrambling_sequence(pci: Pci, v: u32, lmax: Lmax) -> u32 {
     })
 }
 
-/// Places that are never scrambled.
+/// Returns the positions that are not scrambled.
 fn clear_places(lmax: Lmax) -> u32 {
     let place = |p: u8| 1u32 << (31 - p);
     let always = place(SFN_BIT_2) | place(SFN_BIT_1) | place(HALF_FRAME);

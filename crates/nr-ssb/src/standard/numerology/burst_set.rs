@@ -1,23 +1,23 @@
-//! The size of a burst set.
+//! Burst set size.
 
 use crate::error::Error;
 
-/// How many SSBs a burst set can have.
+/// Maximum number of SSBs per burst set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Lmax {
-    /// Carriers up to 3 GHz (below 1.88 GHz where case C is used in unpaired spectrum).
+    /// Carriers up to 3 GHz (below 1.88 GHz for case C in unpaired spectrum).
     L4,
-    /// Other carriers of frequency range 1.
+    /// Other carriers in frequency range 1.
     L8,
     /// Frequency range 2.
     L64,
 }
 
 impl Lmax {
-    /// All of them.
+    /// All burst set sizes.
     pub const ALL: [Self; 3] = [Self::L4, Self::L8, Self::L64];
 
-    /// The number of SSB indices.
+    /// Returns the number of SSB indices.
     pub const fn count(self) -> u8 {
         match self {
             Self::L4 => 4,
@@ -26,7 +26,8 @@ impl Lmax {
         }
     }
 
-    /// The low bits of the SSB index, v, which select the PBCH scrambling (TS 38.211 §7.3.3.1).
+    /// Returns the low bits of the SSB index, v, which select the PBCH scrambling (TS 38.211
+    /// §7.3.3.1).
     pub const fn index_lsb(self, ssb_index: u8) -> u8 {
         match self {
             Self::L4 => ssb_index & 3,

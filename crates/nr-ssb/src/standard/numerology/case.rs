@@ -1,4 +1,4 @@
-//! The pattern of the SSBs in a half frame.
+//! SSB patterns in a half frame.
 
 use super::burst_set::Lmax;
 use super::spacing::SubcarrierSpacing;
@@ -13,17 +13,17 @@ pub enum Case {
     B,
     /// 30 kHz, first symbols {2, 8} + 14n.
     C,
-    /// 120 kHz, first symbols {4, 8, 16, 20} + 28n, every fifth n left out.
+    /// 120 kHz, first symbols {4, 8, 16, 20} + 28n, without every fifth n.
     D,
-    /// 240 kHz, first symbols {8, 12, 16, 20, 32, 36, 40, 44} + 56n, every fifth n left out.
+    /// 240 kHz, first symbols {8, 12, 16, 20, 32, 36, 40, 44} + 56n, without every fifth n.
     E,
 }
 
 impl Case {
-    /// All of them.
+    /// All patterns.
     pub const ALL: [Self; 5] = [Self::A, Self::B, Self::C, Self::D, Self::E];
 
-    /// The pattern's subcarrier spacing.
+    /// Returns the subcarrier spacing of the pattern.
     pub const fn spacing(self) -> SubcarrierSpacing {
         match self {
             Self::A => SubcarrierSpacing::Khz15,
@@ -33,7 +33,7 @@ impl Case {
         }
     }
 
-    /// The pattern's letter.
+    /// Returns the letter of the pattern.
     pub const fn name(self) -> &'static str {
         match self {
             Self::A => "A",
@@ -44,7 +44,7 @@ impl Case {
         }
     }
 
-    /// The largest burst set that the pattern has places for.
+    /// Returns the maximum burst set size of the pattern.
     pub const fn lmax(self) -> Lmax {
         match self {
             Self::A | Self::B | Self::C => Lmax::L8,
@@ -52,7 +52,7 @@ impl Case {
         }
     }
 
-    /// First OFDM symbol of SSB `index`, counted from the start of its half frame.
+    /// Returns the first OFDM symbol of SSB `index`, relative to the start of its half frame.
     ///
     /// ```
     /// use nr_ssb::Case;
@@ -67,7 +67,7 @@ impl Case {
     pub fn start_symbol(self, index: u8) -> Result<usize, Error> {
         self.lmax().check_index(index)?;
         let i = usize::from(index);
-        // Of frequency range 2's slots in pairs, every fifth is left free for uplink.
+        // In frequency range 2, every fifth pair of slots is reserved for the uplink.
         let n = |per_n: usize| i / per_n + i / (4 * per_n);
         Ok(match self {
             Self::A | Self::C => 14 * (i / 2) + 2 + 6 * (i % 2),

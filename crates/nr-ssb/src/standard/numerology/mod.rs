@@ -1,4 +1,4 @@
-//! Where an SSB lies in time: subcarrier spacings, SSB patterns, symbols and cyclic prefixes.
+//! Position of an SSB in time: subcarrier spacings, SSB patterns, symbols and cyclic prefixes.
 
 mod burst_set;
 mod case;

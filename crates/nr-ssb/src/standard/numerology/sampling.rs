@@ -3,10 +3,11 @@
 use super::spacing::SubcarrierSpacing;
 use crate::error::Error;
 
-/// A subcarrier spacing sampled with a given FFT size.
+/// Subcarrier spacing and FFT size.
 ///
-/// Cyclic prefixes are those of TS 38.211 §5.3.1, 144 samples in 2048, and 16κ longer (κT_c ≈ 32.6 ns,
-/// 16 samples at 30.72 Msps) at every start of 0.5 ms. A multiple of 256 keeps them whole.
+/// The cyclic prefix (TS 38.211 §5.3.1) is 144 of 2048 samples, and 16κ longer (κT_c ≈ 32.6 ns, 16
+/// samples at 30.72 Msps) at every multiple of 0.5 ms. With a multiple of 256 it is an integer
+/// number of samples.
 ///
 /// ```
 /// use nr_ssb::{Numerology, SubcarrierSpacing};
@@ -31,7 +32,7 @@ impl Numerology {
         Ok(Self { spacing, fft_size })
     }
 
-    /// The numerology whose sample rate is `rate_hz`.
+    /// Returns the numerology with the sample rate `rate_hz`.
     ///
     /// # Errors
     /// [`Error::SampleRate`] unless the rate is a positive integer multiple of

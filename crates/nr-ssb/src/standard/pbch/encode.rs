@@ -1,4 +1,4 @@
-//! From the payload to QPSK symbols.
+//! Encoding of a payload to QPSK symbols.
 
 use num_complex::Complex32;
 
@@ -12,14 +12,15 @@ use crate::standard::pci::Pci;
 use crate::standard::sequence::gold::Gold;
 use crate::standard::sequence::modulation::qpsk;
 
-/// The 432 QPSK symbols of the PBCH of one SSB, in the order of
+/// Returns the 432 QPSK symbols of the PBCH of one SSB, in the order of
 /// [`pbch_indices`](crate::grid::pbch_indices).
 pub fn encode(payload: &BchPayload, pci: Pci, lmax: Lmax) -> [Complex32; PBCH_LEN] {
     let message = message(payload.bits(lmax), pci, lmax);
     modulate(message, pci, lmax.index_lsb(payload.ssb_index))
 }
 
-/// The K = 56 bits that are polar encoded: the payload, scrambled, and its CRC (TS 38.212 §7.1.3).
+/// Returns the K = 56 bits before polar encoding: the scrambled payload and its CRC (TS 38.212
+/// §7.1.3).
 pub(super) fn message(payload: u32, pci: Pci, lmax: Lmax) -> u64 {
     with_crc(scramble(payload, pci, lmax))
 }
@@ -28,7 +29,7 @@ pub(super) fn with_crc(scrambled: u32) -> u64 {
     u64::from(scrambled) << 24 | u64::from(crc24c(scrambled))
 }
 
-/// The symbols of a message, for the low bits `v` of the SSB index.
+/// Returns the symbols of a message for the low bits `v` of the SSB index.
 pub(super) fn modulate(message: u64, pci: Pci, v: u8) -> [Complex32; PBCH_LEN] {
     let coded = polar::encode(message);
     let bits = rate_match(&coded)
@@ -39,7 +40,8 @@ pub(super) fn modulate(message: u64, pci: Pci, v: u8) -> [Complex32; PBCH_LEN] {
     symbols
 }
 
-/// The sequence added to the E coded bits: c_init = PCI, from v·E on (TS 38.211 §7.3.3.1).
+/// Returns the scrambling sequence of the E coded bits: c_init = PCI, starting at v·E (TS 38.211
+/// §7.3.3.1).
 pub(super) fn scrambling(pci: Pci, v: u8) -> Gold {
     Gold::new(u32::from(pci.get()), u32::from(v) * E as u32)
 }

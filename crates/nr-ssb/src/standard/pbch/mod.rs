@@ -1,5 +1,4 @@
-//! The physical broadcast channel: payload to QPSK symbols and back (TS 38.212 §7.1,
-//! TS 38.211 §7.3.3).
+//! Physical broadcast channel: encoding and decoding (TS 38.212 §7.1, TS 38.211 §7.3.3).
 
 mod combine;
 mod decode;

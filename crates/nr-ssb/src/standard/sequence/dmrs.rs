@@ -7,11 +7,11 @@ use super::modulation::qpsk;
 use crate::standard::numerology::Lmax;
 use crate::standard::pci::Pci;
 
-/// Resource elements of the PBCH DM-RS in one SSB.
+/// Number of PBCH DM-RS resource elements in one SSB.
 pub const DMRS_LEN: usize = 144;
 
-/// i̅_SSB, which DM-RS sequence an SSB carries (TS 38.211 §7.4.1.4.1): the two low bits of the SSB
-/// index plus 4·`half_frame` for Lmax 4, the three low bits of the index otherwise.
+/// Returns i̅_SSB, which selects the DM-RS sequence of an SSB (TS 38.211 §7.4.1.4.1): the two low
+/// bits of the SSB index plus 4·`half_frame` for Lmax 4, otherwise the three low bits of the index.
 pub fn ibar_ssb(lmax: Lmax, ssb_index: u8, half_frame: bool) -> u8 {
     match lmax {
         Lmax::L4 => (ssb_index & 3) + 4 * u8::from(half_frame),

@@ -1,12 +1,13 @@
 //! The length-31 Gold sequence (TS 38.211 §5.2.1).
 
-/// Samples of both registers that are thrown away, N_C.
+/// Number of discarded samples of both registers, N_C.
 const NC: u32 = 1600;
-/// New samples that one step of a register gives: its taps reach 3 ahead, so 31 − 3 are known.
+/// Number of new samples per register step. The taps reach 3 samples ahead, so that 31 − 3 samples
+/// are known.
 const STEP: u32 = 28;
 const STEP_MASK: u32 = (1 << STEP) - 1;
 
-/// State of x1 after N_C samples; x1 starts the same for everybody.
+/// State of x1 after N_C samples; its initial state is always the same.
 const X1_AT_NC: u32 = {
     let mut x1 = 1;
     let mut left = NC;
@@ -18,21 +19,22 @@ const X1_AT_NC: u32 = {
     x1
 };
 
-/// The next `n` ≤ 28 samples of x1(i+31) = x1(i+3) + x1(i); bit j of the state is x1(i+j).
+/// Returns the state after `n` ≤ 28 samples of x1(i+31) = x1(i+3) + x1(i); bit j of the state is
+/// x1(i+j).
 const fn advance_x1(x: u32, n: u32) -> u32 {
     let new = ((x >> 3) ^ x) & STEP_MASK;
     ((x >> n) | (new << (31 - n))) & 0x7fff_ffff
 }
 
-/// The next `n` ≤ 28 samples of x2(i+31) = x2(i+3) + x2(i+2) + x2(i+1) + x2(i).
+/// Returns the state after `n` ≤ 28 samples of x2(i+31) = x2(i+3) + x2(i+2) + x2(i+1) + x2(i).
 const fn advance_x2(x: u32, n: u32) -> u32 {
     let new = ((x >> 3) ^ (x >> 2) ^ (x >> 1) ^ x) & STEP_MASK;
     ((x >> n) | (new << (31 - n))) & 0x7fff_ffff
 }
 
-/// The pseudo-random sequence c(n), n = `offset`, `offset` + 1, …, each 0 or 1.
+/// Pseudo-random sequence c(n), n = `offset`, `offset` + 1, …, each 0 or 1.
 ///
-/// Registers move 28 samples at a time, so that a far `offset` is cheap.
+/// The registers advance by 28 samples per step, so that a large `offset` is fast.
 ///
 /// ```
 /// use nr_ssb::Gold;
@@ -49,7 +51,7 @@ pub struct Gold {
 }
 
 impl Gold {
-    /// The sequence with initial value `c_init` (31 bits), from c(`offset`) on.
+    /// Creates the sequence with initial value `c_init` (31 bits), starting at c(`offset`).
     pub const fn new(c_init: u32, offset: u32) -> Self {
         let mut x1 = X1_AT_NC;
         let mut x2 = c_init & 0x7fff_ffff;
@@ -96,7 +98,7 @@ impl Iterator for Gold {
 mod tests {
     use super::*;
 
-    /// The definition, one sample at a time.
+    /// Reference: the definition, one sample at a time.
     fn naive(c_init: u32, length: usize) -> Vec<u8> {
         let total = length + NC as usize + 31;
         let mut x1 = vec![0u8; total];

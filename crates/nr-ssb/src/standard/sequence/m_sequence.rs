@@ -1,9 +1,9 @@
-//! The m-sequences of length 127 that PSS and SSS are made of.
+//! m-sequences of length 127, from which PSS and SSS are formed.
 
 /// Length of the PSS and of the SSS.
 pub const SYNC_LEN: usize = 127;
 
-/// The m-sequence x(i+7) = x(i+`tap`) + x(i) from x(0)…x(6) = `start`.
+/// Returns the m-sequence x(i+7) = x(i+`tap`) + x(i) with x(0)…x(6) = `start`.
 pub(crate) const fn m_sequence(start: [u8; 7], tap: usize) -> [u8; SYNC_LEN] {
     let mut x = [0; SYNC_LEN];
     let mut i = 0;

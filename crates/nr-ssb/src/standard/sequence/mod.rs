@@ -1,4 +1,4 @@
-//! The sequences that fill an SSB's resource elements.
+//! Sequences of an SSB's resource elements.
 
 pub mod dmrs;
 pub mod gold;

@@ -1,26 +1,26 @@
-//! The bits of the checksum that come before the last of the payload: the interleaver puts each
-//! right after those payload bits that it is the parity of (TS 38.212 §5.3.1.1), so that a decoder
-//! knows its value from what it decided before.
+//! CRC bits that precede the last payload bit. The interleaver places each of them after the
+//! payload bits of its parity (TS 38.212 §5.3.1.1), so that earlier decisions of the decoder
+//! determine its value.
 
 use super::code::{INFORMATION_SET, INTERLEAVER, K};
 use super::encode::Codeword;
 use crate::standard::message::crc::crc24c;
 
-/// Bits of the payload, which come first in the message.
+/// Number of payload bits, the first bits of the message.
 const PAYLOAD: usize = 32;
-/// Bits of the checksum with payload after them.
+/// Number of CRC bits that precede a payload bit.
 const COUNT: usize = 3;
 
-/// A parity check on channels up to that of a bit of the checksum.
+/// Parity check on bit channels, ending at that of a CRC bit.
 #[derive(Debug, Clone, Copy)]
 pub struct Check {
-    /// The channel of that bit, the last of those checked.
+    /// Bit channel of the CRC bit, the last one of the check.
     pub channel: usize,
-    /// The channels whose sum is zero.
+    /// Bit channels with a sum of zero.
     mask: Codeword,
 }
 
-/// All of them, by rising channel.
+/// All checks, in ascending order of their last bit channel.
 const CHECKS: [Check; COUNT] = {
     let mut checks = [Check {
         channel: 0,
@@ -42,7 +42,7 @@ const CHECKS: [Check; COUNT] = {
     checks
 };
 
-/// The check by bit `bit` of the checksum, which is the `k`-th of the information channels.
+/// Returns the check of CRC bit `bit`, which is the `k`-th information channel.
 const fn check(k: usize, bit: usize) -> Check {
     let channel = INFORMATION_SET[k] as usize;
     let mut mask = [0; 8];
@@ -61,14 +61,15 @@ const fn check(k: usize, bit: usize) -> Check {
 }
 
 impl Check {
-    /// The check that ends among the `len` channels from `first` on.
+    /// Returns the check that ends within `len` channels starting at `first`.
     pub fn inside(first: usize, len: usize) -> Option<&'static Self> {
         CHECKS
             .iter()
             .find(|check| (first..first + len).contains(&check.channel))
     }
 
-    /// Whether it holds for u with `word` on the 64 channels around `first`, where u is still zero.
+    /// Whether the check is satisfied for u with `word` on the 64 channels that include `first`,
+    /// where u is still zero.
     pub fn holds(&self, u: &Codeword, word: u64, first: usize) -> bool {
         let before = u.iter().zip(&self.mask).fold(0, |sum, (u, m)| sum ^ u & m);
         (before ^ word & self.mask[first / 64])

@@ -7,7 +7,7 @@ const WORDS: usize = N / 64;
 /// N coded bits, d(n) in bit n mod 64 of word n / 64.
 pub type Codeword = [u64; WORDS];
 
-/// Encode a message of K = 56 bits: the first in bit 55, the CRC in the low 24 bits.
+/// Encodes a message of K = 56 bits: the first in bit 55, the CRC in the low 24 bits.
 ///
 /// The code is linear: encode(a ⊕ b) = encode(a) ⊕ encode(b).
 pub fn encode(message: u64) -> Codeword {
@@ -16,7 +16,7 @@ pub fn encode(message: u64) -> Codeword {
     u
 }
 
-/// u, the message on the information channels.
+/// Returns u: the message on the information channels.
 pub(super) fn place(message: u64) -> Codeword {
     let mut u = [0; WORDS];
     for (&channel, &from) in INFORMATION_SET.iter().zip(&INTERLEAVER) {
@@ -26,7 +26,7 @@ pub(super) fn place(message: u64) -> Codeword {
     u
 }
 
-/// The message, from u.
+/// Returns the message of u.
 pub(super) fn message_of(u: &Codeword) -> u64 {
     let pairs = INFORMATION_SET.iter().zip(&INTERLEAVER);
     pairs.fold(0, |message, (&channel, &from)| {
@@ -35,7 +35,8 @@ pub(super) fn message_of(u: &Codeword) -> u64 {
     })
 }
 
-/// u ← u·G_64, its own inverse; with leading zeros u·G_n for every smaller power of two.
+/// u ← u·G_64, which is its own inverse. With leading zeros it is u·G_n for every smaller power of
+/// two.
 pub(super) const fn transform_word(mut word: u64) -> u64 {
     const BUTTERFLIES: [(u32, u64); 6] = [
         (1, 0x5555_5555_5555_5555),
@@ -54,7 +55,7 @@ pub(super) const fn transform_word(mut word: u64) -> u64 {
     word
 }
 
-/// u ← u·G_N, its own inverse: butterflies first inside the words, then between them.
+/// u ← u·G_N, which is its own inverse: butterflies within the words, then between words.
 fn transform(u: &mut Codeword) {
     for word in u.iter_mut() {
         *word = transform_word(*word);

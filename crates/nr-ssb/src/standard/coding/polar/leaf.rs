@@ -1,19 +1,20 @@
-//! A leaf of the decoding tree: a code so small that the LLRs are correlated with all its words.
+//! Leaf of the decoding tree: a code with so few words that the LLRs are correlated with all of
+//! them.
 //!
-//! Of n rows of G_n the last is the all-ones word, and those whose index lacks a single digit b are,
-//! up to that word, the sign patterns (−1)^{i_b}: their sums are the Walsh functions, with which one
-//! fast Hadamard transform correlates. The few remaining rows make cosets, one transform each
-//! (J. Conway, N. Sloane, "Soft decoding techniques for codes and lattices", IEEE Trans. Inf. Theory
-//! 32 (1986)).
+//! The last of the n rows of G_n is the all-ones word. The rows whose index lacks a single binary
+//! digit b are, up to that word, the sign patterns (−1)^{i_b}. Their sums are the Walsh functions,
+//! with which one fast Hadamard transform correlates. The few remaining rows form cosets, with one
+//! transform each (J. Conway, N. Sloane, "Soft decoding techniques for codes and lattices", IEEE
+//! Trans. Inf. Theory 32 (1986)).
 
 use super::encode::transform_word;
 
-/// Longest leaf: the bits of a word.
+/// Maximum length of a leaf: the number of bits of a word.
 const MAX_LEN: usize = 64;
-/// Rows that make cosets at most: four transforms a path.
+/// Maximum number of rows that form cosets: four transforms per path.
 const COSET_ROWS: usize = 2;
 
-/// Bits i whose digit b is one.
+/// Bits i whose binary digit b is one.
 const DIGITS: [u64; 6] = [
     0xAAAA_AAAA_AAAA_AAAA,
     0xCCCC_CCCC_CCCC_CCCC,
@@ -23,19 +24,19 @@ const DIGITS: [u64; 6] = [
     0xFFFF_FFFF_0000_0000,
 ];
 
-/// The code of a leaf.
+/// Code of a leaf.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Leaf {
     len: usize,
-    /// Digits whose Walsh functions are words.
+    /// Number of digits whose Walsh functions are words of the code.
     digits: usize,
-    /// Words outside the Walsh functions, 0 for none.
+    /// Words outside the Walsh functions; 0 for none.
     others: [u64; COSET_ROWS],
 }
 
 impl Leaf {
-    /// The code of these rows of G_n, n = `len` up to 64; `None` if they are too many or without the
-    /// last.
+    /// Returns the code of these rows of G_n, n = `len` up to 64; `None` if there are too many
+    /// rows, or the last row is missing.
     pub fn new(rows: u64, len: usize) -> Option<Self> {
         let last = len - 1;
         let (mut digits, mut others, mut count) = (0, [0; COSET_ROWS], 0);
@@ -56,7 +57,7 @@ impl Leaf {
     }
 
     /// Calls `offer` with every word c, or its complement, for which Σ α(i)·(−1)^{c(i)} exceeds the
-    /// threshold, and this sum. `offer` returns the threshold from there on.
+    /// threshold, and with this sum. `offer` returns the new threshold.
     pub fn correlate(
         &self,
         alpha: &[f32],
@@ -98,7 +99,7 @@ impl Leaf {
     }
 }
 
-/// The bits i with an odd number of digits in common with `walsh`.
+/// Returns the bits i with an odd number of digits in common with `walsh`.
 fn walsh_function(walsh: usize) -> u64 {
     let digits = DIGITS.iter().enumerate();
     digits
@@ -137,7 +138,7 @@ mod tests {
     fn every_word_is_offered_once_with_its_correlation() {
         let alpha: Vec<f32> = (0..32).map(|i| (i as f32 * 1.7).sin()).collect();
         for (rows, len, count) in [
-            // Two rows that make cosets, three Walsh functions, the all-ones word.
+            // Two rows that form cosets, three Walsh functions, the all-ones word.
             (0xE200_8200_u64, 32, 64),
             (0xE, 4, 8),
             (0xF, 4, 16),

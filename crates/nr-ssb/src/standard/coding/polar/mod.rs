@@ -1,7 +1,7 @@
 //! The polar code of the PBCH: K = 56 bits (32 payload, 24 CRC) to N = 512 (TS 38.212 §5.3.1, §7.1.4).
 //!
-//! The decoder is told by `tree` where to stop descending, decodes there with `leaf`, and on the way
-//! holds the paths to the parity `checks`.
+//! `tree` determines the leaves, `leaf` decodes them, and `checks` removes paths that violate the
+//! parity checks.
 
 mod checks;
 mod code;

@@ -1,4 +1,4 @@
-//! List decoding by the book, one channel at a time and everything copied, to test against.
+//! Reference list decoder for tests: one channel at a time, with copies of all values.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,13 +11,13 @@ use super::list::ListDecoder;
 use super::tree::Node;
 use crate::standard::message::crc::crc24c;
 
-/// A path that enters a node: its metric, its LLRs, its u so far.
+/// Path at the start of a node: metric, LLRs, decided bits u.
 type Entered = (f64, Vec<f64>, Codeword);
-/// A path at a node's end: its metric, its place among the paths that entered, its bits, its u.
+/// Path at the end of a node: metric, index of its path at the start, bits, u.
 type Path = (f64, usize, Vec<u8>, Codeword);
 
-/// Decode the node that begins at channel `first`. The list is cut down at the ends of the leaves
-/// of the decoding tree, of which this node is a part if `in_leaf`.
+/// Decodes the node that begins at channel `first`. The list is pruned at the ends of the leaves;
+/// `in_leaf` states whether this node is part of a leaf.
 fn visit(entered: &[Entered], first: usize, list_size: usize, in_leaf: bool) -> Vec<Path> {
     let len = entered[0].1.len();
     let is_leaf = !in_leaf && matches!(Node::at(first, len), Node::Leaf(_));
@@ -58,7 +58,7 @@ fn visit(entered: &[Entered], first: usize, list_size: usize, in_leaf: bool) -> 
     paths
 }
 
-/// Both ways to go on at a channel, or the one that is allowed.
+/// Returns both continuations at an information channel, or the only one at a frozen channel.
 fn channel(entered: &[Entered], channel: usize) -> Vec<Path> {
     let mut paths = Vec::new();
     for (parent, (metric, llr, u)) in entered.iter().enumerate() {

@@ -1,10 +1,10 @@
-//! The decoding tree: where to stop descending.
+//! Decoding tree: nodes at which the descent ends.
 
 use super::code::INFORMATION_SET;
 use super::encode::Codeword;
 use super::leaf::Leaf;
 
-/// The information channels as bits.
+/// Information channels as bits.
 const INFORMATION: Codeword = {
     let mut channels = [0; 8];
     let mut k = 0;
@@ -16,19 +16,19 @@ const INFORMATION: Codeword = {
     channels
 };
 
-/// What a node of the decoding tree asks for.
+/// Kind of node of the decoding tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Node {
-    /// All channels frozen: the all-zero word.
+    /// All channels are frozen: the all-zero word.
     Rate0,
-    /// A code whose words can all be compared.
+    /// Code whose words are all compared.
     Leaf(Leaf),
-    /// To be descended into.
+    /// Node with two children.
     Split,
 }
 
 impl Node {
-    /// The node over `len` channels, a power of two, from its multiple `first` on.
+    /// Returns the node of `len` channels, a power of two, starting at its multiple `first`.
     pub fn at(first: usize, len: usize) -> Self {
         let words = &INFORMATION[first / 64..(first + len).div_ceil(64)];
         if len > 64 {
