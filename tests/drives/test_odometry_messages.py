@@ -229,7 +229,7 @@ def test_fields_and_topics_have_the_names_of_the_file(
     [
         ("drive.mcap.zst", b"\x28\xb5\x2f\xfd\0\0", "zstd -d"),
         ("drive.bag", b"#ROSBAG V2.0\n\0\0", "rosbags-convert"),
-        ("drive.parquet", b"PAR1\0\0", "is Parquet, and no CSV"),
+        ("drive.parquet", b"PAR1\0\0", "is Parquet, not CSV"),
         ("drive.csv.gz", b"\x1f\x8b\0\0", "gunzip"),
         ("drive.xlsx", b"PK\x03\x04\0\0", "write the table as CSV"),
         ("metadata.yaml", b"rosbag2_bagfile_information:\n", "give the rosbag2 folder"),

@@ -1,4 +1,4 @@
-//! Where bytes come from and go to.
+//! Addresses of inputs and outputs.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -7,28 +7,28 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// An end of a connection, written as one string.
+/// Address of an input or output, written as one string.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "String", into = "String")]
 #[schemars(with = "String")]
 pub enum Address {
     /// `-`: standard input or output.
     Standard,
-    /// `tcp://HOST:PORT`: connects, and again when the connection ends.
+    /// `tcp://HOST:PORT`: TCP client, which reconnects when the connection ends.
     Tcp(String),
-    /// `tcp-listen://HOST:PORT`: waits for connections.
+    /// `tcp-listen://HOST:PORT`: TCP server.
     TcpListen(String),
-    /// `udp://HOST:PORT`: receives there, or sends there.
+    /// `udp://HOST:PORT`: receives datagrams there, or sends them there.
     Udp(String),
-    /// `unix:///PATH`: connects to a Unix socket.
+    /// `unix:///PATH`: client of a Unix socket.
     Unix(PathBuf),
-    /// `unix-listen:///PATH`: waits for connections at a Unix socket.
+    /// `unix-listen:///PATH`: server at a Unix socket.
     UnixListen(PathBuf),
-    /// A path: a file.
+    /// Path of a file.
     File(PathBuf),
 }
 
-/// What may stand in place of an address.
+/// Allowed forms of an address.
 pub const FORMS: &str = "it must be `-`, a path, or begin with tcp://, tcp-listen://, udp://, unix:// or \
                          unix-listen://; the first three are followed by HOST:PORT";
 
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn addresses_are_written_as_they_are_read() {
+    fn addresses_round_trip_through_text() {
         for text in [
             "-",
             "tcp://127.0.0.1:5000",

@@ -1,18 +1,19 @@
-//! What time it is: of samples that carry none, and of the drive.
+//! Clocks: time of samples without time stamps, and time of the drive.
 
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-/// Seconds since 1970.
+/// Returns the time in seconds since 1970 (UTC).
 pub fn unix_s() -> f64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(0.0, |it| it.as_secs_f64())
 }
 
-/// Length of a window in which the least delayed block is looked for, in seconds.
+/// Length of the window over which the minimum delay is determined, in seconds.
 const WINDOW_S: f64 = 1.0;
-/// Two oscillators differ by less, relative.
+/// Maximum relative frequency difference of two oscillators.
 const DRIFT: f64 = 1e-4;
-/// Minimum change of the least delay, in seconds, that is corrected at once; a smaller one is drift.
+/// Minimum change of the minimum delay, in seconds, that is corrected immediately; a smaller change
+/// is drift.
 const STEP_S: f64 = 2e-3;
 /// Minimum silence, in seconds, that counts as an interruption. Transport and a loaded computer delay blocks
 /// by less.
@@ -22,29 +23,31 @@ pub const INTERRUPTION_S: f64 = 0.25;
 pub const CATCH_UP_S: f64 = 0.2;
 /// Minimum decrease of the delay, in seconds, by samples that come faster than in real time.
 pub const CAUGHT_UP_S: f64 = 0.01;
-/// A stated rate that differs by more from what arrives, relative, is a wrong one.
+/// Minimum relative difference between the configured and the measured sample rate that indicates a
+/// wrong rate.
 const WRONG_RATE: f64 = 0.01;
-/// Windows in a row of which each must say so.
+/// Number of consecutive windows that must indicate a wrong rate.
 const WINDOWS: u32 = 3;
 
-/// What a window of arrivals showed.
+/// Finding from a window of arrivals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Finding {
-    /// Samples of this many seconds are missing; the offset includes them.
+    /// Duration of missing samples in seconds; the offset includes it.
     Missing(f64),
-    /// So many more samples a second come than the rate says, relative.
+    /// Measured sample rate divided by the configured rate, minus one.
     WrongRate(f64),
 }
 
-/// Times of a stream's samples: the sample time by counting alone, and its offset from the arrival of blocks.
+/// Clock of a stream of samples: the sample time by counting, and its offset from the arrival of
+/// blocks.
 ///
-/// The sample time is exact from one SSB to the next, so that windows stay where SSBs are. The offset adds
-/// drift of the oscillators and samples that are missing. A block cannot arrive before its last sample was
-/// received, therefore the least delay of a second is that of the transport.
+/// The sample time is exact between SSBs, so that windows remain at the SSBs. The offset includes
+/// drift of the oscillators and missing samples. A block cannot arrive before its last sample was
+/// received. Therefore, the minimum delay within a second is the delay of the transport.
 #[derive(Debug, Clone)]
 pub struct ArrivalClock {
     rate_hz: f64,
-    /// Time of sample 0, once a block has come.
+    /// Time of sample 0; `None` before the first block.
     zero_s: Option<f64>,
     counted: u64,
     offset_s: f64,
@@ -60,7 +63,7 @@ pub struct ArrivalClock {
 struct Interruption {
     decided_s: f64,
     lost_s: f64,
-    /// The same when the decision was put off last.
+    /// Delay at the last postponement of the decision, in seconds.
     before_s: f64,
 }
 
@@ -71,7 +74,7 @@ struct Window {
 }
 
 impl ArrivalClock {
-    /// Before the first sample of a stream of this rate.
+    /// Creates the clock of a stream before its first sample.
     pub const fn new(rate_hz: f64) -> Self {
         Self {
             rate_hz,
@@ -85,17 +88,18 @@ impl ArrivalClock {
         }
     }
 
-    /// Time minus sample time, in seconds.
+    /// Returns time minus sample time in seconds.
     pub const fn offset_s(&self) -> f64 {
         self.offset_s
     }
 
-    /// Sample time of the next sample; `None` before the first.
+    /// Returns the sample time of the next sample; `None` before the first block.
     pub fn next_s(&self) -> Option<f64> {
         Some(self.zero_s? + self.counted as f64 / self.rate_hz)
     }
 
-    /// Sample time of the first of `length` samples that have arrived at `now_s`.
+    /// Processes the arrival of `length` samples at `now_s` and returns the sample time of the
+    /// first one.
     pub fn block(&mut self, length: usize, now_s: f64) -> (f64, Option<Finding>) {
         let duration_s = length as f64 / self.rate_hz;
         let zero_s = *self.zero_s.get_or_insert(now_s - duration_s);
@@ -121,7 +125,7 @@ impl ArrivalClock {
         (start_s, finding)
     }
 
-    /// Decides after an interruption whether its samples are missing or come late.
+    /// Decides after an interruption whether its samples are missing or late.
     fn catch_up(&mut self, delay_s: f64, now_s: f64) -> Option<Finding> {
         let interruption = self.interruption.as_mut()?;
         let early_s = delay_s.min(0.0);
@@ -141,7 +145,7 @@ impl ArrivalClock {
         (lost_s >= INTERRUPTION_S).then_some(Finding::Missing(lost_s))
     }
 
-    /// Keeps the least delay of a window, and corrects the offset by it at the end.
+    /// Updates the minimum delay of a window, and corrects the offset at its end.
     fn watch(&mut self, delay_s: f64, now_s: f64) -> Option<Finding> {
         let window = self.window.get_or_insert(Window {
             began_s: now_s,
@@ -178,10 +182,12 @@ impl ArrivalClock {
     }
 }
 
-/// Maximum time by which samples or angles may be ahead of the odometry's clock to move the drive's time, in seconds.
+/// Maximum time by which samples or angles may be ahead of the odometry's clock and still advance
+/// the time of the drive, in seconds.
 const MAX_AHEAD_S: f64 = 1.0;
 
-/// Time of the drive: that of the newest input, plus the time since its arrival. The odometry's clock leads.
+/// Time of the drive: that of the newest input plus the time since its arrival. The odometry's
+/// clock has priority.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct DriveClock {
     newest: Option<(f64, Instant)>,
@@ -189,7 +195,7 @@ pub struct DriveClock {
 }
 
 impl DriveClock {
-    /// Samples or angles of this time came in.
+    /// Processes the arrival of samples or angles.
     pub fn see(&mut self, time_s: f64) {
         let is_ahead = |now_s: f64| time_s > now_s + MAX_AHEAD_S;
         if !(self.is_of_odometry && self.now_s().is_some_and(is_ahead)) {
@@ -197,7 +203,7 @@ impl DriveClock {
         }
     }
 
-    /// Odometry of this time came in.
+    /// Processes the arrival of odometry.
     pub fn see_odometry(&mut self, time_s: f64) {
         if !self.is_of_odometry {
             *self = Self {
@@ -208,20 +214,20 @@ impl DriveClock {
         self.move_to(time_s);
     }
 
-    /// Moves on to a time, whatever it is of.
+    /// Advances to a time from any source.
     pub fn move_to(&mut self, time_s: f64) {
         if self.newest.is_none_or(|(newest_s, _)| time_s > newest_s) {
             self.newest = Some((time_s, Instant::now()));
         }
     }
 
-    /// Time now in seconds; `None` before any input.
+    /// Returns the present time in seconds; `None` before any input.
     pub fn now_s(&self) -> Option<f64> {
         self.newest
             .map(|(time_s, at)| time_s + at.elapsed().as_secs_f64())
     }
 
-    /// Forgets the time, as after a step of the odometry's clock.
+    /// Resets the time, as after a step of the odometry's clock.
     pub fn reset(&mut self) {
         *self = Self::default();
     }
@@ -234,7 +240,8 @@ mod tests {
     const RATE_HZ: f64 = 3.84e6;
     const BLOCK: usize = 3840;
 
-    /// Blocks of 1 ms, each delayed by up to 20 ms but one in ten; `lost_s` before block `at`.
+    /// Blocks of 1 ms with random delays of up to 20 ms, and one block in ten without; `lost_s` is
+    /// missing before block `at`.
     fn run(drift: f64, lost: Option<(usize, f64)>, blocks: usize) -> (Vec<f64>, Vec<Finding>) {
         let (mut clock, mut found, mut errors_s) =
             (ArrivalClock::new(RATE_HZ), Vec::new(), Vec::new());
@@ -257,7 +264,7 @@ mod tests {
             sample_times_s.push(time_s);
             found.extend(finding);
         }
-        // Windows are placed by the sample time, which is contiguous whatever the delays are.
+        // Windows depend on the sample time, which is contiguous for any delays.
         for (number, time_s) in sample_times_s.iter().enumerate() {
             let counted_s = sample_times_s[0] + number as f64 * 1e-3;
             assert!((time_s - counted_s).abs() < 1e-6, "{number}");
@@ -266,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn jitter_and_drift_leave_the_time_within_a_tenth_of_a_millisecond() {
+    fn jitter_and_drift_cause_an_error_below_a_tenth_of_a_millisecond() {
         for drift in [0.0, 2e-5, -5e-5] {
             let (errors_s, found) = run(drift, None, 60_000);
             assert!(found.is_empty(), "{found:?}");
@@ -276,8 +283,9 @@ mod tests {
         }
     }
 
-    /// A change of the delay by milliseconds is a loaded computer more often than missing samples, which the
-    /// SSBs tell: the time is right within two windows, and nothing is reported.
+    /// A change of the delay by milliseconds is usually caused by a loaded computer. Missing
+    /// samples are detected by the SSBs. The time is correct within two windows, and nothing is
+    /// reported.
     #[test]
     fn a_short_gap_is_corrected_within_two_windows() {
         let (errors_s, found) = run(0.0, Some((5_500, 7e-3)), 9_000);
@@ -286,13 +294,14 @@ mod tests {
     }
 
     #[test]
-    fn an_interruption_is_corrected_at_once_and_reported_once() {
+    fn an_interruption_is_corrected_immediately_and_reported_once() {
         let (errors_s, found) = run(0.0, Some((5_500, 6.0)), 9_000);
         let [Finding::Missing(lost_s)] = found[..] else {
             panic!("{found:?}");
         };
         assert!((lost_s - 6.0).abs() < 3e-4, "{lost_s}");
-        // The delay of the first block is known after the least delayed one of the next ten.
+        // The delay of the first block is known after the block with the minimum delay among the
+        // next ten.
         assert!(errors_s[5_500..].iter().all(|it| it.abs() < 2.1e-2));
         assert!(errors_s[5_511..].iter().all(|it| it.abs() < 3e-4));
     }
@@ -302,7 +311,8 @@ mod tests {
         let mut clock = ArrivalClock::new(RATE_HZ);
         let mut found = Vec::new();
         for number in 0..8_000 {
-            // From 3 s on nothing arrives for half a second, then a third faster than in real time.
+            // Samples stop at 3 s for half a second and then arrive a third faster than in real
+            // time.
             let due_s = f64::from(number) * 1e-3;
             let arrival_s = due_s.max(if due_s < 3.0 {
                 0.0
@@ -320,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_rate_is_named() {
+    fn a_wrong_rate_is_reported() {
         let mut clock = ArrivalClock::new(RATE_HZ);
         let found: Vec<Finding> = (0..10_000)
             .filter_map(|number| clock.block(2 * BLOCK, 10.0 + f64::from(number) * 1e-3).1)
@@ -333,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn the_odometry_leads_the_time_of_the_drive() {
+    fn the_odometry_determines_the_time_of_the_drive() {
         let mut clock = DriveClock::default();
         let near = |clock: &DriveClock, time_s: f64| (clock.now_s().unwrap() - time_s).abs() < 0.5;
         clock.see(100.0);

@@ -1,15 +1,15 @@
-//! Which samples are wanted: between the bursts that are listened to none are.
+//! Gate for samples: sources drop samples between the received bursts.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use nr_ssb::Case;
 use onboard::settings::Site;
 
-/// Samples before and after an SSB that the receiver needs, in seconds: the reach of its low-pass and of the
-/// clocks' drift since the last burst.
+/// Samples before and after an SSB that the receiver needs, in seconds: length of its low-pass
+/// filter, and clock drift since the last burst.
 const GUARD_S: f64 = 4e-4;
 
-/// The stretch of time of which samples are wanted, set by the pipeline and read by the sources.
+/// Time interval of required samples, set by the pipeline and read by the sources.
 #[derive(Debug)]
 pub struct Gate {
     is_open: AtomicBool,
@@ -28,19 +28,19 @@ impl Default for Gate {
 }
 
 impl Gate {
-    /// Everything is wanted.
+    /// Opens the gate for all samples.
     pub fn open(&self) {
         self.is_open.store(true, Ordering::Release);
     }
 
-    /// Samples of this stretch are wanted, before it none.
+    /// Sets the interval of required samples.
     pub fn set(&self, [from_s, until_s]: [f64; 2]) {
         self.from_s.store(from_s.to_bits(), Ordering::Release);
         self.until_s.store(until_s.to_bits(), Ordering::Release);
         self.is_open.store(false, Ordering::Release);
     }
 
-    /// The stretch of which samples are wanted; `None` for all.
+    /// Returns the interval of required samples; `None` for all samples.
     pub fn wanted(&self) -> Option<[f64; 2]> {
         if self.is_open.load(Ordering::Acquire) {
             return None;
@@ -50,19 +50,19 @@ impl Gate {
     }
 }
 
-/// The stretch of samples that holds a burst's SSBs, of which one begins at a time.
+/// Calculator of the interval of a burst from the time of one of its SSBs.
 #[derive(Debug, Clone, Copy)]
 pub struct Windows {
     symbol_s: f64,
-    /// Of 30 kHz case C; the SSBs of case B are apart by four symbols more or less at most, for which
-    /// [`GUARD_S`] has room.
+    /// SSB pattern. For 30 kHz case C is used; the SSBs of case B differ by at most four symbols,
+    /// for which [`GUARD_S`] is sufficient.
     case: Case,
-    /// First symbols of the first and the last SSB that the site's radio heads send.
+    /// First symbols of the first and the last SSB of the site's radio heads.
     symbols: [usize; 2],
 }
 
 impl Windows {
-    /// For the SSBs of a site.
+    /// Creates the calculator for the SSBs of a site.
     pub fn new(site: &Site) -> Self {
         let spacing_khz = site.ssb.subcarrier_spacing_khz;
         let is_spaced = |case: &Case| f64::from(case.spacing().khz()) == spacing_khz;
@@ -76,12 +76,12 @@ impl Windows {
         }
     }
 
-    /// Length of an SSB.
+    /// Returns the duration of an SSB in seconds.
     pub const fn ssb_s(&self) -> f64 {
         4.0 * self.symbol_s
     }
 
-    /// The stretch around the burst whose SSB of this index begins at `ssb_s`.
+    /// Returns the interval of the burst whose SSB with this index begins at `ssb_s`.
     pub fn around(&self, ssb_s: f64, ssb_index: u8) -> [f64; 2] {
         let symbol = self.case.start_symbol(ssb_index).unwrap_or(self.symbols[0]) as f64;
         let begins_s = |other: usize| ssb_s + (other as f64 - symbol) * self.symbol_s;
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_window_holds_every_ssb_of_its_burst() {
+    fn a_window_contains_every_ssb_of_its_burst() {
         let site = Site::from_library("yard", &Shipped).unwrap();
         let windows = Windows::new(&site);
         // SSBs of indices 0 and 3 begin at symbols 2 and 22 at 15 kHz (case A), and are 4 symbols long.
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_set_is_what_is_wanted() {
+    fn the_gate_returns_the_interval_that_was_set() {
         let gate = Gate::default();
         assert_eq!(gate.wanted(), None);
         gate.set([1.0, 2.0]);

@@ -184,7 +184,7 @@ impl OutputHealth {
         std::mem::take(&mut self.lock().changes)
     }
 
-    /// Returns the present health.
+    /// Returns the current health.
     pub fn status(&self) -> OutputStatus {
         let state = self.lock();
         let failure = state.failure.as_ref();

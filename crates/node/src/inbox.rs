@@ -1,5 +1,5 @@
-//! What has come in and not been taken yet: bounded. The oldest are dropped where there is no room, or whoever puts
-//! waits where nothing comes by itself.
+//! Bounded queue of inputs. If the queue is full, the oldest inputs are dropped, or the producer
+//! waits if it reads a file.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -12,31 +12,31 @@ use onboard::observation::OdometrySample;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Bytes of samples that wait at most: 0.1 s of four antennas at 3.84 Msps.
+/// Maximum size of waiting samples in bytes: 0.1 s of four antennas at 3.84 Msps.
 pub const MOST_SAMPLE_BYTES: usize = 12 << 20;
-/// Other things that wait at most.
+/// Maximum number of waiting inputs other than samples.
 pub const MOST_OTHERS: usize = 4096;
-/// Buffers of blocks kept for reuse.
+/// Maximum number of buffers kept for reuse.
 const MOST_SPARE: usize = 8;
 
-/// Samples of every antenna of the array, in its order.
+/// Samples of every antenna in the order of the array.
 #[derive(Debug, Default)]
 pub struct Block {
-    /// Sample time of the first, in seconds.
+    /// Sample time of the first sample in seconds.
     pub time_s: f64,
-    /// Time minus sample time in seconds, where the arrival of counted samples is measured.
+    /// Time minus sample time in seconds; `None` unless the arrival of counted samples is measured.
     pub offset_s: Option<f64>,
-    /// As many of each antenna.
+    /// Samples of each antenna, in equal numbers.
     pub antennas: Vec<Vec<Complex32>>,
 }
 
 impl Block {
-    /// Samples of each antenna.
+    /// Returns the number of samples per antenna.
     pub fn length(&self) -> usize {
         self.antennas.first().map_or(0, Vec::len)
     }
 
-    /// Adds the samples that come after these.
+    /// Appends the following samples.
     pub fn append(&mut self, next: &Self) {
         if self.length() == 0 {
             self.time_s = next.time_s;
@@ -54,42 +54,42 @@ impl Block {
     }
 }
 
-/// How serious an event is.
+/// Severity of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
-    /// Good to know.
+    /// Information.
     Info,
-    /// Something needs watching.
+    /// Warning.
     Warn,
 }
 
-/// What is asked of the node by message.
+/// Command from a message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command {
-    /// The pose is this, with the covariance of (x, y, heading) where it is known.
+    /// Sets the pose, with the covariance of (x, y, heading) if it is known.
     SetPose {
-        /// At this time; now without.
+        /// Time of the pose in seconds; `None` for the present.
         time_s: Option<f64>,
-        /// The pose.
+        /// New pose.
         pose: Pose,
-        /// Covariance of (x, y, heading), row-major.
+        /// Covariance of (x, y, heading), row-major, in m², m·rad and rad².
         covariance: Option<[[f64; 3]; 3]>,
     },
-    /// Everything is forgotten and the pose searched for.
+    /// Resets all estimates and searches for the pose.
     Reset,
-    /// A cell is left out ...
+    /// Excludes a cell.
     Exclude(u16),
-    /// ... or taken in again.
+    /// Includes an excluded cell again.
     Readmit(u16),
 }
 
-/// Something that came in.
+/// Input of the pipeline.
 #[derive(Debug)]
 pub enum Input {
     /// Samples.
     Samples(Block),
-    /// The sources dropped what was not wanted, up to this time (s).
+    /// Time up to which the sources dropped samples that were not required (s).
     Slept(f64),
     /// Odometry.
     Odometry(OdometrySample),
@@ -97,21 +97,21 @@ pub enum Input {
     Angle(AngleObservation),
     /// A command.
     Command(Command),
-    /// Something about a source that somebody should know.
+    /// Event of a source.
     Remark {
-        /// How serious it is.
+        /// Severity.
         level: Level,
-        /// Which source.
+        /// Name of the source.
         source: &'static str,
-        /// What.
+        /// Description.
         text: String,
     },
-    /// A source has come to its end, and no more will come.
+    /// End of a source.
     End,
 }
 
 impl Input {
-    /// Something that needs watching.
+    /// Creates a warning.
     pub const fn warning(source: &'static str, text: String) -> Self {
         let level = Level::Warn;
         Self::Remark {
@@ -122,7 +122,7 @@ impl Input {
     }
 }
 
-/// What waits to be taken.
+/// Waiting inputs.
 #[derive(Default)]
 struct Waiting {
     inputs: VecDeque<(Instant, Input)>,
@@ -134,18 +134,19 @@ struct Waiting {
     is_closed: bool,
 }
 
-/// A queue from all sources to the pipeline.
+/// Queue from all sources to the pipeline.
 #[derive(Default)]
 pub struct Inbox {
     waiting: Mutex<Waiting>,
     came: Condvar,
     taken: Condvar,
-    /// Whether whoever puts something in waits for room, as it may where it reads files.
+    /// Whether a producer waits for space instead of dropping inputs, which is correct for files.
     waits: bool,
 }
 
 impl Inbox {
-    /// An empty queue; whoever puts something in other than samples waits for room where `waits` is true.
+    /// Creates an empty queue. If `waits` is true, producers of inputs other than samples wait for
+    /// space.
     pub fn new(waits: bool) -> Self {
         Self {
             waits,
@@ -157,7 +158,7 @@ impl Inbox {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts something in; drops the oldest of its kind where there is no room, or waits for it.
+    /// Adds an input. If the queue is full, drops the oldest input of its kind or waits for space.
     pub fn put(&self, input: Input) {
         let mut waiting = self.lock();
         while self.waits && waiting.others >= MOST_OTHERS && !waiting.is_closed {
@@ -178,14 +179,15 @@ impl Inbox {
                 while waiting.others > MOST_OTHERS && waiting.drop_oldest(false) {}
             }
         }
-        // Whoever takes waits for the first alone; to wake it takes a call of the system.
+        // The consumer waits only for the first input; each notification is a system call.
         if waiting.inputs.is_empty() {
             self.came.notify_one();
         }
         waiting.inputs.push_back((Instant::now(), input));
     }
 
-    /// Takes the oldest, with when it came in; `None` where nothing comes for so long, or the queue was closed and is empty.
+    /// Takes the oldest input with its arrival time; `None` after the timeout `wait`, or if the
+    /// queue is closed and empty.
     pub fn take(&self, wait: Duration) -> Option<(Instant, Input)> {
         let mut waiting = self.lock();
         if waiting.inputs.is_empty() && !waiting.is_closed {
@@ -206,26 +208,26 @@ impl Inbox {
         Some((came, input))
     }
 
-    /// Ends the waiting of whoever takes.
+    /// Closes the queue and wakes the consumer.
     pub fn close(&self) {
         self.lock().is_closed = true;
         self.came.notify_all();
         self.taken.notify_all();
     }
 
-    /// Whether it was closed.
+    /// Whether the queue is closed.
     pub fn is_closed(&self) -> bool {
         self.lock().is_closed
     }
 
-    /// Empty buffers of so many antennas, used before where there are such.
+    /// Returns empty buffers for `antennas` antennas, reused if possible.
     pub fn buffers(&self, antennas: usize) -> Vec<Vec<Complex32>> {
         let mut buffers = self.lock().spare.pop().unwrap_or_default();
         buffers.resize_with(antennas, Vec::new);
         buffers
     }
 
-    /// Gives the buffers of a block back.
+    /// Returns the buffers of a block for reuse.
     pub fn give_back(&self, mut antennas: Vec<Vec<Complex32>>) {
         antennas.iter_mut().for_each(Vec::clear);
         let mut waiting = self.lock();
@@ -234,7 +236,7 @@ impl Inbox {
         }
     }
 
-    /// Blocks of samples and other things that were dropped since the start.
+    /// Returns the number of dropped blocks of samples and of other dropped inputs since the start.
     pub fn dropped(&self) -> [u64; 2] {
         let waiting = self.lock();
         [waiting.dropped_blocks, waiting.dropped_others]
@@ -242,7 +244,8 @@ impl Inbox {
 }
 
 impl Waiting {
-    /// Drops the oldest block of samples, or the oldest of anything else; `false` where there is none.
+    /// Drops the oldest block of samples, or the oldest other input; returns `false` if there is
+    /// none.
     fn drop_oldest(&mut self, samples: bool) -> bool {
         let of_kind = |(_, it): &(Instant, Input)| matches!(it, Input::Samples(_)) == samples;
         let Some(place) = self.inputs.iter().position(of_kind) else {
@@ -278,7 +281,7 @@ mod tests {
         for number in 0..12 {
             inbox.put(block(f64::from(number)));
         }
-        // A block is 2 MiB: six fit.
+        // A block has 2 MiB, so that six blocks fit.
         assert_eq!(inbox.dropped(), [6, 0]);
         let wait = Duration::ZERO;
         assert!(matches!(inbox.take(wait), Some((_, Input::Odometry(_)))));
@@ -299,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn who_reads_files_waits_for_room_and_nothing_is_dropped() {
+    fn a_producer_that_reads_files_waits_and_nothing_is_dropped() {
         let inbox = Inbox::new(true);
         let sent = MOST_OTHERS + 1000;
         std::thread::scope(|scope| {
@@ -320,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn what_slept_is_one_thing_however_often_it_is_said() {
+    fn repeated_sleep_inputs_are_merged() {
         let inbox = Inbox::default();
         for number in 0..10_000 {
             inbox.put(Input::Slept(f64::from(number)));

@@ -7,7 +7,7 @@ use crate::clock::{CATCH_UP_S, CAUGHT_UP_S, INTERRUPTION_S};
 /// Time within which all SSBs are found again after an interruption.
 const RECENT: Duration = Duration::from_secs(2);
 
-/// Newest samples and odometry at an instant.
+/// Newest samples and odometry at one time.
 #[derive(Debug, Clone, Copy)]
 struct Mark {
     came: Instant,
@@ -15,17 +15,18 @@ struct Mark {
     odometry_s: Option<f64>,
 }
 
-/// An interruption that is not decided.
+/// Interruption without a decision yet.
 #[derive(Debug, Clone, Copy)]
 struct Undecided {
-    /// The last samples before it.
+    /// Last samples before the interruption.
     before: Mark,
-    /// When the decision was put off last, and the missing time then, in seconds.
+    /// Time of the last postponement of the decision.
     since: Instant,
+    /// Missing time at the last postponement, in seconds.
     missing_s: f64,
 }
 
-/// What an arrival of samples shows.
+/// Finding from an arrival of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Arrival {
     /// Whether samples resumed after an interruption.
@@ -34,19 +35,20 @@ pub struct Arrival {
     pub missing_s: Option<f64>,
 }
 
-/// Detects interruptions by arrival times, and missing samples by the time of the odometry: a simulator that
-/// pauses interrupts both.
+/// Detector of interruptions from arrival times, and of missing samples from the time of the
+/// odometry. A simulator that pauses interrupts both.
 #[derive(Debug, Default)]
 pub struct Interruptions {
     last: Option<Mark>,
-    /// An interruption of which the samples may be late or missing.
+    /// Interruption whose samples may be late or missing.
     undecided: Option<Undecided>,
-    /// When samples resumed last.
+    /// Time at which samples resumed last.
     resumed: Option<Instant>,
 }
 
 impl Interruptions {
-    /// Takes in that samples up to `samples_s` came, while the newest odometry was of `odometry_s`.
+    /// Processes the arrival of samples up to `samples_s`, while `odometry_s` is the time of the
+    /// newest odometry.
     pub fn samples(&mut self, came: Instant, samples_s: f64, odometry_s: Option<f64>) -> Arrival {
         let now = Mark {
             came,
@@ -88,13 +90,14 @@ impl Interruptions {
         }
     }
 
-    /// Whether samples resumed so recently before `now` that SSBs off their period belong to that interruption.
+    /// Whether samples resumed so shortly before `now` that SSBs at unexpected times belong to this
+    /// interruption.
     pub fn is_recent(&self, now: Instant) -> bool {
         let is_recent = |at| now.saturating_duration_since(at) < RECENT;
         self.resumed.is_some_and(is_recent)
     }
 
-    /// Forgets all arrivals, for a new start.
+    /// Removes all arrivals, for a new start.
     pub const fn reset(&mut self) {
         (self.last, self.undecided, self.resumed) = (None, None, None);
     }
@@ -104,7 +107,8 @@ impl Interruptions {
 mod tests {
     use super::*;
 
-    /// Samples in blocks of 10 ms for 2 s, absent from 0.5 s for `absent_s`, of which `late_s` come later at once.
+    /// Blocks of 10 ms for 2 s with an interruption at 0.5 s for `absent_s`; samples of `late_s`
+    /// arrive later in one block.
     fn arrivals(absent_s: f64, late_s: f64, odometry_stops: bool) -> (usize, Vec<f64>) {
         let (start, mut interruptions) = (Instant::now(), Interruptions::default());
         let (mut resumed, mut missing) = (0, Vec::new());
@@ -122,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_samples_are_told_from_late_ones_and_from_a_pause() {
+    fn missing_samples_late_samples_and_pauses_are_distinguished() {
         let (resumed, missing) = arrivals(6.0, 0.0, false);
         assert_eq!((resumed, missing.len()), (1, 1));
         assert!((missing[0] - 6.0).abs() < 1e-6, "{missing:?}");

@@ -1,14 +1,14 @@
-//! The localizer on the vehicle, live: samples, angles and odometry in by file, socket or radio; poses out
-//! by file, socket, MQTT and a page to look at.
+//! Live localizer on the vehicle. Inputs are samples, angles and odometry from files, sockets or
+//! radios. Outputs are poses to files, sockets, MQTT and a web page.
 //!
-//! What it computes is [`onboard::Live`]; threads and sockets live here alone. One thread for each source fills
-//! the [`inbox`], one thread ([`engine`]) takes from it and owns the pipeline, one thread for each output writes
-//! its records ([`sink`]), one serves the page ([`web`]). Everything between them is bounded: what cannot be taken
-//! in time is dropped, the oldest first, and counted. An output that fails does not affect the others
-//! ([`health`]).
+//! The localizer is [`onboard::Live`]; this crate adds threads and sockets. Each source has a
+//! thread that fills the [`inbox`]. One thread ([`engine`]) owns the pipeline and takes from the
+//! inbox. Each output has a thread that writes its records ([`sink`]), and one thread serves the
+//! web page ([`web`]). All queues are bounded: inputs that cannot be processed in time are dropped,
+//! oldest first, and counted. A failed output does not affect the others ([`health`]).
 //!
-//! The parsers of whatever comes from outside are here rather than in the program, so that they can be tested
-//! with hostile input.
+//! The parsers of external input are in this library instead of the program, so that fuzz tests can
+//! call them.
 
 pub mod address;
 mod angle_watch;

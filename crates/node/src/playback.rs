@@ -1,5 +1,4 @@
-//! Files played through the pipeline in the order of time, so that the poses are those of `access-av locate`,
-//! to the bit.
+//! Playback of files in order of time, which gives the poses of `access-av locate` bit by bit.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,15 +16,17 @@ use crate::settings::Pace;
 use crate::source::{Blocks, Files};
 use crate::statistics::SourceHealth;
 
-/// Samples that are looked at together, in seconds, as where a recording is located.
+/// Duration of the samples that are processed together, in seconds, equal to that of `access-av
+/// locate`.
 const BLOCK_S: f64 = 0.02;
-/// How far samples are read beyond the time that bursts are wanted up to: a burst, and the receiver's reach.
+/// Duration of samples that are read beyond the last required burst, in seconds: a burst and the
+/// receiver's filter.
 const AHEAD_S: f64 = 0.01;
 
-/// Plays the files until they, or the node, end.
+/// Plays the files until they end or the node is stopped.
 ///
 /// # Errors
-/// What is wrong with a file, or stops the pipeline.
+/// Error of a file or of the pipeline.
 pub fn play(
     engine: &mut Engine,
     files: Files,
@@ -67,7 +68,7 @@ struct Player<'a> {
     angles: &'a [LoggedAngle],
     health: &'a [Arc<SourceHealth>],
     stop: &'a AtomicBool,
-    /// When the drive began, if it is played as it was recorded.
+    /// Start of the playback in real time; `None` for playback at maximum speed.
     pace: Option<Instant>,
     first_s: Option<f64>,
 }
@@ -82,7 +83,7 @@ impl Player<'_> {
         Ok(())
     }
 
-    /// Hears every burst that began before `time_s`.
+    /// Processes every burst that began before `time_s`.
     fn hear_before(&mut self, time_s: f64) -> Result<()> {
         self.hear_angles_before(time_s)?;
         while let Some(blocks) = &mut self.blocks
@@ -97,7 +98,7 @@ impl Player<'_> {
             let length_s = blocks.length_s(&self.samples);
             let antennas: Vec<&[Complex32]> = self.samples.iter().map(Vec::as_slice).collect();
             let live = self.engine.live_mut();
-            // Less than a sample of whatever rate is no gap.
+            // A difference below one sample period at any rate is not a gap.
             let ends = next_s.is_none_or(|next_s| next_s > block_s + length_s + 1e-8);
             live.receive(block_s, &antennas)?;
             if ends {
@@ -145,7 +146,7 @@ impl Player<'_> {
         let first_s = *self.first_s.get_or_insert(time_s);
         if let Some(began) = self.pace {
             let due = Duration::try_from_secs_f64(time_s - first_s).unwrap_or_default();
-            // In a gap of the drive the node is alive, and can be ended.
+            // During a gap of the drive, the watchdog is notified and a stop is possible.
             while !self.stop.load(Ordering::Acquire)
                 && let left = due.saturating_sub(began.elapsed())
                 && !left.is_zero()

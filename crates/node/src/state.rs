@@ -1,7 +1,7 @@
 //! The state file: pose, calibration and excluded radio heads, saved once a second and resumed at the next start.
 //!
-//! A file is written beside, synchronized and renamed, so that at every instant there is a whole one. A thread of its
-//! own writes, because a disk may take long.
+//! The file is written under a temporary name, synchronised and renamed, so that a complete file
+//! exists at any time. A separate thread writes, because disk access may take long.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
@@ -19,10 +19,11 @@ use crate::inbox::{Inbox, Input, Level};
 /// Version of the file's format.
 const VERSION: u32 = 1;
 
-/// Maximum age of a state that is resumed, in seconds. In an older one too much may have changed that no counter shows.
+/// Maximum age of a state that is resumed, in seconds. An older state may have changed in ways that
+/// no counter reveals.
 pub const MAX_AGE_S: f64 = 600.0;
 
-/// Largest file that is read, in bytes; a state takes less than 2 kB.
+/// Maximum size of a state file in bytes; a state takes less than 2 kB.
 const MAX_BYTES: u64 = 1 << 16;
 
 /// Content of the file.
@@ -30,14 +31,14 @@ const MAX_BYTES: u64 = 1 << 16;
 #[serde(deny_unknown_fields)]
 struct StateFile {
     version: u32,
-    /// When it was saved, in seconds since 1970 by this computer's clock.
+    /// Time of saving in seconds since 1970 according to this computer's clock.
     saved_unix_s: f64,
     /// Hash of site and vehicle.
     fingerprint: String,
     state: SavedState,
 }
 
-/// Hash of site and vehicle, so that a state is resumed only with the same (FNV-1a, 64 bit).
+/// Returns the hash (FNV-1a, 64 bit) of site and vehicle. A state is resumed only with equal files.
 pub fn fingerprint(site: &Site, vehicle: &Vehicle) -> String {
     let text = [site.to_toml(), vehicle.to_toml()];
     let bytes = text.iter().flat_map(|it| it.bytes());
@@ -47,10 +48,11 @@ pub fn fingerprint(site: &Site, vehicle: &Vehicle) -> String {
     format!("{hash:016x}")
 }
 
-/// Reads a state file: the state and its age in seconds; `None` if there is no file.
+/// Reads a state file and returns the state with its age in seconds; `None` if the file does not
+/// exist.
 ///
 /// # Errors
-/// Why the file cannot be used.
+/// Reason why the file cannot be used.
 pub fn read(
     path: &Path,
     fingerprint: &str,
@@ -69,7 +71,7 @@ pub fn read(
     }
     let bytes = fs::read(path).map_err(|error| named(error.to_string()))?;
     let file: StateFile = serde_json::from_slice(&bytes)
-        .map_err(|error| named(format!("is no state file: {error}")))?;
+        .map_err(|error| named(format!("is not a state file: {error}")))?;
     if file.version != VERSION {
         let version = file.version;
         return Err(named(format!("version is {version}; it must be {VERSION}")));
@@ -93,7 +95,7 @@ pub fn read(
     Ok(Some((state, age_s)))
 }
 
-/// Writes a file so that at every instant there is either the old or the new one, on the disk, too.
+/// Replaces a file atomically, including on the disk.
 fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut beside = path.as_os_str().to_owned();
     beside.push(".new");
@@ -113,7 +115,7 @@ struct Slot {
     is_closed: bool,
 }
 
-/// Takes states and has them written.
+/// Queue of the newest state for the writer thread.
 #[derive(Debug, Default)]
 pub struct StateStore {
     slot: Mutex<Slot>,
@@ -121,7 +123,7 @@ pub struct StateStore {
 }
 
 impl StateStore {
-    /// For a site and vehicle of this fingerprint.
+    /// Creates the queue for a site and vehicle with this fingerprint.
     pub fn new(fingerprint: String) -> Self {
         Self {
             slot: Mutex::new(Slot {
@@ -136,26 +138,26 @@ impl StateStore {
         self.slot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Has a state written; one that is not written yet is replaced.
+    /// Requests that a state is written; replaces an unwritten one.
     pub fn put(&self, state: SavedState) {
         self.lock().newest = Some(state);
         self.came.notify_one();
     }
 
-    /// Site and vehicle are others from now on.
+    /// Changes the fingerprint after a change of site or vehicle.
     pub fn set_fingerprint(&self, fingerprint: String) {
         let mut slot = self.lock();
         slot.fingerprint = fingerprint;
         slot.newest = None;
     }
 
-    /// Ends the thread after the last state.
+    /// Ends the writer thread after the last state.
     pub fn close(&self) {
         self.lock().is_closed = true;
         self.came.notify_one();
     }
 
-    /// The next state, with the fingerprint; `None` at the end.
+    /// Returns the next state with the fingerprint; `None` at the end.
     fn take(&self) -> Option<(SavedState, String)> {
         let mut slot = self.lock();
         loop {
@@ -170,10 +172,10 @@ impl StateStore {
     }
 }
 
-/// Starts the thread that writes states to `path`; a failure and its end are events.
+/// Starts the thread that writes states to `path`. A failure and its end are events.
 ///
 /// # Errors
-/// Where the thread cannot be started.
+/// An error if the thread cannot be started.
 pub fn start(
     store: Arc<StateStore>,
     path: PathBuf,
@@ -237,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_state_is_written_and_read_and_what_cannot_be_used_is_named() {
+    fn states_round_trip_and_unusable_files_are_reported() {
         let folder = std::env::temp_dir().join(format!("access-av-state-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let path = folder.join("state.json");
@@ -256,8 +258,8 @@ mod tests {
             (text.as_str(), "b", now_s, "another site or vehicle"),
             (&text, "a", now_s + 601.0, "s old; it must be"),
             (&text, "a", now_s - 60.0, "s old; it must be"),
-            (&text[..text.len() / 2], "a", now_s, "is no state file"),
-            ("", "a", now_s, "is no state file"),
+            (&text[..text.len() / 2], "a", now_s, "is not a state file"),
+            ("", "a", now_s, "is not a state file"),
             (
                 &text.replace("\"version\":1", "\"version\":9"),
                 "a",
@@ -265,7 +267,12 @@ mod tests {
                 "version is 9",
             ),
             (&text.replace("0.3", "-0.3"), "a", now_s, "negative"),
-            (&text.replace("0.3", "null"), "a", now_s, "is no state file"),
+            (
+                &text.replace("0.3", "null"),
+                "a",
+                now_s,
+                "is not a state file",
+            ),
             (&"x".repeat(1 << 17), "a", now_s, "bytes"),
         ] {
             fs::write(&path, text).unwrap();
@@ -277,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_disk_that_cannot_be_written_is_an_event_once() {
+    fn a_write_failure_is_reported_once() {
         let inbox = Arc::new(Inbox::default());
         let store = Arc::new(StateStore::new("a".to_owned()));
         let path = PathBuf::from("/proc/none/state.json");
@@ -297,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn another_vehicle_has_another_fingerprint() {
+    fn a_different_vehicle_has_a_different_fingerprint() {
         let site = Site::from_library("yard", &Shipped).unwrap();
         let mut vehicle = Vehicle::from_library("tugger", &Shipped).unwrap();
         let before = fingerprint(&site, &vehicle);

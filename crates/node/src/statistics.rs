@@ -1,4 +1,4 @@
-//! Counters and histograms that several threads write and the page and the metrics show.
+//! Counters and histograms that several threads write and the web page and metrics display.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -6,24 +6,25 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-/// Buckets per decade, from 1 µs on: a quantile has an error of at most 12 %.
+/// Number of buckets per decade, starting at 1 µs: a quantile has an error of at most 12 %.
 const PER_DECADE: usize = 20;
-/// Decades: up to 100 s.
+/// Number of decades, up to 100 s.
 const DECADES: usize = 8;
 const MIN_S: f64 = 1e-6;
 const BUCKETS: usize = PER_DECADE * DECADES;
-/// Length of a part of the sliding window, in seconds ...
+/// Length of a part of the sliding window, in seconds.
 const PART_S: u64 = 5;
-/// ... and number of parts: quantiles are those of the last minute.
+/// Number of parts of the sliding window; quantiles are those of the last minute.
 const PARTS: usize = 12;
 
-/// Targets of the latencies, in seconds. An SSB is decided on within a quarter of the shortest burst period (20 ms)
-/// in 99 % of cases, and within half of it in 99.9 %.
+/// Targets of the latency from an SSB to its pose, in seconds: a quarter of the shortest burst
+/// period (20 ms) for 99 % of the SSBs, and half of it for 99.9 %.
 pub const SSB_TO_POSE_TARGETS: Targets = Targets {
     p99_s: 5e-3,
     p999_s: 10e-3,
 };
-/// A pose by odometry is needed within a period of a controller at 50 Hz, less the time to act on it.
+/// Targets of the latency from odometry to its pose, in seconds, for a controller at 50 Hz with
+/// time to act.
 pub const ODOMETRY_TO_POSE_TARGETS: Targets = Targets {
     p99_s: 5e-3,
     p999_s: 10e-3,
@@ -38,7 +39,7 @@ pub struct Targets {
     pub p999_s: f64,
 }
 
-/// Histogram of durations by their logarithm: since the start, and of the last minute.
+/// Histogram of the logarithm of durations, since the start and of the last minute.
 #[derive(Debug)]
 pub struct Histogram {
     buckets: [AtomicU64; BUCKETS],
@@ -195,20 +196,20 @@ fn upper_s(place: usize) -> f64 {
     MIN_S * 10f64.powf((place + 1) as f64 / PER_DECADE as f64)
 }
 
-/// A source, as seen from outside.
+/// Activity of a source.
 #[derive(Debug)]
 pub struct SourceHealth {
-    /// Its name.
+    /// Name of the source.
     pub name: &'static str,
     began: Instant,
-    /// Nanoseconds since `began` when something came last, plus 1; 0 before.
+    /// Time of the last item in nanoseconds since `began`, plus 1; 0 before the first item.
     last_ns: AtomicU64,
     items: AtomicU64,
     defects: AtomicU64,
 }
 
 impl SourceHealth {
-    /// A source from which nothing has come yet.
+    /// Creates a source without activity.
     pub fn new(name: &'static str) -> Self {
         Self {
             name,
@@ -219,14 +220,14 @@ impl SourceHealth {
         }
     }
 
-    /// So many items came.
+    /// Counts received items.
     pub fn came(&self, items: u64) {
         let ns = self.began.elapsed().as_nanos() as u64 + 1;
         self.last_ns.store(ns, Ordering::Relaxed);
         self.items.fetch_add(items, Ordering::Relaxed);
     }
 
-    /// It is switched off for so long, and silent on purpose; so many items would have come.
+    /// Marks a planned pause of the source for `duration`, and counts the items that were omitted.
     pub fn rests(&self, items: u64, duration: Duration) {
         let until = self.began.elapsed() + duration;
         self.last_ns
@@ -234,36 +235,38 @@ impl SourceHealth {
         self.items.fetch_add(items, Ordering::Relaxed);
     }
 
-    /// Something came that cannot be used.
+    /// Counts an item that cannot be used.
     pub fn defect(&self) {
         self.defects.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Time since something came, or since the start.
+    /// Returns the time since the last item, or since the start.
     pub fn silent_for(&self) -> Duration {
         let last = Duration::from_nanos(self.last_ns.load(Ordering::Relaxed));
         self.began.elapsed().saturating_sub(last)
     }
 
-    /// Items that came, or would have while it was switched off: samples per channel, or messages.
+    /// Returns the number of received items, including those omitted in planned pauses: samples per
+    /// channel, or messages.
     pub fn items(&self) -> u64 {
         self.items.load(Ordering::Relaxed)
     }
 
-    /// Items that could not be used.
+    /// Returns the number of items that could not be used.
     pub fn defects(&self) -> u64 {
         self.defects.load(Ordering::Relaxed)
     }
 }
 
-/// How punctual the node is.
+/// Latencies of the node.
 #[derive(Debug, Default)]
 pub struct Punctuality {
-    /// From the arrival of an SSB's last sample to the pose with its angle.
+    /// Latency from the arrival of an SSB's last sample to the pose with its angle.
     pub ssb_to_pose: Histogram,
-    /// From the arrival of odometry to the pose by it.
+    /// Latency from the arrival of odometry to its pose.
     pub odometry_to_pose: Histogram,
-    /// By how much the time between two poses differs from that between the odometry of theirs.
+    /// Jitter: difference between the interval of two poses and the interval of their odometry
+    /// samples.
     pub jitter: Histogram,
 }
 

@@ -1,4 +1,4 @@
-//! A short run of the fuzz target; `fuzz/README.md` says how to run it for longer.
+//! Short run of the fuzz target; `fuzz/README.md` describes longer runs.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../../../fuzz/bodies/node.rs"]

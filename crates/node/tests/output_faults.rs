@@ -246,7 +246,7 @@ impl Drop for Tmpfs {
 }
 
 #[test]
-fn a_full_disk_under_mcap_and_tum_leaves_the_other_outputs_and_both_recover() {
+fn a_full_disk_under_mcap_and_tum_does_not_affect_other_outputs_and_both_recover() {
     let folder = scratch("full-disk");
     let Some(disk) = Tmpfs::mount(&folder) else {
         return;
@@ -451,7 +451,7 @@ fn a_reader_that_stops_reading_is_reported_and_the_pipeline_continues() {
 }
 
 #[test]
-fn a_deleted_log_folder_is_made_again() {
+fn a_deleted_log_folder_is_created_again() {
     let folder = scratch("deleted");
     let logs = folder.join("logs");
     let (tum, mcap, json) = (

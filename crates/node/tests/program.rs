@@ -1,4 +1,4 @@
-//! The program itself: sockets that come and go, signals, files that are whole.
+//! Tests of the program: connections that end and return, signals, and complete files.
 #![allow(clippy::unwrap_used, clippy::expect_used, missing_docs)]
 
 mod common;
@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use common::{Node, odometry, scratch};
 
 #[test]
-fn sources_vanish_and_return_and_each_silence_is_named_within_a_second() {
+fn sources_vanish_and_return_and_each_silence_is_reported_within_a_second() {
     let folder = scratch("vanish");
     let address = {
         let free = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -51,13 +51,13 @@ fn sources_vanish_and_return_and_each_silence_is_named_within_a_second() {
     stream.write_all(odometry(2.0).as_bytes()).unwrap();
     node.until_event("messages", "left out");
     assert_eq!(node.until(|it| it["type"] == "pose")["time_s"], 2.0);
-    // A stamp that goes back is rejected.
+    // A time stamp that goes back is rejected.
     stream.write_all(odometry(0.5).as_bytes()).unwrap();
     node.until_event(
         "odometry",
         "rejected: odometry: time_s is 0.500, 1.500 s before",
     );
-    // A clock that stays back is accepted, and the pose resumed.
+    // A permanent step back of the clock is accepted, and the pose is resumed.
     for number in 0..20 {
         let time_s = 0.5 + 0.05 * f64::from(number);
         stream.write_all(odometry(time_s).as_bytes()).unwrap();
@@ -71,7 +71,7 @@ fn sources_vanish_and_return_and_each_silence_is_named_within_a_second() {
 }
 
 #[test]
-fn poses_can_be_set_heads_left_out_and_what_is_refused_is_said() {
+fn poses_can_be_set_radio_heads_excluded_and_rejected_commands_are_reported() {
     let folder = scratch("commands");
     let mut node = Node::start(&folder, "-", "");
     let mut input = node.process.stdin.take().unwrap();
@@ -94,12 +94,12 @@ fn poses_can_be_set_heads_left_out_and_what_is_refused_is_said() {
     input.write_all(odometry(0.1).as_bytes()).unwrap();
     assert_eq!(node.until(|it| it["type"] == "pose")["state"], "searching");
     drop(input);
-    // All there was has come to its end.
+    // All input has ended.
     assert!(node.process.wait().unwrap().success());
 }
 
 #[test]
-fn implausible_time_stamps_are_events_of_their_cause_and_leave_the_pose() {
+fn implausible_time_stamps_are_reported_by_cause_and_do_not_change_the_pose() {
     let folder = scratch("stamps");
     let mut node = Node::start(&folder, "-", "");
     let mut input = node.process.stdin.take().unwrap();
@@ -171,10 +171,10 @@ fn the_state_is_saved_and_resumed_after_a_kill() {
     );
     assert_eq!(pose["state"], "unavailable");
     node.terminate();
-    // What cannot be used is named, and the vehicle is searched for.
+    // An unusable file is reported, and the pose is searched for.
     fs::write(&file, "{").unwrap();
     let mut node = Node::start(&folder, "-", &more);
-    node.until_event("state", "state.json: is no state file");
+    node.until_event("state", "state.json: is not a state file");
     let mut input = node.process.stdin.take().unwrap();
     input.write_all(stands(0.0).as_bytes()).unwrap();
     assert_eq!(node.until(|it| it["type"] == "pose")["state"], "searching");
@@ -182,7 +182,7 @@ fn the_state_is_saved_and_resumed_after_a_kill() {
 }
 
 #[test]
-fn mcap_files_are_begun_anew_and_each_is_whole() {
+fn mcap_files_are_rotated_and_each_is_complete() {
     let folder = scratch("rotation");
     let files = folder.join("mcap");
     let more = format!(
@@ -219,9 +219,9 @@ fn mcap_files_are_begun_anew_and_each_is_whole() {
 }
 
 #[test]
-fn what_files_bring_is_taken_as_fast_as_it_can_be_and_nothing_is_dropped() {
+fn file_input_is_processed_at_maximum_speed_and_nothing_is_dropped() {
     let folder = scratch("fast");
-    // Twice what waits at most; status comes by the drive's time.
+    // Twice the capacity of the queue; status messages follow the time of the drive.
     let seconds: u32 = 200;
     let lines: String = (0..=50 * seconds)
         .map(|number| odometry(0.02 * f64::from(number)))
@@ -242,7 +242,7 @@ fn what_files_bring_is_taken_as_fast_as_it_can_be_and_nothing_is_dropped() {
 }
 
 #[test]
-fn a_service_manager_is_told_of_beginning_life_and_end() {
+fn the_service_manager_is_notified_of_start_watchdog_and_end() {
     let folder = scratch("service");
     let socket = folder.join("notify");
     let manager = UnixDatagram::bind(&socket).unwrap();
@@ -268,7 +268,7 @@ fn a_service_manager_is_told_of_beginning_life_and_end() {
         }
     };
     until("READY=1");
-    // Nothing comes, and the pipeline is alive.
+    // Without input, the pipeline is alive.
     let began = Instant::now();
     (0..5).for_each(|_| drop(until("WATCHDOG=1")));
     assert!(began.elapsed() < 5 * Duration::from_millis(400));
@@ -282,7 +282,7 @@ fn a_service_manager_is_told_of_beginning_life_and_end() {
 }
 
 #[test]
-fn the_schema_is_printed_and_names_every_key() {
+fn the_schema_is_printed_and_contains_every_key() {
     let told = Command::new(env!("CARGO_BIN_EXE_access-av-node"))
         .arg("schema")
         .output()
@@ -339,7 +339,7 @@ fn the_reference_page_of_the_messages_is_up_to_date() {
 }
 
 #[test]
-fn a_new_node_file_is_one_that_the_program_takes() {
+fn a_new_node_file_is_accepted_by_the_program() {
     let template = include_str!("../../../python/access_av/site_files/templates/node.toml");
     let text = template
         .replace("$name", "new")

@@ -1,4 +1,4 @@
-//! From a recording to angles of arrival, by the library alone: samples, SSBs, electrical angles.
+//! From a recording to angles of arrival with the library only: samples, SSBs, electrical angles.
 //!
 //! ```sh
 //! access-av synth yard --duration-s 2 --out drive
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [file, site, vehicle] = given.as_slice() else {
         return Err("give a recording, a site and a vehicle: names that ship, or files".into());
     };
-    // The site says which cells to listen to and on which frequency, the vehicle what its array is.
+    // The site determines the cells and the frequency, the vehicle determines the array.
     let site: Site = load(site)?;
     let vehicle: Vehicle = load(vehicle)?;
     let mut recording = Recording::open(file)?;

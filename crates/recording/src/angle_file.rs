@@ -1,4 +1,4 @@
-//! Angles out of whatever holds them.
+//! Reader of angles from files of several formats.
 
 use std::path::Path;
 
@@ -6,10 +6,11 @@ use crate::angle_log::{AngleLog, read_angle_log};
 use crate::error::RecordingError;
 use crate::mcap::{is_bag, read_angles_mcap};
 
-/// Reads angles: of a rosbag2 folder, or by the name's ending MCAP or CSV.
+/// Reads angles from a rosbag2 folder, or from an MCAP or CSV file according to the file extension.
 ///
 /// # Errors
-/// As [`read_angles_mcap`] and [`read_angle_log`], and for a topic of a file that has none.
+/// Errors of [`read_angles_mcap`] and [`read_angle_log`]; an error for a topic with a file that has
+/// none.
 pub fn read_angles(path: &Path, topic: Option<&str>) -> Result<AngleLog, RecordingError> {
     if is_bag(path) {
         return read_angles_mcap(path, topic);

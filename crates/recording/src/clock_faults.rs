@@ -1,21 +1,25 @@
-//! Time stamps of single items that are not times of the drive.
+//! Time stamps that are not times of the drive.
 
-/// Times from which on a clock counts from 1970 and not from its own start (s): the year 1973.
+/// Minimum time in seconds that is interpreted as seconds since 1970 (the year 1973) instead of
+/// since the start of a clock.
 const EPOCH_S: f64 = 1e8;
-/// Gap (s) and gap in usual steps after which a leading time of 0 is one that was not set.
+/// Minimum gap in seconds after a leading time of 0 that was not set.
 const MIN_GAP_S: f64 = 1.0;
+/// Minimum gap after a leading time of 0 that was not set, in median time steps.
 const MIN_GAP_STEPS: f64 = 5.0;
 
 /// Defect of a time stamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TimeFault {
-    /// It comes before the clock was set: 0 before the first time, or a small number before times since 1970.
+    /// The time is before the clock was set: 0 before the first time, or a small number before
+    /// times since 1970.
     NotSet,
-    /// It is far ahead of the times before and after it.
+    /// The time is far ahead of the previous and following times.
     Ahead,
 }
 
-/// Defect of each time of a file, in its order; times that are not finite have none here.
+/// Returns the defect of each time of a file in order. Times that are not finite have no defect
+/// here.
 pub fn time_faults(times_s: &[f64]) -> Vec<Option<TimeFault>> {
     let mut faults = vec![None; times_s.len()];
     let gap_s = MIN_GAP_S.max(MIN_GAP_STEPS * usual_step_s(times_s));
@@ -44,7 +48,8 @@ pub fn time_faults(times_s: &[f64]) -> Vec<Option<TimeFault>> {
     faults
 }
 
-/// Number of leading times from before the clock was set; 0 if they are more than half of all.
+/// Returns the number of leading times from before the clock was set; 0 if they are more than half
+/// of all.
 fn leading_unset(times_s: &[f64], gap_s: f64) -> usize {
     let is_before = |times: &&f64| times.abs() < EPOCH_S || times.is_nan();
     let mut count = times_s.iter().take_while(is_before).count();
@@ -54,7 +59,7 @@ fn leading_unset(times_s: &[f64], gap_s: f64) -> usize {
             return 0;
         }
     }
-    // Times since 1970 follow each other; a single one among others is itself wrong.
+    // Times since 1970 occur in sequence; a single one is a defect itself.
     let since_1970 = times_s.iter().filter(|it| **it >= EPOCH_S).count();
     let is_single = 0 < since_1970 && 2 * since_1970 < times_s.len();
     if 2 * count > times_s.len() || is_single {
@@ -64,7 +69,7 @@ fn leading_unset(times_s: &[f64], gap_s: f64) -> usize {
     }
 }
 
-/// Median of the positive differences of successive times (s).
+/// Returns the median of the positive differences of successive times (s).
 fn usual_step_s(times_s: &[f64]) -> f64 {
     let steps = times_s.windows(2).filter_map(|pair| match pair {
         [a, b] => Some(b - a),
@@ -85,21 +90,21 @@ mod tests {
     }
 
     #[test]
-    fn times_before_the_clock_was_set_are_found() {
+    fn times_before_the_clock_was_set_are_detected() {
         let since_1970 = |k: i32| 1.7e9 + 0.1 * f64::from(k);
         let mut times_s: Vec<f64> = (0..50).map(since_1970).collect();
         assert_eq!(faulty(&times_s), []);
         times_s.splice(0..0, [0.0, 0.0, 3.5]);
         let unset = |k| (k, TimeFault::NotSet);
         assert_eq!(faulty(&times_s), [unset(0), unset(1), unset(2)]);
-        // A simulator's clock starts anywhere.
+        // The clock of a simulator starts at any time.
         let mut times_s: Vec<f64> = (0..50).map(|k| 7.0 + 0.1 * f64::from(k)).collect();
         times_s.splice(0..0, [0.0, 0.0]);
         assert_eq!(faulty(&times_s), [unset(0), unset(1)]);
     }
 
     #[test]
-    fn drives_that_start_at_zero_are_whole() {
+    fn drives_that_start_at_zero_have_no_defects() {
         for step_s in [0.001, 0.05, 0.5, 50.0] {
             let times_s: Vec<f64> = (0..50).map(|k| step_s * f64::from(k)).collect();
             assert_eq!(faulty(&times_s), [], "{step_s}");
@@ -109,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_time_far_ahead_is_found() {
+    fn a_single_time_far_ahead_is_detected() {
         for ahead_s in [4e9, 5.0] {
             let mut times_s: Vec<f64> = (0..50).map(|k| 0.1 * f64::from(k)).collect();
             times_s[20] += ahead_s;

@@ -1,29 +1,32 @@
-//! Steps of a distance counter that no vehicle drives: overflows, resets and spikes.
+//! Impossible steps of a distance counter: overflows, resets and spikes.
 //!
-//! A speed that is derived from such a step would be as wrong as the step. It is replaced by the speed of the steps
-//! around it, so that distance, speed and yaw rate stay right.
+//! A speed derived from an impossible step would be wrong as well. The step is replaced by the
+//! speed of its neighbours, so that distance, speed and yaw rate remain correct.
 
-/// Steps to either side from which the usual speed is taken.
+/// Number of steps on each side that determine the usual speed.
 const NEIGHBOURS: usize = 3;
-/// Largest acceleration of a vehicle (m/s²), which bounds the change of speed across the neighbours.
+/// Maximum acceleration of a vehicle (m/s²), which limits the change of speed across the
+/// neighbours.
 const MAX_ACCELERATION_MPS2: f64 = 10.0;
-/// Deviation (m) that is never a jump: resolution of a counter.
+/// Maximum deviation (m) that is attributed to the resolution of a counter.
 const RESOLUTION_M: f64 = 0.1;
-/// Multiple of the 95th percentile of all steps other than 0 that a jump exceeds, so that a counter of coarse resolution has none.
+/// Minimum ratio of a jump to the 95th percentile of all nonzero steps, so that a counter of coarse
+/// resolution has no jumps.
 const TIMES_USUAL: f64 = 3.0;
 
-/// A step that was replaced.
+/// Replaced step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jump {
-    /// Index of the sample at its end.
+    /// Index of the sample at the end of the step.
     pub index: usize,
-    /// The step as read (m).
+    /// Step in the file (m).
     pub step_m: f64,
-    /// Speed of the neighbouring steps (m/s) that was used instead.
+    /// Speed of the neighbouring steps (m/s), used instead.
     pub speed_mps: f64,
 }
 
-/// Replaces the jumps of a distance (m) at strictly increasing times, in place. A distance without jumps is not touched.
+/// Replaces the jumps of a distance (m) at strictly increasing times in place. A distance without
+/// jumps is not changed.
 pub fn replace_jumps(times_s: &[f64], distances_m: &mut [f64]) -> Vec<Jump> {
     let steps: Vec<(f64, f64)> = times_s
         .windows(2)
@@ -69,7 +72,7 @@ pub fn replace_jumps(times_s: &[f64], distances_m: &mut [f64]) -> Vec<Jump> {
     jumps
 }
 
-/// Median speed of the steps next to one (m/s); `None` if there are too few.
+/// Returns the median speed of the neighbouring steps (m/s); `None` if there are too few.
 fn neighbours_mps(steps: &[(f64, f64)], k: usize) -> Option<f64> {
     let around = k.saturating_sub(NEIGHBOURS)..=k + NEIGHBOURS;
     let near = steps
@@ -117,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_without_jumps_is_not_touched() {
+    fn a_drive_without_jumps_is_not_changed() {
         for rate_hz in [1.0, 5.0, 20.0, 100.0] {
             let (times_s, given_m) = driven(rate_hz);
             for tick_m in [1e-9, 0.01, 0.25, 1.0] {

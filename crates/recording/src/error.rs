@@ -1,65 +1,66 @@
-//! What can be wrong with a recorded file, said so that it can be put right.
+//! Errors of recorded files.
 
 use std::io;
 
 use thiserror::Error;
 
-/// An unusable recording. `file` is the path; `key` the place inside, as `captures[1].core:frequency`.
+/// Unusable recording. `file` is the path, and `key` is the position in the file, for example
+/// `captures[1].core:frequency`.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RecordingError {
-    /// The file system refuses.
+    /// Error of the file system.
     #[error("{file}: {source}")]
     Io {
-        /// The file.
+        /// Path of the file.
         file: String,
-        /// Why.
+        /// Cause.
         source: io::Error,
     },
-    /// Metadata without data, or data without metadata.
+    /// SigMF metadata without data, or data without metadata.
     #[error("{present}: its other half {missing} is missing; a SigMF recording needs both")]
     HalfMissing {
-        /// The file that is there.
+        /// Existing file.
         present: String,
-        /// The file that is not.
+        /// Missing file.
         missing: String,
     },
-    /// Neither half is there.
+    /// Neither metadata nor data exist.
     #[error("no recording {file}: neither .sigmf-meta nor .sigmf-data exists")]
     NoSuchRecording {
-        /// What was asked for.
+        /// Path of the recording.
         file: String,
     },
-    /// Not text of the announced format.
+    /// The file is not valid in its format.
     #[error("{file}: not valid {format}: {message}")]
     Syntax {
-        /// The file.
+        /// Path of the file.
         file: String,
-        /// "JSON", "TOML", "CSV" or "MCAP".
+        /// Format: "JSON", "TOML", "CSV" or "MCAP".
         format: &'static str,
-        /// The parser's message, with its place.
+        /// Message of the parser with the position.
         message: String,
     },
-    /// A key that must be there is not.
+    /// A required key is missing.
     #[error("{file}: `{key}` is missing; {allowed}")]
     Missing {
-        /// The file.
+        /// Path of the file.
         file: String,
-        /// The key.
+        /// Name of the key.
         key: String,
-        /// What should stand there.
+        /// Allowed values.
         allowed: String,
     },
-    /// A value of the wrong type, out of range, or at odds with another.
+    /// A value has a wrong type, is out of range, or contradicts another value.
     #[error("{file}: `{key}` is {value}; {allowed}")]
     Value {
-        /// The file.
+        /// Path of the file.
         file: String,
-        /// The key.
+        /// Name of the key.
         key: String,
-        /// Its value.
+        /// Value of the key.
         value: String,
-        /// What is allowed.
+        /// Allowed values.
         allowed: String,
     },
     /// Data that ends within a sample.
@@ -68,65 +69,65 @@ pub enum RecordingError {
          ({channels} channels of {datatype})"
     )]
     PartialFrame {
-        /// The data file.
+        /// Path of the data file.
         file: String,
-        /// Its length.
+        /// Length of the file in bytes.
         bytes: u64,
-        /// Bytes of one sample of all channels.
+        /// Number of bytes of one sample of all channels.
         frame_bytes: u64,
         /// Number of channels in the file.
         channels: usize,
-        /// The samples' datatype.
+        /// Datatype of the samples.
         datatype: &'static str,
     },
-    /// Raw files of different lengths.
+    /// Raw files have different lengths.
     #[error(
         "{file} holds {samples} samples, {first} holds {expected}; channels must be equally long"
     )]
     UnequalChannels {
-        /// The file that differs.
+        /// Path of the differing file.
         file: String,
-        /// Its samples.
+        /// Number of its samples.
         samples: u64,
-        /// The first channel's file.
+        /// Path of the first channel's file.
         first: String,
-        /// Samples of the first channel.
+        /// Number of samples of the first channel.
         expected: u64,
     },
-    /// Samples asked for that are not there.
-    #[error("{file}: samples {start} to {start} + {count} asked for; it has {length}")]
+    /// The requested samples do not exist.
+    #[error("{file}: samples {start} to {start} + {count} requested; the recording has {length}")]
     OutOfRange {
-        /// The data file.
+        /// Path of the data file.
         file: String,
-        /// First sample asked for.
+        /// First requested sample.
         start: u64,
-        /// Number asked for.
+        /// Number of requested samples.
         count: u64,
-        /// Samples per channel.
+        /// Number of samples per channel.
         length: u64,
     },
-    /// A sample that is not a number, or infinite.
+    /// A sample is NaN or infinite.
     #[error("{file}: sample {sample} of channel {channel} is not finite")]
     NotFinite {
-        /// The data file.
+        /// Path of the data file.
         file: String,
         /// Index of the sample.
         sample: u64,
         /// Index of the channel.
         channel: usize,
     },
-    /// Samples to be written that do not fit the recording.
+    /// Samples to be written do not match the recording.
     #[error("{file}: {message}")]
     Write {
-        /// The file.
+        /// Path of the file.
         file: String,
-        /// What does not fit.
+        /// Description of the mismatch.
         message: String,
     },
 }
 
 impl RecordingError {
-    /// What the file system says of a file.
+    /// Creates an error of the file system.
     pub fn io(file: &std::path::Path, source: io::Error) -> Self {
         Self::Io {
             file: file.display().to_string(),

@@ -1,4 +1,4 @@
-//! Files in and out: regular ones of a bounded size in, whole ones out.
+//! File access: reads regular files of limited size, and writes complete files.
 
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
@@ -6,22 +6,22 @@ use std::path::{Path, PathBuf};
 
 use crate::error::RecordingError;
 
-/// Opens a regular file; a pipe or a device has no end that could be relied on.
+/// Opens a regular file. Pipes and devices are rejected because they have no reliable end.
 ///
 /// # Errors
-/// What the file system says, or that it is no regular file.
+/// Error of the file system, or an error for a file that is not regular.
 pub fn open(path: &Path) -> io::Result<File> {
-    // Asked before it is opened: that alone may wait for ever on a pipe.
+    // The check precedes the opening, because opening a pipe may block forever.
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::other("not a regular file"));
     }
     File::open(path)
 }
 
-/// Reads a regular file of at most so many bytes.
+/// Reads a regular file with a maximum size.
 ///
 /// # Errors
-/// As [`open`], or that it is longer.
+/// Errors of [`open`]; an error for a longer file.
 pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.take(most_bytes + 1).read_to_end(&mut bytes)?;
@@ -32,7 +32,7 @@ pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// A file that appears whole: written beside its place and moved there in the end, or gone.
+/// File that is written under a temporary name and renamed when it is complete, or removed.
 #[derive(Debug)]
 pub struct Partial {
     path: PathBuf,
@@ -40,7 +40,7 @@ pub struct Partial {
 }
 
 impl Partial {
-    /// Begins the file that will be `target`.
+    /// Creates the temporary file for `target`.
     ///
     /// # Errors
     /// [`RecordingError::Io`].
@@ -52,7 +52,7 @@ impl Partial {
         Ok((Self { path, target }, file))
     }
 
-    /// Puts the file into its place.
+    /// Renames the file to its target.
     ///
     /// # Errors
     /// [`RecordingError::Io`].
@@ -64,12 +64,12 @@ impl Partial {
 
 impl Drop for Partial {
     fn drop(&mut self) {
-        // After `finish` there is none.
+        // After `finish`, the temporary file does not exist.
         let _ = fs::remove_file(&self.path);
     }
 }
 
-/// Writes a whole file.
+/// Writes a complete file.
 ///
 /// # Errors
 /// [`RecordingError::Io`].

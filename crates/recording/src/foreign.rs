@@ -1,6 +1,6 @@
-//! Files of other formats where a table of text is expected.
+//! Detection of other file formats where a text table is expected.
 
-/// Beginning of a file, its format, and how to use it.
+/// First bytes of a file, name of the format, and remedy.
 const FORMATS: [(&[u8], &str, &str); 9] = [
     (b"\x89MCAP0", "MCAP", "name the file .mcap"),
     (
@@ -41,21 +41,22 @@ const FORMATS: [(&[u8], &str, &str); 9] = [
     (b"\x89HDF", "HDF5", "write the table as CSV"),
 ];
 
-/// Byte order marks of UTF-16.
+/// Byte order mark of UTF-16, little-endian.
 const UTF16_LE: &[u8] = b"\xff\xfe";
+/// Byte order mark of UTF-16, big-endian.
 const UTF16_BE: &[u8] = b"\xfe\xff";
 
-/// Text of a file in UTF-8, or in UTF-16 with a byte order mark.
+/// Returns the text of a file in UTF-8, or in UTF-16 with a byte order mark.
 ///
 /// # Errors
-/// Format of the file and how to use it, if it is no text.
+/// Format of the file and the remedy, if it is not text.
 pub fn text_of(bytes: &[u8]) -> Result<String, String> {
     let formats = FORMATS.into_iter();
     let known = formats
         .clone()
         .find(|(beginning, ..)| bytes.starts_with(beginning));
     if let Some((_, format, remedy)) = known {
-        return Err(format!("the file is {format}, and no CSV; {remedy}"));
+        return Err(format!("the file is {format}, not CSV; {remedy}"));
     }
     let utf16 = |from: fn([u8; 2]) -> u16| {
         let pairs = bytes.chunks_exact(2).skip(1);
@@ -83,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_of_either_encoding_is_read() {
+    fn text_in_utf8_and_utf16_is_read() {
         let text = "time_s,Größe\n0,1\n";
         assert_eq!(text_of(text.as_bytes()).unwrap(), text);
         let units: Vec<u16> = "\u{feff}"
@@ -99,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn other_formats_are_named() {
+    fn other_formats_are_reported_by_name() {
         for (beginning, format, _) in FORMATS {
             let bytes = [beginning, b"\0\0\0"].concat();
             let error = text_of(&bytes).unwrap_err();

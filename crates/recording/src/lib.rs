@@ -1,5 +1,4 @@
-//! Recorded drives, in and out, and their [replay]; [scan] looks through a recording for whatever
-//! cells are in it.
+//! Recorded drives: readers, writers and [replay]. [scan] searches a recording for cells.
 //!
 //! | what | format | |
 //! |---|---|---|
@@ -10,8 +9,8 @@
 //! | poses, verdicts, diagnoses | [MCAP](mcap) | written |
 //! | sites, vehicles, scenarios, platforms | [TOML](Files) | read |
 //!
-//! A file that cannot be used at all is a [`RecordingError`]; single bad items in it are left out
-//! and reported beside what was read.
+//! A file that cannot be used at all is a [`RecordingError`]. Single invalid items are omitted and
+//! reported next to the data.
 
 mod angle_file;
 mod angle_log;

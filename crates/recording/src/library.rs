@@ -1,4 +1,4 @@
-//! Settings files: those that come with the product, and whatever lies in the file system.
+//! Settings files: shipped files and files of the file system.
 
 use std::path::{Path, PathBuf};
 
@@ -7,17 +7,18 @@ use onboard::settings::{Library, NamedText, SettingsError, Shipped, TomlFile};
 use crate::road_file::read_points_m;
 use crate::text::read_text;
 
-/// A settings file is written by people.
+/// Maximum size of a settings file in bytes.
 const MOST_BYTES: u64 = 4 << 20;
 
-/// Shipped files by their names, all others by their paths; a path in a file counts from there.
+/// Library of shipped files by name and other files by path. Relative paths in a file refer to its
+/// folder.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Files;
 
-/// A shipped file by its name, or else a file by its path.
+/// Loads a shipped file by name, or another file by path.
 ///
 /// # Errors
-/// [`SettingsError`] when there is neither, or when what there is cannot be used.
+/// [`SettingsError`] if neither exists, or if the file is invalid.
 pub fn load<T: TomlFile>(name_or_path: &str) -> Result<T, SettingsError> {
     T::from_library(name_or_path, &Files)
 }

@@ -1,7 +1,7 @@
-//! Numbers as tables have them, with a decimal point or a decimal comma.
+//! Numbers of tables with a decimal point or a decimal comma.
 
-/// Reads the numbers of one table. Where no comma separates its columns, a comma in a number is a
-/// decimal one; the first number with a sign says which sign all of them have.
+/// Reader of the numbers of one table. A comma in a number is a decimal comma unless commas
+/// separate the columns. The first number with a decimal sign determines the sign of all numbers.
 #[derive(Debug)]
 pub struct Numbers {
     separator: char,
@@ -9,7 +9,7 @@ pub struct Numbers {
 }
 
 impl Numbers {
-    /// Of a table whose columns are separated so.
+    /// Creates a reader for a table with this column separator.
     pub const fn new(separator: char) -> Self {
         Self {
             separator,
@@ -20,7 +20,7 @@ impl Numbers {
     /// Reads a number.
     ///
     /// # Errors
-    /// What is wrong with it, and what to write.
+    /// Description of the error and of the correct notation.
     pub fn read(&mut self, field: &str) -> Result<f64, String> {
         let not_a_number = || format!("`{field}` is not a number");
         let signs: Vec<char> = field.chars().filter(|it| ".,".contains(*it)).collect();
@@ -51,7 +51,7 @@ impl Numbers {
         }
     }
 
-    /// What to write where a row has more fields than there are columns.
+    /// Returns the advice for a row with more fields than columns.
     pub const fn surplus_hint(&self) -> &'static str {
         if self.separator == ',' {
             "; with decimal commas, separate the columns by semicolons"
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_comma_is_decimal_where_it_separates_no_columns() {
+    fn a_comma_is_decimal_unless_it_separates_columns() {
         let mut numbers = Numbers::new(';');
         for (field, number) in [
             ("3,5", 3.5),
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn what_may_be_a_thousands_separator_is_refused() {
+    fn possible_thousands_separators_are_rejected() {
         for (fields, last) in [(&["3,5"], "1.234"), (&["0.5"], "1,234")] {
             let mut numbers = Numbers::new(';');
             assert!(fields.iter().all(|field| numbers.read(field).is_ok()));

@@ -1,11 +1,11 @@
 //! Wheel odometry as CSV.
 //!
-//! | what | column | where that is not there |
+//! | quantity | column | substitute if the column is missing |
 //! |---|---|---|
 //! | time | `time_s` | |
-//! | distance | `distance_m` | the mean of `left_m` and `right_m`; else the speed, summed up |
-//! | speed | `speed_mps` | the mean of `left_mps` and `right_mps`; else of the distance |
-//! | yaw rate | `yaw_rate_radps` | the difference of `left_mps` and `right_mps`, or of `left_m` and `right_m`, by the track width; else none |
+//! | distance | `distance_m` | mean of `left_m` and `right_m`; otherwise the integrated speed |
+//! | speed | `speed_mps` | mean of `left_mps` and `right_mps`; otherwise derived from the distance |
+//! | yaw rate | `yaw_rate_radps` | difference of `left_mps` and `right_mps`, or of `left_m` and `right_m`, divided by the track width; otherwise none |
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -29,20 +29,20 @@ const COLUMNS: [&str; 7] = [
     "right_mps",
 ];
 
-/// Reads odometry of a vehicle of which no track width is stated, see [`read_wheel_odometry_csv`].
+/// Reads odometry of a vehicle without a specified track width, see [`read_wheel_odometry_csv`].
 ///
 /// # Errors
-/// As there.
+/// Errors of [`read_wheel_odometry_csv`].
 pub fn read_odometry_csv(file: &Path) -> Result<OdometryLog, RecordingError> {
     read_wheel_odometry_csv(file, None)
 }
 
-/// Reads odometry from a CSV file with `time_s` and distance or speed, of the vehicle or of its left
-/// and right wheel, whose contact points are `track_width_m` apart.
+/// Reads odometry from a CSV file with `time_s` and distance or speed, of the vehicle or of its
+/// left and right wheels. The contact points of the wheels are `track_width_m` apart.
 ///
 /// # Errors
-/// [`RecordingError`] when the file cannot be read, tells neither distance nor speed, or tells of
-/// wheels where no track width is stated. Single rows are only remarked upon.
+/// [`RecordingError`] if the file cannot be read, has neither distance nor speed, or has wheel
+/// columns without a specified track width. Invalid single rows are reported as remarks only.
 pub fn read_wheel_odometry_csv(
     file: &Path,
     track_width_m: Option<f64>,
@@ -75,7 +75,7 @@ pub fn read_wheel_odometry_csv(
     } else if !has_distance {
         collector.remark(derived("distance_m", "the speeds"));
     }
-    // Nothing but the distance says then how fast the vehicle drove, or how it turned.
+    // Without a speed column, the distance is the only source of speed and yaw rate.
     if !has_speed {
         replace(&times_s, &mut rows, &mut collector, "distance_m", |row| {
             row.distance_m.as_mut()
@@ -104,7 +104,7 @@ fn derived(column: &'static str, from: &str) -> OdometryIssue {
     OdometryIssue::Derived { column, from }
 }
 
-/// Rows whose values are finite, in order of time; the others are reported.
+/// Returns the rows with finite values in order of time; the others are reported.
 fn usable_rows(table: &Table, collector: &mut OdometryCollector) -> Vec<Row> {
     let read = |line: &crate::table::Row| line.values.as_deref().ok().map(Row::new);
     let read: Vec<Option<Row>> = table.rows.iter().map(read).collect();
@@ -130,7 +130,7 @@ fn usable_rows(table: &Table, collector: &mut OdometryCollector) -> Vec<Row> {
     rows
 }
 
-/// Replaces the jumps of a column, in the rows that have it, and reports them.
+/// Replaces the jumps of a column in the rows that have it, and reports them.
 fn replace(
     times_s: &[f64],
     rows: &mut [Row],
@@ -180,7 +180,7 @@ impl Row {
         }
     }
 
-    /// The values that have to be finite, with their columns.
+    /// Returns the values that must be finite, with their columns.
     fn values(&self) -> Vec<(&'static str, f64)> {
         let mut values = Vec::with_capacity(4);
         values.extend(self.distance_m.map(|it| ("distance_m", it)));
@@ -204,7 +204,7 @@ impl Row {
         values
     }
 
-    /// The row as a sample, after the one before.
+    /// Converts the row to a sample, given the previous row.
     fn sample(
         &self,
         before: Option<(&Self, &OdometrySample)>,
@@ -249,7 +249,7 @@ impl Row {
     }
 }
 
-/// Writes odometry as [`read_odometry_csv`] reads it.
+/// Writes odometry in the format of [`read_odometry_csv`].
 ///
 /// # Errors
 /// [`RecordingError::Io`].

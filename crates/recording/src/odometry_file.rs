@@ -1,4 +1,4 @@
-//! Odometry out of whatever holds it.
+//! Reader of odometry from files of several formats.
 
 use std::path::Path;
 
@@ -7,21 +7,23 @@ use crate::mcap::{is_bag, read_odometry_mcap};
 use crate::odometry::OdometryLog;
 use crate::odometry_csv::read_wheel_odometry_csv;
 
-/// What has to be known of odometry beside where it is.
+/// Additional choices for reading odometry.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OdometryChoice<'a> {
-    /// Topic of the odometry, where a bag has several.
+    /// Topic of the odometry in a bag with several.
     pub topic: Option<&'a str>,
-    /// Topic of the IMU that tells the yaw rate, where it is not to be the odometry.
+    /// Topic of the IMU with the yaw rate [default: yaw rate of the odometry].
     pub imu_topic: Option<&'a str>,
-    /// Distance of left and right wheel in metres, where it is theirs.
+    /// Distance between left and right wheel in metres, for odometry of single wheels.
     pub track_width_m: Option<f64>,
 }
 
-/// Reads odometry: of a rosbag2 folder, or by the name's ending MCAP or CSV.
+/// Reads odometry from a rosbag2 folder, or from an MCAP or CSV file according to the file
+/// extension.
 ///
 /// # Errors
-/// As [`read_odometry_mcap`] and [`read_wheel_odometry_csv`], and for a topic of a file that has none.
+/// Errors of [`read_odometry_mcap`] and [`read_wheel_odometry_csv`]; an error for a topic with a
+/// file that has none.
 pub fn read_odometry(
     path: &Path,
     choice: &OdometryChoice<'_>,

@@ -1,4 +1,4 @@
-//! Roads from survey files: CSV and GeoJSON.
+//! Roads from survey files in CSV and GeoJSON format.
 
 use std::path::Path;
 
@@ -9,22 +9,22 @@ use crate::error::RecordingError;
 use crate::table::Table;
 use crate::text::read_text;
 
-/// A road of a million points.
+/// Maximum size of a road file in bytes, about a million points.
 const MOST_BYTES: u64 = 64 << 20;
 
-/// Semi-major axis of the ellipsoid of WGS 84 in metres (EPSG:7030).
+/// Semi-major axis of the WGS 84 ellipsoid in metres (EPSG:7030).
 const SEMI_MAJOR_M: f64 = 6_378_137.0;
 
-/// Square of the eccentricity of the ellipsoid of WGS 84.
+/// Squared eccentricity of the WGS 84 ellipsoid.
 const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_141_317e-3;
 
-/// EPSG codes of longitude and latitude, whose ellipsoids differ from that of WGS 84 by less than
-/// a millimetre: WGS 84, ETRS89, NAD83, SIRGAS 2000, GDA94, GDA2020, NZGD2000.
+/// EPSG codes of longitude and latitude whose ellipsoids differ from WGS 84 by less than a
+/// millimetre: WGS 84, ETRS89, NAD83, SIRGAS 2000, GDA94, GDA2020, NZGD2000.
 const IN_DEGREES: [u32; 9] = [4326, 4979, 4258, 4269, 4674, 4283, 7844, 9057, 4167];
 
-/// EPSG codes of grids whose metres are those of the ground within a thousandth: UTM of WGS 84,
-/// ETRS89 and NAD83, MGA, Gauss-Krüger, and national grids of Switzerland, Britain, the Netherlands,
-/// France and New Zealand.
+/// EPSG codes of grids whose scale error is below 1/1000: UTM of WGS 84, ETRS89 and NAD83, MGA,
+/// Gauss-Krüger, and national grids of Switzerland, Britain, the Netherlands, France and New
+/// Zealand.
 const GRIDS: [std::ops::RangeInclusive<u32>; 13] = [
     32601..=32660,
     32701..=32760,
@@ -41,19 +41,20 @@ const GRIDS: [std::ops::RangeInclusive<u32>; 13] = [
     2193..=2193,
 ];
 
-/// No road of a plant reaches as far (m).
+/// Maximum extent of a plant's road (m).
 const PLANT_M: f64 = 100e3;
 
-/// What to write where coordinates are no degrees.
+/// Advice for coordinates that are not in degrees.
 const IN_METRES: &str = "coordinates in metres are read from CSV with the columns x_m,y_m, or where \
                          the file names their system: \"crs\": {\"type\": \"name\", \"properties\": \
                          {\"name\": \"urn:ogc:def:crs:EPSG::25832\"}}";
 
-/// Reads the points of a road: the columns `x_m` and `y_m` of a CSV file, or a GeoJSON `LineString`
-/// in metres where it says so, else projected onto the tangent plane of its first point.
+/// Reads the points of a road: the columns `x_m` and `y_m` of a CSV file, or a GeoJSON
+/// `LineString`. GeoJSON coordinates are in metres if the file names such a system. Otherwise they
+/// are projected to the tangent plane of the first point.
 ///
 /// # Errors
-/// [`SettingsError`] naming the place in the file.
+/// [`SettingsError`] with the position in the file.
 pub fn read_points_m(path: &Path) -> Result<Vec<[f64; 2]>, SettingsError> {
     let file = path.display().to_string();
     let text = read_text(path, MOST_BYTES)?;
@@ -68,7 +69,7 @@ pub fn read_points_m(path: &Path) -> Result<Vec<[f64; 2]>, SettingsError> {
     points.map_err(|(key, message)| SettingsError::Shape { file, key, message })
 }
 
-/// Place in the file and what is wrong there.
+/// Position in the file, and description of the defect.
 type Defect = (String, String);
 
 fn from_csv(text: &str) -> Result<Vec<[f64; 2]>, Defect> {
@@ -91,9 +92,9 @@ fn from_csv(text: &str) -> Result<Vec<[f64; 2]>, Defect> {
     .collect()
 }
 
-/// The first `LineString`: longitude and latitude, to metres east and north of its first point on the
-/// tangent plane of the ellipsoid; metres unchanged if the file names a grid of [`GRIDS`], or the
-/// frame of the plant.
+/// Reads the first `LineString` in metres. Longitude and latitude are converted to metres east and
+/// north of the first point on the tangent plane of the ellipsoid. Metres are unchanged if the file
+/// names a grid of [`GRIDS`] or the frame of the plant.
 fn from_geojson(text: &str) -> Result<Vec<[f64; 2]>, Defect> {
     let defect = |key: &str, message: &str| (key.to_owned(), message.to_owned());
     let json: Value = serde_json::from_str(text).map_err(|e| defect("JSON", &e.to_string()))?;
@@ -133,8 +134,9 @@ fn from_geojson(text: &str) -> Result<Vec<[f64; 2]>, Defect> {
     Ok(points)
 }
 
-/// Why a place is no longitude and latitude of a plant. Swapped, those of Asia and America have
-/// latitudes beyond 72°, and those of Europe lie off the Horn of Africa.
+/// Returns the reason why a point is not the longitude and latitude of a plant. With exchanged
+/// coordinates, points in Asia and America have latitudes above 72°, and points in Europe are near
+/// the Horn of Africa.
 fn not_degrees([longitude, latitude]: [f64; 2]) -> Option<String> {
     const SWAPPED: &str = "if latitude and longitude are swapped, write [longitude, latitude]";
     if longitude.abs() > 180.0 || latitude.abs() > 90.0 {
@@ -164,7 +166,7 @@ enum System {
     Metres,
 }
 
-/// The reference system that the member `crs` names (GeoJSON 2008); degrees without one.
+/// Returns the reference system of the member `crs` (GeoJSON 2008); degrees without one.
 fn system(json: &Value) -> Result<System, Defect> {
     let Some(crs) = json.get("crs") else {
         return Ok(System::Degrees);
@@ -193,7 +195,7 @@ fn system(json: &Value) -> Result<System, Defect> {
     }
 }
 
-/// The plane that touches the ellipsoid of WGS 84 at a point.
+/// Tangent plane of the WGS 84 ellipsoid at a point.
 struct TangentPlane {
     origin: [f64; 3],
     longitude_rad: f64,
@@ -209,7 +211,7 @@ impl TangentPlane {
         }
     }
 
-    /// Metres east and north of the point.
+    /// Returns the metres east and north of the point of tangency.
     fn metres(&self, [longitude_deg, latitude_deg]: [f64; 2]) -> [f64; 2] {
         let [x, y, z] = geocentric_m(longitude_deg, latitude_deg);
         let [dx, dy, dz] = [x - self.origin[0], y - self.origin[1], z - self.origin[2]];
@@ -223,7 +225,7 @@ impl TangentPlane {
     }
 }
 
-/// Geocentric coordinates in metres of a point of the ellipsoid.
+/// Returns the geocentric coordinates of a point on the ellipsoid in metres.
 fn geocentric_m(longitude_deg: f64, latitude_deg: f64) -> [f64; 3] {
     let (sin_lon, cos_lon) = longitude_deg.to_radians().sin_cos();
     let (sin_lat, cos_lat) = latitude_deg.to_radians().sin_cos();
@@ -259,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_csv_names_the_line() {
+    fn invalid_csv_is_reported_with_its_line() {
         assert_eq!(from_csv("x,y\n1,2\n").unwrap_err().0, "header");
         assert_eq!(from_csv("x_m,y_m\n1,2\n3,nan\n").unwrap_err().0, "line 3");
         let told = from_csv("x_m,y_m\n1,5,2,5\n").unwrap_err();
@@ -278,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn geojson_that_is_not_in_degrees_is_refused_with_what_to_write() {
+    fn geojson_that_is_not_in_degrees_is_rejected_with_advice() {
         let line = |coordinates: &str| {
             from_geojson(&format!(
                 r#"{{"type":"LineString","coordinates":{coordinates}}}"#
@@ -309,12 +311,13 @@ mod tests {
     }
 
     #[test]
-    fn geojson_becomes_metres() {
+    fn geojson_is_converted_to_metres() {
         let text = r#"{"type":"Feature","properties":{},"geometry":
             {"type":"LineString","coordinates":[[8.0,60.0],[8.001,60.0],[8.001,60.001]]}}"#;
         let points = from_geojson(text).unwrap();
-        // Of the ellipsoid: a degree of longitude at 60° is 55,800 m, of latitude 111,412 m
-        // (NIMA TR8350.2); along 0.001° the tangent plane is 0.4 mm north of the parallel.
+        // On the ellipsoid, a degree of longitude at 60° is 55,800 m and a degree of latitude is
+        // 111,412 m (NIMA TR8350.2). After 0.001° the tangent plane is 0.4 mm north of the
+        // parallel.
         assert!((points[1][0] - 55.800).abs() < 0.002 && points[1][1].abs() < 1e-3);
         assert!((points[2][1] - 111.412).abs() < 0.003);
         let metres = text.replacen(

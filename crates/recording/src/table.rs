@@ -1,5 +1,5 @@
-//! Tables of numbers with named columns, separated by commas, semicolons or tabs; after the latter two, numbers
-//! may have a decimal comma.
+//! Tables of numbers with named columns, separated by commas, semicolons or tabs. With semicolons
+//! or tabs, numbers may have a decimal comma.
 
 use std::path::Path;
 
@@ -10,13 +10,13 @@ use crate::file as files;
 use crate::foreign::text_of;
 use crate::number::Numbers;
 
-/// A day of samples at 50 Hz.
+/// Maximum size of a table in bytes: a day of samples at 50 Hz.
 const MOST_BYTES: u64 = 512 << 20;
 
-/// What may stand between two columns.
+/// Allowed column separators.
 const SEPARATORS: [char; 3] = [',', ';', '\t'];
 
-/// A table in memory: the wanted columns of each row, or what is wrong with the row.
+/// Table in memory: the requested columns of each row, or the defect of the row.
 #[derive(Debug)]
 pub struct Table {
     pub rows: Vec<Row>,
@@ -28,17 +28,17 @@ pub struct Table {
 pub struct Row {
     /// Line in the file, from 1.
     pub line: usize,
-    /// One value per wanted column, `None` where an optional one is absent or empty.
+    /// One value per requested column; `None` for an optional column that is missing or empty.
     pub values: Result<Vec<Option<f64>>, String>,
 }
 
 impl Table {
-    /// Reads the columns `required` and `optional`; others are ignored, as are lines that begin with
-    /// `#`.
+    /// Reads the columns `required` and `optional`; other columns and lines that begin with `#` are
+    /// ignored.
     ///
     /// # Errors
-    /// [`RecordingError`] when the file cannot be read, a required column is missing or a wanted one
-    /// is there twice. A row that cannot be used is not an error: it says what is wrong with it.
+    /// [`RecordingError`] if the file cannot be read, a required column is missing, or a requested
+    /// column occurs twice. An unusable row is not an error; its entry describes the defect.
     pub fn read(file: &Path, required: &[&str], optional: &[&str]) -> Result<Self, RecordingError> {
         let bytes =
             files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
@@ -50,10 +50,10 @@ impl Table {
         Self::parse(&text, file, required, optional)
     }
 
-    /// The same of a text; `file` is what errors name.
+    /// Reads a table from a text; `file` is the name in errors.
     ///
     /// # Errors
-    /// As for [`read`](Self::read).
+    /// Errors of [`read`](Self::read).
     pub fn parse(
         text: &str,
         file: &Path,
@@ -109,12 +109,12 @@ impl Table {
         Ok(table)
     }
 
-    /// Whether there is a column of this name.
+    /// Whether a column with this name exists.
     pub fn has(&self, name: &str) -> bool {
         self.header.iter().any(|column| column == name)
     }
 
-    /// That a column is not there, what should be, and what is.
+    /// Creates the error for a missing column, with the allowed and the existing columns.
     pub fn missing(&self, column: &str, allowed: &str) -> RecordingError {
         let named: Vec<&str> = self.header.iter().collect();
         let is_header = |name: &&str| name.parse::<f64>().is_err();
@@ -136,13 +136,13 @@ impl Table {
     }
 }
 
-/// What separates the columns: whichever the first line has most of.
+/// Returns the separator with the most occurrences in the first line.
 fn separator(text: &str) -> char {
     let mut lines = text.trim_start_matches('\u{feff}').lines();
     let is_header = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
     let header = lines.find(is_header).unwrap_or_default();
     let count = |it: &char| header.chars().filter(|sign| sign == it).count();
-    // Of equally many the last is found: the comma where there is none.
+    // For equal counts, the last candidate is selected: the comma if the line has no separator.
     let most = SEPARATORS.into_iter().rev().max_by_key(count);
     most.unwrap_or(',')
 }

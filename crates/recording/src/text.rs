@@ -1,4 +1,4 @@
-//! Text files of a bounded size.
+//! Text files of limited size.
 
 use std::io;
 use std::path::Path;
@@ -7,7 +7,7 @@ use onboard::settings::SettingsError;
 
 use crate::file;
 
-/// Reads a regular file of at most so many bytes.
+/// Reads a regular text file with a maximum size.
 ///
 /// # Errors
 /// [`SettingsError::Read`].

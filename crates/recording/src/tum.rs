@@ -1,4 +1,4 @@
-//! TUM trajectories: `t x y z qx qy qz qw` per line, single spaces, nothing else.
+//! TUM trajectories: `t x y z qx qy qz qw` per line, separated by single spaces.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,19 +8,19 @@ use crate::file as files;
 use onboard::geometry::{Pose, wrap_angle};
 use onboard::time_unit::TimeUnit;
 
-/// A day of poses at 50 Hz.
+/// Maximum size of a trajectory in bytes: a day of poses at 50 Hz.
 const MOST_BYTES: u64 = 512 << 20;
 
-/// A pose and its time in seconds.
+/// Pose with its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimedPose {
     /// Time in seconds.
     pub time_s: f64,
-    /// Place and heading.
+    /// Position and heading.
     pub pose: Pose,
 }
 
-/// A TUM trajectory as text; times to the nanosecond.
+/// Returns a TUM trajectory as text, with times in nanoseconds.
 pub fn tum_text(poses: &[TimedPose]) -> String {
     let mut text = String::with_capacity(poses.len() * 80);
     for TimedPose { time_s, pose } in poses {
@@ -44,12 +44,12 @@ pub fn write_tum(file: &Path, poses: &[TimedPose]) -> Result<(), RecordingError>
     files::write(file, tum_text(poses).as_bytes())
 }
 
-/// Reads a TUM trajectory; lines that begin with `#` are comments. Roll and pitch are dropped; the heading is NaN if the
-/// quaternion is no rotation.
+/// Reads a TUM trajectory; lines that begin with `#` are comments. Roll and pitch are ignored. The
+/// heading is NaN if the quaternion is not a rotation.
 ///
 /// # Errors
-/// [`RecordingError::Io`], or [`RecordingError::Value`] naming the line that is not eight numbers, or whose time is not
-/// in seconds.
+/// [`RecordingError::Io`]; [`RecordingError::Value`] for a line that is not eight numbers, or whose
+/// time is not in seconds.
 pub fn read_tum(file: &Path) -> Result<Vec<TimedPose>, RecordingError> {
     let bytes = files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
     let text = String::from_utf8_lossy(&bytes);
@@ -71,7 +71,7 @@ pub fn read_tum(file: &Path) -> Result<Vec<TimedPose>, RecordingError> {
         .collect()
 }
 
-/// Largest deviation of a quaternion's norm from 1: numbers with two digits have up to 0.01.
+/// Maximum deviation of a quaternion's norm from 1; numbers with two digits deviate by up to 0.01.
 const NORM_TOLERANCE: f64 = 0.02;
 
 fn pose(line: &str) -> Result<TimedPose, String> {

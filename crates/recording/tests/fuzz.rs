@@ -1,4 +1,4 @@
-//! Short runs of the fuzz targets of the readers: see `fuzz/README.md`.
+//! Short runs of the fuzz targets of the readers; see `fuzz/README.md`.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -18,17 +18,17 @@ mod sigmf;
 mod tables;
 
 #[test]
-fn no_files_make_the_sigmf_reader_panic() {
+fn the_sigmf_reader_never_panics() {
     short_run::run(&seeds("sigmf"), 20_000, sigmf::run);
 }
 
 #[test]
-fn no_files_make_the_mcap_reader_panic() {
+fn the_mcap_reader_never_panics() {
     short_run::run(&seeds("mcap"), 1_000, mcap::run);
 }
 
 #[test]
-fn no_files_make_the_readers_of_tables_panic() {
+fn the_table_readers_never_panic() {
     let seeds = [
         "\0time_s,distance_m,speed_mps,yaw_rate_radps\n0,0,1,0\n0.02,0.02,1,0.1\n",
         "\x01time_s;left_mps;right_mps\n0;1,0;1,1\n0,02;1,0;1,1\n",

@@ -14,7 +14,8 @@ use crate::statistics::SourceHealth;
 use crate::supervisor;
 
 impl Engine {
-    /// Reports steps of the clock of angles or samples, and clocks that differ or no longer do.
+    /// Reports clock steps of the angles or samples, and the begin and end of a difference between
+    /// clocks.
     pub(super) fn report_clocks(&mut self) {
         if let Some(step) = self.live.take_angle_step() {
             let text = format!(
@@ -59,14 +60,14 @@ impl Engine {
         }
     }
 
-    /// Reports a radio head that the site does not have, once.
+    /// Reports an unknown radio head once.
     pub(super) fn report_unknown(&mut self, pci: u16, ssb_index: u8) {
         if let Some(text) = self.angle_watch.unknown(pci, ssb_index) {
             self.event(Level::Warn, "angles", text);
         }
     }
 
-    /// Names sources that are silent, and those that are no longer.
+    /// Reports silent sources, and the end of their silence.
     pub(super) fn watch(&mut self, sources: &[Arc<SourceHealth>], silent_after: Duration) {
         for source in sources {
             let silent = source.silent_for();
@@ -77,7 +78,7 @@ impl Engine {
                 self.event(Level::Warn, source.name, text);
             } else if silent < silent_after && told {
                 self.silent.retain(|it| *it != source.name);
-                self.event(Level::Info, source.name, "is there again".to_owned());
+                self.event(Level::Info, source.name, "sends again".to_owned());
             }
         }
         if let Some((level, text)) = self.angle_watch.change(Instant::now()) {
@@ -129,7 +130,8 @@ impl Engine {
         });
     }
 
-    /// Time by which repeated events are reported: real time, or that of the drive in playback.
+    /// Returns the time for reports of repeated events: real time, or the time of the drive in
+    /// playback.
     fn now_of_events_s(&self) -> f64 {
         if self.records.waits() {
             self.clock.now_s().unwrap_or(0.0)
@@ -138,7 +140,7 @@ impl Engine {
         }
     }
 
-    /// Reports outputs that have failed or work again.
+    /// Reports outputs that have failed or have recovered.
     pub(super) fn report_outputs(&mut self) {
         let changes = self.records.changes();
         if changes.is_empty() {

@@ -1,4 +1,5 @@
-//! Samples: handed to the pipeline in whole windows, and dropped between them.
+//! Processing of samples: complete windows are given to the pipeline, and samples between windows
+//! are dropped.
 
 use std::time::{Duration, Instant};
 
@@ -29,7 +30,7 @@ impl Engine {
         self.arrivals.push_back((end_s + offset_s, came));
         let is_over = |[from_s, until_s]: [f64; 2]| end_s <= from_s || block.time_s >= until_s;
         if self.gate.wanted().is_some_and(is_over) {
-            inbox.give_back(block.antennas); // on its way when the gate closed
+            inbox.give_back(block.antennas); // arrived after the gate was closed
             return Ok(());
         }
         let pending_s = self.pending.length() as f64 / self.rate_hz();
@@ -44,7 +45,8 @@ impl Engine {
             self.publish_heard(Some(came))?;
             self.sleep_until_next(end_s)?;
             if self.gate.wanted().is_some() {
-                // What the receiver holds back would be heard with the next window only.
+                // Flush the receiver's delayed SSBs; otherwise they are processed with the next
+                // window.
                 self.receive(true)?;
                 self.publish_heard(Some(came))?;
             }
@@ -65,7 +67,7 @@ impl Engine {
             let periods = (missing_s / self.period_s).floor();
             let before_s = self.live.time_offset_s();
             self.live.add_interruption(periods * self.period_s);
-            // Where arrival times are measured, the source has reported it.
+            // If arrival times are measured, the source has already reported the missing samples.
             if self.live.time_offset_s() > before_s {
                 let text = format!("samples of {missing_s:.2} s are missing");
                 self.event(Level::Warn, "samples", text);
@@ -75,7 +77,8 @@ impl Engine {
         if std::mem::replace(&mut self.unreported_gaps, gaps) < gaps
             && !self.interruptions.is_recent(came)
         {
-            let text = "samples are missing: the SSBs came off their period".to_owned();
+            let text =
+                "samples are missing: the SSBs are not at multiples of their period".to_owned();
             self.event(Level::Warn, "samples", text);
         }
     }
@@ -84,8 +87,8 @@ impl Engine {
         self.setup.stream.map_or(1.0, |it| it.rate_hz)
     }
 
-    /// Hands the samples of a window, or of a period, to the pipeline, all at once: whoever searches for cells
-    /// must see a whole burst.
+    /// Gives the samples of a window or a period to the pipeline in one block, because a cell
+    /// search requires a complete burst.
     pub(super) fn receive(&mut self, ends: bool) -> Result<(), LiveError> {
         let mut antennas: [&[Complex32]; MAX_ELEMENTS] = [&[]; MAX_ELEMENTS];
         for (antenna, samples) in antennas.iter_mut().zip(&self.pending.antennas) {
@@ -108,14 +111,14 @@ impl Engine {
         self.live.hear_before(f64::INFINITY)?;
         if let Some(error) = self.live.take_refused_burst() {
             self.refused("samples", &error);
-            // Whether their clock has stepped is seen soonest with all samples.
+            // All samples are required to detect a clock step as early as possible.
             self.gate.open();
         }
         self.report_clocks();
         Ok(())
     }
 
-    /// Closes the gate up to the next burst that is wanted.
+    /// Closes the gate until the next required burst.
     pub(super) fn sleep_until_next(&mut self, now_s: f64) -> Result<(), LiveError> {
         if !self.sleeps {
             return Ok(());
@@ -128,7 +131,7 @@ impl Engine {
         let offset_s = self.live.time_offset_s();
         let mut window = self.windows.around(burst_s, ssb_index);
         if window[0] < now_s {
-            // Part of it is gone already.
+            // The window has partly passed; take the next burst.
             burst_s = self.live.next_wake_up_s(burst_s)?;
             window = self.windows.around(burst_s, ssb_index);
         }
@@ -137,13 +140,13 @@ impl Engine {
         } else if self.live.listens(burst_s + offset_s)? {
             self.gate.set(window);
         } else {
-            // None is wanted as far as one can see: it is time to ask again then, and not to listen.
+            // No burst is required in the near future: query again at this time, without reception.
             self.gate.set([window[0]; 2]);
         }
         Ok(())
     }
 
-    /// When the sample of this time arrived, or would have if samples came one by one.
+    /// Returns the arrival time of a sample, assuming that samples arrive one by one.
     pub(super) fn arrival_of(&self, time_s: f64) -> Option<Instant> {
         let (end_s, came) = self.arrivals.iter().find(|(end_s, _)| *end_s >= time_s)?;
         came.checked_sub(Duration::try_from_secs_f64(end_s - time_s).ok()?)

@@ -1,4 +1,4 @@
-//! `node.toml`: what comes from where and goes whereto.
+//! `node.toml`: inputs and outputs of the node.
 
 mod node;
 mod outputs;

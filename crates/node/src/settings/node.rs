@@ -1,4 +1,4 @@
-//! The file itself.
+//! Node file.
 
 use std::path::Path;
 
@@ -14,39 +14,40 @@ use crate::address::Address;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NodeSettings {
-    /// Short name; the page shows it.
+    /// Short name of the node, displayed on the web page.
     pub name: String,
-    /// How files are played back.
+    /// Speed of playback.
     #[serde(default)]
     pub pace: Pace,
-    /// Samples of all antennas; without, angles come by `messages` or `angles`.
+    /// Samples of all antennas [default: none; angles are from `messages` or `angles`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub samples: Option<SampleSource>,
-    /// Newline JSON comes here: odometry, angles, poses to begin from.
+    /// Inputs of newline-delimited JSON messages: odometry, angles and initial poses.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 16))]
     pub messages: Vec<Address>,
-    /// Odometry of a file.
+    /// Odometry from a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry: Option<OdometryFile>,
-    /// Angles of a file.
+    /// Angles from a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angles: Option<AngleFile>,
-    /// Whether samples are dropped unseen where no SSB is wanted, and the radio is switched off.
+    /// Whether samples between required SSBs are dropped unprocessed and the radio is switched off.
     #[serde(default = "yes")]
     pub sleep: bool,
-    /// A source that is silent for so long is named, in seconds.
+    /// Time without input after which a source is reported as silent, in seconds.
     #[serde(default = "half")]
     #[schemars(range(min = 0.05, max = 60.0))]
     pub silent_after_s: f64,
-    /// File in which pose, calibration and excluded radio heads are saved every second and from which they are resumed
-    /// at the next start; none by default. A relative path counts from this file.
+    /// File in which pose, calibration and excluded radio heads are saved every second and from
+    /// which they are resumed at the next start [default: none]. A relative path refers to the
+    /// folder of this file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state_file: Option<String>,
-    /// Where poses go.
+    /// Outputs of poses.
     #[serde(default)]
     pub output: Outputs,
-    /// The page to look at, with metrics; none without.
+    /// Web page with metrics [default: none].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub page: Option<PageSettings>,
 }
@@ -58,14 +59,15 @@ const fn half() -> f64 {
     0.5
 }
 
-/// How files are played back.
+/// Speed of playback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pace {
-    /// As it was recorded.
+    /// Recorded speed.
     #[default]
     RealTime,
-    /// As fast as possible; all that comes must come from files, or as messages of one file or standard input.
+    /// Maximum speed. Requires that all input comes from files, or as messages from one file or
+    /// standard input.
     Fast,
 }
 
@@ -73,12 +75,12 @@ pub enum Pace {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OdometryFile {
-    /// CSV, MCAP, or the folder of a rosbag2; a path counts from this file.
+    /// CSV file, MCAP file or folder of a rosbag2, relative to the folder of this file.
     pub file: String,
-    /// Topic of the odometry where a bag has several.
+    /// Topic of the odometry in a bag with several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
-    /// Topic of the IMU that tells the yaw rate, where it is not to be the odometry.
+    /// Topic of the IMU with the yaw rate [default: yaw rate of the odometry].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub imu_topic: Option<String>,
 }
@@ -87,34 +89,35 @@ pub struct OdometryFile {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AngleFile {
-    /// CSV, or MCAP or the folder of a rosbag2 with verdicts that a node recorded; a path counts from this file.
+    /// CSV file, or MCAP file or folder of a rosbag2 with verdicts that a node recorded, relative
+    /// to the folder of this file.
     pub file: String,
-    /// Topic of the verdicts where not all of them are meant.
+    /// Topic of the verdicts [default: all].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
 }
 
 impl NodeSettings {
-    /// Whether all that comes in comes from files.
+    /// Whether all input comes from files.
     pub fn is_playback(&self) -> bool {
         let from_file = |it: &SampleSource| matches!(it, SampleSource::Sigmf { .. });
         self.messages.is_empty() && self.samples.as_ref().is_none_or(from_file)
     }
 
-    /// Whether what comes in waits until it is taken, for it comes by no clock of its own; else it is dropped where it
-    /// cannot be taken in time.
+    /// Whether inputs wait until they are processed, because they do not arrive in real time.
+    /// Otherwise, inputs that cannot be processed in time are dropped.
     pub fn waits(&self) -> bool {
         self.is_playback() || self.pace == Pace::Fast
     }
 
-    /// Whether all that comes in are messages of one file or standard input, which are in order.
+    /// Whether all input consists of messages from one file or standard input, which are in order.
     fn is_one_file_of_messages(&self) -> bool {
         let nothing_else =
             self.samples.is_none() && self.odometry.is_none() && self.angles.is_none();
         nothing_else && matches!(&self.messages[..], [Address::Standard | Address::File(_)])
     }
 
-    /// The same with the paths of what is read counted from the folder of `origin`.
+    /// Makes the input paths relative to the folder of `origin`.
     #[must_use]
     pub fn beside(mut self, origin: &str) -> Self {
         let folder = Path::new(origin).parent().unwrap_or(Path::new(""));

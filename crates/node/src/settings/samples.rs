@@ -1,11 +1,12 @@
-//! Where samples come from.
+//! Sources of samples.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::address::Address;
 
-/// How a complex sample stands in a stream, little-endian, real part first. Full scale of integers is one.
+/// Format of a complex sample in a stream, little-endian, real part first. The full scale of
+/// integers is one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum SampleFormat {
     /// Two 32-bit floats.
@@ -23,26 +24,28 @@ pub enum SampleFormat {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "source", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum SampleSource {
-    /// A recording, played back.
+    /// Recording for playback.
     Sigmf {
-        /// Its name, with or without `.sigmf-meta`; a path counts from this file.
+        /// Name of the recording, with or without `.sigmf-meta`, relative to the folder of this
+        /// file.
         recording: String,
-        /// Time of its first sample by the odometry's clock, in seconds.
+        /// Time of the first sample according to the odometry's clock, in seconds.
         #[serde(default)]
         start_time_s: f64,
     },
-    /// Samples of all channels in turn, nothing before, between or after them.
+    /// Interleaved samples of all channels without headers.
     Raw {
-        /// `-` (standard input), `tcp://`, `tcp-listen://`, `unix://`, `unix-listen://`, or the path of a file
-        /// or pipe.
+        /// `-` (standard input), `tcp://`, `tcp-listen://`, `unix://`, `unix-listen://`, or the
+        /// path of a file or pipe.
         address: Address,
         /// Format of a sample.
         format: SampleFormat,
-        /// What the samples are.
+        /// Description of the samples.
         stream: Stream,
     },
-    /// ZeroMQ as srsRAN, OCUDU and OpenAirInterface speak it: a request of one byte to the transmitter of each
-    /// channel is answered by samples, as many as there are. Several channels are aligned by counting.
+    /// ZeroMQ protocol of srsRAN, OCUDU and OpenAirInterface: a one-byte request to the transmitter
+    /// of each channel is answered with the available samples. Several channels are aligned by
+    /// counting.
     Zeromq {
         /// `tcp://HOST:PORT` of each channel's transmitter.
         #[schemars(length(min = 1, max = 16))]
@@ -50,10 +53,10 @@ pub enum SampleSource {
         /// Format of a sample.
         #[serde(default = "cf32")]
         format: SampleFormat,
-        /// What the samples are.
+        /// Description of the samples.
         stream: Stream,
     },
-    /// A radio that SoapySDR drives; the program must be built with the feature `soapy`.
+    /// Radio with a SoapySDR driver; requires the feature `soapy` at build time.
     Soapy(Radio),
 }
 
@@ -61,51 +64,52 @@ const fn cf32() -> SampleFormat {
     SampleFormat::Cf32
 }
 
-/// A radio by SoapySDR.
+/// Radio with a SoapySDR driver.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Radio {
-    /// Which radio, as `driver=uhd,serial=…`.
+    /// Arguments of the SoapySDR device, for example `driver=uhd,serial=…`.
     pub device: String,
-    /// Gain of every channel in dB; the radio's own choice without.
+    /// Gain of every channel in dB [default: the radio's choice].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -50.0, max = 150.0))]
     pub gain_db: Option<f64>,
-    /// What the samples are.
+    /// Description of the samples.
     pub stream: Stream,
 }
 
-/// `[samples.stream]`: what the samples of a stream are. Nothing in a stream says so itself.
+/// `[samples.stream]`: description of the samples of a stream, which a stream does not contain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stream {
-    /// Million samples per second and channel.
+    /// Sample rate in million samples per second and channel.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub rate_msps: f64,
-    /// Frequency that stands at 0 Hz, in MHz.
+    /// Absolute frequency at 0 Hz in the samples, in MHz.
     #[schemars(range(min = 100.0, max = 100_000.0))]
     pub centre_mhz: f64,
-    /// Which antenna of the vehicle's array each channel is of, from 0: `[0, 1, 2, 3]`.
+    /// Index of the antenna of each channel in the vehicle's array, from 0: `[0, 1, 2, 3]`.
     #[schemars(length(min = 1, max = 16))]
     pub antennas: Vec<u8>,
-    /// Where the samples' time comes from.
+    /// Source of the samples' time.
     #[serde(default)]
     pub clock: Clock,
 }
 
-/// Where the time of samples comes from that carry none.
+/// Source of the time of samples without time stamps.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Clock {
-    /// This computer's clock when they arrive, smoothed: seconds since 1970. The odometry must use the same.
+    /// Clock of this computer at the arrival of the samples, smoothed: seconds since 1970. The
+    /// odometry must use the same clock.
     #[default]
     Arrival,
-    /// Counting alone, from this time on in seconds: for simulators.
+    /// Sample counter, starting at this time in seconds: for simulators.
     StartTimeS(f64),
 }
 
 impl SampleSource {
-    /// What its samples are, where the settings say so; a recording says it itself.
+    /// Returns the description of the samples; `None` for a recording, which contains it.
     pub fn stream(&self) -> Option<&Stream> {
         match self {
             Self::Sigmf { .. } => None,
@@ -114,7 +118,7 @@ impl SampleSource {
         }
     }
 
-    /// Its name in messages.
+    /// Returns the name of the source in messages.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Sigmf { .. } => "sigmf",

@@ -41,7 +41,7 @@ pub struct Json {
 }
 
 impl Json {
-    /// Newline JSON as the settings describe it; nothing is opened yet.
+    /// Creates the output from the settings; nothing is opened.
     pub fn new(settings: &JsonOutput) -> Self {
         Self {
             address: settings.address.clone(),
@@ -79,7 +79,7 @@ impl Json {
         format!("output.json.address {}", self.address)
     }
 
-    /// Whether a pose is left out because the configured rate is lower than that of the odometry.
+    /// Whether a pose is omitted because the configured rate is lower than that of the odometry.
     fn is_left_out(&mut self, record: &Record) -> bool {
         let Record::Pose(pose) = record else {
             return false;

@@ -26,8 +26,9 @@ const MAP_TO_ODOM: Frames<'_> = Frames {
     parent: "map",
     child: "odom",
 };
-/// Variance of a wheel speed in (m/s)² and of a gyroscope's rate in (rad/s)².
+/// Variance of a wheel speed in (m/s)².
 const SPEED_VARIANCE: f64 = 1e-4;
+/// Variance of a yaw rate in (rad/s)².
 const YAW_RATE_VARIANCE: f64 = 1e-4;
 
 /// Maximum time between two chunks: after `kill -9` the file is readable up to this time before its end, and up
@@ -66,7 +67,7 @@ struct Open {
 }
 
 impl Mcap {
-    /// Files as the settings describe them; nothing is opened yet.
+    /// Creates the output from the settings; nothing is opened.
     pub fn new(settings: &McapOutput) -> Self {
         Self {
             settings: settings.clone(),
@@ -455,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn rates_hold_and_begin_anew_with_the_drive() {
+    fn rates_are_limited_and_restart_with_the_drive() {
         let mut last_s = f64::NEG_INFINITY;
         let times = (0..100).map(|number| f64::from(number) * 0.02);
         let due = times.filter(|time_s| {

@@ -52,7 +52,7 @@ pub struct Mqtt {
 }
 
 impl Mqtt {
-    /// Positions as the settings describe them; nothing is connected yet.
+    /// Creates the output from the settings; nothing is connected.
     pub fn new(settings: &MqttOutput, node: &str, alert_limit_m: f64) -> Self {
         Self {
             client_id: format!("access-av-{node}-{}", std::process::id()),

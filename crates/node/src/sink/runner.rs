@@ -19,16 +19,17 @@ use crate::settings::Outputs;
 
 /// Maximum time between two calls of [`Sink::flush`].
 const FLUSH: Duration = Duration::from_millis(200);
-/// Time from a failure to the first retry. It doubles with each retry that fails ...
+/// Time from a failure to the first retry. It doubles with each retry that fails.
 const FIRST_RETRY: Duration = Duration::from_millis(250);
-/// ... up to this time, so that an output works again 5 s after the cause has ended.
+/// Maximum time between retries, so that an output works again within 5 s after the cause has
+/// ended.
 const MAX_RETRY: Duration = Duration::from_secs(2);
 /// Maximum time that the start of the node waits for the outputs. One that takes longer opens later.
 const START_PATIENCE: Duration = Duration::from_millis(500);
 /// Time that an output may take to finish after the last record, if it does not make progress.
 const END_PATIENCE: Duration = Duration::from_secs(5);
 
-/// Makes the outputs that the settings name; nothing is opened yet.
+/// Creates the outputs of the settings; nothing is opened.
 pub fn sinks(
     settings: &Outputs,
     node: &str,

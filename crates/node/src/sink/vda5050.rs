@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn times_are_written_as_iso_8601() {
-        // By `date -u -d @SECONDS`.
+        // Reference values: `date -u -d @SECONDS`.
         for (seconds, expected) in [
             (0.0, "1970-01-01T00:00:00.000Z"),
             (951_782_399.5, "2000-02-28T23:59:59.500Z"),

@@ -1,5 +1,5 @@
-//! Drives with one wrong thing in their files: how often it is named as what it is, and whether
-//! anything is named on sound drives. With `$ACCESS_AV_DATA` the recorded drives too.
+//! Drives with one error in their files: fraction of errors that are diagnosed correctly, and false
+//! diagnoses of correct drives. With `$ACCESS_AV_DATA`, the recorded drives are included.
 //!
 //! `cargo run --release -p recording --example misconfigured_drives -- [seeds] [first seed]`;
 //! `ONLY="yaw rate zero" KIND="Robot, integrity true" VERBOSE=1` for one row, drive by drive.
@@ -15,7 +15,7 @@ use simulator::{Drive, Kind, drive};
 
 const KINDS: [Kind; 3] = [Kind::OnRoad, Kind::WithoutRoad, Kind::Robot];
 
-/// Whether a drive ends with exit code 3, as the command line has it.
+/// Whether a drive ends with exit code 3, by the rule of the command line.
 fn is_unreliable(located: &LocatedDrive) -> bool {
     located.is_lost_for_long() || located.suspicions().next().is_some()
 }
@@ -38,7 +38,7 @@ fn describe(what: &str, drive: &Drive, name: &str) -> (Vec<String>, bool, f64) {
     (named, unreliable, rms_m)
 }
 
-/// What became of drives with one wrong thing.
+/// Results of the drives with one kind of error.
 #[derive(Default)]
 struct Tally {
     drives: usize,
@@ -48,7 +48,7 @@ struct Tally {
     silently_far: usize,
 }
 
-/// Locates a group of drives, sound and with each wrong thing.
+/// Locates a group of drives, without an error and with each error.
 fn campaign(sound: &[(String, Drive)], only: &str) {
     if only.is_empty() || only == "sound" {
         let (mut accused, mut unreliable, mut errors_m) = (0, 0, Vec::new());

@@ -1,4 +1,4 @@
-//! One wrong thing in the files of a drive, and how it is to be named.
+//! Errors in the files of a drive, and their expected diagnoses.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::simulator::{Drive, Kind};
 
-/// One wrong thing: its name, and what it does to the files. Gives the words by which it is named.
+/// Name of an error, and a function that applies it to a drive and returns the words of the
+/// expected diagnosis.
 pub type Misconfiguration = (&'static str, fn(&mut Drive, &mut ChaCha8Rng) -> Vec<String>);
 
 fn words(said: &[&str]) -> Vec<String> {
@@ -61,7 +62,7 @@ fn exchange_pcis(drive: &mut Drive, rng: &mut ChaCha8Rng) -> Vec<String> {
     vec![format!("pci {} and pci {} are exchanged", pcis[0], pcis[1])]
 }
 
-/// What is done to road vehicles and robots alike.
+/// Errors of road vehicles and robots.
 pub const MISCONFIGURATIONS: [Misconfiguration; 12] = [
     ("one head 10 m off", move_head),
     ("x and y of one head", exchange_axes),
@@ -107,7 +108,8 @@ pub const MISCONFIGURATIONS: [Misconfiguration; 12] = [
     }),
 ];
 
-/// The drive with one of them, and the words by which it is to be named; `None` where it is none.
+/// Returns the drive with one error and the words of the expected diagnosis; `None` if the error
+/// does not apply.
 pub fn misconfigured(sound: &Drive, number: usize, seed: u64) -> Option<(Drive, Vec<String>)> {
     let (name, spoil) = MISCONFIGURATIONS[number];
     if name == "robot as road vehicle" && sound.kind != Kind::Robot {

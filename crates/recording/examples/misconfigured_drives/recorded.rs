@@ -1,4 +1,4 @@
-//! The recorded drives of `$ACCESS_AV_DATA`, by what their data sheets say.
+//! Recorded drives of `$ACCESS_AV_DATA` with the specifications of their data sheets.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -10,7 +10,7 @@ use recording::{read_angle_log, read_odometry_csv, read_tum};
 
 use super::simulator::{Drive, Kind};
 
-/// Data sheets of the robots of MRCLAM and of "lost in the woods", and of the street's car.
+/// Data sheet of the MRCLAM robots.
 const MRCLAM: &str = "drive = \"differential\"
 odometer = { scale_std = 0.08, noise_m_per_sqrt_m = 0.05 }
 gyroscope = { noise_rad_per_sqrt_s = 0.04, bias_std_radps = 0.005 }
@@ -33,7 +33,7 @@ fn numbers(file: &Path) -> Vec<Vec<f64>> {
     text.lines().skip(1).map(row).collect()
 }
 
-/// The drives, each with its name.
+/// Returns the drives with their names.
 pub fn drives(guarded: bool) -> Vec<(String, Drive)> {
     let data = PathBuf::from(std::env::var_os("ACCESS_AV_DATA").unwrap());
     let folders = fs::read_dir(data.join("drives")).unwrap();

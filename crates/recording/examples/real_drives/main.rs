@@ -1,6 +1,7 @@
-//! Locates the converted real drives of `$ACCESS_AV_DATA/drives` and the ray-traced street, and says
-//! how well: position RMS against truth at truth's own times, share `ok`, errors beyond the
-//! protection level while `ok`, NEES/2. `cargo run --profile dev -p recording --example real_drives`.
+//! Accuracy on the converted real drives of `$ACCESS_AV_DATA/drives` and on the ray-traced street:
+//! RMS position error at the times of the truth, fraction in state `ok`, errors that exceed the
+//! protection level in state `ok`, NEES/2. Run with `cargo run --profile dev -p recording --example
+//! real_drives`.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)]
 
 mod street;
@@ -65,7 +66,7 @@ heading_std_rad = 0.05
 [array]
 ";
 
-/// A recorded drive.
+/// Recorded drive.
 #[derive(Clone)]
 struct Drive {
     name: String,
@@ -140,7 +141,7 @@ impl Drive {
             "integrity",
             "localizer",
         ] {
-            // To try a setting: RECEIVER="phase_bias_correlation_s = 2.0".
+            // Environment variables add settings: RECEIVER="phase_bias_correlation_s = 2.0".
             let Ok(keys) = std::env::var(table.to_uppercase()) else {
                 continue;
             };
@@ -165,7 +166,7 @@ impl Drive {
         .expect("a located drive")
     }
 
-    /// RMS error from a time on.
+    /// Returns the RMS error in a time interval.
     fn rms_m(&self, poses: &[LocatedPose], from_s: f64, to_s: f64) -> f64 {
         let errors = poses
             .iter()
@@ -179,7 +180,7 @@ impl Drive {
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     }
 
-    /// Half the squared error of the place in units of its covariance.
+    /// Returns half of the squared position error normalised by its covariance.
     fn half_nees(&self, pose: &LocatedPose) -> Option<f64> {
         let truth = self.true_pose(pose.estimate.time_s)?;
         let [[xx, xy, _], [_, yy, _], _] = pose.estimate.covariance?;
@@ -246,7 +247,8 @@ impl Drive {
     }
 }
 
-/// Why a position was not `ok`: shares of the time lost, above the alert limit, and in doubt.
+/// Returns the reasons for states other than `ok`: fractions of the time lost, above the alert
+/// limit, and with a doubted source.
 fn why_not_ok(poses: &[LocatedPose]) -> String {
     let alert_limit_m = IntegritySettings::default().alert_limit_m;
     let (mut lost, mut wide, mut doubted) = (0, 0, 0);
@@ -270,7 +272,7 @@ fn why_not_ok(poses: &[LocatedPose]) -> String {
     )
 }
 
-/// The first remarks of each kind.
+/// Prints the first remarks of each kind.
 fn print_remarks(located: &LocatedDrive) {
     if std::env::var_os("REMARKS").is_some() {
         let mut seen: BTreeMap<String, usize> = BTreeMap::new();
@@ -289,7 +291,7 @@ fn print_remarks(located: &LocatedDrive) {
     }
 }
 
-/// The first minute, each three seconds.
+/// Prints the first minute in steps of three seconds.
 fn print_trace(drive: &Drive, poses: &[LocatedPose]) {
     if std::env::var_os("TRACE").is_none() {
         return;
@@ -318,7 +320,7 @@ fn print_trace(drive: &Drive, poses: &[LocatedPose]) {
     }
 }
 
-/// RMS in each minute, and NEES/2.
+/// Prints the RMS error in each minute, and NEES/2.
 fn print_minutes(drive: &Drive, poses: &[LocatedPose]) {
     if std::env::var_os("MINUTES").is_none() {
         return;
@@ -404,7 +406,7 @@ fn main() {
     }
 }
 
-/// The drive from several starts on: whether what holds of the whole holds of its parts.
+/// Locates parts of the drive from several starts, for comparison with the whole drive.
 fn parts(drive: &Drive, told: &str) {
     const LENGTH_S: f64 = 300.0;
     let end_s = drive.truth.last().map_or(0.0, |last| last.time_s);
@@ -480,7 +482,7 @@ fn faults(drive: &Drive, told: &str) {
     deaf.angles
         .angles
         .retain(|it| !(at_s..at_s + 60.0).contains(&it.measured.time_s));
-    // Back in 30 s: counted from when there are angles again.
+    // Recovery within 30 s of the first angle after the interruption.
     let mut times_s = deaf.angles.angles.iter().map(|it| it.measured.time_s);
     let heard_s = times_s.find(|time_s| *time_s > at_s).unwrap_or(at_s);
     compare("a minute deaf", &deaf, drive.start, heard_s + 30.0);

@@ -1,4 +1,4 @@
-//! The ray-traced street of `$ACCESS_AV_DATA/street`.
+//! Ray-traced street of `$ACCESS_AV_DATA/street`.
 
 use std::f64::consts::PI;
 use std::fs;
@@ -31,12 +31,13 @@ rms_m = 0.02
 position_m = [0.0, 0.0, 1.5]
 ";
 
-/// The street with exact angles, every kind of map and speed, and with those of the ray tracer.
+/// Locates the street with exact angles, every kind of map and speed, and with the ray tracer's
+/// angles.
 pub fn exact_and_real(folder: &Path) {
     let base = Drive::read(folder, "angles.csv", "odometry.csv");
     let raw = Drive::read(folder, "angles.csv", "odometry_rawspeed.csv");
     let sparse = Drive::read(folder, "angles_every2m.csv", "odometry.csv");
-    // Exact angles: from the true pose, heads at height, at the logged times.
+    // Exact angles from the true pose and the heights of the radio heads at the logged times.
     let heads = table(&folder.join("landmarks.csv"));
     let exact = |drive: &Drive| {
         let mut drive = drive.clone();
@@ -107,8 +108,8 @@ pub fn exact_and_real(folder: &Path) {
     }
 }
 
-/// The street with odometers of its data sheet, ten of them: medians and worst of RMS, and shares of
-/// all their time.
+/// Locates the street with ten odometers according to its data sheet: median and maximum RMS error,
+/// and fractions of the total time.
 pub fn ten_odometers(folder: &Path) {
     let road = fs::read_to_string(folder.join("road.toml")).unwrap();
     let road = road.replace("[track]", "\n[road]");
@@ -166,7 +167,7 @@ pub fn ten_odometers(folder: &Path) {
     }
 }
 
-/// Odometry of the true drive by the street's data sheet.
+/// Simulates the odometry of the true drive according to the street's data sheet.
 fn odometry(drive: &Drive, seed: u64) -> Vec<OdometrySample> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut normal = || -> f64 { random.sample(StandardNormal) };

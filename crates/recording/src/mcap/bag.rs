@@ -1,4 +1,4 @@
-//! The MCAP files that a path stands for: one, or those of a rosbag2 folder.
+//! MCAP files of a path: a single file, or the files of a rosbag2 folder.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,21 +7,21 @@ use super::messages::first_time_ns;
 use crate::error::RecordingError;
 use crate::file as files;
 
-/// A bag of many thousand files has a shorter `metadata.yaml`.
+/// Maximum size of `metadata.yaml` in bytes; a bag of many thousand files has a shorter one.
 const MOST_METADATA_BYTES: u64 = 16 << 20;
 
-/// Whether a path is a rosbag2 folder or a file of one, by its name.
+/// Whether a path is a rosbag2 folder or one of its files, judged by the name.
 pub fn is_bag(path: &Path) -> bool {
     path.is_dir() || ends_with(path, "mcap") || ends_with(path, "db3")
 }
 
-/// The MCAP files of a bag in order of time; a file is a bag by itself.
+/// Returns the MCAP files of a bag in order of time; a single file is a bag.
 ///
-/// What a folder holds is read, whether or not its recorder lived to write `metadata.yaml`; a file that
-/// is named there has to be here.
+/// All MCAP files of a folder are read, even if the recorder was stopped before it wrote
+/// `metadata.yaml`. A file that `metadata.yaml` names must exist.
 ///
 /// # Errors
-/// [`RecordingError`] when the folder cannot be read, lacks a file, or holds no MCAP.
+/// [`RecordingError`] if the folder cannot be read, lacks a named file, or contains no MCAP file.
 pub fn files_of(bag: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     let io = |source| RecordingError::io(bag, source);
     if ends_with(bag, "db3") {
@@ -59,7 +59,7 @@ pub fn files_of(bag: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     }
     let mut timed = Vec::with_capacity(found.len());
     for file in found {
-        // A file without messages stands anywhere.
+        // The position of a file without messages is arbitrary.
         timed.push((first_time_ns(&file)?.unwrap_or(u64::MAX), file));
     }
     timed.sort();
@@ -71,8 +71,8 @@ fn ends_with(file: &Path, extension: &str) -> bool {
     found.is_some_and(|it| it.eq_ignore_ascii_case(extension))
 }
 
-/// Names of MCAP files that stand in a list of `metadata.yaml`, without the folders before them, as
-/// old versions write them.
+/// Returns the names of the MCAP files in `metadata.yaml`, without the folders that old versions
+/// write.
 fn announced(bag: &Path) -> Result<Vec<String>, RecordingError> {
     let file = bag.join("metadata.yaml");
     if !file.exists() {

@@ -1,10 +1,10 @@
-//! Common Data Representation (OMG DDS-XTypes, classic CDR), as ROS 2 messages use it: every number
-//! at a multiple of its size, counted from behind the four bytes of the header.
+//! Common Data Representation (OMG DDS-XTypes, classic CDR) of ROS 2 messages. Every number is
+//! aligned to a multiple of its size, relative to the end of the four-byte header.
 
 /// Header of little-endian classic CDR.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 
-/// A message being written.
+/// Encoder of a message.
 #[derive(Debug, Default)]
 pub(super) struct Encoder {
     bytes: Vec<u8>,
@@ -21,7 +21,7 @@ macro_rules! numbers {
 }
 
 impl Encoder {
-    /// Begins a new message in the same buffer.
+    /// Starts a new message in the same buffer.
     pub fn start(&mut self) -> &mut Self {
         self.bytes.clear();
         self.bytes.extend(LITTLE_ENDIAN);
@@ -48,7 +48,7 @@ impl Encoder {
     }
 }
 
-/// A message being read; `None` from any call once it ends early.
+/// Decoder of a message; every method returns `None` if the message is too short.
 #[derive(Debug)]
 pub(super) struct Decoder<'a> {
     body: &'a [u8],
@@ -91,7 +91,7 @@ impl<'a> Decoder<'a> {
         self.number(f64::from_le_bytes, f64::from_be_bytes)
     }
 
-    /// As many numbers in an array.
+    /// Reads an array of numbers.
     pub fn f64s<const N: usize>(&mut self) -> Option<[f64; N]> {
         let mut values = [0.0; N];
         for value in &mut values {
@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_stand_at_multiples_of_their_size() {
+    fn numbers_are_aligned_to_their_size() {
         let mut encoder = Encoder::default();
         encoder
             .start()
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_and_what_is_cut_is_refused() {
+    fn messages_round_trip_and_truncated_ones_are_rejected() {
         let mut encoder = Encoder::default();
         encoder.start().i32(-5).u32(6).string("frame").f64(-2.5);
         let whole = encoder.bytes();

@@ -1,4 +1,4 @@
-//! A located drive as one MCAP file.
+//! Export of a located drive as an MCAP file.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -20,17 +20,18 @@ const POSE_TOPIC: &str = "/access_av/odometry";
 const SMOOTHED_TOPIC: &str = "/access_av/smoothed";
 /// Topic of the verdicts.
 const VERDICT_TOPIC: &str = "/access_av/verdicts";
-/// Variance of a wheel speed in (m/s)² and of a gyroscope's rate in (rad/s)².
+/// Variance of a wheel speed in (m/s)².
 const SPEED_VARIANCE: f64 = 1e-4;
+/// Variance of a yaw rate in (rad/s)².
 const YAW_RATE_VARIANCE: f64 = 1e-4;
-/// Diagnostics come once a second (REP-107).
+/// Period of the diagnostics in seconds (REP-107).
 const DIAGNOSTIC_PERIOD_S: f64 = 1.0;
 
-/// Writes poses, verdicts and a diagnosis a second, in order of time. As long as the first pose is
-/// searched for there are no poses. The diagnoses name every item of the input that was remarkable.
+/// Writes poses, verdicts and one diagnostic message per second in order of time. There are no
+/// poses until the first pose is found. The diagnostics contain every remark on the input.
 ///
 /// # Errors
-/// [`RecordingError`] when the file cannot be written.
+/// [`RecordingError`] if the file cannot be written.
 pub fn write_drive_mcap(file: &Path, drive: &LocatedDrive) -> Result<(), RecordingError> {
     let (partial, made) = Partial::create(file)?;
     write(BufWriter::new(made), drive).map_err(|error| RecordingError::Write {
@@ -87,7 +88,7 @@ fn twist(pose: &LocatedPose) -> Twist {
     }
 }
 
-/// What was remarkable about the input lately, item by item.
+/// Returns the diagnostic status of the input with the recent remarks.
 fn input(remarks: &[Remark]) -> DiagnosticStatus {
     let (level, message) = match remarks.len() {
         0 => (DiagnosticLevel::Ok, "nothing to remark".to_owned()),
@@ -146,7 +147,7 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
             ("mounting_rad", found.mounting_rad),
             ("phase_rad", found.phase_rad),
         ] {
-            // What is taken as surveyed has nothing to tell.
+            // A constant that is assumed to be exact is omitted.
             if constant.std > 0.0 {
                 let value = format!("{:.4} ± {:.4}", constant.departure(), constant.std);
                 values.push((name.to_owned(), value));

@@ -1,4 +1,4 @@
-//! The messages of an MCAP file that tell of the vehicle's motion, and of angles.
+//! Reader of the messages of an MCAP file with odometry, IMU or angles.
 
 use std::collections::HashMap;
 use std::io::{BufReader, ErrorKind, Read};
@@ -13,14 +13,14 @@ use super::schema::{ODOMETRY, VERDICT};
 use crate::error::RecordingError;
 use crate::file as files;
 
-/// Bytes of the longest record that is read; chunks are customarily below 10 MB.
+/// Maximum length of a record in bytes; chunks are usually below 10 MB.
 const LONGEST_RECORD: usize = 1 << 28;
-/// Of a message record, between channel and times.
+/// Length of the sequence number of a message record in bytes, between channel and times.
 const SEQUENCE_BYTES: usize = 4;
-/// Of the two times of a message record.
+/// Length of the two times of a message record in bytes.
 const TIMES_BYTES: usize = 8 + 8;
 
-/// The types of message that are read.
+/// Type of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// `nav_msgs/msg/Odometry`.
@@ -43,8 +43,8 @@ pub enum FileEnd {
 /// Description of a truncated file, for remarks.
 pub const TRUNCATED: &str = "the file was not closed; it is read up to its last complete chunk";
 
-/// Gives every CDR message of a [`Kind`] to `take`, with its topic and the recorder's time (ns), in the order of the
-/// file. A file that was not closed is read up to its last complete chunk.
+/// Calls `take` for every CDR message of a [`Kind`] with its topic and the recorder's time (ns), in
+/// the order of the file. An unclosed file is read up to its last complete chunk.
 ///
 /// # Errors
 /// [`RecordingError`] if the file is not MCAP, or is damaged before its end.
@@ -59,10 +59,11 @@ pub fn each_message(
     })
 }
 
-/// When the first message of a file was logged, in nanoseconds; `None` where it has none.
+/// Returns the recorder's time of the first message of a file in nanoseconds; `None` for a file
+/// without messages.
 ///
 /// # Errors
-/// As [`each_message`].
+/// Errors of [`each_message`].
 pub fn first_time_ns(file: &Path) -> Result<Option<u64>, RecordingError> {
     let mut time_ns = None;
     each_record(file, |opcode, body| {
@@ -76,7 +77,7 @@ pub fn first_time_ns(file: &Path) -> Result<Option<u64>, RecordingError> {
     Ok(time_ns)
 }
 
-/// Gives records to `take` until it breaks; it returns `None` for a damaged record.
+/// Calls `take` for each record until it breaks; `take` returns `None` for a damaged record.
 fn each_record(
     file: &Path,
     mut take: impl FnMut(u8, &[u8]) -> Option<ControlFlow<()>>,
@@ -88,7 +89,7 @@ fn each_record(
     };
     let opened = files::open(file).map_err(|source| RecordingError::io(file, source))?;
     let mut source = BufReader::new(opened);
-    // A damaged length must not be taken for the memory to set aside.
+    // The limit prevents a huge allocation for a damaged length.
     let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
     let mut has_records = false;
@@ -120,18 +121,19 @@ fn each_record(
     Ok(FileEnd::Complete)
 }
 
-/// Schemas and channels of the file so far.
+/// Schemas and channels up to the current position in the file.
 #[derive(Default)]
 struct Channels {
-    /// Schemas of what is read.
+    /// Known schemas.
     schemas: HashMap<u16, Kind>,
-    /// Kind and topic of each channel that carries such in CDR; `None` for the others.
+    /// Kind and topic of each channel with a known schema in CDR; `None` for other channels.
     topics: HashMap<u16, Option<(Kind, String)>>,
 }
 
 impl Channels {
-    /// `None` where the record is shorter than it says, or of a channel that was not announced.
-    /// The crate's own parser sets aside what a damaged string says its length is, up to 4 GiB.
+    /// Processes a record. Returns `None` if the record is shorter than its lengths, or belongs to
+    /// an unknown channel. The parser of the crate `mcap` would allocate up to 4 GiB for a damaged
+    /// string length.
     fn record(
         &mut self,
         opcode: u8,
@@ -178,7 +180,7 @@ fn u16(body: &mut &[u8]) -> Option<u16> {
     Some(u16::from_le_bytes(*number))
 }
 
-/// A string with its length before it.
+/// Reads a string with a length prefix.
 fn string<'a>(body: &mut &'a [u8]) -> Option<&'a [u8]> {
     let (length, rest) = body.split_first_chunk()?;
     let (text, rest) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;

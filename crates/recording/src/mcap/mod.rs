@@ -1,8 +1,9 @@
-//! MCAP as ROS 2 tools write and read it: profile `ros2`, messages in CDR, schemas in `ros2msg`.
+//! MCAP files of ROS 2 tools: profile `ros2`, messages in CDR, schemas in `ros2msg`.
 //!
-//! Written are `nav_msgs/msg/Odometry` with covariance and twist, `tf2_msgs/msg/TFMessage`, `diagnostic_msgs/msg/
-//! DiagnosticArray` and [`access_av_msgs/msg/AngleVerdict`](McapWriter::verdict); read are odometry,
-//! `sensor_msgs/msg/Imu` and the angles of such verdicts, of one file or of the files of a rosbag2 folder.
+//! Written messages: `nav_msgs/msg/Odometry` with covariance and twist, `tf2_msgs/msg/TFMessage`,
+//! `diagnostic_msgs/msg/DiagnosticArray` and
+//! [`access_av_msgs/msg/AngleVerdict`](McapWriter::verdict). Read messages: odometry,
+//! `sensor_msgs/msg/Imu` and angle verdicts, from a file or the files of a rosbag2 folder.
 
 mod angles;
 mod bag;

@@ -1,62 +1,67 @@
 //! Distance and speed from the poses and twists of `nav_msgs/msg/Odometry`.
 //!
-//! A step of the position counts by its component along the heading of the same messages, which is negative in reverse.
-//! Drivers fill these messages differently: some only the pose, some only the twist, some give the twist in the frame
-//! of the pose or without a sign. The quantities that a file has are found from the file itself, and reported.
+//! A step of the position counts with its component along the heading of the messages, which is
+//! negative in reverse. Drivers fill these messages differently: only the pose, only the twist, a
+//! twist in the frame of the pose, or a twist without a sign. The available quantities are
+//! determined from the file and reported.
 
 use onboard::geometry::wrap_angle;
 
 use crate::counter_jumps::{Jump, replace_jumps};
 use crate::odometry::OdometryFields;
 
-/// Largest coordinate of a position (m): more than any map projection has.
+/// Maximum coordinate of a position (m), larger than in any map projection.
 pub const MAX_COORDINATE_M: f64 = 1e8;
-/// Change of position (m) below which a pose does not move.
+/// Minimum change of position (m) that counts as motion.
 const STANDING_M: f64 = 1e-6;
-/// Steps that a single wrong position makes: a pose with no more of them does not move.
+/// Maximum number of steps caused by a single wrong position; more steps are motion.
 const MAX_SPIKE_STEPS: usize = 2;
-/// Speed (m/s) above which a step is a jump of the position, and says nothing about heading and twist.
+/// Maximum speed of a step (m/s). A faster step is a jump of the position, which is not used to
+/// judge heading and twist.
 const MAX_SPEED_MPS: f64 = 50.0;
-/// Share of the squared steps across the heading above which the heading is not that of the motion: 33° RMS.
+/// Maximum fraction of the squared steps across the heading (33° RMS); above it, the heading is not
+/// the direction of motion.
 const MAX_ACROSS: f64 = 0.3;
-/// Share of the squared steps across a heading that never changes above which it is one that is not filled: 1.8° RMS.
+/// Maximum fraction of the squared steps across a constant heading (1.8° RMS); above it, the
+/// heading is not filled.
 const MAX_ACROSS_CONSTANT: f64 = 1e-3;
-/// Change of a heading (rad) below which it is constant.
+/// Maximum change of a constant heading (rad).
 const CONSTANT_RAD: f64 = 1e-6;
-/// Share of the squared steps across the heading from which on it is reported: 8° RMS.
+/// Minimum fraction of the squared steps across the heading that is reported (8° RMS).
 const REPORTED_ACROSS: f64 = 0.02;
-/// Path length (m) and share of the path from which on a contradiction is looked into.
+/// Minimum path length (m) of a contradiction.
 const LEAST_PATH_M: f64 = 0.3;
+/// Minimum fraction of the path of a contradiction.
 const LEAST_SHARE: f64 = 0.02;
 
 const POSITION: &str = OdometryFields::ROS.distance;
 const SPEED: &str = OdometryFields::ROS.speed;
 
-/// The quantities used of one `nav_msgs/msg/Odometry`.
+/// Quantities used from one `nav_msgs/msg/Odometry` message.
 #[derive(Debug, Clone, Copy)]
 pub struct Reading {
     pub time_s: f64,
-    /// x and y of the position.
+    /// Position x and y (m).
     pub position_m: [f64; 2],
-    /// Yaw of the orientation; `None` if it is no unit quaternion.
+    /// Yaw of the orientation (rad); `None` if it is not a unit quaternion.
     pub heading_rad: Option<f64>,
-    /// x and y of the linear velocity.
+    /// Linear velocity x and y (m/s).
     pub linear_mps: [f64; 2],
-    /// Yaw rate; `None` if it is marked as unknown.
+    /// Yaw rate (rad/s); `None` if it is marked as unknown.
     pub yaw_rate_radps: Option<f64>,
 }
 
-/// Quantities that a file has.
+/// Quantities that a file contains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Filled {
-    /// Whether the position moves.
+    /// Whether the position changes.
     pub position: bool,
-    /// Whether the linear velocity is ever other than zero.
+    /// Whether the linear velocity is ever nonzero.
     pub twist: bool,
 }
 
 impl Filled {
-    /// Quantities of all messages of a topic.
+    /// Determines the quantities from all messages of a topic.
     pub fn new<'a>(readings: impl Iterator<Item = &'a Reading> + Clone) -> Self {
         let is_position = |it: &&Reading| {
             it.position_m
@@ -77,7 +82,7 @@ impl Filled {
         }
     }
 
-    /// Values that have to be finite for a message to be usable, with their fields.
+    /// Returns the values that must be finite for a usable message, with their fields.
     pub fn required(self, reading: &Reading) -> Vec<(&'static str, f64)> {
         let [x_m, y_m] = reading.position_m;
         let mut values = Vec::with_capacity(3);
@@ -90,24 +95,24 @@ impl Filled {
     }
 }
 
-/// Distances and speeds, one for each message.
+/// Distances and speeds, one per message.
 #[derive(Debug, Clone, Default)]
 pub struct Motion {
     pub distances_m: Vec<f64>,
     pub speeds_mps: Vec<f64>,
-    /// Properties of the file, as sentences.
+    /// Properties of the file as sentences.
     pub notes: Vec<String>,
-    /// Properties of the file that may displace the vehicle, as sentences.
+    /// Properties of the file that may cause a position error, as sentences.
     pub doubts: Vec<String>,
-    /// Whether the position moves along a heading that never changes.
+    /// Whether the position moves along a constant heading.
     pub is_straight: bool,
-    /// Steps of the distance that were replaced.
+    /// Replaced steps of the distance.
     pub jumps: Vec<Jump>,
-    /// Whether distance and speed come from different fields.
+    /// Whether distance and speed are from different fields.
     pub has_both: bool,
 }
 
-/// Distance and speed of usable messages, of strictly increasing times.
+/// Computes distance and speed from usable messages with strictly increasing times.
 pub fn motion(readings: &[Reading], filled: Filled) -> Motion {
     if filled.position {
         Path::new(readings).motion(filled.twist)
@@ -116,7 +121,7 @@ pub fn motion(readings: &[Reading], filled: Filled) -> Motion {
     }
 }
 
-/// Motion of messages whose position never moves.
+/// Computes the motion from messages whose position is constant.
 fn of_twist(readings: &[Reading], is_filled: bool) -> Motion {
     if !is_filled {
         let zeros = vec![0.0; readings.len()];
@@ -130,7 +135,8 @@ fn of_twist(readings: &[Reading], is_filled: bool) -> Motion {
         "{POSITION} never changes; the distance is taken from {SPEED}"
     )];
     let mut doubts = Vec::new();
-    // Length of the motion across the vehicle, if the velocity is in the vehicle's frame or in that of the pose.
+    // Compare the motion across the vehicle for a velocity in the vehicle's frame and in the frame
+    // of the pose.
     let steps = || {
         readings
             .windows(2)
@@ -173,24 +179,25 @@ fn of_twist(readings: &[Reading], is_filled: bool) -> Motion {
 }
 
 impl Reading {
-    /// A vector of the pose's frame, along the vehicle and to its left; as it is without a heading.
+    /// Transforms a vector from the frame of the pose to the vehicle: forward and left components.
+    /// Without a heading, the vector is unchanged.
     fn in_vehicle(&self, vector: [f64; 2]) -> [f64; 2] {
         rotated(vector, self.heading_rad.unwrap_or(0.0))
     }
 }
 
-/// A step between two messages.
+/// Step between two messages.
 #[derive(Debug, Clone, Copy)]
 struct Step {
     duration_s: f64,
     /// Change of the position (m).
     change_m: [f64; 2],
     length_m: f64,
-    /// Change of the position along the vehicle and to its left (m); `None` without a heading.
+    /// Change of position in forward and left direction (m); `None` without a heading.
     in_vehicle_m: Option<[f64; 2]>,
     /// Mean linear velocity of both messages (m/s).
     linear_mps: [f64; 2],
-    /// Whether the position jumps, which says nothing about heading and twist.
+    /// Whether the position jumps; such a step is not used to judge heading and twist.
     jumps: bool,
 }
 
@@ -223,26 +230,26 @@ impl Step {
         }
     }
 
-    /// Velocity times duration (m).
+    /// Returns velocity times duration (m).
     fn by_twist_m(&self) -> [f64; 2] {
         self.linear_mps.map(|it| it * self.duration_s)
     }
 }
 
-/// Meaning of `twist.twist.linear`.
+/// Interpretation of `twist.twist.linear`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum TwistMeaning {
-    /// In the vehicle's frame, as REP-147 has it.
+    /// Velocity in the vehicle's frame (REP-147).
     OfVehicle,
-    /// In the frame of the pose.
+    /// Velocity in the frame of the pose.
     OfMap,
-    /// The speed without its sign.
+    /// Speed without a sign.
     Unsigned,
     /// Not filled.
     Unfilled,
 }
 
-/// Messages whose position moves.
+/// Messages with a changing position.
 struct Path<'a> {
     readings: &'a [Reading],
     steps: Vec<Step>,
@@ -280,7 +287,7 @@ impl<'a> Path<'a> {
         let times_s: Vec<f64> = self.readings.iter().map(|it| it.time_s).collect();
         let mut jumps = Vec::new();
         if meaning == TwistMeaning::Unfilled {
-            // Nothing but the position says then how fast the vehicle drove.
+            // The position is the only source of the speed in this case.
             jumps = replace_jumps(&times_s, &mut distances_m);
             self.notes.push(format!(
                 "{SPEED} is not filled; the speed is taken from {POSITION}"
@@ -301,12 +308,12 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// The steps that tell of heading and twist.
+    /// Returns the steps that are used to judge heading and twist.
     fn smooth(&self) -> impl Iterator<Item = &Step> {
         self.steps.iter().filter(|step| !step.jumps)
     }
 
-    /// Whether the positions move along the headings of their messages.
+    /// Determines whether the position moves along the heading of its messages.
     fn compare_heading(&mut self) {
         let known = || self.smooth().filter_map(|step| step.in_vehicle_m);
         let all2: f64 = self.smooth().map(|step| step.length_m.powi(2)).sum();
@@ -335,7 +342,7 @@ impl<'a> Path<'a> {
         } else {
             MAX_ACROSS
         };
-        // A vehicle that really moves sideways has a velocity to the side, too.
+        // A vehicle that really moves sideways also has a lateral velocity.
         let is_explained =
             self.smooth().any(|it| it.linear_mps[1] != 0.0) && misfit2 < MAX_ACROSS * across2;
         let across_m: f64 = known().map(|[_, across]| across.abs()).sum();
@@ -356,7 +363,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// What the twist means, by the steps of the position.
+    /// Determines the interpretation of the twist by comparison with the steps of the position.
     fn twist_meaning(&mut self) -> TwistMeaning {
         if !self.follows_heading {
             return TwistMeaning::OfVehicle;
@@ -399,7 +406,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// Distance driven at each message (m).
+    /// Returns the distance driven at each message (m).
     fn distances_m(&self, has_twist: bool) -> Vec<f64> {
         let mut distance_m = 0.0;
         let mut distances_m = vec![distance_m; self.readings.len().min(1)];
@@ -415,7 +422,7 @@ impl<'a> Path<'a> {
         distances_m
     }
 
-    /// Speed at each message (m/s).
+    /// Returns the speed at each message (m/s).
     fn speeds_mps(&mut self, meaning: TwistMeaning, distances_m: &[f64]) -> Vec<f64> {
         let driven = distances_m
             .windows(2)
@@ -457,7 +464,7 @@ impl<'a> Path<'a> {
     }
 }
 
-/// Whether a part of a path is long enough to contradict.
+/// Whether a part of a path is long enough for a contradiction.
 fn is_contradiction(part_m: f64, path_m: f64) -> bool {
     part_m > LEAST_PATH_M && part_m > LEAST_SHARE * path_m
 }
@@ -479,7 +486,7 @@ fn distance_m([x0, y0]: [f64; 2], [x1, y1]: [f64; 2]) -> f64 {
     (x1 - x0).hypot(y1 - y0)
 }
 
-/// A vector in a frame that is turned by an angle.
+/// Rotates a vector into a frame with the given heading.
 fn rotated([x, y]: [f64; 2], heading_rad: f64) -> [f64; 2] {
     let (sin, cos) = heading_rad.sin_cos();
     [cos * x + sin * y, cos * y - sin * x]

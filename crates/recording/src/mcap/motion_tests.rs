@@ -1,12 +1,13 @@
-//! Every way in which drivers fill odometry messages gives the motion of the vehicle, or is reported.
+//! Each variant of filling odometry messages gives the motion of the vehicle or is reported.
 
 use super::motion::{Filled, Motion, Reading, motion};
 
 const STEP_S: f64 = 0.05;
-/// Between the largest difference of a speed to the mean over a step, at 1 m/s² and 20 Hz, and rounding.
+/// Tolerance of a speed: above the maximum difference to the mean over a step at 1 m/s² and 20 Hz.
 const SPEED_TOLERANCE_MPS: f64 = 0.06;
 
-/// Drives ahead, along a bend, stops, and reverses along another one; distances (m) and messages as they should be.
+/// Simulates a drive: ahead, along a bend, stop, and reverse along another bend. Returns distances
+/// (m) and correct messages.
 fn driven() -> (Vec<f64>, Vec<Reading>) {
     let (mut x_m, mut y_m, mut heading_rad, mut distance_m) = (3.0, -2.0, 0.4, 0.0);
     let mut last_mps = 0.0_f64;
@@ -26,7 +27,7 @@ fn driven() -> (Vec<f64>, Vec<Reading>) {
         let step_m = 0.5 * (last_mps + speed_mps) * if k == 0 { 0.0 } else { STEP_S };
         let turn_rad = if k == 0 { 0.0 } else { turn_radps * STEP_S };
         let middle_rad: f64 = heading_rad + 0.5 * turn_rad;
-        // An arc and its chord.
+        // Chord of the arc.
         let half_rad = 0.5 * turn_rad;
         let chord_m = if half_rad == 0.0 {
             step_m
@@ -50,7 +51,7 @@ fn driven() -> (Vec<f64>, Vec<Reading>) {
     rows.unzip()
 }
 
-/// Motion of the drive after each message was changed.
+/// Returns the motion of the drive after a change of each message.
 fn found(change: impl Fn(usize, &mut Reading)) -> Motion {
     let (_, mut readings) = driven();
     for (k, reading) in readings.iter_mut().enumerate() {
@@ -59,7 +60,7 @@ fn found(change: impl Fn(usize, &mut Reading)) -> Motion {
     motion(&readings, Filled::new(readings.iter()))
 }
 
-/// Asserts that distances (m) and speeds are those of the drive.
+/// Asserts that distances (m) and speeds equal those of the drive.
 fn assert_right(motion: &Motion, tolerance_m: f64, what: &str) {
     let (distances_m, readings) = driven();
     for (k, (found, given)) in motion.distances_m.iter().zip(&distances_m).enumerate() {
@@ -85,9 +86,9 @@ fn assert_said(motion: &Motion, says: &str) {
 }
 
 #[test]
-fn nothing_is_said_of_messages_that_are_filled_as_they_should_be() {
+fn correctly_filled_messages_are_not_reported() {
     let motion = found(|_, _| {});
-    // Chords are shorter than arcs by the square of half the turn in a step, over six.
+    // Relative difference of chord and arc: square of half the turn in a step, divided by six.
     assert_right(&motion, 2e-3, "right");
     assert!(motion.notes.is_empty() && motion.doubts.is_empty() && motion.jumps.is_empty());
     let (_, readings) = driven();
@@ -99,7 +100,7 @@ fn nothing_is_said_of_messages_that_are_filled_as_they_should_be() {
 }
 
 #[test]
-fn a_twist_without_its_sign_has_that_of_the_pose() {
+fn a_twist_without_a_sign_gets_the_sign_of_the_pose() {
     let motion = found(|_, it| it.linear_mps[0] = it.linear_mps[0].abs());
     assert_right(&motion, 2e-3, "unsigned");
     assert_said(&motion, "twist.twist.linear.x has the wrong sign");
@@ -109,7 +110,7 @@ fn a_twist_without_its_sign_has_that_of_the_pose() {
 }
 
 #[test]
-fn a_twist_in_the_frame_of_the_pose_is_turned() {
+fn a_twist_in_the_frame_of_the_pose_is_rotated() {
     let turned_by = |more_rad: f64| {
         found(move |_, it| {
             let heading_rad = it.heading_rad.unwrap() + more_rad;
@@ -130,7 +131,7 @@ fn a_twist_in_the_frame_of_the_pose_is_turned() {
 }
 
 #[test]
-fn a_pose_alone_gives_speeds_and_a_twist_alone_distances() {
+fn speeds_are_derived_from_poses_and_distances_from_twists() {
     let motion = found(|_, it| it.linear_mps = [0.0, 0.0]);
     assert_right(&motion, 2e-3, "pose alone");
     assert_said(&motion, "twist.twist.linear.x is not filled");
@@ -153,7 +154,7 @@ fn a_pose_alone_gives_speeds_and_a_twist_alone_distances() {
 }
 
 #[test]
-fn single_values_that_are_no_numbers_do_not_disturb() {
+fn single_invalid_values_are_ignored() {
     let motion = found(|k, it| {
         if k % 50 == 7 {
             it.linear_mps[0] = f64::NAN;
@@ -167,12 +168,12 @@ fn single_values_that_are_no_numbers_do_not_disturb() {
             it.heading_rad = None;
         }
     });
-    // The heading of one end of the step alone is half its turn off.
+    // With the heading of one end only, the direction is wrong by half of the turn in the step.
     assert_right(&motion, 1e-2, "headings missing");
 }
 
 #[test]
-fn without_an_orientation_the_twist_has_the_sign() {
+fn without_an_orientation_the_twist_gives_the_sign() {
     let motion = found(|_, it| it.heading_rad = None);
     assert_right(&motion, 2e-3, "no orientation");
     for heading_rad in [0.0, 1.5, -2.5] {
@@ -184,7 +185,7 @@ fn without_an_orientation_the_twist_has_the_sign() {
     assert_right(&motion, 2e-3, "orientation off by a quarter of a turn");
 }
 
-/// An orientation that is not filled is 0, which a road along x may not show at first sight.
+/// An unfilled orientation has a heading of 0, which may resemble a road along x.
 #[test]
 fn a_constant_orientation_on_a_winding_road_is_not_used() {
     let step = |k: i32| {
@@ -200,7 +201,7 @@ fn a_constant_orientation_on_a_winding_road_is_not_used() {
     let readings: Vec<Reading> = (0..1000).map(step).collect();
     let motion = motion(&readings, Filled::new(readings.iter()));
     assert_said(&motion, "does not move along the heading");
-    // Length of a sine: mean of the root of 1 + 0.09 cos², 1 + 0.09 / 4 but for 0.09² / 21.
+    // Length of a sine: mean of the root of 1 + 0.09 cos², approximately 1 + 0.09/4 − 3 · 0.09²/64.
     let length_m = motion.distances_m.last().unwrap() / (0.05 * 999.0);
     assert!(
         (length_m - (1.0 + 0.09 / 4.0 - 0.09 * 0.09 * 3.0 / 64.0)).abs() < 1e-3,
@@ -210,10 +211,10 @@ fn a_constant_orientation_on_a_winding_road_is_not_used() {
 }
 
 #[test]
-fn motion_to_the_side_is_reported() {
-    // Slides at 0.5 m/s for 5 s.
+fn lateral_motion_is_reported() {
+    // The vehicle slides sideways at 0.5 m/s for 5 s.
     let motion = found(|k, it| {
-        // The heading from the first bend on.
+        // Heading after the first bend.
         let (sin, cos) = 2.9_f64.sin_cos();
         let side_m = 0.5 * STEP_S * (k.clamp(300, 400) - 300) as f64;
         it.position_m[0] -= sin * side_m;
@@ -228,18 +229,19 @@ fn motion_to_the_side_is_reported() {
 }
 
 #[test]
-fn a_pose_in_front_of_the_axle_drives_as_far() {
+fn a_pose_in_front_of_the_axle_gives_equal_distances() {
     let motion = found(|_, it| {
         let (sin, cos) = it.heading_rad.unwrap().sin_cos();
         it.position_m[0] += 0.8 * cos;
         it.position_m[1] += 0.8 * sin;
     });
-    // While it turns, the point moves along an arc to the side, whose chord is 0.8 m · (turn in a step)² / 2 ahead.
+    // In a bend, the point moves on an arc with a lateral component. The chord deviates forward by
+    // 0.8 m · (turn in a step)² / 2.
     assert_right(&motion, 2e-2, "lever arm");
 }
 
 #[test]
-fn jumps_of_the_pose_give_no_speed() {
+fn jumps_of_the_pose_do_not_change_the_speed() {
     let resets = |no_twist: bool| {
         found(move |k, it| {
             if no_twist {
@@ -256,12 +258,12 @@ fn jumps_of_the_pose_give_no_speed() {
     let motion = resets(true);
     assert_right(&motion, 2e-3, "reset");
     assert_eq!(motion.jumps.len(), 3);
-    // With a speed of its own the localizer replaces the step.
+    // With a separate speed, the localizer replaces the step itself.
     assert!(resets(false).jumps.is_empty());
 }
 
 #[test]
-fn a_vehicle_that_stands_does_not_move() {
+fn a_stationary_vehicle_has_no_motion() {
     let motion = found(|_, it| (it.position_m, it.linear_mps) = ([5.0, 6.0], [0.0; 2]));
     assert!(
         motion

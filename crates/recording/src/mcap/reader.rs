@@ -1,4 +1,4 @@
-//! Odometry out of MCAP files.
+//! Reader of odometry from MCAP files.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -18,25 +18,30 @@ use crate::odometry::{
     OdometryCollector, OdometryFields, OdometryIssue, OdometryLog, OdometryRemark,
 };
 
-/// What items are called.
+/// Name of an item in remarks.
 const KIND: &str = "message";
-/// Largest step between the recorder's times by which stamps that were not set are restored (ns).
+/// Maximum step of the recorder's time (ns) for which unset time stamps are restored from the
+/// recorder.
 const MAX_RECORDED_STEP_NS: u64 = 1_000_000_000;
 
-/// Reads the `nav_msgs/msg/Odometry` messages of one topic of an MCAP file or a rosbag2 folder; of the
-/// only such topic where none is named. The distance is the sum of the steps of their positions along their headings;
-/// [`motion`](super::motion) describes the exceptions.
+/// Reads the `nav_msgs/msg/Odometry` messages of one topic of an MCAP file or a rosbag2 folder. The
+/// topic is optional if there is only one. The distance is the sum of the position steps along the
+/// headings; [`motion`](super::motion) describes the exceptions.
 ///
-/// The yaw rate is that of the twist. Where it is unknown there, or zero throughout, or `imu_topic` is
-/// named, it is `angular_velocity.z` of a `sensor_msgs/msg/Imu`, whose z axis is taken for up
-/// (REP-103); where there is none, it is how the orientation of the pose turns; else there is none.
-/// Each is the mean over the step before its sample, by the stamps of the headers. What was taken is
-/// remarked upon.
+/// The yaw rate has the following sources, in this order.
+///
+/// 1. The twist, unless `imu_topic` is given or the twist's yaw rate is unknown or always zero.
+/// 2. `angular_velocity.z` of a `sensor_msgs/msg/Imu`, whose z axis is assumed to point upwards
+///    (REP-103).
+/// 3. The change of the orientation of the pose.
+///
+/// Each value is the mean over the step before its sample, according to the time stamps of the
+/// headers. The source is reported as a remark.
 ///
 /// # Errors
-/// [`RecordingError`] when a file is no MCAP or is damaged, when the bag does not have exactly
-/// that topic, or several that tell the yaw rate and none is named, or when the named one does not.
-/// Single messages, and a file that was not closed, are only remarked upon.
+/// [`RecordingError`] if a file is not MCAP or damaged; if the topic is missing or ambiguous; if
+/// several IMU topics have a yaw rate and none is given; if the given IMU topic has none. Invalid
+/// single messages and an unclosed file are reported as remarks only.
 pub fn read_odometry_mcap(
     bag: &Path,
     topic: Option<&str>,
@@ -103,15 +108,15 @@ pub fn read_odometry_mcap(
     Ok(log)
 }
 
-/// A message of the odometry's topic.
+/// Message of the odometry topic.
 struct Message {
-    /// Time of the recorder's clock (ns).
+    /// Time according to the recorder's clock (ns).
     recorded_ns: u64,
     /// `None` if it is not complete.
     reading: Option<Reading>,
 }
 
-/// The usable messages, their motion, and a collector that has reported the others.
+/// Returns the usable messages, their motion, and a collector with remarks on the others.
 fn used(mut messages: Vec<Message>) -> (Vec<Reading>, Motion, OdometryCollector) {
     let stamp_s = |it: &Message| it.reading.map_or(f64::NAN, |it| it.time_s);
     let times_s: Vec<f64> = messages.iter().map(stamp_s).collect();
@@ -160,8 +165,9 @@ fn used(mut messages: Vec<Message>) -> (Vec<Reading>, Motion, OdometryCollector)
     (readings, motion, collector)
 }
 
-/// Gives leading messages whose stamp was not set the times at which they were recorded, relative to the first message
-/// with a stamp. Returns their indices; none if the recorder's times have a gap.
+/// Restores the times of leading messages whose time stamp was not set, from the recorder's times
+/// relative to the first message with a time stamp. Returns their indices; an empty range if the
+/// recorder's times have a gap.
 fn restore_times(messages: &mut [Message], faults: &mut [Option<TimeFault>]) -> Range<usize> {
     let unset = faults
         .iter()
@@ -223,12 +229,12 @@ fn one_topic<'a>(
     }
 }
 
-/// All that a bag tells of the vehicle's turning.
+/// Sources of the yaw rate in a bag.
 struct Turning<'a> {
     bag: &'a Path,
     /// Topic of the odometry.
     topic: &'a str,
-    /// Its messages, one for each sample.
+    /// Messages of the odometry topic, one per sample.
     readings: &'a [Reading],
     imus: &'a BTreeMap<String, Gyroscope>,
     /// Whether the position moves along headings that are all known.
@@ -236,7 +242,7 @@ struct Turning<'a> {
 }
 
 impl Turning<'_> {
-    /// Gives the samples their yaw rate, and remarks on where it is from.
+    /// Sets the yaw rate of the samples and adds a remark on its source.
     fn tell(&self, log: &mut OdometryLog, asked: Option<&str>) -> Result<(), RecordingError> {
         let times_s: Vec<f64> = log.samples.iter().map(|sample| sample.time_s).collect();
         let by_twist: Vec<Option<f64>> = self.readings.iter().map(|it| it.yaw_rate_radps).collect();
@@ -265,7 +271,7 @@ impl Turning<'_> {
             }
         }
         if told.is_none() && twist_tells {
-            // Only where there was a choice is there something to say.
+            // Only an alternative source requires a remark.
             let others: Vec<&str> = self.imus.keys().map(String::as_str).collect();
             let said = format!(
                 "twist.angular.z of {}; --imu-topic takes that of {}",
@@ -284,7 +290,7 @@ impl Turning<'_> {
                 self.readings.iter().map(|it| it.heading_rad).collect();
             let mut rates = rates_of_headings(&times_s, &headings);
             if self.is_straight && rates.iter().all(Option::is_none) {
-                // The orientation is filled, and never changes.
+                // The orientation is filled and constant.
                 rates.fill(Some(0.0));
             }
             if rates.iter().any(Option::is_some) {
@@ -306,7 +312,7 @@ impl Turning<'_> {
         Ok(())
     }
 
-    /// The IMU that is asked for or needed, with its topic; what cannot be used is remarked upon.
+    /// Returns the requested or required IMU with its topic; unusable IMUs are reported as remarks.
     fn imu(
         &self,
         asked: Option<&str>,
@@ -358,7 +364,7 @@ impl Turning<'_> {
         }
     }
 
-    /// That odometry and gyroscope have no time in common.
+    /// Returns the text for odometry and IMU without common times.
     fn apart(&self, times_s: &[f64], gyroscope: &Gyroscope) -> String {
         let from_to = |[from_s, to_s]: [f64; 2]| format!("{from_s:.3} to {to_s:.3} s");
         let of_imu = gyroscope.interval_s().map_or_else(String::new, from_to);
@@ -368,7 +374,7 @@ impl Turning<'_> {
     }
 }
 
-/// Why a gyroscope tells nothing, if so.
+/// Returns the reason why a gyroscope is unusable; `None` for a usable one.
 fn says_nothing(gyroscope: &Gyroscope) -> Option<&'static str> {
     if gyroscope.len() < 2 {
         Some("without an angular velocity that is known, finite and in order of time")
@@ -402,8 +408,9 @@ fn decode_odometry(message: &[u8]) -> Option<Reading> {
     })
 }
 
-/// Time (s) and yaw rate (rad/s) of a `sensor_msgs/msg/Imu`; `None` where its angular velocity is
-/// marked as unknown by a first element of −1 in its covariance, and of a message that is cut off.
+/// Decodes time (s) and yaw rate (rad/s) of a `sensor_msgs/msg/Imu`. Returns `None` for a truncated
+/// message, or if the first element of the covariance is −1, which marks the angular velocity as
+/// unknown.
 fn decode_imu(message: &[u8]) -> Option<(f64, f64)> {
     let mut decoder = Decoder::new(message)?;
     let time_s = stamp_s(&mut decoder)?;

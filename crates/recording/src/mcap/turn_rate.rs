@@ -1,30 +1,30 @@
-//! Yaw rates of odometry, of what else in its bag tells how the vehicle turned.
+//! Yaw rates of odometry from other sources in its bag.
 //!
-//! A yaw rate holds for the step before its sample, as the localizer takes it: what is found is the
-//! mean over that step, of a gyroscope that is read more often, or of a heading that is told.
+//! A yaw rate is valid for the step before its sample, as in the localizer. It is the mean over
+//! this step, from a gyroscope with a higher rate or from a heading.
 
 use onboard::geometry::wrap_angle;
 
-/// Share of a step that has to be covered by readings.
+/// Minimum fraction of a step that readings must cover.
 const LEAST_COVERED: f64 = 0.5;
-/// Readings this many times their usual distance apart say nothing of the time between them.
+/// Minimum interval of two readings, in median intervals, that is a gap without information.
 const GAP_STEPS: f64 = 5.0;
-/// By how far a heading has to turn altogether to be one, and not a constant with rounding (rad).
+/// Minimum total change of a heading that is not a constant with rounding (rad).
 const LEAST_TURN_RAD: f64 = 1e-6;
-/// By how much the square of a unit quaternion's norm may be off.
+/// Maximum deviation of a unit quaternion's squared norm from 1.
 const NORM_TOLERANCE: f64 = 1e-3;
 
 /// Readings of a gyroscope in order of time.
 #[derive(Debug, Clone, Default)]
 pub struct Gyroscope {
-    /// Time (s) and yaw rate (rad/s), of strictly increasing times.
+    /// Time (s) and yaw rate (rad/s), with strictly increasing times.
     readings: Vec<(f64, f64)>,
-    /// Messages that could not be used.
+    /// Number of unusable messages.
     pub left_out: usize,
 }
 
 impl Gyroscope {
-    /// Takes in a reading; one that is not finite or not after the last one is left out.
+    /// Adds a reading; omits one that is not finite or not later than the previous one.
     pub fn add(&mut self, reading: Option<(f64, f64)>) {
         let last_s = self.readings.last().map_or(f64::NEG_INFINITY, |it| it.0);
         let usable = |(time_s, rate): &(f64, f64)| {
@@ -36,22 +36,23 @@ impl Gyroscope {
         }
     }
 
-    /// Number of usable readings.
+    /// Returns the number of usable readings.
     pub fn len(&self) -> usize {
         self.readings.len()
     }
 
-    /// Whether every reading is zero: a field that nobody fills.
+    /// Whether every reading is zero, which indicates an unfilled field.
     pub fn is_silent(&self) -> bool {
         self.readings.iter().all(|(_, rate)| *rate == 0.0)
     }
 
-    /// Times of the first and the last reading (s).
+    /// Returns the times of the first and the last reading (s).
     pub fn interval_s(&self) -> Option<[f64; 2]> {
         Some([self.readings.first()?.0, self.readings.last()?.0])
     }
 
-    /// Mean yaw rate over the step before each time; `None` where too little of it is covered.
+    /// Returns the mean yaw rate over the step before each time; `None` if too little of the step
+    /// is covered.
     pub fn rates(&self, times_s: &[f64]) -> Vec<Option<f64>> {
         let longest_s = GAP_STEPS * self.usual_step_s();
         over_steps(times_s, |from_s, to_s| {
@@ -88,8 +89,8 @@ impl Gyroscope {
     }
 }
 
-/// Mean yaw rate over the step before each time, of the headings at these times; `None` where nothing
-/// tells, and throughout where they do not turn at all.
+/// Returns the mean yaw rate over the step before each time from the headings; `None` without
+/// headings, and for all steps if the heading is constant.
 pub fn rates_of_headings(times_s: &[f64], headings_rad: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut known = headings_rad.iter().flatten();
     let first = known.next().copied().unwrap_or(0.0);
@@ -101,7 +102,7 @@ pub fn rates_of_headings(times_s: &[f64], headings_rad: &[Option<f64>]) -> Vec<O
     })
 }
 
-/// One value a time: of the first, before which there is no step, that of the second.
+/// Applies a function to each step; the first time has no step and gets the value of the second.
 fn over_steps(times_s: &[f64], mut rate: impl FnMut(f64, f64) -> Option<f64>) -> Vec<Option<f64>> {
     let steps = times_s.windows(2).map(|step| match step {
         [from_s, to_s] => rate(*from_s, *to_s),
@@ -114,11 +115,11 @@ fn over_steps(times_s: &[f64], mut rate: impl FnMut(f64, f64) -> Option<f64>) ->
     rates
 }
 
-/// Yaw of a quaternion x, y, z, w; `None` of one that is no turn: not set, or not finite.
+/// Returns the yaw of a quaternion x, y, z, w; `None` if it is not a rotation.
 pub fn yaw_rad([x, y, z, w]: [f64; 4]) -> Option<f64> {
     let norm = x * x + y * y + z * z + w * w;
     let yaw = (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z));
-    // Comparisons with what is no number do not hold.
+    // The comparison is false for NaN.
     ((norm - 1.0).abs() < NORM_TOLERANCE).then_some(yaw)
 }
 
@@ -134,7 +135,7 @@ mod tests {
         gyroscope
     }
 
-    /// Of a linear rate the trapezoidal rule is exact, whatever the two clocks' ticks.
+    /// The trapezoidal rule is exact for a linear yaw rate and any sampling times.
     #[test]
     fn a_gyroscope_is_averaged_over_the_steps_of_the_odometry() {
         let rate = |time_s: f64| 0.3 - 0.2 * time_s;
@@ -147,7 +148,7 @@ mod tests {
             let found = gyroscope.rates(&shifted);
             assert_eq!(found.len(), times_s.len());
             for (time_s, found) in times_s.iter().zip(&found).skip(1) {
-                // Times of 1.7e9 s have steps of 2.4e-7 s.
+                // Times of 1.7e9 s have a resolution of 2.4e-7 s.
                 let error = found.unwrap() - rate(time_s - 0.05);
                 assert!(error.abs() < 1e-6, "{time_s}: {error}");
             }
@@ -156,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_without_readings_are_not_told() {
+    fn steps_without_readings_have_no_yaw_rate() {
         let early = (0..=100).map(|k| (0.01 * f64::from(k), 0.5));
         let late = (200..=300).map(|k| (0.01 * f64::from(k), -0.5));
         let gyroscope = read(early.chain(late));
@@ -172,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_that_go_back_or_are_no_numbers_are_left_out() {
+    fn reversed_and_invalid_readings_are_omitted() {
         let mut gyroscope = read([(0.0, 0.1), (0.1, 0.1), (0.1, 0.2), (0.05, 3.0)]);
         gyroscope.add(Some((0.2, f64::NAN)));
         gyroscope.add(None);
@@ -180,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn headings_are_differences_over_the_cut() {
+    fn heading_differences_are_wrapped() {
         let times_s: Vec<f64> = (0..50).map(|k| 0.02 * f64::from(k)).collect();
         let heading = |time_s: &f64| Some(wrap_angle(3.0 + 2.0 * time_s));
         let mut headings: Vec<_> = times_s.iter().map(heading).collect();
@@ -199,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn quaternions_that_are_no_turn_have_no_yaw() {
+    fn quaternions_that_are_no_rotations_have_no_yaw() {
         let half: f64 = 0.4;
         let yaw = yaw_rad([0.0, 0.0, half.sin(), half.cos()]).unwrap();
         assert!((yaw - 0.8).abs() < 1e-12);
@@ -211,7 +212,7 @@ mod tests {
         ] {
             assert_eq!(yaw_rad(q), None, "{q:?}");
         }
-        // Half a turn, in steps that go over it.
+        // Half a turn in steps that cross the branch cut.
         assert!((wrap_angle(yaw_rad([0.0, 0.0, 1.0, 0.0]).unwrap()).abs() - PI).abs() < 1e-9);
     }
 }

@@ -1,4 +1,4 @@
-//! A recording's angles, as the vehicle's receiver and estimator find them, without locating it.
+//! Angles of a recording from the vehicle's receiver and estimator, without localization.
 
 use onboard::BoxError;
 use onboard::estimator;
@@ -12,21 +12,22 @@ use super::receive::receive_recording;
 use crate::angle_log::LoggedAngle;
 use crate::sigmf::Recording;
 
-/// The angles of a recording.
+/// Angles of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RecordedAngles {
-    /// Each with all of its error that is believed as its deviation: see [`all_of_error`].
+    /// Angles whose standard deviation is the total modelled error, see [`all_of_error`].
     pub angles: Vec<LoggedAngle>,
-    /// Of each the deviation by the receiver's noise alone (rad).
+    /// Standard deviation of each angle due to receiver noise only (rad).
     pub noise_sigma_rad: Vec<f64>,
 }
 
-/// Estimates the angle of every SSB of the site's radio heads in a recording, whose sample 0 was
-/// received at `start_time_s`. Times are the SSBs' own: the receiver's lateness is not taken off.
+/// Estimates the angle of every SSB of the site's radio heads in a recording, whose first sample
+/// was received at `start_time_s`. The times are those of the SSBs, without correction of the
+/// receiver's time offset.
 ///
 /// # Errors
-/// [`ReplayError`] when the recording cannot be read, does not suit the receiver or holds no SSB of the
-/// site, and when the vehicle cannot serve there.
+/// [`ReplayError`] if the recording cannot be read, is incompatible with the receiver or contains
+/// no SSB of the site, and if the vehicle is incompatible with the site.
 pub fn estimate_angles(
     site: &Site,
     vehicle: &Vehicle,
@@ -68,7 +69,8 @@ pub fn estimate_angles(
     Ok(found)
 }
 
-/// Deviation (rad) that the scatter which a site states by its Rician K adds to an angle.
+/// Returns the standard deviation (rad) of an angle due to the scatter with the site's Rician K
+/// factor.
 pub fn scatter_sigma_rad(site: &Site, vehicle: &Vehicle) -> f64 {
     let config = EkfConfig::new(site, vehicle);
     let measurand = config.array.measurand;
@@ -76,13 +78,13 @@ pub fn scatter_sigma_rad(site: &Site, vehicle: &Vehicle) -> f64 {
     variance.sqrt()
 }
 
-/// The vehicle for a log of angles whose deviations hold the receiver's noise and the site's scatter:
-/// all of an angle's error is another half a wavelength on. How well the array is mounted and
-/// calibrated is not in them: the localizer reckons with it by itself.
+/// Returns the vehicle for a log of angles whose standard deviations include the receiver noise and
+/// the site's scatter. The errors are independent after half a wavelength. Mounting and calibration
+/// errors of the array are not included, because the localizer models them.
 pub fn all_of_error(site: &Site, vehicle: &Vehicle) -> Vehicle {
     let mut vehicle = vehicle.clone();
     vehicle.receiver.phase_bias_share = Some(1.0);
     vehicle.receiver.phase_bias_correlation_m = 0.5 * site.wavelength_m();
-    vehicle.receiver.phase_bias_correlation_s = 1e-3; // only the way forgets
+    vehicle.receiver.phase_bias_correlation_s = 1e-3; // correlation depends on distance only
     vehicle
 }

@@ -1,10 +1,11 @@
-//! Whether angles and odometry are of one clock: how much later angles come than they say, before any is located.
+//! Time offset between the clocks of angles and odometry, estimated before the drive is located.
 //!
-//! A plain filter predicts the angles, each set back by so many seconds; what it says of them all together is the
-//! likelihood of the lateness (Schweppe, IEEE Trans. IT 11(1), 1965), searched on a grid and then by golden section
-//! (Kiefer, Proc. AMS 4, 1953). Start position, start heading and odometer scale are estimated together with it, because a
-//! lateness is confounded with them on a straight road. Speed that changes and turns tell it: while a vehicle drives straight on, late angles are
-//! those of a place further back.
+//! A plain filter predicts the angles for each assumed time offset. The likelihood of its
+//! innovations is the likelihood of the offset (Schweppe, IEEE Trans. IT 11(1), 1965). It is
+//! searched on a grid and then by golden section (Kiefer, Proc. AMS 4, 1953). Start position, start
+//! heading and odometer scale are estimated together with the offset, because they are confounded
+//! on a straight road. Changes of speed and turns make the offset observable. On a straight drive
+//! at constant speed, late angles resemble those of an earlier position.
 
 use onboard::localize::ekf::EkfConfig;
 use onboard::settings::LocalizerSettings;
@@ -15,60 +16,69 @@ use super::evidence::{Evidence, screened};
 use super::hypotheses::Drive;
 use crate::angle_log::LoggedAngle;
 
-/// Largest lateness that is looked for, either way (s; assumed: buffers and drivers take up to a second), and the grid's
-/// spacing: less than over which speed changes.
+/// Maximum time offset of the search in either direction (s); buffers and drivers are assumed to
+/// delay by at most one second.
 const MOST_S: f64 = 1.5;
+/// Spacing of the search grid (s), less than the time over which the speed changes.
 const GRID_S: f64 = 0.5;
 
-/// How closely it is found (s): a drive of two minutes tells it to some 0.02 s.
+/// Resolution of the search (s); a drive of two minutes determines the offset to about 0.02 s.
 const FINEST_S: f64 = 0.005;
 
-/// From the best to where the curvature of the likelihood is taken (s): several odometry samples, between which it ripples.
+/// Distance from the maximum at which the curvature of the likelihood is evaluated (s): several
+/// odometry samples, because the likelihood ripples between samples.
 const ASIDE_S: f64 = 0.1;
 
-/// Smallest lateness that anybody minds (s): at walking pace 0.04 m.
+/// Minimum time offset that is corrected (s), 0.04 m at walking pace.
 pub const LEAST_LATENESS_S: f64 = 0.03;
 
-/// Standard deviations of what a lateness is confounded with on a straight road, estimated together with it: start
-/// position (m), start heading (rad), and odometer scale as a multiple of its specified deviation.
+/// Standard deviation of the start position (m), estimated together with the time offset because
+/// both are confounded on a straight road.
 const DOUBTED_START_STD_M: f64 = 10.0;
+/// Standard deviation of the start heading (rad), estimated together with the time offset.
 const DOUBTED_HEADING_STD_RAD: f64 = 0.2;
+/// Standard deviation of the odometer scale as a multiple of the specified one, estimated together
+/// with the time offset.
 const DOUBTED_SCALE_STDS: f64 = 3.0;
 
-/// Minimum log-likelihood ratio for a correction. Twice the ratio is χ² with one degree of freedom without lateness (Wilks
-/// 1938), which exceeds 20 with a probability of 8e-6. The search over ±1.5 s has about 30 independent trials: the
-/// false-alarm rate is 2.4e-4 per drive.
+/// Minimum log-likelihood ratio for a correction. Without an offset, twice the ratio is χ²
+/// distributed with one degree of freedom (Wilks 1938), which exceeds 20 with a probability of
+/// 8e-6. The search over ±1.5 s has about 30 independent trials, so that the false-alarm rate is
+/// 2.4e-4 per drive.
 const CORRECTION_LOG_ODDS: f64 = 10.0;
 
-/// Time from the first angle on by which it is judged (s): two clocks run apart.
+/// Duration from the first angle that is evaluated (s); it is limited because clocks drift.
 const SPAN_S: f64 = 300.0;
 
-/// Log-odds from which two clocks are in doubt: two deviations of the one that is free, as one drive in 22 has in time
-/// (Wilks, Ann. Math. Statist. 9(1), 1938), were its errors white.
+/// Minimum log-likelihood ratio for an uncertain offset: two standard deviations of one parameter,
+/// which one of 22 drives without an offset exceeds if the errors are white (Wilks, Ann. Math.
+/// Statist. 9(1), 1938).
 const DOUBT_LOG_ODDS: f64 = 2.0;
 
-/// Lateness that is left to the filter where it is in doubt (s): by drives of two minutes, what a road hides, whose bends
-/// and changes of speed alone tell it (notes/experiments.md).
+/// Standard deviation of an uncertain offset that becomes a filter state (s). In drives of two
+/// minutes, this is the error of the search on roads with few bends and speed changes
+/// (notes/experiments.md).
 const DOUBTED_STD_S: f64 = 0.1;
 
-/// How much later angles come than they say, by the odometry's clock.
+/// Time offset of the angles according to the odometry's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::struct_field_names, reason = "every name ends with its unit")]
 pub struct Lateness {
-    /// The lateness (s).
+    /// Estimated time offset (s).
     pub found_s: f64,
-    /// Standard deviation of what is left of it to the localizer's filter (s).
+    /// Standard deviation of the remaining offset, which the localizer's filter estimates (s).
     pub left_std_s: f64,
-    /// Most probable offset (s), also if it is in doubt.
+    /// Most probable offset (s), even if it is uncertain.
     pub candidate_s: f64,
 }
 
-/// The lateness of a drive's angles, where it is more than anybody minds, explains them, and is as much likelier than none
-/// as anything that is free must be; where it is somewhat likelier all of it is left. Where its deviation is stated the
-/// localizer's filter finds it within that.
+/// Returns the time offset of a drive's angles if it is relevant, explains the angles, and is
+/// significant. An offset that is only somewhat more likely than none is left to the filter as a
+/// state. If the settings specify a standard deviation of the offset, the localizer's filter
+/// estimates it.
 ///
 /// # Errors
-/// [`ReplayError::Settings`] for a road that cannot be built.
+/// [`ReplayError::Settings`] if the road cannot be built.
 pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     let vehicle = &given.vehicle;
     let is_tracker = matches!(vehicle.localizer, LocalizerSettings::Tracker(_));
@@ -85,7 +95,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     let config = EkfConfig::new(&given.site, vehicle);
     let filter_std_s = config.lateness_std_s;
     let scale_std = config.odometer_scale_std;
-    // What is searched for is no state of the filter as well.
+    // The offset is searched for, so that it must not be a filter state as well.
     given.vehicle.to_mut().receiver.lateness_std_s = Some(0.0);
     let start = &mut given.vehicle.to_mut().start;
     start.position_std_m = start.position_std_m.max(DOUBTED_START_STD_M);
@@ -132,7 +142,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     }
     let beside = likelihood(found_s - ASIDE_S)? + likelihood(found_s + ASIDE_S)?;
     let curvature = (2.0 * at_best - beside) / (ASIDE_S * ASIDE_S);
-    // Never wider than where it was looked for by then.
+    // The standard deviation is limited to the spacing of the search grid.
     let left_std_s = curvature.max(0.0).sqrt().recip().min(GRID_S);
     Ok(Some(Lateness {
         found_s,
@@ -141,7 +151,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     }))
 }
 
-/// Angles that were taken so much earlier (s).
+/// Returns the angles with earlier time stamps, by `late_s` seconds.
 pub fn earlier(angles: &[LoggedAngle], late_s: f64) -> Vec<LoggedAngle> {
     let mut angles = angles.to_vec();
     for angle in &mut angles {
@@ -151,7 +161,7 @@ pub fn earlier(angles: &[LoggedAngle], late_s: f64) -> Vec<LoggedAngle> {
     angles
 }
 
-/// Where a function with one maximum in between has it.
+/// Returns the position of the maximum of a unimodal function (golden section search).
 fn highest(
     [mut low, mut high]: [f64; 2],
     of: &mut impl FnMut(f64) -> Result<f64, ReplayError>,
@@ -179,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_highest_place_is_found() {
+    fn the_maximum_is_found() {
         let mut of = |x: f64| Ok(-(x - 0.123).powi(2));
         let found = highest([-0.5, 0.5], &mut of).unwrap();
         assert!((found - 0.123).abs() < FINEST_S);

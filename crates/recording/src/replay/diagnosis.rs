@@ -1,11 +1,11 @@
-//! Misconfiguration diagnosis: whether a drive was meant in another way than it was given.
+//! Diagnosis of misconfigurations: whether the files of a drive contain a systematic error.
 //!
-//! The localizer that located the drive is run once more as given. Where its angles do not come
-//! from where it expects them, each [configuration hypothesis](Hypothesis) is screened by a plain
-//! filter, and the best of them are put to the localizer itself: the likelihoods of its innovations
-//! are compared (multiple-model testing; Bar-Shalom, Li and Kirubarajan, Estimation with
-//! Applications to Tracking and Navigation, 11.6). What is named is far more likely, and agrees
-//! with the angles.
+//! The localizer of the drive is run once more with the given files. If its angles deviate from the
+//! predicted ones, each [configuration hypothesis](Hypothesis) is screened by a plain filter. The
+//! best hypotheses are tested with the localizer itself by comparison of the likelihoods of its
+//! innovations (multiple-model testing; Bar-Shalom, Li and Kirubarajan, Estimation with
+//! Applications to Tracking and Navigation, 11.6). A reported hypothesis is far more likely than
+//! the given files and consistent with the angles.
 
 use std::collections::BTreeMap;
 
@@ -26,47 +26,52 @@ use super::yaw_rate;
 use crate::angle_log::LoggedAngle;
 use crate::odometry::{OdometryFields, OdometryIssue};
 
-/// Angles by which it is judged, spread over the drive; of a radio head at most one in this time (s).
+/// Maximum number of angles used for the diagnosis, spread over the drive. Angles of one radio head
+/// are at least [`LEAST_APART_S`] apart.
 const MOST_ANGLES: usize = 3000;
+/// Minimum time between two used angles of a radio head (s).
 const LEAST_APART_S: f64 = 0.2;
 
-/// Log-odds a hypothesis must have: each is true of one drive of a thousand, and one of a thousand
-/// that are named may be wrong.
+/// Minimum log-likelihood ratio of a reported hypothesis: each has a prior probability of 1/1000,
+/// and at most one of a thousand reports may be wrong.
 const LOG_ODDS: f64 = 13.8;
 
-/// Log-odds within which two hypotheses cannot be told apart, and both are named.
+/// Log-likelihood difference below which two hypotheses are indistinguishable, and both are
+/// reported.
 const AS_LIKELY: f64 = 5.0;
 
-/// Largest share of angles that may be refused where a drive is understood, ...
+/// Maximum fraction of rejected angles of a correctly configured drive.
 const MOST_REFUSED: f64 = 0.2;
 
-/// ... and of one radio head's, with so many angles, that may be beyond three standard deviations of
-/// what is expected. Errors that stay over metres are found while driving, and nothing is refused.
+/// Maximum fraction of a radio head's angles beyond three standard deviations from the prediction.
+/// Correlated errors are estimated while driving, so that no angle is rejected because of them.
 const MOST_MISFITS: f64 = 0.1;
+/// Minimum number of angles of a radio head for the fraction [`MOST_MISFITS`].
 const LEAST_OF_HEAD: usize = 10;
 
-/// Hypotheses that are put to the localizer itself.
+/// Maximum number of hypotheses that are tested with the localizer itself.
 const CONFIRMED: usize = 4;
 
-/// ... of those that the filter finds hardly less likely than the best.
+/// Maximum log-likelihood difference to the best hypothesis of the filter for a test with the
+/// localizer.
 const CLOSE: f64 = 30.0;
 
-/// A radio head that is off by less is not called moved (m).
+/// Minimum displacement of a radio head that is reported (m).
 const LEAST_MOVED_M: f64 = 2.0;
 
-/// By how much the path may change where a misconfiguration did no harm (m, root mean square).
+/// Maximum change of the path by a harmless misconfiguration (m, RMS).
 const HARMLESS_M: f64 = 0.5;
 
-/// A speed of so many times the vehicle's is in another unit.
+/// Minimum ratio of the speed to the vehicle's top speed that indicates another unit.
 const TOO_FAST: f64 = 10.0;
 
-/// No vehicle is so slow in the median while it moves (m/s).
+/// Minimum median speed of a moving vehicle (m/s).
 const CRAWLS_MPS: f64 = 0.05;
 
-/// What is wrong with a drive as it was given: one diagnosis each.
+/// Returns the diagnoses of a drive.
 ///
 /// # Errors
-/// As [`vehicles_localizer`].
+/// Errors of [`vehicles_localizer`].
 pub fn diagnose(given: &Drive<'_>, located: &LocatedDrive) -> Result<Vec<Diagnosis>, ReplayError> {
     let is_tracker = matches!(given.vehicle.localizer, LocalizerSettings::Tracker(_));
     if !(is_tracker && given.vehicle.start.known) {
@@ -80,7 +85,7 @@ pub fn diagnose(given: &Drive<'_>, located: &LocatedDrive) -> Result<Vec<Diagnos
         confirmed(&given)?
     };
     let is_lost = by_localizer.is_none();
-    // Of a localizer that is lost there is no prediction to compare with but that of its filter.
+    // A lost localizer gives no predictions, so that those of a plain filter are used.
     let Some(as_given) = by_localizer.map_or_else(|| screened(&given), |it| Ok(Some(it)))? else {
         return Ok(Vec::new());
     };
@@ -91,7 +96,8 @@ pub fn diagnose(given: &Drive<'_>, located: &LocatedDrive) -> Result<Vec<Diagnos
     } else if located.poses.iter().any(|pose| pose.is_lost)
         && let Some(from_start) = screened(&given)?.filter(|it| !is_understood(it))
     {
-        // It was found elsewhere: a start that was wrong is one that no filter could have gone on from.
+        // The vehicle was found at another position. No filter could have continued from a wrong
+        // start.
         let mut of_start = of_drive();
         of_start.retain(|it| it.subject == Subject::Start);
         found = better_explanations(&given, of_start, &from_start, false)?;
@@ -109,7 +115,7 @@ pub fn diagnose(given: &Drive<'_>, located: &LocatedDrive) -> Result<Vec<Diagnos
     Ok(found)
 }
 
-/// The drive by as many angles as it takes to judge it, in order of time.
+/// Returns the drive with as many angles as the diagnosis needs, in order of time.
 pub fn spread<'a>(given: &Drive<'a>) -> Drive<'a> {
     let heads = RadioHead::heard(&given.site, &given.vehicle);
     let mut given = given.clone();
@@ -126,7 +132,7 @@ pub fn spread<'a>(given: &Drive<'a>) -> Drive<'a> {
         let mut kept = angles.clone();
         kept.retain(|it| {
             let time_s = it.measured.time_s;
-            // Times of a regular log are told to some digits.
+            // The times of a regular log are rounded.
             let is_apart = |last_s: f64| time_s - last_s > 0.99 * apart_s;
             let is_kept = last_s
                 .get(&head_of(it))
@@ -144,13 +150,13 @@ pub fn spread<'a>(given: &Drive<'a>) -> Drive<'a> {
     }
 }
 
-/// Whether angles come from where they are expected, those of each radio head too.
+/// Whether the angles agree with the predictions, overall and for each radio head.
 pub fn is_understood(evidence: &Evidence) -> bool {
     let is_off = |it: &Count| it.angles >= LEAST_OF_HEAD && it.misfit_share() > MOST_MISFITS;
     evidence.all.refused_share() < MOST_REFUSED && !evidence.heads.values().any(is_off)
 }
 
-/// What the vehicle's own localizer makes of a drive; `None` where it is lost.
+/// Evaluates a drive with the vehicle's own localizer; `None` if it is lost.
 fn confirmed(drive: &Drive<'_>) -> Result<Option<Evidence>, ReplayError> {
     Evidence::by(
         &mut *vehicles_localizer(&drive.site, &drive.vehicle)?,
@@ -158,7 +164,7 @@ fn confirmed(drive: &Drive<'_>) -> Result<Option<Evidence>, ReplayError> {
     )
 }
 
-/// Of these hypotheses those that explain the drive's angles where it, as given, does not.
+/// Returns the hypotheses that explain the drive's angles if the given files do not.
 fn better_explanations(
     given: &Drive<'_>,
     hypotheses: Vec<Hypothesis>,
@@ -199,7 +205,8 @@ fn better_explanations(
     judged.sort_by(|a, b| b.0.total_cmp(&a.0));
     let best = judged.first().map_or(0.0, |(log_odds, ..)| *log_odds);
     judged.retain(|(log_odds, ..)| best - log_odds < LOG_ODDS);
-    // What has something free in it explains whatever has not, too.
+    // A hypothesis with a free parameter explains everything that one without explains, so that the
+    // latter is preferred.
     if judged.iter().any(|(_, it, _)| it.penalty == 0.0) {
         judged.retain(|(_, it, _)| it.penalty == 0.0);
     } else {
@@ -221,7 +228,7 @@ fn better_explanations(
     Ok(judged.into_iter().map(diagnosis).collect())
 }
 
-/// All that may be wrong with a drive.
+/// Returns all hypotheses of a drive.
 fn hypotheses(given: &Drive<'_>) -> Result<Vec<Hypothesis>, ReplayError> {
     let site = &given.site;
     let mut hypotheses = of_drive();
@@ -247,7 +254,7 @@ fn hypotheses(given: &Drive<'_>) -> Result<Vec<Hypothesis>, ReplayError> {
     Ok(hypotheses)
 }
 
-/// How far two paths are apart (m, root mean square).
+/// Returns the RMS distance of two paths (m).
 fn apart_m(one: &[Option<Pose>], other: &[Option<Pose>]) -> f64 {
     let pairs = one
         .iter()
@@ -267,7 +274,7 @@ fn is_on_road(given: &Drive<'_>) -> bool {
     given.site.road.is_some() && given.vehicle.follows_road()
 }
 
-/// A yaw rate that is not what the road turns by, or that never changes where nothing fits.
+/// Detects a yaw rate that contradicts the road, or that is constant while the angles do not fit.
 fn wrong_yaw_rate(
     given: &Drive<'_>,
     located: &LocatedDrive,
@@ -275,7 +282,7 @@ fn wrong_yaw_rate(
     is_sound: bool,
 ) -> Result<Option<Diagnosis>, ReplayError> {
     let is_constant = yaw_rate::constant_radps(&given.odometry.samples).is_some();
-    // Off the road the heading is the yaw rate's own, unless that never changes.
+    // Off the road, the heading is the integrated yaw rate, unless the yaw rate is constant.
     let tells_heading = is_on_road(given) || is_constant;
     let told_per_turned = if tells_heading && !located.is_lost_for_long() {
         yaw_rate::told_per_turned(&located.poses)
@@ -293,7 +300,7 @@ fn wrong_yaw_rate(
     let meant = hypothesis.correct(given);
     let evidence = confirmed(&meant)?;
     let is_worse = |it: &Evidence| as_given.log_likelihood - it.log_likelihood > LOG_ODDS;
-    // Without any yaw rate the localizer may be lost as well.
+    // Without any yaw rate, the localizer may be lost as well.
     if evidence.as_ref().map_or(!is_constant, is_worse) {
         return Ok(None);
     }
@@ -309,7 +316,7 @@ fn wrong_yaw_rate(
     }))
 }
 
-/// An odometry without yaw rate where something has to tell how the vehicle turns.
+/// Detects an odometry without a yaw rate that needs one.
 fn missing_yaw_rate(given: &Drive<'_>, is_sound: bool) -> Option<Diagnosis> {
     let vehicle = &given.vehicle;
     let mut samples = given.odometry.samples.iter();
@@ -331,7 +338,7 @@ fn missing_yaw_rate(given: &Drive<'_>, is_sound: bool) -> Option<Diagnosis> {
     })
 }
 
-/// The fields of an odometry that would tell the yaw rate.
+/// Returns the advice on the fields of the yaw rate.
 fn add_yaw_rate(fields: &OdometryFields) -> &'static str {
     if *fields == OdometryFields::ROS {
         "the odometry has no yaw rate; fill twist.twist.angular.z or pose.pose.orientation, or record a \
@@ -341,7 +348,7 @@ fn add_yaw_rate(fields: &OdometryFields) -> &'static str {
     }
 }
 
-/// Defects of the odometry that were reported, where they did harm.
+/// Returns the reported defects of the odometry that affected the result.
 fn doubtful_odometry(given: &Drive<'_>) -> impl Iterator<Item = Diagnosis> {
     let doubts = given
         .odometry
@@ -358,13 +365,13 @@ fn doubtful_odometry(given: &Drive<'_>) -> impl Iterator<Item = Diagnosis> {
     })
 }
 
-/// Whether a vehicle drives as fast as that.
+/// Whether the speed is plausible for the vehicle.
 fn is_plausible(drive: &Drive<'_>) -> bool {
     let fastest_mps = TOO_FAST * drive.vehicle.top_speed_mps();
     median_speed_mps(drive).is_none_or(|it| (CRAWLS_MPS..fastest_mps).contains(&it))
 }
 
-/// Median of the speeds while it moves.
+/// Returns the median speed while the vehicle moves (m/s).
 fn median_speed_mps(drive: &Drive<'_>) -> Option<f64> {
     let speeds_mps = drive.odometry.samples.iter().map(|it| it.speed_mps.abs());
     let mut moving_mps: Vec<f64> = speeds_mps.filter(|it| *it > 0.0).collect();
@@ -372,7 +379,7 @@ fn median_speed_mps(drive: &Drive<'_>) -> Option<f64> {
     moving_mps.get(moving_mps.len() / 2).copied()
 }
 
-/// Speeds that no such vehicle has. Angles refuse nothing where an odometer says so much.
+/// Detects speeds above those of the vehicle. With such odometry, the filter rejects no angle.
 fn too_fast(given: &Drive<'_>) -> Option<Diagnosis> {
     let vehicle = &given.vehicle;
     let median_mps = median_speed_mps(given)?;

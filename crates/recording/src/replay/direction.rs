@@ -1,7 +1,8 @@
-//! Odometry that counts upwards in reverse, as encoders of a single channel do.
+//! Odometry that counts upwards in reverse, like single-channel encoders.
 //!
-//! A vehicle changes its direction where it stands. The parts of the drive between standstills are taken in turn: each
-//! is driven ahead and in reverse, and the direction that predicts the angles up to its end better is retained.
+//! A vehicle changes its direction at a standstill. The parts of the drive between standstills are
+//! processed in turn: each is tried ahead and in reverse, and the direction that predicts the
+//! angles up to its end better is retained.
 
 use std::ops::Range;
 
@@ -12,17 +13,19 @@ use super::evidence::screened;
 use super::hypotheses::{Drive, FREEDOM_LOG_ODDS, Hypothesis};
 use crate::odometry::OdometryLog;
 
-/// Share of the median speed below which a vehicle stands, and the least such speed (m/s).
+/// Maximum speed of a standstill as a fraction of the median speed.
 const STANDING_SHARE: f64 = 0.1;
+/// Minimum of the maximum speed of a standstill (m/s).
 const STANDING_MPS: f64 = 0.02;
-/// Maximum number of parts, which bounds the computation.
+/// Maximum number of parts, which limits the computing time.
 const MAX_PARTS: usize = 40;
 
-/// The hypothesis that some parts of a drive were driven in reverse; `None` if the odometry tells directions, the vehicle
-/// never stands, or every part is explained better by driving ahead.
+/// Returns the hypothesis that some parts of a drive were driven in reverse. Returns `None` if the
+/// odometry has a sign, the vehicle never stops, or all parts are explained better by driving
+/// ahead.
 ///
 /// # Errors
-/// As [`screened`].
+/// Errors of [`screened`].
 pub fn reversed_parts(given: &Drive<'_>) -> Result<Option<Hypothesis>, ReplayError> {
     let samples = &given.odometry.samples;
     let tells_direction = samples.iter().any(|it| it.speed_mps < 0.0)
@@ -48,7 +51,7 @@ pub fn reversed_parts(given: &Drive<'_>) -> Result<Option<Hypothesis>, ReplayErr
         return Ok(None);
     }
     let count = reversed.len();
-    // Each part may have been driven in either direction.
+    // Each part has two possible directions.
     let penalty = FREEDOM_LOG_ODDS + std::f64::consts::LN_2 * parts.len() as f64;
     let log = with_reversed(&given.odometry, &reversed, samples.len());
     Ok(Some(Hypothesis::of_odometry(
@@ -62,7 +65,8 @@ pub fn reversed_parts(given: &Drive<'_>) -> Result<Option<Hypothesis>, ReplayErr
     )))
 }
 
-/// Samples between the middles of successive standstills, all of the drive together.
+/// Returns the sample ranges between the centres of successive standstills, which cover the whole
+/// drive.
 fn parts(samples: &[OdometrySample]) -> Vec<Range<usize>> {
     let speeds_mps = samples.iter().map(|it| it.speed_mps.abs());
     let mut moving_mps: Vec<f64> = speeds_mps.filter(|it| *it > 0.0).collect();
@@ -87,7 +91,8 @@ fn parts(samples: &[OdometrySample]) -> Vec<Range<usize>> {
     parts
 }
 
-/// Log-likelihood of the angles up to a sample, with parts of the drive in reverse; minus infinity if it is lost.
+/// Returns the log-likelihood of the angles up to a sample with some parts in reverse; minus
+/// infinity if the filter is lost.
 fn log_likelihood(
     given: &Drive<'_>,
     reversed: &[Range<usize>],
@@ -108,7 +113,7 @@ fn log_likelihood(
     Ok(evidence.map_or(f64::NEG_INFINITY, |it| it.log_likelihood))
 }
 
-/// The first samples of an odometry, with parts of them in reverse.
+/// Returns the first samples of an odometry with some parts in reverse.
 fn with_reversed(odometry: &OdometryLog, reversed: &[Range<usize>], end: usize) -> OdometryLog {
     let mut before_m = None;
     let mut distance_m = 0.0;
@@ -141,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_end_in_the_middle_of_standstills() {
+    fn parts_end_at_the_centre_of_standstills() {
         let speeds = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.7, 0.0];
         let mut distance_m = 0.0;
         let samples: Vec<OdometrySample> = (0..)

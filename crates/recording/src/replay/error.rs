@@ -1,4 +1,4 @@
-//! Why a drive cannot be located.
+//! Errors of the localization of a recorded drive.
 
 use onboard::BoxError;
 use onboard::receive::ReceiveError;
@@ -8,56 +8,56 @@ use thiserror::Error;
 
 use crate::error::RecordingError;
 
-/// Why a drive cannot be located.
+/// Error of the localization of a recorded drive.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReplayError {
-    /// Site, vehicle or platform cannot be used.
+    /// Site, vehicle or platform are invalid.
     #[error(transparent)]
     Settings(#[from] SettingsError),
     /// The recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// The receiver refuses the samples.
+    /// The receiver rejects the samples.
     #[error("{file}: {source}")]
     Receive {
-        /// The recording.
+        /// Path of the recording.
         file: String,
-        /// Why.
+        /// Cause.
         source: ReceiveError,
     },
-    /// The recording's rate or band does not suit the site.
+    /// The sample rate or band of the recording is incompatible with the site.
     #[error("{file}: {source}")]
     FrontEnd {
-        /// The recording.
+        /// Path of the recording.
         file: String,
-        /// Why.
+        /// Cause.
         source: nr_ssb::front_end::FrontEndError,
     },
-    /// A start that is no time.
+    /// The start time is not finite.
     #[error("the recording's start time is {start_time_s} s; it must be finite")]
     StartTime {
-        /// What was given.
+        /// Given start time (s).
         start_time_s: f64,
     },
-    /// Times that are not in seconds.
+    /// Times are not in seconds.
     #[error(
         "{of}: `{field}` is in {unit}, by steps of {step} between {samples}; it must be in seconds: divide it by \
          {:e}", unit.per_second()
     )]
     TimeUnit {
-        /// "odometry" or "angles".
+        /// Kind of the data: "odometry" or "angles".
         of: &'static str,
-        /// The field of the time.
+        /// Field of the time.
         field: &'static str,
-        /// The likely unit.
+        /// Probable unit.
         unit: TimeUnit,
-        /// "samples" or "angles".
+        /// Name of the items: "samples" or "angles".
         samples: &'static str,
-        /// Median step between them, in that unit.
+        /// Median step of the times in this unit.
         step: f64,
     },
-    /// Angles and odometry of different times.
+    /// Angles and odometry have no common time.
     #[error(
         "no angle falls into the odometry's time: odometry is from {} to {} s, angles from {} to {} s, \
          {:.3} s apart; both must be told by one clock",
@@ -69,7 +69,7 @@ pub enum ReplayError {
         /// Times of the first and the last angle (s).
         angles_s: [f64; 2],
     },
-    /// No radio head of the site is heard.
+    /// No angle is from a radio head of the site.
     #[error(
         "not one of {angles} angles is of a radio head of the site; check pci and ssb_index in both"
     )]
@@ -77,25 +77,25 @@ pub enum ReplayError {
         /// Number of angles.
         angles: usize,
     },
-    /// Less than two usable samples of odometry.
+    /// The odometry has fewer than two usable samples.
     #[error("the odometry holds fewer than two usable samples{}", because(why.as_ref()))]
     NoOdometry {
-        /// What is wrong with the first that cannot be used.
+        /// Error of the first unusable sample.
         why: Option<String>,
     },
-    /// No SSB in the recording.
+    /// The recording contains no SSB of the site.
     #[error(
-        "{file}: no SSB of a radio head of the site is in it; check the carrier, the band, and \
-         pci and ssb_index; `access-av scan` tells which cells there are"
+        "{file}: the recording contains no SSB of a radio head of the site; check the carrier, the band, and \
+         pci and ssb_index; `access-av scan` lists the cells"
     )]
     NoSsb {
-        /// The recording.
+        /// Path of the recording.
         file: String,
     },
-    /// No usable angle.
+    /// The log has no usable angle.
     #[error("the angle log holds no usable angle{}", because(why.as_ref()))]
     NoAngle {
-        /// What is wrong with the first that cannot be used.
+        /// Error of the first unusable angle.
         why: Option<String>,
     },
     /// The user's own code failed.
@@ -107,7 +107,7 @@ fn because(why: Option<&String>) -> String {
     why.map(|why| format!("; {why}")).unwrap_or_default()
 }
 
-/// Length of the gap between two intervals.
+/// Returns the length of the gap between two intervals.
 fn apart_s(a: &[f64; 2], b: &[f64; 2]) -> f64 {
     (a[0] - b[1]).max(b[0] - a[1]).max(0.0)
 }

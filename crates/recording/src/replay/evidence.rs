@@ -1,4 +1,4 @@
-//! How well a way of reading a drive predicts its angles, by the innovations of a localizer.
+//! Evidence of a hypothesis: likelihood of the innovations of a localizer.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,27 +12,27 @@ use super::innovations::{Met, Step, plain_filter, replay_angles};
 use super::stated::with_phase;
 use crate::angle_log::LoggedAngle;
 
-/// Share of angles that come from anywhere, by a reflection say, where not even the settings are certain; the others
-/// are Gaussian.
+/// Fraction of outliers with a uniform distribution, for example due to reflections, assumed in the
+/// diagnosis. The other angles are Gaussian.
 pub const OUTLIERS: f64 = 0.1;
 
-/// Angles to one radio head within this time count as one (s).
+/// Time within which angles to one radio head count as one independent angle (s).
 const INDEPENDENT_S: f64 = 1.0;
 
-/// Squared Mahalanobis distance of an angle that fits: within three standard deviations.
+/// Maximum squared Mahalanobis distance of a fitting angle: three standard deviations.
 const FITS: f64 = 9.0;
 
-/// Relative log-likelihood of an angle that the filter cannot use, as of an outlier.
+/// Relative log-likelihood of an angle that the filter cannot use, equal to that of an outlier.
 const UNUSABLE: f64 = -8.0;
 
-/// A radio head by its PCI and SSB index.
+/// Radio head, identified by PCI and SSB index.
 pub type HeadId = (u16, u8);
 
 pub fn head_of(angle: &LoggedAngle) -> HeadId {
     (angle.ssb.pci, angle.ssb.ssb_index)
 }
 
-/// What became of angles: how many there were, how many were refused, how many fit the prediction.
+/// Numbers of angles in total, rejected, and deviating from the prediction.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Count {
     pub angles: usize,
@@ -50,24 +50,25 @@ impl Count {
     }
 }
 
-/// How well a way of reading a drive predicts its angles.
+/// Result of the evaluation of a drive.
 pub struct Evidence {
-    /// Sum over the angles, those that are not independent counted as one.
+    /// Log-likelihood of the angles, in which dependent angles count as one.
     pub log_likelihood: f64,
-    /// The same relative to angles that are predicted exactly, and each as independent as its variance says: comparable
-    /// where nothing differs but when they were taken, which changes how many the variances count for one.
+    /// Log-likelihood relative to exactly predicted angles, with the independence that the
+    /// variances imply. It is comparable between hypotheses that differ in the times of the angles
+    /// only, because the times change the number of independent angles.
     pub relative_log_likelihood: f64,
     pub all: Count,
     pub heads: BTreeMap<HeadId, Count>,
-    /// Believed pose at each angle.
+    /// Estimated pose at each angle.
     pub path: Vec<Option<Pose>>,
 }
 
 impl Evidence {
-    /// Drives with a localizer; `None` where it is lost for long.
+    /// Evaluates a drive with a localizer; `None` if the localizer is lost for long.
     ///
     /// # Errors
-    /// As [`replay_angles`].
+    /// Errors of [`replay_angles`].
     pub fn by(
         localizer: &mut dyn Localizer,
         drive: &Drive<'_>,
@@ -104,13 +105,14 @@ impl Evidence {
     }
 }
 
-/// Of an angle, per standard deviation of its measurement: so it does not matter in what it is told.
+/// Returns the log-likelihood of an angle in units of its standard deviation, so that it does not
+/// depend on the unit of the angle.
 fn log_likelihood(met: Option<&Met>, sigma_rad: f64) -> f64 {
     let density = met.map_or(0.0, |met| met.innovation.density());
     (sigma_rad * with_outliers(density, OUTLIERS)).ln()
 }
 
-/// Share of the angles that count as independent.
+/// Returns the fraction of the angles that count as independent.
 fn independent_share(angles: &[LoggedAngle]) -> f64 {
     let apart = |it: &LoggedAngle| {
         let time = (it.measured.time_s / INDEPENDENT_S).floor() as i64;
@@ -123,7 +125,7 @@ fn independent_share(angles: &[LoggedAngle]) -> f64 {
 /// Evaluates a drive with a plain filter, which suffices to rank hypotheses; `None` if the filter is lost.
 ///
 /// # Errors
-/// As [`plain_filter`].
+/// Errors of [`plain_filter`].
 pub fn screened(drive: &Drive<'_>) -> Result<Option<Evidence>, ReplayError> {
     Evidence::by(&mut plain_filter(&drive.site, &drive.vehicle)?, drive)
 }

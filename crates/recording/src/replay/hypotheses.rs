@@ -1,6 +1,7 @@
-//! Configuration hypotheses: what people get wrong in the files of a drive, and how it was meant.
+//! Configuration hypotheses: common errors in the files of a drive, and their corrections.
 //!
-//! One table: what concerns the whole drive, each radio head, each two of them.
+//! One table contains the hypotheses about the whole drive, about each radio head and about each
+//! pair of radio heads.
 
 use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -12,39 +13,40 @@ use onboard::settings::{DriveKind, RadioHeadSettings, Site, Vehicle};
 use crate::angle_log::LoggedAngle;
 use crate::odometry::OdometryLog;
 
-/// Log-odds that a hypothesis must have beside one with nothing free in it: a place that is fitted
-/// may be anywhere within 100 m, and is told to some metres; a robot may turn in any way.
+/// Log-likelihood penalty of a hypothesis with a free parameter: a fitted position may be anywhere
+/// within 100 m and is determined to a few metres; a robot may turn arbitrarily.
 pub const FREEDOM_LOG_ODDS: f64 = 8.0;
 
-/// A drive as it was given, or as it may have been meant.
+/// Drive with the given files or with corrected ones.
 #[derive(Clone)]
 pub struct Drive<'a> {
     pub site: Cow<'a, Site>,
     pub vehicle: Cow<'a, Vehicle>,
     pub odometry: Cow<'a, OdometryLog>,
-    /// In order of time; the electrical angle is NaN where the angle from the array's axis is given.
+    /// Angles in order of time; the electrical angle is NaN if the angle from the array's axis is
+    /// given.
     pub angles: Cow<'a, [LoggedAngle]>,
 }
 
-/// What a hypothesis is about.
+/// Subject of a hypothesis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Subject {
-    /// All of the drive.
+    /// Whole drive.
     Drive,
-    /// The start alone.
+    /// Start only.
     Start,
-    /// One radio head, or two.
+    /// One or two radio heads.
     RadioHeads,
 }
 
-/// A way in which a drive may have been meant.
+/// Hypothesis about the configuration of a drive.
 pub struct Hypothesis {
-    /// "the angles fit if …".
+    /// Text after "the angles fit if …".
     pub meant: String,
-    /// "check …".
+    /// Text after "check …".
     pub check: String,
     pub subject: Subject,
-    /// What its log-likelihood is to be ahead by, where something in it is free.
+    /// Minimum log-likelihood advantage because of free parameters.
     pub penalty: f64,
     correction: Correction,
 }
@@ -52,12 +54,12 @@ pub struct Hypothesis {
 enum Correction {
     Angle(fn(&mut LoggedAngle, &Vehicle)),
     Odometry(fn(&mut OdometrySample)),
-    /// All of the odometry.
+    /// Complete odometry.
     Log(Box<OdometryLog>),
     Heads(fn([f64; 3]) -> [f64; 3]),
-    /// The place of one radio head, by its number.
+    /// Position of the radio head with this index.
     Head(usize, [f64; 2]),
-    /// The places of two, by their numbers.
+    /// Exchanged positions of the radio heads with these indices.
     Exchange(usize, usize),
     Mounting(f64),
     Vehicle(fn(&mut Vehicle)),
@@ -80,7 +82,7 @@ impl Hypothesis {
         }
     }
 
-    /// The hypothesis of another odometry, with the log-odds that it has to be ahead by.
+    /// Creates a hypothesis with a different odometry and its penalty.
     pub fn of_odometry(
         meant: String,
         check: &'static str,
@@ -93,7 +95,7 @@ impl Hypothesis {
         }
     }
 
-    /// The drive as it was meant.
+    /// Returns the corrected drive.
     pub fn correct<'a>(&self, given: &Drive<'a>) -> Drive<'a> {
         let mut drive = given.clone();
         match self.correction {
@@ -137,7 +139,7 @@ impl Hypothesis {
     }
 }
 
-/// How a radio head is called: by its PCI, and by its SSB where that is not enough.
+/// Returns the name of a radio head: its PCI, and its SSB index if the PCI is ambiguous.
 pub fn name_of(site: &Site, head: &RadioHeadSettings) -> String {
     let alike = site.radio_heads.iter().filter(|it| it.pci == head.pci);
     if alike.count() > 1 {
@@ -147,7 +149,7 @@ pub fn name_of(site: &Site, head: &RadioHeadSettings) -> String {
     }
 }
 
-/// What may be wrong with one radio head, or with two.
+/// Returns the hypotheses about single radio heads and pairs of radio heads.
 pub fn of_radio_heads(site: &Site) -> Vec<Hypothesis> {
     let mut hypotheses = Vec::new();
     for (number, head) in site.radio_heads.iter().enumerate() {
@@ -199,7 +201,7 @@ pub fn of_radio_heads(site: &Site) -> Vec<Hypothesis> {
     hypotheses
 }
 
-/// A radio head, by its number, that stands elsewhere.
+/// Returns the hypothesis that the radio head with index `number` is at another position.
 pub fn moved(site: &Site, number: usize, place: Point) -> Option<Hypothesis> {
     let head = site.radio_heads.get(number)?;
     let [x_m, y_m, _] = head.position_m;
@@ -218,7 +220,8 @@ pub fn moved(site: &Site, number: usize, place: Point) -> Option<Hypothesis> {
     })
 }
 
-/// A road vehicle that is none.
+/// Returns the hypothesis that the vehicle is a robot with a differential drive instead of a road
+/// vehicle.
 pub fn robot() -> Hypothesis {
     Hypothesis {
         penalty: FREEDOM_LOG_ODDS,
@@ -227,14 +230,14 @@ pub fn robot() -> Hypothesis {
             "drive in the vehicle's file: drive = \"differential\"",
             Correction::Vehicle(|vehicle| {
                 vehicle.drive = DriveKind::Differential;
-                vehicle.receiver.phase_bias_probability = Some(0.0); // as where nothing is stated
+                vehicle.receiver.phase_bias_probability = Some(0.0); // default of a differential drive
             }),
         )
     }
 }
 
-/// What may be wrong with the yaw rate, and what it then tells per radian turned. One that never
-/// changes may be what nobody measured.
+/// Returns the hypotheses about the yaw rate, each with its ratio of measured to true turn. A
+/// constant yaw rate may be a value that is not measured.
 pub fn of_yaw_rate(constant_radps: Option<f64>) -> Vec<(f64, Hypothesis)> {
     if let Some(radps) = constant_radps {
         let radps = radps + 0.0; // a negative zero is zero
@@ -265,7 +268,7 @@ pub fn of_yaw_rate(constant_radps: Option<f64>) -> Vec<(f64, Hypothesis)> {
     ]
 }
 
-/// What may be wrong with all of a drive.
+/// Returns the hypotheses about the whole drive.
 pub fn of_drive() -> Vec<Hypothesis> {
     let table: [(&str, &str, Correction); 20] = [
         (
@@ -395,7 +398,7 @@ fn turned(pose: Pose, by_rad: f64) -> Pose {
     }
 }
 
-/// A pose mirrored at the line that lies closest to the radio heads (their principal axis).
+/// Mirrors a pose at the line that is closest to the radio heads (their principal axis).
 fn other_side(site: &Site, pose: Pose) -> Pose {
     let count = site.radio_heads.len().max(1) as f64;
     let places = || site.radio_heads.iter().map(|head| head.position_m);
@@ -407,7 +410,7 @@ fn other_side(site: &Site, pose: Pose) -> Pose {
         xx_minus_yy += dx * dx - dy * dy;
         xy += dx * dy;
     }
-    // Mirrored at an axis of direction φ, a direction β becomes 2φ − β.
+    // A mirror axis of direction φ converts a direction β to 2φ − β.
     let twice_rad = (2.0 * xy).atan2(xx_minus_yy);
     let (sin, cos) = twice_rad.sin_cos();
     let (dx, dy) = (pose.x_m - middle[0], pose.y_m - middle[1]);
@@ -424,8 +427,8 @@ mod tests {
     use onboard::settings::{Shipped, TomlFile as _};
 
     #[test]
-    fn the_other_side_looks_alike_and_the_way_back_leads_home() {
-        // Along a wall that rises by half a metre per metre.
+    fn the_other_side_gives_equal_angles_and_mirroring_is_its_own_inverse() {
+        // Radio heads along a line that rises by half a metre per metre.
         let heads = [0.0, 10.0, 20.0, 50.0].iter().enumerate();
         let heads = heads.map(|(pci, x)| {
             let y = 3.0 + 0.5 * x;

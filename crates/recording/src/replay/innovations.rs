@@ -1,4 +1,4 @@
-//! What the angles of a drive say of what was believed before each of them.
+//! Innovations of the angles of a drive.
 
 use std::sync::Arc;
 
@@ -14,34 +14,33 @@ use super::stated::with_phase;
 use crate::angle_log::LoggedAngle;
 use crate::odometry::OdometryLog;
 
-/// An angle as the localizer met it.
+/// Innovation of an angle in the localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Met {
-    /// Of the electrical angle (rad).
+    /// Innovation of the electrical angle (rad).
     pub innovation: Innovation,
     /// Log-likelihood relative to an angle that is predicted exactly; see [`Ekf::relative_log_likelihood`].
     pub relative_log_likelihood: f64,
-    /// Whether the localizer used it.
+    /// Whether the localizer used the angle.
     pub used: bool,
 }
 
-/// Where the localizer believed the vehicle to be at an angle, and how it met the angle; nothing of
-/// one that told it nothing.
+/// Estimated pose at an angle and the innovation; `None` if the angle was not processed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Step {
     pub pose: Option<Pose>,
     pub met: Option<Met>,
 }
 
-/// Drives with a filter that neither searches nor guards itself, and tells what it met; `None` for
-/// an angle that told it nothing. Where `used` says which angles count, exactly those do, however
-/// far they are from what was expected; without, its gate decides.
+/// Processes a drive with a filter without search and integrity monitoring, and returns its
+/// innovations; `None` for an angle that was not processed. If `used` is given, exactly the marked
+/// angles are used, without a gate. Otherwise the filter's gate decides.
 ///
-/// So the residuals are those of the innovations form: given site and vehicle they are independent
-/// and normal, and their likelihood is that of the drive (Schweppe, IEEE Trans. IT 11(1), 1965).
+/// The innovations are independent and normal for the given site and vehicle, and their likelihood
+/// is that of the drive (innovations form; Schweppe, IEEE Trans. IT 11(1), 1965).
 ///
 /// # Errors
-/// [`ReplayError::Settings`] for a road that cannot be built, or an unknown start.
+/// [`ReplayError::Settings`] if the road cannot be built or the start is unknown.
 pub fn innovations(
     site: &Site,
     vehicle: &Vehicle,
@@ -57,10 +56,10 @@ pub fn innovations(
     Ok(steps.into_iter().map(|step| step.met).collect())
 }
 
-/// A filter at the known start that neither searches nor guards itself.
+/// Creates a filter at the known start without search and integrity monitoring.
 ///
 /// # Errors
-/// As [`innovations`].
+/// Errors of [`innovations`].
 pub fn plain_filter(site: &Site, vehicle: &Vehicle) -> Result<Ekf, ReplayError> {
     let start = InitialPose {
         pose: known_start(vehicle)?,
@@ -74,10 +73,10 @@ pub fn plain_filter(site: &Site, vehicle: &Vehicle) -> Result<Ekf, ReplayError> 
     Ok(Ekf::new(config, road.map(Arc::new), &heads, &start))
 }
 
-/// The localizer that the vehicle's settings choose, with all that guards it.
+/// Creates the localizer of the vehicle's settings, including integrity monitoring.
 ///
 /// # Errors
-/// As [`innovations`].
+/// Errors of [`innovations`].
 pub fn vehicles_localizer(
     site: &Site,
     vehicle: &Vehicle,
@@ -91,19 +90,19 @@ fn known_start(vehicle: &Vehicle) -> Result<Pose, ReplayError> {
         pose.is_some(),
         "start.pose",
         "missing",
-        "a drive that says something of the site has a known start",
+        "a drive for the calibration of a site requires a known start",
     )?;
     Ok(pose.unwrap_or_default())
 }
 
-/// Share of the angles at which a localizer may be lost before there is nothing to be learnt from it.
+/// Maximum fraction of the angles at which a localizer is lost; with more, the evaluation stops.
 const MOST_LOST: f64 = 0.2;
 
-/// Drives with a localizer: its belief at each angle, and how it met it, up to where it was lost for
-/// long (a search costs as much as a hundred filters).
+/// Processes a drive with a localizer and returns the estimated pose and the innovation at each
+/// angle, until the localizer is lost for long. A search would take the time of a hundred filters.
 ///
 /// # Errors
-/// [`ReplayError::Custom`] where the localizer fails.
+/// [`ReplayError::Custom`] if the localizer fails.
 pub fn replay_angles(
     localizer: &mut dyn Localizer,
     site: &Site,

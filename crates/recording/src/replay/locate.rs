@@ -1,4 +1,4 @@
-//! A recorded drive as poses.
+//! Localization of a recorded drive.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -26,7 +26,7 @@ use crate::angle_log::{AngleLog, LoggedAngle};
 use crate::odometry::OdometryLog;
 use crate::sigmf::Recording;
 
-/// Locates a drive by angles that were estimated before, and smooths it if asked to.
+/// Locates a drive from logged angles, with optional smoothing.
 ///
 /// # Errors
 /// [`ReplayError`].
@@ -71,8 +71,8 @@ pub fn locate_angles(
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 
-/// Locates a drive by recorded samples, and smooths it if asked to. Sample 0 was received at
-/// `start_time_s` of the odometry.
+/// Locates a drive from recorded samples, with optional smoothing. `start_time_s` is the time of
+/// the first sample according to the odometry's clock.
 ///
 /// # Errors
 /// [`ReplayError`].
@@ -147,8 +147,9 @@ pub fn locate_recording(
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 
-/// Resolves a time offset that the search left in doubt: the localizer's filter estimates the offset over the whole
-/// drive. A significant estimate is corrected from the start of the drive, and its variance remains.
+/// Resolves an uncertain time offset: the localizer's filter estimates the offset over the whole
+/// drive. A significant estimate is corrected from the start of the drive, and its variance
+/// remains.
 fn resolved(
     late: Lateness,
     site: &Site,
@@ -161,7 +162,7 @@ fn resolved(
         return Ok(late);
     }
     let mut vehicle = vehicle.clone();
-    // The prior covers the candidate of the search, so that it does not bias the estimate.
+    // The prior includes the candidate of the search, so that it does not bias the estimate.
     vehicle.receiver.lateness_std_s = Some(late.left_std_s.max(late.candidate_s.abs()));
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     replay.hear(angles)?;
@@ -184,7 +185,7 @@ fn defines_times(recording: &Recording) -> bool {
     (captures.iter()).any(|it| keys.iter().any(|key| it.other.contains_key(*key)))
 }
 
-/// Takes in the rest of the odometry, and says what is wrong with the drive as it was given.
+/// Processes the rest of the odometry and adds the diagnoses of the drive.
 fn explain(
     replay: &mut Replay<'_>,
     site: &Site,
@@ -214,7 +215,8 @@ fn as_given<'a>(
     }
 }
 
-/// An angle as it was heard; its lateness is taken off.
+/// Converts the measurement of an execution to a logged angle; the time offset is already
+/// corrected.
 fn as_logged(execution: &Execution) -> Option<LoggedAngle> {
     let measured = execution.measured?;
     let ssb = SensedSsb {
@@ -224,7 +226,8 @@ fn as_logged(execution: &Execution) -> Option<LoggedAngle> {
     Some(LoggedAngle { ssb, measured })
 }
 
-/// The vehicle for angles that its wake-up policy has chosen already.
+/// Returns the vehicle with a policy that uses every angle, because the wake-up policy has already
+/// selected them.
 fn as_chosen(vehicle: &Vehicle) -> Vehicle {
     Vehicle {
         wake_up: Some(WakeUpSettings::EVERY_SSB),
@@ -232,7 +235,7 @@ fn as_chosen(vehicle: &Vehicle) -> Vehicle {
     }
 }
 
-/// The vehicle for angles whose lateness is taken off already.
+/// Returns the vehicle without a time offset, because it is already corrected.
 fn in_time(vehicle: &Vehicle) -> Vehicle {
     let mut vehicle = vehicle.clone();
     vehicle.receiver.lateness_s = 0.0;
@@ -254,8 +257,8 @@ fn finish(
     Ok(drive)
 }
 
-/// Drives once more, to see each pose from the end. A radio head that was found faulty is not
-/// heard before it was trusted again; so nothing needs a guard.
+/// Processes the drive once more with smoothing. Angles of a radio head that was found faulty are
+/// omitted until it was valid again, so that integrity monitoring is not needed.
 fn look_back(
     site: &Site,
     vehicle: &Vehicle,
@@ -284,7 +287,7 @@ fn look_back(
     };
     let executions = executions.iter().filter(trusted);
     let mut angles: Vec<LoggedAngle> = executions.filter_map(as_logged).collect();
-    // Nothing is late when all is known.
+    // With all data available, no angle is late.
     angles.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));
     let mut replay = Replay::new(site, &unguarded, start, Custom::default(), odometry)?;
     replay.keep_journal();

@@ -1,4 +1,4 @@
-//! A drive that has been located.
+//! Located drive.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -7,34 +7,34 @@ use onboard::Execution;
 use onboard::localize::PoseEstimate;
 use onboard::localize::ekf::EstimatedConstants;
 
-/// Where the vehicle was at one instant.
+/// Estimate at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocatedPose {
     /// Time, pose and covariance.
     pub estimate: PoseEstimate,
     /// Odometer speed in m/s.
     pub speed_mps: f64,
-    /// Yaw rate in rad/s, where there is a gyroscope.
+    /// Yaw rate in rad/s; `None` without a gyroscope.
     pub yaw_rate_radps: Option<f64>,
-    /// Number of places the vehicle may be at, while the first pose is searched for; the estimate
-    /// is their mean.
+    /// Number of possible positions during the search for the first pose; the estimate is their
+    /// mean. `None` after the search.
     pub searching: Option<usize>,
-    /// Whether the angles came from elsewhere than expected, so that the pose is not to be relied on.
+    /// Whether the angles contradict the pose, so that the pose is invalid.
     pub is_lost: bool,
-    /// How far the array has come from its survey.
+    /// Estimated constants of the vehicle.
     pub constants: Option<EstimatedConstants>,
 }
 
-/// What is remarkable about one item of the input.
+/// Remark on one item of the input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Remark {
-    /// When in the drive it came, in seconds.
+    /// Time in the drive in seconds.
     pub time_s: f64,
-    /// Which item, what is wrong with it, and whether it was left out.
+    /// Item, its defect, and whether it was omitted.
     pub text: String,
 }
 
-/// Remarks in order of time; of those that differ in numbers only the first stands for all.
+/// Sorts remarks by time. Remarks that differ in numbers only are merged into the first one.
 pub fn gathered(mut remarks: Vec<Remark>) -> Vec<Remark> {
     remarks.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     let is_of_number = |it: char| it.is_ascii_digit() || ".-".contains(it);
@@ -63,46 +63,49 @@ pub fn gathered(mut remarks: Vec<Remark>) -> Vec<Remark> {
     told.collect()
 }
 
-/// A located drive.
+/// Located drive.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LocatedDrive {
     /// One pose per odometry sample.
     pub poses: Vec<LocatedPose>,
-    /// The angles and what became of them.
+    /// Results of the angles.
     pub executions: Vec<Execution>,
-    /// The poses as seen from the end of the drive, from the first known one on, where asked for.
+    /// Smoothed poses from the first known one; empty unless requested.
     pub smoothed: Vec<LocatedPose>,
-    /// What the drive showed of the vehicle by its end, where the localizer looks for it.
+    /// Estimated constants of the vehicle at the end of the drive; `None` if the localizer
+    /// estimates none.
     pub constants: Option<EstimatedConstants>,
-    /// What was remarkable about single items of the input, in order of time.
+    /// Remarks on single items of the input, in order of time.
     pub remarks: Vec<Remark>,
-    /// What is wrong with the input as it was given; these are among the remarks too.
+    /// Diagnoses of systematic errors in the input, which are also part of the remarks.
     pub diagnoses: Vec<Diagnosis>,
 }
 
-/// What is wrong with the input as it was given.
+/// Diagnosis of a systematic error in the input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Diagnosis {
-    /// What speaks for it, and what to check.
+    /// Evidence, and recommended checks.
     pub text: String,
-    /// Whether it is the start alone, which a vehicle that is found again has overcome.
+    /// Whether the error concerns the start only, which does not matter after the vehicle is found
+    /// again.
     pub is_of_start: bool,
-    /// Whether the drive was located well all the same.
+    /// Whether the drive was located well nevertheless.
     pub is_harmless: bool,
 }
 
-/// Share of the time that a drive may be lost without that being its result.
+/// Maximum fraction of the time in state `lost` of a usable result.
 const MOST_LOST: f64 = 0.2;
 
 impl LocatedDrive {
-    /// Whether it never was where it could be relied on: lost for long, or at its end, or never found.
+    /// Whether the result is unusable: lost for more than 20 % of the time, lost at the end, or
+    /// never found.
     pub fn is_lost_for_long(&self) -> bool {
         let ends_lost = self.poses.last().is_none_or(|last| last.is_lost);
         ends_lost || self.lost_share() > MOST_LOST
     }
 
-    /// Share of the time without a position that can be relied on: angles came from elsewhere than
-    /// expected, or the vehicle was never found.
+    /// Returns the fraction of the time without a valid position: the angles contradict the pose,
+    /// or the vehicle was never found.
     pub fn lost_share(&self) -> f64 {
         if self.poses.iter().all(|pose| pose.searching.is_some()) {
             return 1.0;
@@ -111,7 +114,7 @@ impl LocatedDrive {
         lost as f64 / self.poses.len() as f64
     }
 
-    /// What of the diagnoses did harm.
+    /// Returns the diagnoses that affected the result.
     pub fn suspicions(&self) -> impl Iterator<Item = &Diagnosis> {
         self.diagnoses.iter().filter(|it| !it.is_harmless)
     }
@@ -122,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn remarks_that_differ_in_numbers_are_one() {
+    fn remarks_that_differ_in_numbers_are_merged() {
         let remark = |time_s: f64, text: &str| Remark {
             time_s,
             text: text.to_owned(),

@@ -1,4 +1,4 @@
-//! A recorded drive through the pipeline: odometry and SSBs, or angles, in order of time.
+//! Replay of a recorded drive: odometry and SSBs, or angles, are processed in order of time.
 
 mod angles;
 mod clock;

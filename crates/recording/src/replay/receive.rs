@@ -1,5 +1,5 @@
-//! A recording through the receiver, block by block. A recording that was switched off between the
-//! bursts has a capture for each stretch, with its place in time in `core:global_index`.
+//! Reception of a recording block by block. If the recorder was off between the bursts, the
+//! recording has one capture per segment with its position in time in `core:global_index`.
 
 use nr_ssb::receiver::ReceiverError;
 use num_complex::Complex32;
@@ -10,33 +10,34 @@ use onboard::receive::{ReceiveError, ReceiverConfig};
 use super::error::ReplayError;
 use crate::sigmf::{Capture, Recording};
 
-/// Samples of the recording read at once: 20 ms.
+/// Duration of samples that are read at once in seconds.
 const BLOCK_S: f64 = 0.02;
 
-/// A stretch of samples without a gap.
+/// Contiguous segment of samples.
 struct Stretch {
-    /// First and last-plus-one sample in the file.
+    /// Index of the first sample in the file.
     from: u64,
+    /// Index after the last sample in the file.
     to: u64,
-    /// Number of its first sample since the receiver began to count.
+    /// Number of the first sample since the receiver began to count.
     global_index: u64,
 }
 
-/// Samples that are missing from a recording and that it says nothing of, by the times of its SSBs.
+/// Missing samples that the recording does not report, detected from the times of the SSBs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UntoldGap {
-    /// Time of the first SSB after it, in seconds; it and all later times are corrected.
+    /// Time of the first SSB after the gap in seconds; this and all later times are corrected.
     pub before_s: f64,
-    /// How long it is, but for whole periods of the SSB, in seconds.
+    /// Duration of the gap in seconds, modulo the SSB period.
     pub lost_s: f64,
 }
 
-/// Receives a whole recording and hands the SSBs to `take`, those of a burst at once, in order of time. The
-/// gaps that the recording does not tell of are returned.
+/// Receives a whole recording and calls `take` with the SSBs of each burst in order of time.
+/// Returns the gaps that the recording does not report.
 ///
 /// # Errors
-/// [`ReplayError`] when the recording cannot be read or does not suit the receiver, and whatever
-/// `take` fails with.
+/// [`ReplayError`] if the recording cannot be read or is incompatible with the receiver; errors of
+/// `take`.
 pub fn receive_recording(
     config: ReceiverConfig,
     recording: &mut Recording,
@@ -65,7 +66,7 @@ pub fn receive_recording(
     }
     recording.check_one_frequency()?;
     let rate_hz = recording.sample_rate_hz();
-    // Where the recording does not say, the SSB was tuned to.
+    // Without a centre frequency in the recording, the receiver is assumed to be tuned to the SSB.
     let centre_hz = recording.centre_frequency_hz();
     let centre_hz = centre_hz.unwrap_or(config.ssb_freq_hz);
     let stream = StreamConfig { rate_hz, centre_hz };
@@ -118,7 +119,7 @@ fn stretches(recording: &Recording) -> Vec<Stretch> {
         let global_index = global_index(capture);
         if let Some(last) = stretches.last_mut() {
             last.to = capture.sample_start;
-            // A capture that goes on where the last one ended is no gap.
+            // A capture that continues the previous one is not a gap.
             if global_index == last.global_index + (last.to - last.from) {
                 last.to = recording.length();
                 continue;

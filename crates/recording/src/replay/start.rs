@@ -1,25 +1,25 @@
-//! Where a recorded drive begins.
+//! Start of a recorded drive.
 
 use onboard::geometry::Pose;
 use onboard::live::starting_at;
 use onboard::settings::{SettingsError, Site, Vehicle, WakeUpSettings};
 
-/// Where a drive begins, if not where the vehicle's settings say.
+/// Choice of the start pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum StartChoice {
-    /// Where the vehicle's settings say; anywhere on the road if they do not.
+    /// Start of the vehicle's settings; a search along the road if the settings have none.
     #[default]
     AsSet,
-    /// Here.
+    /// Given pose.
     At(Pose),
-    /// Anywhere on the road.
+    /// Unknown position on the road.
     Unknown,
 }
 
-/// The vehicle with the start of a drive, and that start.
+/// Returns the vehicle with the start of a drive, and the start pose.
 ///
 /// # Errors
-/// [`SettingsError`] when it is not known, and not what finding the vehicle takes.
+/// [`SettingsError`] if the start is unknown and a search is impossible.
 pub fn starting(
     site: &Site,
     vehicle: &Vehicle,
@@ -37,7 +37,7 @@ pub fn starting(
         }
     };
     let (mut vehicle, pose) = starting_at(site, vehicle, pose)?;
-    // Nobody saves energy on what is recorded already, unless asked to.
+    // Saving energy is pointless with recorded data, so that every SSB is used by default.
     vehicle.wake_up.get_or_insert(WakeUpSettings::EVERY_SSB);
     Ok((vehicle, pose))
 }

@@ -6,15 +6,16 @@ use super::error::ReplayError;
 use crate::angle_log::LoggedAngle;
 use crate::odometry::OdometryLog;
 
-/// Share of the angles within the time of the odometry below which their unit is in doubt.
+/// Minimum fraction of the angles within the time of the odometry; below it, the unit of the
+/// angles' times is checked.
 const MIN_INSIDE: f64 = 0.5;
-/// Share of the angles within the time of the odometry from which on a unit explains them.
+/// Minimum fraction of the angles within the time of the odometry for an accepted unit.
 const EXPLAINED: f64 = 0.9;
 
 /// Checks that the times of odometry and angles are in seconds.
 ///
 /// # Errors
-/// [`ReplayError::TimeUnit`] naming the likely unit.
+/// [`ReplayError::TimeUnit`] with the probable unit.
 pub fn check_times(odometry: &OdometryLog, angles: &[LoggedAngle]) -> Result<(), ReplayError> {
     let field = odometry.fields.time;
     if let Some((unit, step)) = unit_of(odometry) {
@@ -40,7 +41,7 @@ pub fn check_times(odometry: &OdometryLog, angles: &[LoggedAngle]) -> Result<(),
     Ok(())
 }
 
-/// Unit of the odometry's times and the usual step between them; `None` if it may be seconds.
+/// Returns the unit of the odometry's times and the median step; `None` if the unit may be seconds.
 fn unit_of(odometry: &OdometryLog) -> Option<(TimeUnit, f64)> {
     let samples = &odometry.samples;
     let mut times = OdometryTimes {
@@ -62,7 +63,8 @@ fn unit_of(odometry: &OdometryLog) -> Option<(TimeUnit, f64)> {
     Some((times.unit()?, times.step_s))
 }
 
-/// Unit in which the angles fall into the time of the odometry, if they do not in seconds.
+/// Returns the unit in which the angles are within the time of the odometry; `None` if this unit is
+/// seconds.
 fn unit_of_angles(odometry: &OdometryLog, angles: &[LoggedAngle]) -> Option<(TimeUnit, f64)> {
     let times = || angles.iter().map(|it| it.measured.time_s);
     let inside = |per_second: f64| {
@@ -75,7 +77,8 @@ fn unit_of_angles(odometry: &OdometryLog, angles: &[LoggedAngle]) -> Option<(Tim
         return None;
     }
     let [first_s, last_s] = odometry.interval_s()?;
-    // All times are near 0 in a unit that is too long; so the angles have to cover the drive, too.
+    // In a unit that is too long, all times are near 0. Therefore, the angles must also cover the
+    // drive.
     let spans = |unit: &TimeUnit| {
         let first = times().fold(f64::INFINITY, f64::min) / unit.per_second();
         let last = times().fold(f64::NEG_INFINITY, f64::max) / unit.per_second();
@@ -86,7 +89,7 @@ fn unit_of_angles(odometry: &OdometryLog, angles: &[LoggedAngle]) -> Option<(Tim
     Some((unit, median_step_s(times())))
 }
 
-/// Median of the positive differences of successive times.
+/// Returns the median of the positive differences of successive times.
 fn median_step_s(times_s: impl Iterator<Item = f64>) -> f64 {
     let mut before_s = None;
     let steps =

@@ -1,23 +1,23 @@
-//! Whether the odometry's yaw rate is what it is said to be.
+//! Plausibility of the odometry's yaw rate.
 
 use onboard::geometry::wrap_angle;
 use onboard::observation::OdometrySample;
 
 use super::located::LocatedPose;
 
-/// Yaw rates that differ by less are one and the same (rad/s).
+/// Maximum difference of equal yaw rates (rad/s).
 const CONSTANT_RADPS: f64 = 1e-9;
 
 /// Time over which turns are compared (s).
 const WINDOW_S: f64 = 2.0;
 
-/// Change of heading without which nothing is said of a yaw rate (rad).
+/// Minimum change of heading for a comparison (rad).
 const LEAST_TURNED_RAD: f64 = 0.5;
 
-/// By what share a factor may be off to be taken for one.
+/// Maximum relative deviation of a ratio from an expected factor.
 const ABOUT: f64 = 0.25;
 
-/// The yaw rate of a log in which it never changes.
+/// Returns the yaw rate of a log in which it is constant; `None` otherwise.
 pub fn constant_radps(samples: &[OdometrySample]) -> Option<f64> {
     let mut rates = samples.iter().map(|it| it.yaw_rate_radps);
     let first_radps = rates.next()??;
@@ -26,11 +26,11 @@ pub fn constant_radps(samples: &[OdometrySample]) -> Option<f64> {
     rates.all(is_same).then_some(first_radps)
 }
 
-/// Radians that the yaw rate tells per radian that the located vehicle turned; `None`
-/// where the vehicle hardly turned, or the two have nothing to do with each other.
+/// Returns the turn according to the yaw rate divided by the turn of the located vehicle. Returns
+/// `None` if the vehicle hardly turned or the two are uncorrelated.
 pub fn told_per_turned(poses: &[LocatedPose]) -> Option<f64> {
     let (mut told_turned, mut turned_turned) = (0.0, 0.0);
-    // By how much it has turned since the first pose, and the bounds of that.
+    // Turn since the first pose, and its minimum and maximum.
     let (mut heading_rad, mut least_rad, mut most_rad) = (0.0, 0.0_f64, 0.0_f64);
     let mut told_told = 0.0;
     let mut window = (poses.first()?, 0.0);
@@ -60,7 +60,7 @@ pub fn told_per_turned(poses: &[LocatedPose]) -> Option<f64> {
     is_told.then_some(told_turned / turned_turned)
 }
 
-/// Whether a yaw rate tells about so much per radian turned.
+/// Whether the ratio is close to a factor.
 pub fn is_about(told_per_turned: f64, factor: f64) -> bool {
     (told_per_turned - factor).abs() < ABOUT * factor.abs()
 }

@@ -1,4 +1,4 @@
-//! What is wrong with single receive channels: clipped, silent, weak, doubled, exchanged.
+//! Faults of receive channels: clipped, silent, weak, duplicated or exchanged channels.
 
 use std::f64::consts::TAU;
 use std::fmt;
@@ -10,43 +10,43 @@ use num_complex::Complex64;
 
 use onboard::receive::array_view::{FoundAngle, View};
 
-/// Channels are judged exchanged only on SSBs of at least this SNR per symbol, in dB.
+/// Minimum SNR per symbol of an SSB for the detection of exchanged channels, in dB.
 const SWAP_SNR_DB: f64 = 10.0;
-/// Power that must be gained by changing two channels back, as a share of all power.
+/// Minimum fraction of the power that the exchange of two channels must add to the beam.
 const SWAP_GAIN: f64 = 0.1;
-/// Share of the power in one direction that right channels have at least.
+/// Minimum fraction of the power in one direction for channels in correct order.
 const RIGHT_SHARE: f64 = 0.9;
 
 /// Maximum frequency of a tone that is called a DC offset, in Hz.
 const DC_HZ: f64 = 100.0;
-/// Two tones closer than this are one, in Hz: a bin of the spectra that they are found in.
+/// Minimum distance of two tones in Hz: a bin of the spectra in which they are detected.
 pub(super) const ONE_TONE_HZ: f64 = 15e3;
 
-/// What is wrong with the channels.
+/// Fault of the receive channels.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ChannelFault {
-    /// Its samples themselves show it.
+    /// Fault that the samples of a channel reveal.
     Samples {
-        /// The channel.
+        /// Index of the channel.
         channel: usize,
-        /// What they show.
+        /// Kind of fault.
         fault: Fault,
     },
-    /// The array's response makes sense with these two exchanged, and not as they are.
+    /// Two channels are exchanged, according to the array's response.
     Exchanged {
-        /// One channel.
+        /// Index of the first channel.
         first: usize,
-        /// The other.
+        /// Index of the second channel.
         second: usize,
     },
-    /// DC offset, or a tone in the recorded band. It is subtracted before SSBs are searched for.
+    /// DC offset, or a tone in the recorded band. It is subtracted before the search for SSBs.
     Tone(Tone),
-    /// There are SSBs with I and Q exchanged, and none otherwise.
+    /// I and Q are exchanged: SSBs are found only after their exchange.
     IqExchanged,
 }
 
 impl ChannelFault {
-    /// The channel that has it; none where two are exchanged.
+    /// Returns the index of the faulty channel; `None` for faults of several channels.
     pub const fn channel(&self) -> Option<usize> {
         match self {
             Self::Samples { channel, .. } => Some(*channel),
@@ -106,7 +106,7 @@ impl fmt::Display for ChannelFault {
     }
 }
 
-/// Faults that the samples alone show.
+/// Returns the faults that the samples reveal.
 pub(super) fn faults_of_samples(
     antennas: &[&[Complex32]],
     sample_rate_hz: f64,
@@ -127,7 +127,7 @@ pub(super) fn faults_of_samples(
     faults
 }
 
-/// Adds a tone, unless it is known.
+/// Adds a tone unless it is already known.
 pub(super) fn add_tone(faults: &mut Vec<ChannelFault>, tone: Tone) {
     let same = |fault: &ChannelFault| match fault {
         ChannelFault::Tone(known) => (known.frequency_hz - tone.frequency_hz).abs() < ONE_TONE_HZ,
@@ -138,7 +138,7 @@ pub(super) fn add_tone(faults: &mut Vec<ChannelFault>, tone: Tone) {
     }
 }
 
-/// Votes of the SSBs on whether two channels are exchanged.
+/// Votes of the SSBs on exchanged channels.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ExchangeVotes {
     right: usize,
@@ -146,9 +146,10 @@ pub(super) struct ExchangeVotes {
 }
 
 impl ExchangeVotes {
-    /// Takes the vote of an SSB as the array saw it.
+    /// Adds the vote of an SSB.
     pub fn vote(&mut self, view: &View) {
-        // Elsewhere than in a row exchanged antennas see a wave from elsewhere.
+        // With an array that is not linear, exchanged antennas give a plane wave from another
+        // direction.
         let FoundAngle::FromRow(estimate) = view.angle else {
             return;
         };
@@ -156,8 +157,9 @@ impl ExchangeVotes {
             return;
         }
         let antennas = view.blocks.first().map_or(0, Vec::len);
-        // Neighbours first: of four antennas, exchanging the inner two looks like exchanging the
-        // outer two in a mirror, and only a clearly better pair replaces a nearer one.
+        // Adjacent pairs first. With four antennas, the exchange of the inner pair is equivalent to
+        // that of the outer pair with a mirrored angle. A distant pair replaces a nearer one only
+        // if it is clearly better.
         let pairs = (1..antennas).flat_map(|apart| (apart..antennas).map(move |j| (j - apart, j)));
         let as_it_is = share_in_one_direction(&view.blocks, None);
         let (share, pair) = pairs.fold((0.0, (0, 0)), |best, pair| {
@@ -175,7 +177,7 @@ impl ExchangeVotes {
         }
     }
 
-    /// Adds the votes of others.
+    /// Adds the votes of another search.
     pub fn add(&mut self, others: &Self) {
         self.right += others.right;
         for (pair, votes) in &others.exchanged {
@@ -191,7 +193,7 @@ impl ExchangeVotes {
         }
     }
 
-    /// What the majority says.
+    /// Returns the fault of the majority.
     pub fn fault(&self) -> Option<ChannelFault> {
         let all = self.right + self.exchanged.iter().map(|(_, votes)| votes).sum::<usize>();
         let ((first, second), votes) = *self.exchanged.iter().max_by_key(|(_, votes)| votes)?;
@@ -199,7 +201,8 @@ impl ExchangeVotes {
     }
 }
 
-/// Largest share of the power that one plane wave explains, with a pair of channels exchanged.
+/// Returns the maximum fraction of the power that one plane wave explains, with a pair of channels
+/// exchanged.
 fn share_in_one_direction(blocks: &[Vec<Complex64>], exchanged: Option<(usize, usize)>) -> f64 {
     const DIRECTIONS: usize = 128;
     let mut total = 0.0;

@@ -1,4 +1,4 @@
-//! What makes a scan impossible.
+//! Errors of a scan.
 
 use nr_ssb::front_end::FrontEndError;
 use nr_ssb::search::SearchError;
@@ -6,41 +6,41 @@ use thiserror::Error;
 
 use crate::error::RecordingError;
 
-/// What makes a scan impossible.
+/// Error of a scan.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ScanError {
     /// The samples cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// The recording's rate or band does not suit.
+    /// The sample rate or band of the recording is unsupported.
     #[error("{file}: {source}")]
     FrontEnd {
-        /// The recording.
+        /// Path of the recording.
         file: String,
-        /// What does not suit.
+        /// Cause.
         source: FrontEndError,
     },
-    /// The search refused its input.
+    /// The search rejects its input.
     #[error("{file}: {source}{}", rate_of_count(source))]
     Search {
-        /// The recording.
+        /// Path of the recording.
         file: String,
-        /// What does not suit.
+        /// Cause.
         source: SearchError,
     },
-    /// No centre frequency, in the recording or in the settings.
-    #[error("{file}: no centre frequency; the recording must state it, or it must be given")]
+    /// Neither the recording nor the settings contain a centre frequency.
+    #[error("{file}: no centre frequency; it must be in the recording or be given")]
     NoCentreFrequency {
-        /// The recording.
+        /// Path of the recording.
         file: String,
     },
-    /// An impossible array.
+    /// The array is invalid.
     #[error("array: {0}")]
     Array(#[from] aoa::Error),
 }
 
-/// The rate at which samples are counted, which need not be that of the file.
+/// Returns an explanation of the sample rate in which samples are counted.
 fn rate_of_count(error: &SearchError) -> &'static str {
     if matches!(error, SearchError::TooShort { .. }) {
         ", counted at the base rate of the search and not at that of the recording"

@@ -1,26 +1,27 @@
-//! Where samples come from.
+//! Sources of samples.
 
 use num_complex::Complex32;
 
 use crate::error::RecordingError;
 use crate::sigmf::Recording;
 
-/// Samples of one or more antennas, read piece by piece.
+/// Samples of one or more antennas, read in blocks.
 pub trait IqSource {
-    /// What errors call it.
+    /// Returns the name of the source in errors.
     fn name(&self) -> String;
-    /// Number of antennas.
+    /// Returns the number of antennas.
     fn channels(&self) -> usize;
-    /// Samples per antenna.
+    /// Returns the number of samples per antenna.
     fn length(&self) -> u64;
-    /// Samples per second and antenna.
+    /// Returns the sample rate in Hz.
     fn sample_rate_hz(&self) -> f64;
-    /// Centre frequency in Hz, where it is known.
+    /// Returns the centre frequency in Hz; `None` if it is unknown.
     fn centre_frequency_hz(&self) -> Option<f64>;
-    /// Reads `count` samples of every antenna from `start` on; `antennas` becomes as many vectors.
+    /// Reads `count` samples of every antenna from sample `start`; `antennas` is resized to one
+    /// vector per antenna.
     ///
     /// # Errors
-    /// [`RecordingError`] where they cannot be had.
+    /// [`RecordingError`] if the samples cannot be read.
     fn read(
         &mut self,
         start: u64,
@@ -60,7 +61,7 @@ impl IqSource for Recording {
     }
 }
 
-/// Channel and number of the first sample that is not finite.
+/// Returns the channel and index of the first sample that is not finite.
 pub(super) fn first_not_finite(antennas: &[&[Complex32]]) -> Option<(usize, usize)> {
     antennas.iter().enumerate().find_map(|(channel, samples)| {
         let place = samples.iter().position(|sample| !sample.is_finite())?;
@@ -68,14 +69,14 @@ pub(super) fn first_not_finite(antennas: &[&[Complex32]]) -> Option<(usize, usiz
     })
 }
 
-/// Samples in memory, one slice per antenna, all of one length.
+/// Samples in memory, one slice of equal length per antenna.
 #[derive(Debug, Clone)]
 pub struct SampleBlock<'a> {
-    /// The samples.
+    /// Samples of each antenna.
     pub antennas: Vec<&'a [Complex32]>,
-    /// Samples per second and antenna.
+    /// Sample rate in Hz.
     pub sample_rate_hz: f64,
-    /// Centre frequency in Hz, where it is known.
+    /// Centre frequency in Hz; `None` if it is unknown.
     pub centre_frequency_hz: Option<f64>,
 }
 

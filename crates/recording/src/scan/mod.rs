@@ -1,4 +1,4 @@
-//! Whatever cells are in a recording that nobody has described, with angles where there are several
+//! Search for cells in a recording without prior knowledge, with angles for arrays of several
 //! antennas.
 
 mod diagnosis;

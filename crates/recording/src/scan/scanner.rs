@@ -1,4 +1,4 @@
-//! Every SSB of a recording that nobody has said anything about.
+//! Search for every SSB of a recording without prior knowledge.
 
 use nr_ssb::front_end::FrontEnd;
 use nr_ssb::raster;
@@ -11,45 +11,46 @@ use super::search_scope::{Places, SearchScope};
 use super::ssb_search::{BLOCK_S, FALSE_ALARM, FoundSsb, SsbSearch, SsbSearchConfig};
 use onboard::receive::array_view::ArraySetup;
 
-/// Searched for unknown frequencies, in two steps: the usual period, and the longest (TS
-/// 38.331).
+/// Durations of the search for unknown frequencies in seconds: the usual SSB period, and the
+/// longest one (TS 38.331).
 const WINDOWS_S: [f64; 2] = [0.02, 0.16];
-/// Off the raster, work grows with duration and with the bandwidth's square: 20 ms at 46 Msps are
-/// looked through, of narrower bands more.
+/// Limit of the search outside the raster: duration times squared sample rate, which is
+/// proportional to the computation. It corresponds to 20 ms at 46.08 Msps; narrower bands are
+/// searched longer.
 const OFF_RASTER_BUDGET: f64 = 0.02 * 46.08e6 * 46.08e6;
 
-/// What a scan is told; by default nothing.
+/// Prior knowledge of a scan; by default none.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ScanSettings {
-    /// Absolute frequency of the SSB's centre in Hz; else the synchronization raster is searched.
+    /// Absolute centre frequency of the SSB in Hz [default: search of the synchronization raster].
     pub ssb_freq_hz: Option<f64>,
-    /// Subcarrier spacing; else both of the frequency range are tried.
+    /// Subcarrier spacing [default: both spacings of the frequency range].
     pub spacing: Option<SubcarrierSpacing>,
-    /// Largest offset of the oscillators, of the transmitter and of the receiver together, in parts
-    /// per million, where the frequency is given; else half a subcarrier.
+    /// Maximum frequency error of transmitter and receiver together in parts per million, if the
+    /// frequency is given [default: half a subcarrier].
     pub cfo_ppm: Option<f64>,
-    /// Centre frequency of the recording in Hz, in place of its own.
+    /// Centre frequency in Hz that replaces the one of the recording.
     pub centre_frequency_hz: Option<f64>,
-    /// The receiving array, for angles.
+    /// Array of the receiver, for angles.
     pub array: ArraySetup,
 }
 
-/// All that a scan found.
+/// Result of a scan.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Scan {
-    /// The SSBs in order of time.
+    /// SSBs in order of time.
     pub ssbs: Vec<FoundSsb>,
-    /// What is wrong with single channels.
+    /// Faults of the receive channels.
     pub faults: Vec<ChannelFault>,
-    /// Where was searched.
+    /// Scope of the search.
     pub searched: Vec<SearchScope>,
 }
 
 /// Finds every SSB of a recording, in order of time.
 ///
 /// # Errors
-/// [`ScanError`] when the recording cannot be read or searched as it is; a recording without any
-/// SSB is not an error.
+/// [`ScanError`] if the recording cannot be read or searched. A recording without an SSB is not an
+/// error.
 pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, ScanError> {
     let file = source.name();
     let front_end_failed = |source| ScanError::FrontEnd {
@@ -60,7 +61,7 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
     let centre_hz = settings
         .centre_frequency_hz
         .or(source.centre_frequency_hz());
-    // A rate that no numerology can use is better said before anything else.
+    // Report an unsupported sample rate before other errors.
     let [lowest, _] =
         SubcarrierSpacing::of_range(settings.ssb_freq_hz.or(centre_hz).unwrap_or(0.0));
     FrontEnd::new(rate_hz, 0.0, lowest.hz(), 1).map_err(front_end_failed)?;
@@ -100,12 +101,12 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
         };
         search.places(source, &mut found.searched)?
     };
-    // Shared among the places looked at.
+    // Divide the false-alarm probability among the searched positions.
     let false_alarm = FALSE_ALARM / places.len() as f64;
     for place in places {
         let mut search = SsbSearch::new(SsbSearchConfig {
             name: file.clone(),
-            // A centre of 0 Hz is none; a given frequency is meant as it is.
+            // A centre frequency of 0 Hz means an unknown one; a given SSB frequency is absolute.
             absolute: centre_hz > 0.0 || settings.ssb_freq_hz.is_some(),
             array: settings.array.clone(),
             false_alarm,
@@ -141,7 +142,7 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
     Ok(found)
 }
 
-/// Where to search, and how.
+/// Frequency and subcarrier spacing of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Place {
     ssb_freq_hz: f64,
@@ -149,7 +150,7 @@ struct Place {
 }
 
 fn given_places(rate_hz: f64, ssb_freq_hz: f64, spacing: Option<SubcarrierSpacing>) -> Vec<Place> {
-    // A spacing that was asked for may fail; one that was only guessed is left out.
+    // A given spacing may cause an error; an assumed one is omitted if it is impossible.
     let guessed = SubcarrierSpacing::of_range(ssb_freq_hz).into_iter();
     let possible = guessed.filter(|one| spacing.is_none() && one.base_rate_hz() <= rate_hz);
     let place = |spacing| Place {
@@ -159,7 +160,7 @@ fn given_places(rate_hz: f64, ssb_freq_hz: f64, spacing: Option<SubcarrierSpacin
     spacing.into_iter().chain(possible).map(place).collect()
 }
 
-/// Carrier frequency offsets looked at, to either side.
+/// Returns the maximum carrier frequency offset of the search in either direction (Hz).
 fn cfo_range_hz(settings: &ScanSettings, place: &Place) -> f64 {
     let given = settings.cfo_ppm.filter(|_| settings.ssb_freq_hz.is_some());
     given.map_or(0.5 * place.spacing.hz(), |ppm| {
@@ -167,16 +168,17 @@ fn cfo_range_hz(settings: &ScanSettings, place: &Place) -> f64 {
     })
 }
 
-/// The search for SSBs whose frequency nobody has told.
+/// Search for SSBs of unknown frequency.
 struct BandSearch {
     centre_hz: Option<f64>,
     spacing: Option<SubcarrierSpacing>,
-    /// A channel with nothing wrong with it.
+    /// Index of a channel without a fault.
     sound_channel: usize,
 }
 
 impl BandSearch {
-    /// Where there are SSBs: on the raster by all channels; everywhere else, too much for that, by one.
+    /// Returns the frequencies with SSBs: on the raster with all channels, and outside the raster
+    /// with one channel because of the computing time.
     fn places(
         &self,
         source: &mut dyn IqSource,
@@ -224,7 +226,7 @@ impl BandSearch {
         Ok(places)
     }
 
-    /// What looking at so many samples, on the raster and off it, comes to.
+    /// Returns the scopes of a search of the given numbers of samples on the raster and outside it.
     fn scopes(&self, rate_hz: f64, samples: [usize; 2], channels: usize) -> Vec<SearchScope> {
         let [on_raster_s, off_raster_s] = samples.map(|samples| samples as f64 / rate_hz);
         let range = SubcarrierSpacing::of_range(self.centre_hz.unwrap_or(0.0));

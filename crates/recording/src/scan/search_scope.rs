@@ -1,39 +1,39 @@
-//! Where a scan has looked, which is what there is to say where it found nothing.
+//! Scope of a scan, which is the result if no SSB is found.
 
 use std::fmt;
 
 use nr_ssb::SubcarrierSpacing;
 
-/// One kind of search through a recording.
+/// Scope of one kind of search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchScope {
-    /// Subcarrier spacing looked for.
+    /// Subcarrier spacing.
     pub spacing: SubcarrierSpacing,
-    /// At which frequencies of the SSB's centre.
+    /// Centre frequencies of the SSB.
     pub places: Places,
-    /// In how much of the recording, from its beginning, in seconds.
+    /// Searched duration from the start of the recording in seconds.
     pub duration_s: f64,
-    /// On how many channels.
+    /// Number of searched channels.
     pub channels: usize,
 }
 
-/// Frequencies of the SSB's centre.
+/// Centre frequencies of the SSB.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Places {
-    /// One that was told.
+    /// Given frequency.
     Given {
-        /// The frequency, Hz.
+        /// Frequency in Hz.
         ssb_freq_hz: f64,
-        /// Largest carrier frequency offset to either side, Hz.
+        /// Maximum carrier frequency offset in either direction in Hz.
         cfo_hz: f64,
     },
-    /// So many points of the synchronization raster.
+    /// Number of points of the synchronization raster.
     Raster(usize),
     /// Any frequency.
     Anywhere {
-        /// The lowest, Hz.
+        /// Lowest frequency in Hz.
         low_hz: f64,
-        /// The highest, Hz.
+        /// Highest frequency in Hz.
         high_hz: f64,
     },
 }

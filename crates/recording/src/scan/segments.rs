@@ -1,4 +1,4 @@
-//! A scan of a recording, segment by segment: each has its own centre frequency.
+//! Scan of a recording by segments, each with its own centre frequency.
 
 use num_complex::Complex32;
 
@@ -9,16 +9,18 @@ use super::scanner::{Scan, ScanSettings, scan};
 use crate::error::RecordingError;
 use crate::sigmf::{Recording, Segment, check_centre_hz};
 
-/// Shortest segment that is searched (s): the SSB with the widest subcarriers, 240 kHz.
+/// Minimum duration of a searched segment (s): the SSB with the widest subcarriers, 240 kHz.
 const SHORTEST_S: f64 = 17e-6;
-/// Duration to which shorter segments are extended by zeros (s): the search wants more than one SSB of any spacing.
+/// Duration to which shorter segments are extended by zeros (s), because the search requires more
+/// than one SSB of any spacing.
 const EXTENDED_S: f64 = 1e-3;
 
-/// Finds every SSB of a recording, in order of time, each at the centre frequency of its capture. If no message is
-/// decoded, the samples are searched with I and Q exchanged, too.
+/// Finds every SSB of a recording in order of time, at the centre frequency of its capture. If no
+/// PBCH is decoded, the search is repeated with I and Q exchanged.
 ///
 /// # Errors
-/// As [`scan`]; and [`ScanError::Recording`] for a centre frequency that is not one of 5G NR, or that replaces several.
+/// Errors of [`scan`]; [`ScanError::Recording`] for a centre frequency outside 5G NR, or for one
+/// that would replace several.
 pub fn scan_recording(
     recording: &mut Recording,
     settings: &ScanSettings,
@@ -67,7 +69,7 @@ pub fn scan_recording(
     Ok(found)
 }
 
-/// Whether the message of any SSB was decoded.
+/// Whether the PBCH of any SSB was decoded.
 fn has_message(scan: &Scan) -> bool {
     scan.ssbs.iter().any(|it| it.ssb.payload.is_some())
 }

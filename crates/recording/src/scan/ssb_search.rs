@@ -1,5 +1,5 @@
-//! The search for SSBs at one place in frequency, its plans and buffers kept from one recording to
-//! the next.
+//! Search for SSBs at one frequency, with FFT plans and buffers that are reused for several
+//! recordings.
 
 use nr_ssb::front_end::FrontEnd;
 use nr_ssb::grid::SUBCARRIERS;
@@ -14,39 +14,39 @@ use num_complex::Complex64;
 use onboard::receive::SSB_SAMPLES;
 use onboard::receive::array_view::{ArraySetup, ArrayView, FoundAngle, View, array_view};
 
-/// Searched at once, in seconds.
+/// Duration of samples that are searched at once in seconds.
 pub(super) const BLOCK_S: f64 = 0.02;
-/// Probability that 20 ms of noise make a cell.
+/// Probability of a false cell in 20 ms of noise.
 pub(super) const FALSE_ALARM: f64 = 1e-3;
 
-/// What is searched, and for what.
+/// Configuration of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SsbSearchConfig {
-    /// What errors call the samples.
+    /// Name of the samples in errors.
     pub name: String,
-    /// Samples per second and antenna.
+    /// Sample rate in Hz.
     pub sample_rate_hz: f64,
-    /// Frequency in Hz that stands at 0 Hz in the samples.
+    /// Absolute frequency at 0 Hz in the samples.
     pub centre_frequency_hz: f64,
     /// Number of antennas.
     pub antennas: usize,
-    /// Frequency of the SSB's centre in Hz.
+    /// Centre frequency of the SSB in Hz.
     pub ssb_freq_hz: f64,
-    /// Whether the frequencies are those on the air, which sets the phase of each symbol (TS
-    /// 38.211, 5.4), or only their difference is known.
+    /// Whether the frequencies are absolute, which determines the phase of each symbol (TS 38.211,
+    /// 5.4), or only their difference is known.
     pub absolute: bool,
     /// Subcarrier spacing of the SSB.
     pub spacing: SubcarrierSpacing,
-    /// The receiving array, for angles.
+    /// Array of the receiver, for angles.
     pub array: ArraySetup,
-    /// Probability that 20 ms of noise make a cell.
+    /// Probability of a false cell in 20 ms of noise.
     pub false_alarm: f64,
-    /// Largest carrier frequency offset to either side, up to five subcarriers.
+    /// Maximum carrier frequency offset in either direction in Hz, up to five subcarriers.
     pub cfo_range_hz: f64,
 }
 
 impl SsbSearchConfig {
-    /// An SSB of known frequency and spacing in samples whose centre is known too.
+    /// Creates a configuration for an SSB with known frequency and subcarrier spacing.
     pub fn new(
         sample_rate_hz: f64,
         centre_frequency_hz: f64,
@@ -69,33 +69,33 @@ impl SsbSearchConfig {
     }
 }
 
-/// One SSB of a recording.
+/// SSB of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundSsb {
-    /// Cell, index, payload, offset and strength.
+    /// Cell, SSB index, payload, frequency offset and strength.
     pub ssb: DetectedSsb,
-    /// First sample of the SSB, its cyclic prefix included, at the recording's rate.
+    /// First sample of the SSB including its cyclic prefix, at the sample rate of the recording.
     pub sample_start: f64,
-    /// Its length at the recording's rate.
+    /// Length of the SSB at the sample rate of the recording.
     pub sample_count: f64,
-    /// Frequency of its centre in Hz.
+    /// Centre frequency of the SSB in Hz.
     pub ssb_freq_hz: f64,
-    /// Its subcarrier spacing.
+    /// Subcarrier spacing of the SSB.
     pub spacing: SubcarrierSpacing,
-    /// Angle of arrival, with two antennas and more.
+    /// Angle of arrival; `None` with one antenna.
     pub angle: Option<FoundAngle>,
-    /// The array's response that it is estimated from, per symbol and antenna, noise power one; empty
-    /// without an array.
+    /// Response of the array from which the angle is estimated, per symbol and antenna, with unit
+    /// noise power; empty without an array.
     pub blocks: Vec<Vec<Complex64>>,
-    /// Per antenna the channel on the SSB's subcarriers, as received, delay and offset taken out.
+    /// Received channel on the SSB's subcarriers per antenna, without delay and frequency offset.
     pub channel: Vec<[Complex32; SUBCARRIERS]>,
-    /// How its noise hangs together from subcarrier to subcarrier.
+    /// Covariance of the noise of `channel` between subcarriers.
     pub channel_covariance: Option<ChannelCovariance>,
-    /// Variance of the noise on a resource element, per antenna, in the channel's scale squared.
+    /// Noise variance on a resource element per antenna, in the squared scale of `channel`.
     pub noise_variance: Vec<f64>,
 }
 
-/// How one SSB was seen.
+/// Array response of one SSB.
 struct Seen {
     pci: Pci,
     sample_start: f64,
@@ -105,17 +105,17 @@ struct Seen {
     noise_variance: Vec<f64>,
 }
 
-/// A search that can be used for one recording after another.
+/// Search that can be used for several recordings.
 pub struct SsbSearch {
     config: SsbSearchConfig,
-    /// Input samples per sample at the base rate.
+    /// Ratio of the input sample rate to the base rate.
     ratio: f64,
-    /// None where the samples are at the base rate and centred already.
+    /// Resampler and mixer; `None` if the samples are centred at the base rate.
     front_end: Option<FrontEnd>,
     searcher: Searcher,
     view: Option<Box<dyn ArrayView>>,
     base: Vec<Vec<Complex32>>,
-    /// How the SSBs of one block were seen.
+    /// Array responses of the SSBs of one block.
     seen: Vec<Seen>,
     votes: ExchangeVotes,
     tones: Vec<Tone>,
@@ -126,7 +126,8 @@ impl SsbSearch {
     /// Plans a search.
     ///
     /// # Errors
-    /// [`ScanError::FrontEnd`], [`ScanError::Search`] or [`ScanError::Array`] for what cannot be.
+    /// [`ScanError::FrontEnd`], [`ScanError::Search`] or [`ScanError::Array`] for an unsupported
+    /// configuration.
     pub fn new(config: SsbSearchConfig) -> Result<Self, ScanError> {
         let offset_hz = config.ssb_freq_hz - config.centre_frequency_hz;
         let (rate_hz, spacing) = (config.sample_rate_hz, config.spacing);
@@ -153,16 +154,16 @@ impl SsbSearch {
         })
     }
 
-    /// What it was told.
+    /// Returns the configuration.
     pub const fn config(&self) -> &SsbSearchConfig {
         &self.config
     }
 
-    /// Every SSB of a recording, in order of time.
+    /// Returns every SSB of a recording in order of time.
     ///
     /// # Errors
-    /// [`ScanError`] for another number of antennas, different lengths, less than one SSB, samples
-    /// that are not finite.
+    /// [`ScanError`] for a different number of antennas, different lengths, less than one SSB, or
+    /// samples that are not finite.
     pub fn search(&mut self, antennas: &[&[Complex32]]) -> Result<&[FoundSsb], ScanError> {
         let first = antennas.first().map_or(0, |samples| samples.len());
         if let Some(other) = antennas.iter().find(|samples| samples.len() != first) {
@@ -195,12 +196,12 @@ impl SsbSearch {
         Ok(&self.found)
     }
 
-    /// Samples of each antenna to be pushed at once.
+    /// Returns the number of samples per block.
     pub(super) fn block(&self) -> usize {
         ((BLOCK_S * self.config.sample_rate_hz) as usize).max(1)
     }
 
-    /// Forgets the last recording; the next one has `length` samples.
+    /// Starts a new recording of `length` samples.
     pub(super) fn begin(&mut self, length: u64) -> Result<(), ScanError> {
         self.searcher.reset();
         self.found.clear();
@@ -215,7 +216,7 @@ impl SsbSearch {
         Ok(())
     }
 
-    /// Takes the next block of a recording.
+    /// Processes the next block of a recording.
     pub(super) fn push(&mut self, antennas: &[&[Complex32]], last: bool) -> Result<(), ScanError> {
         let Self {
             config,
@@ -298,17 +299,18 @@ impl SsbSearch {
         Ok(())
     }
 
-    /// The SSBs of this recording so far, in order of time.
+    /// Returns the SSBs found so far in order of time.
     pub(super) fn found(&self) -> &[FoundSsb] {
         &self.found
     }
 
-    /// DC offset and tones that were subtracted, each at its strongest; frequencies from the recording's centre.
+    /// Returns the subtracted DC offset and tones with their maximum power; frequencies are
+    /// relative to the recording's centre.
     pub fn tones(&self) -> &[Tone] {
         &self.tones
     }
 
-    /// What they say of exchanged channels.
+    /// Returns the votes of the SSBs on exchanged channels.
     pub(super) const fn votes(&self) -> &ExchangeVotes {
         &self.votes
     }

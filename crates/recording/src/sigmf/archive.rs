@@ -1,4 +1,4 @@
-//! SigMF archives (`.sigmf`, a tar file of one recording or more) and collections (`.sigmf-collection`).
+//! SigMF archives (`.sigmf`, a tar file with recordings) and collections (`.sigmf-collection`).
 
 use std::path::{Path, PathBuf};
 
@@ -7,26 +7,26 @@ use serde_json::Value;
 use crate::error::RecordingError;
 use crate::file as files;
 
-/// Size of a collection's file: names and hashes of recordings.
+/// Maximum size of a collection file in bytes: names and hashes of recordings.
 const MAX_COLLECTION_BYTES: u64 = 16 << 20;
-/// Largest metadata in an archive: some hours of annotated SSBs.
+/// Maximum size of the metadata in an archive in bytes: some hours of annotated SSBs.
 const MAX_META_BYTES: u64 = 512 << 20;
 
-/// Place of data in a file.
+/// Byte range of data in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Extent {
-    /// The file.
+    /// Path of the file.
     pub file: PathBuf,
-    /// First byte.
+    /// Offset of the first byte.
     pub offset: u64,
     /// Number of bytes.
     pub bytes: u64,
 }
 
-/// The one recording of an archive: its metadata and the place of its data in the archive.
+/// Returns the metadata and the byte range of the data of the only recording of an archive.
 ///
 /// # Errors
-/// [`RecordingError`] when the file is no tar file, or does not hold exactly one recording.
+/// [`RecordingError`] if the file is not a tar file or does not contain exactly one recording.
 pub fn recording_in(archive: &Path) -> Result<(Vec<u8>, Extent), RecordingError> {
     let io = |source| RecordingError::io(archive, source);
     let syntax = |source: std::io::Error| RecordingError::Syntax {
@@ -85,10 +85,10 @@ pub fn recording_in(archive: &Path) -> Result<(Vec<u8>, Extent), RecordingError>
     Ok((text, extent))
 }
 
-/// The one recording of a collection, by its name.
+/// Returns the path of the only recording of a collection.
 ///
 /// # Errors
-/// [`RecordingError`] when the file cannot be read, or does not name exactly one recording.
+/// [`RecordingError`] if the file cannot be read or does not name exactly one recording.
 pub fn recording_of(collection: &Path) -> Result<PathBuf, RecordingError> {
     let text = files::read(collection, MAX_COLLECTION_BYTES)
         .map_err(|source| RecordingError::io(collection, source))?;

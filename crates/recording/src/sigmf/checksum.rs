@@ -5,12 +5,12 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use sha2::{Digest, Sha512};
 
-/// Bytes hashed at once.
+/// Number of bytes hashed at once.
 const BLOCK: usize = 1 << 16;
 
 use super::archive::Extent;
 
-/// SHA-512 of data, hexadecimal, as `core:sha512` holds it.
+/// Returns the SHA-512 of data in hexadecimal form, like `core:sha512`.
 pub(super) fn of_extent(extent: &Extent) -> io::Result<String> {
     let mut file = crate::file::open(&extent.file)?;
     file.seek(SeekFrom::Start(extent.offset))?;

@@ -1,15 +1,16 @@
 //! Plausibility of a centre frequency.
 
-/// Frequencies (Hz) of 5G NR: from below band n31 to the upper end of FR2-2, 71 GHz, with a margin.
+/// Minimum centre frequency (Hz) with a margin: below band n31 of 5G NR.
 const MIN_HZ: f64 = 400e6;
+/// Maximum centre frequency (Hz) with a margin: above FR2-2, which ends at 71 GHz.
 const MAX_HZ: f64 = 100e9;
-/// Largest NR-ARFCN (TS 38.104, 5.4.2.1).
+/// Maximum NR-ARFCN (TS 38.104, 5.4.2.1).
 const MAX_ARFCN: f64 = 3_279_165.0;
 
-/// Checks that a centre frequency is one that 5G NR uses; 0 stands for an unknown one.
+/// Checks that a centre frequency is used by 5G NR; 0 means unknown.
 ///
 /// # Errors
-/// The range that is allowed, and what the value probably is.
+/// Allowed range, and the probable meaning of the value.
 pub fn check_centre_hz(hz: f64) -> Result<(), String> {
     if hz == 0.0 || (MIN_HZ..=MAX_HZ).contains(&hz) {
         return Ok(());
@@ -23,7 +24,7 @@ pub fn check_centre_hz(hz: f64) -> Result<(), String> {
     })
 }
 
-/// What a value outside the range may be.
+/// Returns the possible meanings of a value outside the range.
 fn guesses(value: f64) -> Vec<String> {
     let mut guesses = Vec::new();
     if let Some(hz) = arfcn_hz(value).filter(|hz| (MIN_HZ..=MAX_HZ).contains(hz)) {
@@ -38,7 +39,8 @@ fn guesses(value: f64) -> Vec<String> {
     guesses
 }
 
-/// Frequency of an NR-ARFCN (TS 38.104, table 5.4.2.1-1); `None` of a value that is none of FR1 or FR2 above 400 MHz.
+/// Returns the frequency of an NR-ARFCN (TS 38.104, table 5.4.2.1-1); `None` for a value outside
+/// FR1 and FR2 or below 400 MHz.
 fn arfcn_hz(value: f64) -> Option<f64> {
     if value.fract() != 0.0 || !(0.0..=MAX_ARFCN).contains(&value) {
         return None;
@@ -64,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn other_units_are_named() {
+    fn other_units_are_recognised() {
         for (value, unit) in [
             (3489.6, "in MHz (3.4896e9 Hz)"),
             (3_489_600.0, "in kHz (3.4896e9 Hz)"),

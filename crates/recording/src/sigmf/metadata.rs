@@ -1,4 +1,4 @@
-//! The `.sigmf-meta` file.
+//! Metadata of a `.sigmf-meta` file.
 
 use std::path::Path;
 
@@ -9,23 +9,23 @@ use super::frequency;
 use crate::error::RecordingError;
 use crate::file as files;
 
-/// Metadata of some hours of annotated SSBs.
+/// Maximum size of a metadata file in bytes: some hours of annotated SSBs.
 const MOST_BYTES: u64 = 512 << 20;
 
-/// Most channels a recording may have.
+/// Maximum number of channels.
 const MAX_CHANNELS: usize = 1024;
-/// SigMF's own limit, in Hz.
+/// Maximum sample rate of SigMF in Hz.
 const MAX_SAMPLE_RATE_HZ: f64 = 1e12;
 
-/// The whole file.
+/// Content of the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Metadata {
-    /// What holds for all samples.
+    /// Properties of all samples.
     pub global: Global,
-    /// Stretches of samples with one set of receiver settings, by `sample_start`.
+    /// Segments of samples with equal receiver settings, ordered by `sample_start`.
     #[serde(default)]
     pub captures: Vec<Capture>,
-    /// What is known of single stretches, by `sample_start`.
+    /// Annotations of segments of samples, ordered by `sample_start`.
     #[serde(default)]
     pub annotations: Vec<Annotation>,
 }
@@ -33,10 +33,10 @@ pub struct Metadata {
 /// `global`
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Global {
-    /// Format of a sample, as `cf32_le`.
+    /// Format of a sample, for example `cf32_le`.
     #[serde(rename = "core:datatype")]
     pub datatype: String,
-    /// Samples per second and channel.
+    /// Sample rate in Hz.
     #[serde(rename = "core:sample_rate")]
     pub sample_rate_hz: f64,
     /// Version of SigMF.
@@ -49,21 +49,21 @@ pub struct Global {
     /// Number of channels, interleaved sample by sample.
     #[serde(rename = "core:num_channels", default = "one")]
     pub channels: usize,
-    /// SHA-512 of the data file, hexadecimal.
+    /// SHA-512 of the data file in hexadecimal form.
     #[serde(
         rename = "core:sha512",
         default,
         skip_serializing_if = "Option::is_none"
     )]
     pub sha512: Option<String>,
-    /// What it is, for people.
+    /// Description of the recording.
     #[serde(
         rename = "core:description",
         default,
         skip_serializing_if = "Option::is_none"
     )]
     pub description: Option<String>,
-    /// Everything else.
+    /// Other keys.
     #[serde(flatten)]
     pub other: Map<String, Value>,
 }
@@ -72,10 +72,10 @@ const fn one() -> usize {
     1
 }
 
-/// One of `captures`.
+/// Element of `captures`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Capture {
-    /// Its first sample.
+    /// Index of the first sample.
     #[serde(rename = "core:sample_start")]
     pub sample_start: u64,
     /// Centre frequency in Hz.
@@ -85,46 +85,46 @@ pub struct Capture {
         skip_serializing_if = "Option::is_none"
     )]
     pub frequency_hz: Option<f64>,
-    /// Everything else.
+    /// Other keys.
     #[serde(flatten)]
     pub other: Map<String, Value>,
 }
 
-/// One of `annotations`.
+/// Element of `annotations`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Annotation {
-    /// Its first sample.
+    /// Index of the first sample.
     #[serde(rename = "core:sample_start")]
     pub sample_start: u64,
-    /// Number of samples; to the end of the capture where it is not said.
+    /// Number of samples [default: up to the end of the capture].
     #[serde(
         rename = "core:sample_count",
         default,
         skip_serializing_if = "Option::is_none"
     )]
     pub sample_count: Option<u64>,
-    /// Lower edge of its band in Hz.
+    /// Lower edge of the band in Hz.
     #[serde(
         rename = "core:freq_lower_edge",
         default,
         skip_serializing_if = "Option::is_none"
     )]
     pub freq_lower_edge_hz: Option<f64>,
-    /// Upper edge of its band in Hz.
+    /// Upper edge of the band in Hz.
     #[serde(
         rename = "core:freq_upper_edge",
         default,
         skip_serializing_if = "Option::is_none"
     )]
     pub freq_upper_edge_hz: Option<f64>,
-    /// What it is, in a few words.
+    /// Short label.
     #[serde(
         rename = "core:label",
         default,
         skip_serializing_if = "Option::is_none"
     )]
     pub label: Option<String>,
-    /// Everything else: `nr:ssb`, `aoa:truth`.
+    /// Other keys: `nr:ssb`, `aoa:truth`.
     #[serde(flatten)]
     pub other: Map<String, Value>,
 }
@@ -133,7 +133,7 @@ impl Metadata {
     /// Reads and checks a `.sigmf-meta` file.
     ///
     /// # Errors
-    /// [`RecordingError`] naming the key where one is missing, of the wrong type or out of range.
+    /// [`RecordingError`] with the key that is missing, has a wrong type or is out of range.
     pub fn read(file: &Path) -> Result<Self, RecordingError> {
         Self::parse(&read_text(file)?, file)
     }
@@ -229,7 +229,7 @@ impl Metadata {
     }
 }
 
-/// Text of a `.sigmf-meta` file.
+/// Reads a `.sigmf-meta` file as text.
 ///
 /// # Errors
 /// [`RecordingError::Io`].
@@ -241,7 +241,7 @@ fn is_nothing(value: &Value) -> bool {
     matches!(value, Value::Null | Value::Bool(false)) || value.as_u64() == Some(0)
 }
 
-/// serde says what it expected in words; put them into the error's fields.
+/// Converts a message of serde to the fields of the error.
 fn explain(file: &Path, path: &str, message: &str) -> RecordingError {
     let at = |name: &str| match path {
         "." | "" => name.to_owned(),

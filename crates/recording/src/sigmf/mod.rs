@@ -1,8 +1,8 @@
-//! SigMF: IQ samples in `NAME.sigmf-data`, interleaved across channels, and what they are in
+//! SigMF recordings: IQ samples in `NAME.sigmf-data`, interleaved across channels, and metadata in
 //! `NAME.sigmf-meta` (JSON). <https://sigmf.org>
 //!
-//! Read are `cf32_le` and `ci16_le`, in place and as much as is asked for, so that a recording may
-//! be larger than memory. Keys of extensions (`nr:ssb`, `aoa:truth`) stay JSON.
+//! The datatypes `cf32_le` and `ci16_le` are supported. Samples are read in blocks, so that a
+//! recording may be larger than the memory. Keys of extensions (`nr:ssb`, `aoa:truth`) remain JSON.
 //!
 //! ```no_run
 //! use recording::Recording;

@@ -1,4 +1,4 @@
-//! Samples of a recording, as many at a time as is asked for.
+//! Reader of the samples of a recording.
 
 use std::fmt;
 use std::fs::File;
@@ -17,26 +17,26 @@ use super::segment::{self, Segment};
 use crate::error::RecordingError;
 use crate::file as files;
 
-/// Bytes read from a file at once.
+/// Number of bytes read from a file at once.
 const BLOCK_BYTES: usize = 1 << 18;
 
-/// What looks wrong with a recording but does not keep it from being read.
+/// Suspicious property of a recording that does not prevent reading.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RecordingWarning {
-    /// The data is not what the metadata was written for.
+    /// The SHA-512 of the data differs from the metadata.
     ChecksumMismatch {
-        /// The data file.
+        /// Path of the data file.
         file: String,
     },
-    /// An annotation reaches beyond the last sample: the data may have been cut off.
+    /// An annotation ends after the last sample, so that the data may be truncated.
     AnnotationBeyondEnd {
         /// Index of the annotation.
         annotation: usize,
-        /// Samples per channel.
+        /// Number of samples per channel.
         length: u64,
     },
-    /// The centre frequency is not said.
+    /// The metadata contain no centre frequency.
     NoFrequency,
 }
 
@@ -54,24 +54,24 @@ impl fmt::Display for RecordingWarning {
                 "annotations[{annotation}] reaches beyond the last of {length} samples; \
                  the data may have been cut off"
             ),
-            Self::NoFrequency => f.write_str("no capture states `core:frequency`"),
+            Self::NoFrequency => f.write_str("no capture contains `core:frequency`"),
         }
     }
 }
 
-/// Open data of a recording.
+/// Open data file of a recording.
 #[derive(Debug)]
 struct DataFile {
     extent: Extent,
     file: File,
 }
 
-/// An open recording of one or more channels.
+/// Open recording of one or more channels.
 #[derive(Debug)]
 pub struct Recording {
     metadata: Metadata,
     datatype: Datatype,
-    /// One file with all channels interleaved, or one per channel.
+    /// One file with interleaved channels, or one file per channel.
     files: Vec<DataFile>,
     length: u64,
     warnings: Vec<RecordingWarning>,
@@ -79,23 +79,23 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Opens a SigMF recording by its name, its `.sigmf-meta` or its `.sigmf-data`, or that of an archive (`.sigmf`) or a
-    /// collection (`.sigmf-collection`) of one recording, and compares the data's SHA-512 with the metadata's, which
-    /// reads all of it once.
+    /// Opens a SigMF recording by its name, its `.sigmf-meta` or `.sigmf-data` file, an archive
+    /// (`.sigmf`) or a collection (`.sigmf-collection`) of one recording. Compares the data's
+    /// SHA-512 with the metadata's, which reads all data once.
     ///
     /// # Errors
-    /// [`RecordingError`] when a half is missing, the metadata is not usable, the data is empty, ends within a sample or
-    /// is not of the stated type.
+    /// [`RecordingError`] if one file of the pair is missing, the metadata are invalid, or the data
+    /// are empty, end within a sample or have another type.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         let mut recording = Self::open_unverified(path)?;
         recording.verify()?;
         Ok(recording)
     }
 
-    /// As [`open`](Self::open), without reading the data for its checksum.
+    /// Opens a recording like [`open`](Self::open), without the comparison of the checksum.
     ///
     /// # Errors
-    /// Those of [`open`](Self::open).
+    /// Errors of [`open`](Self::open).
     pub fn open_unverified(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         let path = path.as_ref();
         let Halves {
@@ -133,8 +133,8 @@ impl Recording {
     /// Opens raw `cf32_le` files, one per channel.
     ///
     /// # Errors
-    /// [`RecordingError`] when a file cannot be read, ends within a sample or is not as long as the
-    /// others, or the rate is not a positive number.
+    /// [`RecordingError`] if a file cannot be read, ends within a sample or has a different length,
+    /// or if the rate is not a positive number.
     pub fn open_raw<P: AsRef<Path>>(
         paths: &[P],
         sample_rate_hz: f64,
@@ -233,7 +233,7 @@ impl Recording {
         Ok(())
     }
 
-    /// The type that the samples probably are, if that is not the stated one.
+    /// Returns the probable type of the samples if it differs from the one in the metadata.
     fn other_datatype(&mut self) -> Result<Option<Datatype>, RecordingError> {
         for DataFile { extent, file } in &mut self.files {
             let failed = |source| RecordingError::io(&extent.file, source);
@@ -248,15 +248,15 @@ impl Recording {
         Ok(None)
     }
 
-    /// Parts of the recording with one centre frequency, in their order.
+    /// Returns the segments of the recording with one centre frequency, in order.
     pub fn segments(&self) -> Vec<Segment> {
         segment::segments(&self.metadata.captures, self.length)
     }
 
-    /// Checks that the recording has one centre frequency, as a drive is received at.
+    /// Checks that the recording has one centre frequency, as a drive requires.
     ///
     /// # Errors
-    /// [`RecordingError::Value`] naming the first capture with another one.
+    /// [`RecordingError::Value`] with the first capture of another frequency.
     pub fn check_one_frequency(&self) -> Result<(), RecordingError> {
         let segments = self.segments();
         let [first, second, ..] = segments.as_slice() else {
@@ -276,24 +276,24 @@ impl Recording {
         ))
     }
 
-    /// The metadata.
+    /// Returns the metadata.
     pub fn metadata(&self) -> &Metadata {
         &self.metadata
     }
 
-    /// The first data file.
+    /// Returns the path of the first data file.
     pub fn data_file(&self) -> &Path {
         self.files
             .first()
             .map_or(Path::new(""), |it| &it.extent.file)
     }
 
-    /// Samples per second and channel.
+    /// Returns the sample rate in Hz.
     pub fn sample_rate_hz(&self) -> f64 {
         self.metadata.global.sample_rate_hz
     }
 
-    /// Centre frequency of the first capture that states one, in Hz.
+    /// Returns the centre frequency of the first capture that has one, in Hz.
     pub fn centre_frequency_hz(&self) -> Option<f64> {
         self.metadata
             .captures
@@ -301,33 +301,33 @@ impl Recording {
             .find_map(|capture| capture.frequency_hz)
     }
 
-    /// Number of channels.
+    /// Returns the number of channels.
     pub fn channels(&self) -> usize {
         self.metadata.global.channels
     }
 
-    /// Samples per channel.
+    /// Returns the number of samples per channel.
     pub fn length(&self) -> u64 {
         self.length
     }
 
-    /// Format of the samples in the file.
+    /// Returns the format of the samples in the file.
     pub fn datatype(&self) -> Datatype {
         self.datatype
     }
 
-    /// What is known of single stretches.
+    /// Returns the annotations.
     pub fn annotations(&self) -> &[Annotation] {
         &self.metadata.annotations
     }
 
-    /// What looks wrong.
+    /// Returns the warnings.
     pub fn warnings(&self) -> &[RecordingWarning] {
         &self.warnings
     }
 
-    /// Reads `count` samples of every channel from sample `start` on; `channels` becomes as many
-    /// vectors of that length.
+    /// Reads `count` samples of every channel from sample `start`; `channels` is resized to one
+    /// vector of this length per channel.
     ///
     /// # Errors
     /// [`RecordingError::OutOfRange`], [`RecordingError::NotFinite`], [`RecordingError::Io`].
@@ -373,7 +373,7 @@ impl Recording {
     }
 }
 
-/// A stretch of one data file.
+/// Segment of one data file.
 struct Place<'a> {
     extent: &'a Extent,
     start: u64,
@@ -429,7 +429,7 @@ struct Halves {
     data: Extent,
 }
 
-/// Metadata and data of the recording that `path` names.
+/// Returns the metadata and data of the recording that `path` names.
 fn halves(path: &Path) -> Result<Halves, RecordingError> {
     let is = |extension: &str| path.extension().is_some_and(|it| it == extension) && path.is_file();
     if is("sigmf") {
@@ -452,7 +452,7 @@ fn halves(path: &Path) -> Result<Halves, RecordingError> {
     })
 }
 
-/// All of a file.
+/// Returns the byte range of a whole file.
 fn whole(path: &Path) -> Result<Extent, RecordingError> {
     let failed = |source| RecordingError::io(path, source);
     let bytes = files::open(path)
@@ -466,7 +466,7 @@ fn whole(path: &Path) -> Result<Extent, RecordingError> {
     })
 }
 
-/// Metadata file and data file of the recording that `path` names.
+/// Returns the metadata file and data file of the recording that `path` names.
 fn both_halves(path: &Path) -> Result<(PathBuf, PathBuf), RecordingError> {
     let name = path.to_string_lossy();
     let stem = [".sigmf-meta", ".sigmf-data", ".sigmf"]
@@ -490,7 +490,7 @@ fn both_halves(path: &Path) -> Result<(PathBuf, PathBuf), RecordingError> {
     }
 }
 
-/// Opens data; returns the number of samples per channel, too.
+/// Opens data and returns the number of samples per channel too.
 fn open_data(
     extent: Extent,
     channels: usize,

@@ -1,22 +1,24 @@
-//! Whether samples are of the type that their metadata states.
+//! Check of the sample type against the metadata.
 //!
-//! Two 16-bit integers read as a 32-bit float have an exponent made of the upper bits of one of them: nearly all are
-//! then tiny, huge or no numbers. Floats of a receiver are within a few decades of 1.
+//! If two 16-bit integers are read as a 32-bit float, the exponent consists of the upper bits of
+//! one of them. Almost all values are then tiny, huge or NaN. Float samples of a receiver are
+//! within a few decades of 1.
 
 use super::samples::Datatype;
 
-/// Bytes that are judged.
+/// Number of bytes that are checked.
 pub const JUDGED_BYTES: usize = 1 << 16;
-/// Magnitudes of floats as receivers write them: from 1e-12 of full scale to 32-bit integers that were not scaled.
+/// Usual magnitudes of float samples: from 1e-12 of full scale to unscaled 32-bit integers.
 const USUAL: std::ops::Range<f32> = 1e-12..1e10;
-/// Minimum number of values other than zero that are judged.
+/// Minimum number of nonzero values for a check.
 const LEAST_VALUES: usize = 64;
-/// Share of usual magnitudes above which the values are floats, and below which they are not. Among random bits it is
-/// 0.29, the share of the exponents.
+/// Minimum fraction of usual magnitudes for floats. Random bits have a fraction of 0.29, that of
+/// the exponents.
 const MOSTLY: f64 = 0.95;
+/// Maximum fraction of usual magnitudes for values that are not floats.
 const HARDLY: f64 = 0.5;
 
-/// The type that the bytes probably are, if that is not the stated one.
+/// Returns the probable type of the bytes if it differs from the type in the metadata.
 pub fn contradiction(stated: Datatype, bytes: &[u8]) -> Option<Datatype> {
     let words = bytes
         .chunks_exact(4)
@@ -44,7 +46,7 @@ pub fn contradiction(stated: Datatype, bytes: &[u8]) -> Option<Datatype> {
 mod tests {
     use super::*;
 
-    /// Values of a linear congruential generator, evenly distributed in ±1.
+    /// Uniformly distributed values in ±1 from a linear congruential generator.
     fn noise() -> impl Iterator<Item = f64> {
         let mut state = 1_u64;
         std::iter::repeat_with(move || {
@@ -56,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn the_right_type_is_not_doubted() {
+    fn the_correct_type_is_accepted() {
         for scale in [1e-6, 1e-3, 1.0, 2048.0, 32768.0] {
             let floats: Vec<u8> = noise()
                 .take(4096)
@@ -72,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn integers_declared_as_floats_are_found() {
+    fn integers_declared_as_floats_are_detected() {
         for scale in [3.0, 20.0, 300.0, 2048.0, 32767.0] {
             let integers: Vec<u8> = noise()
                 .take(4096)
@@ -88,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_is_either() {
+    fn zero_samples_match_any_type() {
         for stated in [Datatype::Cf32Le, Datatype::Ci16Le] {
             assert_eq!(contradiction(stated, &[0; 4096]), None);
             assert_eq!(contradiction(stated, &[]), None);

@@ -1,4 +1,4 @@
-//! How a complex sample stands in a data file.
+//! Encoding of a complex sample in a data file.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use num_complex::Complex32;
 
 use crate::error::RecordingError;
 
-/// Formats of a complex sample, little-endian. Full scale of integers is one.
+/// Format of a complex sample, little-endian. The full scale of integers is one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Datatype {
     /// Two 32-bit floats.
@@ -18,10 +18,10 @@ pub enum Datatype {
 
 impl Datatype {
     const ALL: [Self; 2] = [Self::Cf32Le, Self::Ci16Le];
-    /// What 1.0 is in `ci16_le`.
+    /// Integer value of 1.0 in `ci16_le`.
     const FULL_SCALE: f32 = 32768.0;
 
-    /// Its name in SigMF.
+    /// Returns the name of the format in SigMF.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Cf32Le => "cf32_le",
@@ -29,7 +29,7 @@ impl Datatype {
         }
     }
 
-    /// Bytes of one complex sample.
+    /// Returns the number of bytes of one complex sample.
     pub const fn bytes(self) -> usize {
         match self {
             Self::Cf32Le => 8,
@@ -47,7 +47,7 @@ impl Datatype {
             })
     }
 
-    /// The sample at the start of `bytes`; zero where they are too few.
+    /// Decodes the sample at the start of `bytes`; returns zero if there are too few bytes.
     pub(super) fn decode(self, bytes: &[u8]) -> Complex32 {
         match self {
             Self::Cf32Le => bytes.first_chunk::<8>().map_or(Complex32::ZERO, |b| {
@@ -63,7 +63,7 @@ impl Datatype {
         }
     }
 
-    /// Appends a sample; integers are rounded and stop at full scale.
+    /// Appends a sample; integers are rounded and saturate at full scale.
     pub(super) fn encode(self, sample: Complex32, bytes: &mut Vec<u8>) {
         for part in [sample.re, sample.im] {
             match self {

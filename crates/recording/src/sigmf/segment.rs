@@ -1,24 +1,25 @@
-//! Parts of a recording with one centre frequency.
+//! Segments of a recording with one centre frequency.
 
 use super::metadata::Capture;
 
-/// Frequencies that differ by less are the same (Hz).
+/// Maximum difference of equal frequencies (Hz).
 const SAME_HZ: f64 = 0.5;
 
-/// Successive samples with one centre frequency.
+/// Contiguous samples with one centre frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
-    /// First sample.
+    /// Index of the first sample.
     pub start: u64,
     /// Number of samples.
     pub length: u64,
-    /// Centre frequency (Hz); `None` if no capture states it.
+    /// Centre frequency (Hz); `None` if no capture contains it.
     pub centre_frequency_hz: Option<f64>,
-    /// Index of its first capture.
+    /// Index of the first capture of the segment.
     pub capture: usize,
 }
 
-/// Segments of a recording of `length` samples, in their order. A capture without a frequency continues the one before.
+/// Returns the segments of a recording of `length` samples in order. A capture without a frequency
+/// continues the previous segment.
 pub fn segments(captures: &[Capture], length: u64) -> Vec<Segment> {
     let first_hz = captures.iter().find_map(|it| it.frequency_hz);
     let mut segments = vec![Segment {

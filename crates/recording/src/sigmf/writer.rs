@@ -1,4 +1,4 @@
-//! Writing a recording: samples as they come, the metadata at the end.
+//! Writer of a recording: samples as they arrive, the metadata at the end.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -14,27 +14,27 @@ use super::samples::Datatype;
 use crate::error::RecordingError;
 use crate::file::{self as files, Partial};
 
-/// Version of SigMF that is written.
+/// Version of SigMF in written files.
 const VERSION: &str = "1.2.0";
 
-/// What the recording's metadata will say.
+/// Metadata of a recording to be written.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WriterSettings {
     /// Format of the samples in the file.
     pub datatype: Datatype,
     /// Number of channels.
     pub channels: usize,
-    /// Samples per second and channel.
+    /// Sample rate in Hz.
     pub sample_rate_hz: f64,
     /// Centre frequency in Hz.
     pub frequency_hz: f64,
-    /// What it is, for people.
+    /// Description of the recording.
     pub description: String,
-    /// Keys of extensions for `global`.
+    /// Extension keys for `global`.
     pub global: Map<String, Value>,
 }
 
-/// A recording being written. Without [`finish`](Self::finish) nothing is left of it.
+/// Recording that is being written. Without [`finish`](Self::finish), its files are removed.
 #[derive(Debug)]
 pub struct RecordingWriter {
     settings: WriterSettings,
@@ -50,11 +50,11 @@ pub struct RecordingWriter {
 }
 
 impl RecordingWriter {
-    /// Begins `STEM.sigmf-data`.
+    /// Creates `STEM.sigmf-data`.
     ///
     /// # Errors
-    /// [`RecordingError::Io`] when the file cannot be made, [`RecordingError::Value`] for a setting
-    /// that a reader would refuse.
+    /// [`RecordingError::Io`] if the file cannot be created; [`RecordingError::Value`] for a
+    /// setting that a reader would reject.
     pub fn create(stem: &Path, settings: WriterSettings) -> Result<Self, RecordingError> {
         let file = |suffix: &str| {
             let mut name = stem.as_os_str().to_owned();
@@ -80,10 +80,10 @@ impl RecordingWriter {
         })
     }
 
-    /// Appends samples: as many slices as channels, all of one length.
+    /// Appends samples: one slice of equal length per channel.
     ///
     /// # Errors
-    /// [`RecordingError::Write`] when they are not, [`RecordingError::Io`].
+    /// [`RecordingError::Write`] for a wrong number or length of slices; [`RecordingError::Io`].
     pub fn write(&mut self, channels: &[&[Complex32]]) -> Result<(), RecordingError> {
         let count = channels.first().map_or(0, |samples| samples.len());
         let equal = channels.iter().all(|samples| samples.len() == count);
@@ -114,8 +114,8 @@ impl RecordingWriter {
             .map_err(|source| RecordingError::io(data_file, source))
     }
 
-    /// Begins a stretch whose first sample is number `global_index` since the receiver began to
-    /// count: what comes now does not join what came before.
+    /// Starts a segment whose first sample has the number `global_index` since the receiver began
+    /// to count. Samples before and after the start are not contiguous.
     pub fn begin_capture(&mut self, global_index: u64) {
         let index = ("core:global_index".to_owned(), json!(global_index));
         self.captures.push(Capture {
@@ -125,12 +125,12 @@ impl RecordingWriter {
         });
     }
 
-    /// Says something of a stretch of samples.
+    /// Adds an annotation.
     pub fn annotate(&mut self, annotation: Annotation) {
         self.annotations.push(annotation);
     }
 
-    /// Samples per channel so far.
+    /// Returns the number of samples per channel so far.
     pub fn length(&self) -> u64 {
         self.length
     }
@@ -144,7 +144,7 @@ impl RecordingWriter {
         self.data
             .flush()
             .map_err(|source| RecordingError::io(data_file, source))?;
-        // SigMF asks for annotations in order of their first sample.
+        // SigMF requires annotations in order of their first sample.
         self.annotations
             .sort_by_key(|annotation| annotation.sample_start);
         let metadata =

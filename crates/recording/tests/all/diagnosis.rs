@@ -1,5 +1,5 @@
-//! One wrong thing in the files of a drive is named, and nothing where nothing is wrong. The rates,
-//! over many drives, are measured by the example `misconfigured_drives`.
+//! An error in the files of a drive is diagnosed, and a correct drive has no diagnosis. The example
+//! `misconfigured_drives` measures the rates over many drives.
 
 #[path = "../../examples/misconfigured_drives/misconfiguration.rs"]
 mod misconfiguration;
@@ -9,7 +9,7 @@ mod simulator;
 use misconfiguration::{MISCONFIGURATIONS, misconfigured};
 use simulator::{Kind, drive};
 
-/// Names a wrong thing of a drive, and nothing else.
+/// Asserts that an error of a drive is diagnosed, and nothing else.
 fn is_named(what: &str, kind: Kind, seed: u64) {
     let number = MISCONFIGURATIONS
         .iter()
@@ -27,7 +27,7 @@ fn is_named(what: &str, kind: Kind, seed: u64) {
 }
 
 #[test]
-fn nothing_is_named_on_sound_drives() {
+fn correct_drives_have_no_diagnosis() {
     for kind in [Kind::OnRoad, Kind::WithoutRoad, Kind::Robot] {
         for seed in 31..33 {
             let sound = drive(kind, seed, true);
@@ -40,27 +40,27 @@ fn nothing_is_named_on_sound_drives() {
 }
 
 #[test]
-fn a_radio_head_elsewhere_is_named_and_told_where_it_stands() {
+fn a_moved_radio_head_is_diagnosed_with_its_position() {
     is_named("one head 10 m off", Kind::OnRoad, 41);
     is_named("one head 10 m off", Kind::Robot, 42);
     is_named("x and y of one head", Kind::WithoutRoad, 43);
 }
 
 #[test]
-fn two_that_are_exchanged_are_named() {
+fn exchanged_radio_heads_are_diagnosed() {
     is_named("PCIs exchanged", Kind::OnRoad, 51);
     is_named("PCIs exchanged", Kind::Robot, 52);
 }
 
 #[test]
-fn a_yaw_rate_that_is_none_is_named() {
+fn a_wrong_yaw_rate_is_diagnosed() {
     is_named("yaw rate zero", Kind::OnRoad, 61);
     is_named("yaw rate missing", Kind::OnRoad, 63);
     is_named("yaw rate in degrees", Kind::OnRoad, 64);
 }
 
 #[test]
-fn what_does_no_harm_is_no_reason_to_mistrust_a_drive() {
+fn a_harmless_error_does_not_make_a_drive_unreliable() {
     let number = MISCONFIGURATIONS
         .iter()
         .position(|(name, _)| *name == "one head 10 m off");

@@ -1,4 +1,4 @@
-//! Recordings and recorded drives, from outside.
+//! Tests of recordings and recorded drives through the public interface.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "these are tests")]
 
 mod common;

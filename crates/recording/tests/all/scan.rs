@@ -1,4 +1,4 @@
-//! Scanning recordings: the real ones, and every kind of unsuitable one.
+//! Scans of real recordings and of every kind of unsuitable recording.
 
 use crate::common;
 use nr_ssb::diagnose::Fault;
@@ -17,7 +17,7 @@ use serde_json::Value;
 const SSB_HZ: f64 = 3_700.8e6;
 const RATE_HZ: f64 = 7.68e6;
 
-/// What a cell sends in 5 ms.
+/// Returns the transmitted samples of a cell in 5 ms.
 fn burst(pci: u16, ssb_index: u8) -> Vec<Complex32> {
     let burst = Burst {
         pci: Pci::new(pci).unwrap(),
@@ -31,9 +31,9 @@ fn burst(pci: u16, ssb_index: u8) -> Vec<Complex32> {
     burst.iq(&mut Ofdm::new(numerology)).unwrap()
 }
 
-/// Noise of four antennas; a resource element of amplitude one is so far above it.
+/// Returns the noise of four antennas; `snr_db` is the SNR of a resource element of amplitude one.
 fn noise(samples: usize, snr_db: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<Complex32>> {
-    // A resource element collects the noise of 256 samples.
+    // A resource element contains the noise of 256 samples.
     let sigma = (0.5 * 10f64.powf(-0.1 * snr_db) / 256.0).sqrt();
     let mut part = || (sigma * rng.sample::<f64, _>(StandardNormal)) as f32;
     (0..4)
@@ -45,7 +45,7 @@ fn noise(samples: usize, snr_db: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<Complex32
         .collect()
 }
 
-/// Adds a plane wave of the given electrical angle, its first sample at `start`.
+/// Adds a plane wave of the given electrical angle, starting at sample `start`.
 fn add(
     antennas: &mut [Vec<Complex32>],
     wave: &[Complex32],
@@ -62,7 +62,8 @@ fn add(
     }
 }
 
-/// Four antennas, 5 ms, an SSB from the given electrical angle at 20 dB per resource element.
+/// Returns 5 ms of four antennas with an SSB from the given electrical angle at 20 dB per resource
+/// element.
 fn half_frame(phase_rad: f64, seed: u64) -> Vec<Vec<Complex32>> {
     let sent = burst(7, 2);
     let mut antennas = noise(sent.len(), 20.0, &mut ChaCha8Rng::seed_from_u64(seed));
@@ -86,7 +87,7 @@ fn known() -> ScanSettings {
 }
 
 #[test]
-fn a_built_burst_is_found_with_its_angle() {
+fn a_generated_burst_is_found_with_its_angle() {
     let antennas = half_frame(0.7, 1);
     let found = scan(&mut block(&antennas), &known()).unwrap();
     assert_eq!((found.ssbs.len(), found.faults.len()), (1, 0));
@@ -105,26 +106,27 @@ fn a_built_burst_is_found_with_its_angle() {
     assert!((sample_start - numerology.symbol_start(symbol) as f64).abs() < 0.2);
     let angle = angle.unwrap().from_row().unwrap();
     assert!((angle.phase_rad - 0.7).abs() < 5.0 * angle.phase_sigma_rad);
-    // 20 dB and 830 elements: sigma = 1 / sqrt(2 * 830 * 100 * 5).
+    // Bound for 20 dB and 830 elements: sigma = 1 / sqrt(2 * 830 * 100 * 5).
     assert!((angle.phase_sigma_rad * (2.0 * 830.0 * 100.0 * 5.0_f64).sqrt() - 1.0).abs() < 0.15);
 }
 
 #[test]
-fn cells_under_a_stronger_one_have_angles_and_know_how_good_they_are() {
+fn weaker_cells_have_angles_with_consistent_standard_deviations() {
     let config = SsbSearchConfig::new(RATE_HZ, SSB_HZ, SSB_HZ, Case::C.spacing(), 4);
     let mut search = SsbSearch::new(config).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let trials = 60;
-    // Two more cells under the first, on the same symbols: one with another PSS, one with its own.
+    // Two weaker cells on the same symbols as the first: one with a different PSS, one with an
+    // equal PSS.
     let cells = [(7, 0.7, 1.0), (302, -1.9, 0.1), (610, 2.4, 0.15)];
     let sent = cells.map(|(pci, ..)| burst(pci, 2));
     let mut squares = [0.0; 3];
     for trial in 0..trials {
-        // The weak ones have 5 and 8.5 dB.
+        // The weaker cells have 5 and 8.5 dB.
         let mut antennas = noise(sent[0].len() + 200, 25.0, &mut rng);
         for ((_, phase_rad, amplitude), wave) in cells.iter().zip(&sent) {
             let gain = Complex64::from_polar(*amplitude, 6.2 * rng.random::<f64>());
-            // Other cells of a network come within a cyclic prefix or so.
+            // Cells of a network arrive within about one cyclic prefix.
             let start = 100 + rng.random_range(0..40);
             add(&mut antennas, wave, gain, *phase_rad, start);
         }
@@ -138,7 +140,8 @@ fn cells_under_a_stronger_one_have_angles_and_know_how_good_they_are() {
             *square += ((angle.phase_rad - phase_rad) / angle.phase_sigma_rad).powi(2);
         }
     }
-    // The mean square of n Gaussian errors has a relative deviation of √(2/n); four of them.
+    // The mean square of n Gaussian errors has a relative standard deviation of √(2/n). The limit
+    // is four of them.
     let bound = 4.0 * (2.0 / f64::from(trials)).sqrt();
     for ((pci, ..), square) in cells.iter().zip(squares) {
         let mean = square / f64::from(trials);
@@ -147,7 +150,7 @@ fn cells_under_a_stronger_one_have_angles_and_know_how_good_they_are() {
     }
 }
 
-/// The faults of a scan of four channels, spoilt so.
+/// Returns the faults of a scan of four channels after a modification.
 fn faults_of(spoil: impl FnOnce(&mut Vec<Vec<Complex32>>)) -> Vec<ChannelFault> {
     let mut antennas = half_frame(1.4, 2);
     spoil(&mut antennas);
@@ -160,7 +163,7 @@ fn faults_of(spoil: impl FnOnce(&mut Vec<Vec<Complex32>>)) -> Vec<ChannelFault> 
     found.faults
 }
 
-/// What is wrong with a channel by its samples; `None` unless that is all there is.
+/// Returns the channel and fault if there is exactly one fault of the samples.
 fn only(faults: &[ChannelFault]) -> Option<(usize, Fault)> {
     match faults {
         [ChannelFault::Samples { channel, fault }] => Some((*channel, *fault)),
@@ -174,7 +177,7 @@ fn healthy_channels_have_no_faults() {
 }
 
 #[test]
-fn exchanged_channels_are_told_by_their_phases() {
+fn exchanged_channels_are_detected_by_their_phases() {
     for (first, second) in [(0, 1), (1, 2), (2, 3)] {
         let faults = faults_of(|antennas| antennas.swap(first, second));
         assert_eq!(faults, [ChannelFault::Exchanged { first, second }]);
@@ -182,14 +185,14 @@ fn exchanged_channels_are_told_by_their_phases() {
 }
 
 #[test]
-fn a_silent_channel_is_named() {
+fn a_silent_channel_is_reported() {
     let faults = faults_of(|antennas| antennas[3].fill(Complex32::ZERO));
     assert_eq!(only(&faults), Some((3, Fault::Silent)));
 }
 
 #[test]
-fn a_weak_channel_is_named_with_its_level() {
-    // 46 dB down: a cable that is off leaves no more.
+fn a_weak_channel_is_reported_with_its_level() {
+    // 46 dB correspond to a disconnected cable.
     let weaken = |antenna: &mut Vec<Complex32>| antenna.iter_mut().for_each(|x| *x *= 0.005);
     let faults = faults_of(|antennas| weaken(&mut antennas[1]));
     let Some((1, Fault::Weak { below_strongest_db })) = only(&faults) else {
@@ -204,13 +207,13 @@ fn a_weak_channel_is_named_with_its_level() {
         "{}",
         faults[0]
     );
-    // 20 dB are an antenna that looks the other way.
+    // 20 dB correspond to an antenna in the opposite direction.
     let faults = faults_of(|antennas| antennas[1].iter_mut().for_each(|x| *x *= 0.1));
     assert_eq!(faults, []);
 }
 
 #[test]
-fn a_clipped_channel_is_named_with_its_share() {
+fn a_clipped_channel_is_reported_with_its_fraction() {
     let limit = 0.05;
     let mut share_beyond = 0.0;
     let faults = faults_of(|antennas| {
@@ -224,7 +227,7 @@ fn a_clipped_channel_is_named_with_its_share() {
     let Some((0, Fault::Clipped { share })) = only(&faults) else {
         panic!("{faults:?}")
     };
-    // All that were beyond, but for the few that any recording has.
+    // All samples beyond full scale, except the few that any recording has.
     assert!(
         (share / share_beyond - 1.0).abs() < 0.05,
         "{share} {share_beyond}"
@@ -232,7 +235,7 @@ fn a_clipped_channel_is_named_with_its_share() {
 }
 
 #[test]
-fn a_doubled_channel_is_named_with_its_original() {
+fn a_duplicated_channel_is_reported_with_its_original() {
     let faults = faults_of(|antennas| antennas[2] = antennas[0].clone());
     assert!(
         faults.contains(&ChannelFault::Samples {
@@ -249,17 +252,17 @@ fn a_doubled_channel_is_named_with_its_original() {
 }
 
 #[test]
-fn a_cell_off_the_raster_is_found_where_the_recording_was_tuned_to() {
+fn a_cell_off_the_raster_is_found_at_the_centre_frequency() {
     let antennas = half_frame(0.3, 8);
     let mut source = block(&antennas);
-    // 3700.8 MHz is not 3 GHz + N · 1.44 MHz.
+    // 3700.8 MHz is not on the raster 3 GHz + N · 1.44 MHz.
     source.centre_frequency_hz = Some(SSB_HZ);
     let found = scan(&mut source, &ScanSettings::default()).unwrap();
     assert_eq!((found.ssbs.len(), found.ssbs[0].ssb.pci.get()), (1, 7));
 }
 
 #[test]
-fn a_poor_oscillator_is_found_where_its_offset_is_allowed() {
+fn a_poor_oscillator_is_found_with_a_sufficient_search_range() {
     // 20 ppm of 3.7 GHz are two and a half subcarriers.
     for ppm in [-20.0, -8.0, 8.0, 20.0] {
         let mut antennas = half_frame(0.3, 12);
@@ -288,7 +291,7 @@ fn a_poor_oscillator_is_found_where_its_offset_is_allowed() {
 }
 
 #[test]
-fn a_scan_says_where_it_has_looked() {
+fn a_scan_reports_its_scope() {
     let antennas = noise(38_400, 20.0, &mut ChaCha8Rng::seed_from_u64(3));
     let mut source = block(&antennas);
     source.centre_frequency_hz = Some(3_699.84e6);
@@ -318,7 +321,7 @@ fn a_scan_says_where_it_has_looked() {
 }
 
 #[test]
-fn what_cannot_be_scanned_says_why() {
+fn unsuitable_recordings_are_rejected_with_a_reason() {
     let antennas = half_frame(0.0, 5);
     let mut source = block(&antennas);
     source.centre_frequency_hz = None;
@@ -365,7 +368,7 @@ fn what_cannot_be_scanned_says_why() {
 }
 
 #[test]
-fn every_annotated_recording_is_scanned_without_being_told_anything() {
+fn every_annotated_recording_is_scanned_without_prior_knowledge() {
     let Some(dir) = common::data_dir() else {
         return;
     };
@@ -390,7 +393,7 @@ fn every_annotated_recording_is_scanned_without_being_told_anything() {
         for annotation in &annotations {
             let truth = &annotation.other["nr:ssb"];
             let near = |found: &&FoundSsb| {
-                // The annotation of 46.08 Msps has a resolution of the base rate.
+                // At 46.08 Msps, the annotation has the resolution of the base rate.
                 (found.sample_start - annotation.sample_start as f64).abs() < 6.0
             };
             let found = found
@@ -416,7 +419,7 @@ fn every_annotated_recording_is_scanned_without_being_told_anything() {
     }
 }
 
-/// Gains of the channels as the annotation has them; only their phases count.
+/// Returns the channel gains of the annotation; only their phases matter.
 fn calibration(truth: &Value) -> Vec<Complex64> {
     let part = |key: &str| -> Vec<f64> {
         truth[key]
@@ -434,7 +437,7 @@ fn calibration(truth: &Value) -> Vec<Complex64> {
 }
 
 #[test]
-fn semi_real_angles_are_as_good_as_bartlett_with_perfect_timing() {
+fn semi_real_angles_are_as_accurate_as_bartlett_with_perfect_timing() {
     let Some(dir) = common::data_dir() else {
         return;
     };
@@ -461,7 +464,7 @@ fn semi_real_angles_are_as_good_as_bartlett_with_perfect_timing() {
         let angle = angle.from_row().unwrap();
         let azimuth_deg = 90.0 - angle.angle_rad.to_degrees();
 
-        // Bartlett on the samples of the annotated SSB.
+        // Bartlett estimate from the samples of the annotated SSB.
         let mut samples = Vec::new();
         let count = annotation.sample_count.unwrap() as usize;
         recording

@@ -1,4 +1,4 @@
-//! SigMF: what is written is read again; every kind of damage has its own error; nothing panics.
+//! SigMF: files round-trip, each kind of damage has its own error, and nothing panics.
 
 use crate::common;
 use std::fs;
@@ -58,7 +58,7 @@ fn edit(meta: &Path, change: impl FnOnce(&mut Value)) {
 }
 
 #[test]
-fn what_is_written_is_read_again() {
+fn recordings_round_trip() {
     for datatype in [Datatype::Cf32Le, Datatype::Ci16Le] {
         let meta = write(
             &common::scratch(&format!("sigmf-{}", datatype.name())),
@@ -93,7 +93,7 @@ fn what_is_written_is_read_again() {
 }
 
 #[test]
-fn integers_stop_at_full_scale() {
+fn integers_saturate_at_full_scale() {
     let stem = common::scratch("sigmf-saturate").join("loud");
     let mut writer = RecordingWriter::create(&stem, settings(Datatype::Ci16Le, 1)).unwrap();
     writer.write(&[&[Complex32::new(3.0, -3.0)]]).unwrap();
@@ -106,7 +106,7 @@ fn integers_stop_at_full_scale() {
 }
 
 #[test]
-fn raw_files_are_channels() {
+fn raw_files_are_read_as_channels() {
     let dir = common::scratch("sigmf-raw");
     let bytes: Vec<u8> = (0..32u32).flat_map(|n| (n as f32).to_le_bytes()).collect();
     let paths = ["a.cf32", "b.cf32"].map(|name| dir.join(name));
@@ -138,7 +138,7 @@ fn raw_files_are_channels() {
 }
 
 #[test]
-fn metadata_that_cannot_be_used_names_the_key() {
+fn invalid_metadata_is_reported_with_its_key() {
     type Edit = fn(&mut Value);
     let cases: [(&str, Edit); 12] = [
         ("global.core:sample_rate", |json| {
@@ -206,7 +206,7 @@ fn metadata_that_cannot_be_used_names_the_key() {
 }
 
 #[test]
-fn damaged_data_is_told_apart() {
+fn kinds_of_damage_are_distinguished() {
     let dir = common::scratch("sigmf-damage");
     let meta = write(&dir, Datatype::Cf32Le);
     let data = dir.join("drive.sigmf-data");
@@ -228,7 +228,7 @@ fn damaged_data_is_told_apart() {
         Err(RecordingError::PartialFrame { .. })
     ));
 
-    // Cut off after five samples: readable, and said.
+    // Truncated after five samples: readable with a warning.
     fs::write(&data, &good[..5 * 24]).unwrap();
     let warnings = Recording::open(&meta).unwrap().warnings().to_vec();
     assert!(matches!(
@@ -281,7 +281,7 @@ fn damaged_data_is_told_apart() {
 }
 
 #[test]
-fn samples_that_do_not_fit_are_not_written() {
+fn samples_of_wrong_shape_are_rejected() {
     let stem = common::scratch("sigmf-misfit").join("misfit");
     assert!(RecordingWriter::create(&stem, settings(Datatype::Cf32Le, 0)).is_err());
     let mut writer = RecordingWriter::create(&stem, settings(Datatype::Cf32Le, 2)).unwrap();
@@ -326,7 +326,7 @@ fn real_recordings_are_read() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// Any damage to either half gives an error or a recording that reads, never a panic.
+    /// Any damage to either file gives an error or a readable recording, never a panic.
     #[test]
     fn damage_never_panics(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),

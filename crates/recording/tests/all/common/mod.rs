@@ -1,4 +1,4 @@
-//! What tests that read and write files share.
+//! Functions that are shared by tests of files.
 #![allow(
     dead_code,
     clippy::unwrap_used,
@@ -8,7 +8,8 @@
 
 use std::path::{Path, PathBuf};
 
-/// Where the reference data is, or `None` with a printed reason.
+/// Returns the folder of the reference data; prints a reason and returns `None` if it does not
+/// exist.
 pub fn data_dir() -> Option<PathBuf> {
     let dir = std::env::var_os("ACCESS_AV_DATA").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
@@ -24,7 +25,7 @@ pub fn data_dir() -> Option<PathBuf> {
     None
 }
 
-/// An empty directory of its own for a test.
+/// Creates an empty directory for a test.
 pub fn scratch(name: &str) -> PathBuf {
     let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     if dir.exists() {
