@@ -396,8 +396,8 @@ def test_check_warns_and_goes_on(tmp_path: Path, access_av: Callable[..., Finish
     (tmp_path / "deep.toml").write_text(PLANT.replace("25.0, 8.0]", "25.0, -8.0]"))
     done = access_av("site", "check", tmp_path / "fine.toml", tmp_path / "deep.toml")
     assert done.code == 0
-    assert "fine.toml: fine" in done.out
-    assert "deep.toml: 1 doubtful" in done.out
+    assert "fine.toml: valid" in done.out
+    assert "deep.toml: valid, 1 warning" in done.out
     assert "specify metres above the ground, positive upwards: 8" in done.err
     (tmp_path / "cart.toml").write_text(VEHICLE + 'platform = { name = "jetson" }\n')
     done = access_av("vehicle", "check", tmp_path / "cart.toml")

@@ -217,7 +217,7 @@ def test_without_an_initial_pose_the_vehicle_is_found(
     given[10] = vehicle
     done = access_av(*given, "--truth", drive / "truth.tum")
     assert done.code == 0, done.err
-    driven_m = float(re.findall(r"Found after ([0-9.]+) m", done.out)[0])
+    driven_m = float(re.findall(r"Position found after ([0-9.]+) m", done.out)[0])
     poses = pl.read_parquet(tmp_path / "out" / "poses.parquet")
     known = poses.filter(~pl.col("searching"))
     assert 0.0 < driven_m < 32.0
@@ -241,7 +241,7 @@ def test_the_start_may_be_given_with_the_command(
     told = locate(drive, vehicle=vehicle, start=start).poses
     assert told.equals(given)
     searched = arguments(drive, tmp_path / "out")
-    assert "Found after" in access_av(*searched, "--start", "scratch").out
+    assert "Position found after" in access_av(*searched, "--start", "scratch").out
     for bad in ("1,2", "1,2,x", "1,2,inf", "1,2,-95.8"):
         done = access_av(*searched, "--start", bad)
         assert done.code == 2
@@ -401,7 +401,7 @@ def test_a_drive_is_located_by_variants_side_by_side(access_av: Cli, tmp_path: P
     command += ["--truth", logged / "truth.tum"]
     done = access_av(*command, columns=160)
     assert done.code == 0, done.err
-    assert "Side by side, 4 stretches of 10 s of one drive each" in done.out
+    assert "Comparison, 4 stretches of 10 s of one drive each" in done.out
     compared = pl.read_parquet(tmp_path / "out" / "compared.parquet")
     assert tuple(compared.columns) == TABLES["compared"].columns
     assert compared["variant"].to_list() == [

@@ -93,7 +93,7 @@ def test_what_it_writes_locates_better(
     assert done.code == 0, done.err
     rows = pl.read_parquet(out / "survey.parquet")
     assert tuple(rows.columns) == columns.TABLES["survey"].columns
-    assert "nothing learnt" in done.out
+    assert "not determined" in done.out
 
     def rms_m(site: str) -> float:
         start = vehicle.read_text()
@@ -140,7 +140,7 @@ def test_the_command_tells_what_was_not_learnt_and_does_not_fit(
     assert done.code == 0, done.err
     rows = [line.split() for line in done.out.splitlines() if line.startswith(" radio_heads")]
     assert rows
-    assert all(row[1] == "m" and row[3:] == ["–", "nothing", "learnt"] for row in rows)
+    assert all(row[1] == "m" and row[3:] == ["–", "not", "determined"] for row in rows)
     twice = access_av(*arguments, short, "--site", "yard")
     assert (twice.code, "given twice" in twice.err) == (2, True)
     turned = Vehicle.load(str(short / "vehicle.toml")).with_overrides(
@@ -148,7 +148,7 @@ def test_the_command_tells_what_was_not_learnt_and_does_not_fit(
     )
     (tmp_path / "turned.toml").write_text(turned.to_toml())
     done = access_av(*arguments[:2], "--site", "yard", "--vehicle", tmp_path / "turned.toml")
-    assert "do not fit, and were left out" in done.err
+    assert "are outliers and were left out" in done.err
 
 
 def test_odometry_of_two_wheels_says_the_same(logged: Path, tmp_path: Path) -> None:

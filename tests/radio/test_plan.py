@@ -190,7 +190,7 @@ def test_an_integrity_campaign_goes_on_where_it_stopped(
     for wide, last in ((80, "risk/h   ≤"), (60, "beyond       ≤"), (120, "level/error")):
         shown = access_av(*arguments[:-1], columns=wide)
         lines = shown.out.splitlines()
-        [head] = [line for line in lines if line.startswith(" world")]
+        [head] = [line for line in lines if line.startswith(" truth")]
         assert head.rstrip().endswith(last)
         assert sum(line.startswith(" array 1 degree off ") for line in lines) == 2
         assert max(map(len, lines[1:-1])) <= wide

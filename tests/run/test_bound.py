@@ -104,14 +104,14 @@ def test_command_writes_what_it_promises(
 ) -> None:
     done = access_av("bound", "yard", "--map-step-m", "25", "--out", tmp_path / "b", columns=80)
     assert done.code == 0, done.err
-    assert "least RMS error" in done.out
+    assert "lower bound of the RMS error" in done.out
     assert "dock" in done.out
     names = {path.name for path in (tmp_path / "b").iterdir()}
     said = " ".join(done.out.split())
-    assert "falls short of level 5 on 21.6% of the route" in said
-    assert "What mends that and is usually the cheapest: 8 antennas." in said
+    assert "fails level 5 on 21.6% of the route" in said
+    assert "Cheapest change that reaches the level: 8 antennas." in said
     page = (tmp_path / "b" / "report.html").read_text()
-    assert "falls short of level 5" in page
+    assert "fails level 5" in page
     assert names == {
         "bound.parquet", "map.parquet", "report.html", "scenario.toml", "manifest.json",
     }  # fmt: skip

@@ -106,7 +106,7 @@ def test_run_tells_percentiles_and_integrity(
     )  # fmt: skip
     assert done.code == 0, done.err
     told = " ".join(done.out.split())
-    for text in ("50 % of errors within", "protection level / error", "may rely on its position"):
+    for text in ("50th percentile of the error", "protection level / error", "may rely on its position"):
         assert text in told
     page = (tmp_path / "report.html").read_text()
     assert "stanford" in page
@@ -168,7 +168,7 @@ def test_a_start_from_scratch_says_when_it_was_found(
         *(f"--set={key}={str(value).lower()}" for key, value in changes.items()),
     )  # fmt: skip
     assert done.code == 0, done.err
-    assert "runs in which the vehicle was found" in done.out
+    assert "runs with a successful search" in done.out
     assert "nan" not in done.out
     table = pl.read_parquet(tmp_path / "trajectories.parquet")
     known = table.filter(~pl.col("searching"), run=0)

@@ -164,7 +164,7 @@ def test_a_drawing_gives_the_same_road(
         (6, (), "often wrong"),
         (4, ("--metres-per-unit", "0.001"), "Layers:"),
         (4, ("--metres-per-unit", "0.001", "--road-layer", "CELLS"), "the road is one, or several"),
-        (4, ("--two-points", "0,0,1,0"), "go together"),
+        (4, ("--two-points", "0,0,1,0"), "must be given together"),
         (4, ("--two-points", "0,0,0,0", "--length-m", "5"), "two different points"),
         (4, ("--metres-per-unit", "1", "--road-layer", "WAY"), "another unit"),
     ],
@@ -244,7 +244,7 @@ def test_new_files_are_not_written_over_others(
         assert access_av("new", kind, file, "--force").code == 0
         checked_again = access_av(kind, "check", file)
         assert checked_again.code == 0
-        assert "fine" in checked_again.out, checked_again.out
+        assert "valid" in checked_again.out, checked_again.out
         assert "already" in access_av("new", kind, file).err
     said = access_av("new", "node", file, "--force", columns=500).out
     assert f"access-av-node --site yard --vehicle tugger {file} --dry-run" in said
@@ -369,9 +369,9 @@ def test_a_picture_lies_under_a_site_where_two_points_and_a_length_say(
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (("--underlay", "plan.png"), "say how large it is"),
+        (("--underlay", "plan.png"), "the scale is missing"),
         (("--underlay-metres-per-pixel", "1"), "--underlay is missing"),
-        (("--underlay", "plan.png", "--underlay-points", "0,0,9,0"), "go together"),
+        (("--underlay", "plan.png", "--underlay-points", "0,0,9,0"), "must be given together"),
         (("--underlay", "none.png", "--underlay-metres-per-pixel", "1"), "No such file"),
         (("--underlay", ".", "--underlay-metres-per-pixel", "1"), "not a regular file"),
         (("--underlay", "plan.svg", "--underlay-metres-per-pixel", "1"), "neither a PNG nor"),

@@ -1,4 +1,4 @@
-"""The command ``balance``: cost, energy and carbon of a fleet, two ways side by side."""
+"""Command ``balance``: cost, energy and carbon of a fleet with two localization systems."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from access_av.economics.carbon import Range
 app = typer.Typer()
 
 UNITS = {
-    "capital": "to buy",
-    "yearly": "a year, with electricity",
-    "energy_day_kj": "kJ a day of work, one vehicle",
-    "fleet_day_mj": "MJ a day of work, all of it",
+    "capital": "purchase",
+    "yearly": "per year, including electricity",
+    "energy_day_kj": "kJ per working day and vehicle",
+    "fleet_day_mj": "MJ per working day, whole fleet",
     "embodied_kg": "kgCO2e in production",
-    "use_kg_per_year": "kgCO2e a year in use",
+    "use_kg_per_year": "kgCO2e per year of use",
 }
 
 
@@ -28,13 +28,16 @@ UNITS = {
     epilog="Example: [bold]access-av balance --example > mine.toml; access-av balance mine.toml[/]",
 )
 def balance(
-    figures: Annotated[Path | None, typer.Argument(help="TOML file; else the example.")] = None,
+    figures: Annotated[
+        Path | None, typer.Argument(help="TOML file.", show_default="the example")
+    ] = None,
     example: Annotated[bool, typer.Option("--example", help="Print the example file.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Add up what localizing your fleet costs, draws and emits, before and after.
+    """Compute cost, energy and carbon of a fleet's localization, before and after a change.
 
-    Low, central and high stand side by side; embodied and use apart; every item names its source.
+    Each figure has a low, central and high value. Carbon of production and of use are separate.
+    Every item has its source.
     """
     from access_av.economics import balance as balances
     from access_av.tables.results_directory import json_text
@@ -57,13 +60,13 @@ def balance(
     )
     payback = found.payback_years
     console.print(
-        "Payback: not for every figure in the ranges."
+        "Payback: not reached for all values of the ranges."
         if payback is None
         else f"Payback: {_shown(payback)} years."
     )
 
 
 def _shown(values: Range) -> str:
-    """The three values, or the one that they are."""
+    """Returns the three values as text, or one value if all are equal."""
     ends = dict.fromkeys((values.low, values.central, values.high))
     return " … ".join(f"{end:,.0f}" if abs(end) >= 1000.0 else f"{end:.3g}" for end in ends)

@@ -1,4 +1,4 @@
-"""The command ``bound``: what accuracy a placement of radio heads can give."""
+"""Command ``bound``: error bound of a placement of radio heads."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ def bound(
     out: Out = None,
     allow_large: AllowLarge = False,
     map_step_m: Annotated[
-        float | None, typer.Option(help="Side of the map's squares; else a round length that fits.")
+        float | None, typer.Option(help="Side of the map's squares.", show_default="by the size")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Tell how well any localizer can do, before anything is built.
+    """Compute the smallest possible localization error of a site.
 
-    The posterior Cramér-Rao bound of the horizontal error: along the route and over the site; which
-    3GPP service levels it allows, where it falls short of the next, and the cheapest change that
-    mends that.
+    The posterior Cramér-Rao bound of the horizontal error along the route and over the site. Prints
+    the 3GPP service levels that it permits, where it fails the next one, and the cheapest change
+    that reaches it.
 
     Writes bound.parquet, map.parquet, report.html, scenario.toml and manifest.json.
     """

@@ -1,4 +1,4 @@
-"""The command ``columns``: what the columns of each table are."""
+"""Command ``columns``: description of the columns of each table."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ app = typer.Typer()
 @app.command(epilog="Example: [bold]access-av columns trajectories[/]")
 def columns(
     name: Annotated[
-        str | None, typer.Argument(metavar="TABLE", help="One table; else all of them.")
+        str | None, typer.Argument(metavar="TABLE", help="Name of a table.", show_default="all")
     ] = None,
     as_json_: AsJson = False,
     as_markdown: Annotated[bool, typer.Option("--markdown", help="Print docs/columns.md.")] = False,
 ) -> None:
-    """Tell name, unit and meaning of each column, and when its value is null."""
+    """Print name, unit and meaning of each column, and the condition of a null value."""
     if as_markdown:
         print(markdown(), end="")
         return

@@ -1,4 +1,4 @@
-"""Commands ``designs`` and ``choose``: which design of a scenario is worth having."""
+"""Commands ``designs`` and ``choose``: comparison of configurations of a scenario."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 TABLE = "designs.parquet"
-# Rows that a terminal is shown.
+# Maximum number of rows in the terminal.
 SHOWN = 20
-# Design, energy, percentile and its interval.
+# Minimum columns: design, energy, percentile and its interval.
 LEAST_COLUMNS = 5
 
 
@@ -49,16 +49,21 @@ def _bound(text: str) -> Any:
 )
 def designs(
     scenario: ScenarioArgument,
-    space: Annotated[Path, typer.Option(help="TOML: keys of the scenario, and their values.")],
+    space: Annotated[Path, typer.Option(help="TOML file: keys of the scenario and their values.")],
     sobol: Annotated[
         int | None,
-        typer.Option(min=1, max=100_000, help="So many designs spread evenly; else the grid."),
+        typer.Option(
+            min=1,
+            max=100_000,
+            help="Number of designs of a Sobol sequence.",
+            show_default="the whole grid",
+        ),
     ] = None,
     halving: Annotated[
-        bool, typer.Option("--halving", help="Leave out early what is behind.")
+        bool, typer.Option("--halving", help="Drop inferior designs early (successive halving).")
     ] = False,
     optuna: Annotated[
-        int | None, typer.Option(min=1, max=100_000, help="So many designs that Optuna suggests.")
+        int | None, typer.Option(min=1, max=100_000, help="Number of designs suggested by Optuna.")
     ] = None,
     runs: Runs = 20,
     seed: Seed = 1,
@@ -68,12 +73,12 @@ def designs(
     out: Out = None,
     as_json: AsJson = False,
 ) -> None:
-    """Drive every design of a space, and find those that no other beats in energy and error.
+    """Simulate all designs of a space, and find the Pareto front of energy and error.
 
-    All designs see the same runs. What is not chosen but given, such as the Rician K, stands in the
-    space's table [world], and each design is judged in the worst of these worlds. Drives are kept
-    in results/parts: a command that was stopped goes on. Writes designs.parquet, which access-av
-    choose is asked, worlds.parquet, report.html, scenario.toml and space.toml.
+    All designs use the same runs. The table [world] of the space contains environments that cannot
+    be chosen, such as the Rician K; each design is rated in its worst one. results/parts keeps the
+    runs, so that a repeated command continues. Writes designs.parquet (input of access-av choose),
+    worlds.parquet, report.html, scenario.toml and space.toml.
     """
     from access_av.designs.driven import in_worlds
     from access_av.designs.search import search
@@ -90,7 +95,7 @@ def designs(
     read = Space.read(space)
     share = Shard.parse(shard)
     if optuna is not None and (sobol is not None or halving or share != Shard()):
-        raise InputError("--optuna chooses by itself: not with --sobol, --halving or --shard")
+        raise InputError("--optuna selects the designs itself: omit --sobol, --halving and --shard")
     every = []
     if optuna is None:
         choices = read.grid() if sobol is None else read.sobol(sobol)
@@ -137,19 +142,17 @@ def designs(
         return
     _show(
         front,
-        f"{front.height} of {rows.height} designs may be on the Pareto front of energy and RMS "
-        f"error (95 %, {runs} drives of each)",
+        f"{front.height} of {rows.height} designs are on the Pareto front of energy and RMS "
+        f"error (95 % confidence, {runs} runs each)",
     )
     if not of_worlds.is_empty():
         console.print(
-            f"Each is shown in the worst of {len(read.worlds)} worlds: {', '.join(read.worlds)}. "
-            "worlds.parquet has all of them."
+            f"Results are those of the worst of {len(read.worlds)} environments: "
+            f"{', '.join(read.worlds)}. worlds.parquet contains all of them."
         )
+    console.print(f"{found.drives} runs. Report: {directory.path / 'report.html'}", soft_wrap=True)
     console.print(
-        f"{found.drives} drives. Report: {directory.path / 'report.html'}", soft_wrap=True
-    )
-    console.print(
-        f"Ask: access-av choose {directory.path} --max-error-m 0.3 --percentile 99", soft_wrap=True
+        f"Next: access-av choose {directory.path} --max-error-m 0.3 --percentile 99", soft_wrap=True
     )
 
 
@@ -157,21 +160,21 @@ def designs(
     epilog="Example: [bold]access-av choose results/mine --max-energy-j 1 --max-error-m 0.3[/]",
 )
 def choose(
-    results: Annotated[Path, typer.Argument(help="Directory that access-av designs wrote.")],
+    results: Annotated[Path, typer.Argument(help="Results folder of access-av designs.")],
     max_error_m: MaxError = None,
     percentile: PercentileOption = None,
     max_rms_m: MaxRms = None,
     max_worst_m: Annotated[
-        float | None, _bound("Largest error of a run, in nine of ten runs.")
+        float | None, _bound("Maximum error of a run, in 90 % of the runs, in m.")
     ] = None,
-    max_energy_j: Annotated[float | None, _bound("Mean energy of a trip.")] = None,
+    max_energy_j: Annotated[float | None, _bound("Maximum mean energy of a trip, in J.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Choose the design with the least energy that keeps what it has to.
+    """Choose the design with the least energy that meets all limits.
 
-    Those whose percentile keeps it with 95 % confidence come first. Designs that were driven in
-    several worlds have to keep it in every one of them. Where none keeps it: what would have to
-    change, and exit code 3.
+    Designs that meet the error limit with 95 % confidence come first. A design must meet the limits
+    in every environment. If none does, the command prints the limits that would have to change,
+    with exit code 3.
     """
     from access_av.designs.table import Constraints, what_to_change
     from access_av.errors import InputError
@@ -189,26 +192,26 @@ def choose(
     if as_json:
         print(json_text({"kept": kept.to_dicts(), "advice": advice}))
     elif advice:
-        console.print("No design keeps all of it. What would have to be allowed, by which design:")
+        console.print("No design meets all limits. Limits that a design would meet:")
         for line in advice:
             console.print(f"  {line}", soft_wrap=True)
     else:
-        title = f"{kept.height} of {rows.height} designs keep it, the least energy first"
+        title = f"{kept.height} of {rows.height} designs meet the limits, the least energy first"
         _show(kept, title, constraints.percent)
         for line in constraints.in_words(kept.row(0, named=True)):
-            console.print(f"The first: {line}.", soft_wrap=True)
+            console.print(f"First design: {line}.", soft_wrap=True)
     if advice:
         raise typer.Exit(MISSED)
 
 
 def _show(rows: pl.DataFrame, title: str, percent: float = 99.0) -> None:
-    """Designs as a table, in as many columns as the terminal has room for."""
+    """Prints designs as a table, with as many columns as the terminal can show."""
     from access_av.statistics.percentiles import column, ends_text
 
     name = column(percent)
     low, high = (name.replace("_error_m", f"_error_{end}_m") for end in ("low", "high"))
     columns: list[tuple[str, Callable[[dict[str, Any]], str]]] = [
-        ("design", lambda row: row["choice"] or "as it is"),
+        ("design", lambda row: row["choice"] or "baseline"),
         *([("worst in", lambda row: row["world"])] if (rows["world"] != "").any() else []),
         ("energy J", lambda row: _known(row["energy_j"])),
         (f"{percent:g} % m", lambda row: _known(row[name])),
@@ -216,7 +219,7 @@ def _show(rows: pl.DataFrame, title: str, percent: float = 99.0) -> None:
         ("RMS m", lambda row: _known(row["rms_error_m"])),
         ("median m", lambda row: _known(row["p50_error_m"])),
         ("executions", lambda row: _known(row["executions"])),
-        ("listened", lambda row: _known(row["listened"])),
+        ("received", lambda row: _known(row["listened"])),
     ]
     while True:
         made = table([head for head, _ in columns], title=title)
@@ -230,8 +233,8 @@ def _show(rows: pl.DataFrame, title: str, percent: float = 99.0) -> None:
         console.print(f"{rows.height - SHOWN} more in {TABLE}.")
     if rows["energy_j"].null_count() == rows.height and rows.height:
         console.print(
-            "Energy is not known: the platform has no figure for this method; vehicle.platform "
-            "names another one (access-av platform list)."
+            "Energy is unknown, because the platform has no value for this method. Set "
+            "vehicle.platform to another one (access-av platform list)."
         )
 
 

@@ -1,4 +1,4 @@
-"""Commands that make and locate recorded drives: ``synth``, ``locate``."""
+"""Commands that synthesize and locate recorded drives: ``synth``, ``locate``."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ app = typer.Typer()
 
 MOST_REMARKS = 10
 
-# Exit code of a drive that was located, but not so that it could be relied on.
+# Exit code of a drive whose located poses are not reliable.
 UNRELIABLE = 3
 
 
@@ -45,28 +45,28 @@ UNRELIABLE = 3
 )
 def synth(
     scenario: ScenarioArgument,
-    out: Annotated[Path, typer.Option(help="Directory for the files.")],
+    out: Annotated[Path, typer.Option(help="Output folder.")],
     duration_s: Annotated[
-        float | None, typer.Option(min=0.02, help="From the start on; else the whole drive.")
+        float | None, typer.Option(min=0.02, help="Duration from the start.", show_default="all")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Same seed, same samples.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")] = 1,
     run: Annotated[int, typer.Option(min=0, help="Number of the run.")] = 0,
     continuous: Annotated[
-        bool, typer.Option("--continuous", help="Also the time between the bursts (large).")
+        bool, typer.Option("--continuous", help="Also write samples between the bursts (large).")
     ] = False,
-    datatype: Annotated[str, typer.Option(help="ci16_le or cf32_le.")] = "ci16_le",
+    datatype: Annotated[str, typer.Option(help="Sample format: ci16_le or cf32_le.")] = "ci16_le",
     angles: Annotated[
         bool,
-        typer.Option("--angles", help="angles.csv in place of samples: far less."),
+        typer.Option("--angles", help="Write angles.csv instead of samples (small)."),
     ] = False,
     allow_large: AllowLarge = False,
     overrides: Overrides = None,
 ) -> None:
-    """Record a scenario's drive: samples of all antennas, odometry, site, vehicle, truth.
+    """Synthesize a recorded drive: antenna samples, odometry, site, vehicle, truth.
 
-    The samples are SigMF, so that any other receiver can be fed with them; the truth is in their
-    annotations and in truth.tum. Without --continuous the receiver sleeps between the bursts, and
-    each capture says where in time it belongs (core:global_index).
+    The samples are a SigMF recording for any receiver. Its annotations and truth.tum contain the
+    truth. Without --continuous only the bursts are written, each as a capture with its position in
+    time (core:global_index).
     """
     from access_av.drives import recorded as drives
     from access_av.tables.results_directory import ResultsDirectory
@@ -103,34 +103,35 @@ def synth(
 def locate(
     recording: Annotated[
         Path,
-        typer.Option(help="SigMF recording of the array, or log of angles, CSV or Parquet."),
+        typer.Option(help="SigMF recording of the array, or angles as CSV or Parquet."),
     ],
     odometry: Annotated[
-        Path, typer.Option(help="CSV; MCAP or rosbag2 folder with nav_msgs/Odometry.")
+        Path, typer.Option(help="Odometry: CSV, or MCAP or rosbag2 folder with nav_msgs/Odometry.")
     ],
-    site: Annotated[str, typer.Option(help="Radio heads and road: shipped name, or TOML file.")],
+    site: Annotated[str, typer.Option(help="Site: shipped name, or path of a TOML file.")],
     vehicle: Annotated[
-        str, typer.Option(help="Array, odometer, localizer: shipped name, or TOML file.")
+        str, typer.Option(help="Vehicle: shipped name, or path of a TOML file.")
     ] = "default",
     out: Out = None,
-    truth: Annotated[Path | None, typer.Option(help="TUM trajectory to compare with.")] = None,
-    topic: Annotated[str | None, typer.Option(help="Topic of the odometry in the bag.")] = None,
+    truth: Annotated[Path | None, typer.Option(help="True trajectory, TUM.")] = None,
+    topic: Annotated[str | None, typer.Option(help="Odometry topic of the bag.")] = None,
     imu_topic: Annotated[
         str | None,
-        typer.Option(help="Topic of the IMU for the yaw rate, in place of the odometry's own."),
+        typer.Option(help="IMU topic for the yaw rate.", show_default="yaw rate of the odometry"),
     ] = None,
     start_time_s: Annotated[
-        float, typer.Option(help="Time of the first sample by the odometry's clock.")
+        float, typer.Option(help="Time of the first sample, odometry clock, in s.")
     ] = 0.0,
     start: Annotated[
         str | None,
         typer.Option(
             metavar="X,Y,HEADING",
-            help="Initial pose in m, m, rad, in place of the vehicle's; or the word scratch.",
+            help="Start pose in m, m, rad, or the word scratch.",
+            show_default="of the vehicle file",
         ),
     ] = None,
     smooth: Annotated[
-        bool, typer.Option("--smooth", help="Also each pose by the angles that came after it.")
+        bool, typer.Option("--smooth", help="Also write the smoothed trajectory.")
     ] = False,
     vary: Vary = None,
     compare: Compare = None,
@@ -140,34 +141,32 @@ def locate(
     """Locate a recorded drive.
 
     Writes drive.mcap (poses with covariance and twist, verdicts, diagnostics), trajectory.tum,
-    poses.parquet, angles.parquet, findings.parquet, manifest.json and report.html. Items of the
-    input that cannot be used are named, and the rest is used. Without an initial pose, in the
-    vehicle file or by --start, the vehicle is found: along the road by two radio heads or more,
-    elsewhere by three. --smooth adds smoothed.tum, smoothed.parquet and the topic
-    /access_av/smoothed.
+    poses.parquet, angles.parquet, findings.parquet, manifest.json and report.html. Unusable parts
+    of the input are reported and left out. Without a start pose (vehicle file or --start) the
+    vehicle is searched for: with at least two radio heads along a road, otherwise with three.
+    --smooth adds smoothed.tum, smoothed.parquet and the topic /access_av/smoothed.
 
-    Odometry, CSV: time_s; distance_m or speed_mps or both; yaw_rate_radps where something tells
-    it. Or left_m and right_m, or left_mps and right_mps, of wheels odometer.track_width_m apart.
+    Odometry, CSV: time_s; distance_m or speed_mps or both; optional yaw_rate_radps. Two wheels:
+    left_m and right_m, or left_mps and right_mps, with odometer.track_width_m of the vehicle.
 
-    Odometry, MCAP or rosbag2: nav_msgs/Odometry; where its twist tells no yaw rate, that of a
-    sensor_msgs/Imu (z axis up) or of the turning of the pose's orientation.
+    Odometry, MCAP or rosbag2: nav_msgs/Odometry. If its twist has no yaw rate, the yaw rate is that
+    of a sensor_msgs/Imu (z axis up) or of the pose's orientation.
 
     Angles, CSV or Parquet: time_s; pci; phase_rad (electrical) and phase_sigma_rad, or angle_rad
-    (from the array's axis) and angle_sigma_rad; ssb_index and snr_db where known.
+    (from the array axis) and angle_sigma_rad; optional ssb_index and snr_db.
 
-    Truth, TUM: t x y z qx qy qz qw a line, at times of its own, at most 1 s apart; a line that
-    begins with # is a comment. It has to cover half of the drive. Its orientation is not used.
+    Truth, TUM: lines t x y z qx qy qz qw at most 1 s apart; # begins a comment. The truth must
+    cover half of the drive. Its orientation is not used.
 
-    Site, TOML: radio_heads, of each its pci and position_m; road only where there is one, by its
-    polyline_m, segments, or file (GeoJSON or CSV). docs/locate.md has examples of sites and
-    vehicles.
+    Site, TOML: radio_heads with pci and position_m; optional road with polyline_m, segments, or
+    file (GeoJSON or CSV). docs/locate.md has examples of sites and vehicles.
 
-    --vary changes a key that begins with site. or vehicle., --compare names another vehicle; both
-    locate the drive once more, compare the errors with --truth, and write compared.parquet.
+    --vary changes a key that begins with site. or vehicle.; --compare names another vehicle. Both
+    locate the drive again, compare the errors with --truth, and write compared.parquet.
 
-    Exit code 0: located. 2: the input cannot be used. 3: never found, unavailable for more than a
-    fifth of the time or at the end, or displaced by more than 0.5 m by a reported fault of the
-    input; the message names what to check.
+    Exit code 0: located. 2: unusable input. 3: not reliable (never found, unavailable for more than
+    a fifth of the time or at the end, or displaced by more than 0.5 m by a reported fault of the
+    input); the message names the input to check.
     """
     from access_av.drives import recorded as drives
     from access_av.drives.recorded import Drive
@@ -182,7 +181,7 @@ def locate(
     others = {name: load_site_and_vehicle(site, name, pose) for name in compare or ()}
     beliefs = variants((plant, carrier), vary, others, _changed)
     if len(beliefs) > 1 and truth is None:
-        raise InputError("--vary, --compare: errors are compared, so give --truth FILE")
+        raise InputError("--vary, --compare: add --truth FILE, because the errors are compared")
     true = None if truth is None else drives.read_tum(truth)
     directory = ResultsDirectory.create("locate", out)
     located = dict[str, Drive]()
@@ -246,7 +245,7 @@ def locate(
 
 
 def _changed(belief: tuple[Site, Vehicle], keys: dict[str, Any]) -> tuple[Site, Vehicle]:
-    """A site and a vehicle with keys of theirs changed."""
+    """Returns site and vehicle with changed keys."""
     parts: dict[str, dict[str, Any]] = {"site": {}, "vehicle": {}}
     for key, value in keys.items():
         part, _, rest = key.partition(".")
@@ -260,7 +259,7 @@ def _changed(belief: tuple[Site, Vehicle], keys: dict[str, Any]) -> tuple[Site, 
 def _beside(
     located: dict[str, Drive], truth: pl.DataFrame | None, percents: list[float]
 ) -> list[Compared]:
-    """A drive as located by each variant; nothing where there is but one."""
+    """Compares the variants of a located drive; empty for a single variant."""
     from access_av.drives.recorded import in_stretches
     from access_av.study.compare import beside_first
 
@@ -270,7 +269,7 @@ def _beside(
 
 
 def _show(drive: Drive, numbers: dict[str, float]) -> None:
-    # The verdict ends with the suspicions.
+    # Suspicions are part of the verdict.
     remarks = [remark for remark in drive.remarks if remark not in drive.suspicions]
     for remark in remarks[:MOST_REMARKS]:
         show_warning(remark)
@@ -282,7 +281,7 @@ def _show(drive: Drive, numbers: dict[str, float]) -> None:
     )
     if "found_s" in numbers:
         console.print(
-            f"Found after {numbers['found_m']:.1f} m and {numbers['found_s']:.1f} s from scratch."
+            f"Position found after {numbers['found_m']:.1f} m and {numbers['found_s']:.1f} s."
         )
     if "rms_error_m" in numbers:
         console.print(
@@ -300,23 +299,22 @@ def _unreliable(drive: Drive) -> str:
     if _lost(drive):
         happened = "the vehicle was never found. Give --start, or a longer drive. "
     elif drive.unavailable_share > max(drive.lost_share, MAX_UNAVAILABLE):
-        happened = f"for {drive.unavailable_share:.0%} of the time the position was unavailable. "
+        happened = f"the position was unavailable for {drive.unavailable_share:.0%} of the time. "
     elif drive.lost_share:
-        at_end = ", the end included," if drive.poses["lost"][-1] else ""
+        at_end = ", including the end," if drive.poses["lost"][-1] else ""
         happened = (
-            f"for {drive.lost_share:.0%} of the time{at_end} the angles came from elsewhere than "
-            "expected. "
+            f"for {drive.lost_share:.0%} of the time{at_end} the angles contradicted the position. "
         )
     else:
         happened = ""
     check = (
         " ".join(f"{suspicion}." for suspicion in drive.suspicions)
         if drive.suspicions
-        else "Check, in this order: start pose, array.mounting_rad (sign, mirrored array), places "
-        "and PCIs of the radio heads, drive (road or differential), yaw_rate_radps (unit, sign), "
-        "phase_rad against angle_rad, the clocks, odometer.scale."
+        else "Check, in this order: start pose, array.mounting_rad (sign, mirrored array), "
+        "positions and PCIs of the radio heads, drive (road or differential), "
+        "yaw_rate_radps (unit, sign), phase_rad against angle_rad, the clocks, odometer.scale."
     )
-    return f"not to be relied on: {happened}{check}"
+    return f"not reliable: {happened}{check}"
 
 
 def _lost(drive: Drive) -> bool:
@@ -334,5 +332,5 @@ def _pose(text: str) -> tuple[float, float, float]:
     if not all(map(math.isfinite, (x_m, y_m, heading_rad))):
         raise InputError(f"--start {text}: the numbers must be finite")
     if abs(heading_rad) > math.tau:
-        raise InputError(f"--start {text}: the heading is beyond a whole turn; write it in radians")
+        raise InputError(f"--start {text}: the heading exceeds one turn; write it in radians")
     return x_m, y_m, heading_rad

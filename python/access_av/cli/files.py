@@ -19,13 +19,17 @@ Names = Annotated[list[str], typer.Argument(help="Shipped names, or paths.")]
 
 
 def _check(names: list[str], load: Callable[[str], Any]) -> None:
-    """Describe each that is fine, say of each other one what is wrong or doubtful."""
+    """Prints the result of the check of each file; exit code 2 if one is invalid."""
     wrong = 0
     for name in names:
         try:
             read = load(name)
             warnings = read.warnings()
-            verdict = f"{len(warnings)} doubtful" if warnings else "fine"
+            verdict = (
+                f"valid, {len(warnings)} warning{'s' * (len(warnings) > 1)}"
+                if warnings
+                else "valid"
+            )
             size = _size(read) if isinstance(read, Scenario) else ""
             console.print(f"{name}: {verdict}{size}", soft_wrap=True)
             announce(name, warnings)
@@ -37,16 +41,16 @@ def _check(names: list[str], load: Callable[[str], Any]) -> None:
 
 
 def _size(scenario: Scenario) -> str:
-    """What a drive takes."""
+    """Returns the duration and size of a run."""
     size = scenario.size
     return (
-        f"; a drive of {size['duration_s']:.0f} s, {size['ssbs']:.0f} SSBs, "
+        f"; a run of {size['duration_s']:.0f} s, {size['ssbs']:.0f} SSBs, "
         f"{size['bytes'] * 1e-6:.0f} MB"
     )
 
 
 def files_app(what: str) -> typer.Typer:
-    """Commands that show, check and describe the files of one kind."""
+    """Returns the commands that list, show and check the files of one kind."""
     kinds = {
         "site": Site,
         "vehicle": Vehicle,
@@ -68,7 +72,7 @@ def files_app(what: str) -> typer.Typer:
             console.print(name)
 
     @files.command(
-        help=f"Print a {what} with every default written out.",
+        help=f"Print a {what} file with all default values.",
         epilog=f"Example: [bold]access-av {what} show {example} > mine.toml[/]",
     )
     def show(name: Annotated[str, typer.Argument(help="Shipped name, or path.")]) -> None:
@@ -76,7 +80,7 @@ def files_app(what: str) -> typer.Typer:
 
     command = files.command(
         name="check",
-        help=f"Check {what} files: exit code 2 where one is wrong; warns where one is doubtful.",
+        help=f"Check {what} files: exit code 2 for invalid ones, warnings for implausible ones.",
         epilog=f"Example: [bold]access-av {what} check mine.toml[/]",
     )
     if what == "scenario":
@@ -105,13 +109,14 @@ def files_app(what: str) -> typer.Typer:
 
 
 def power(name: Annotated[str, typer.Argument(help="Shipped name, or path.")]) -> None:
-    """Lay the modelled power of the busy board beside what was measured, mode by mode.
+    """Compare the modelled and the measured power of a board with all cores busy.
 
-    Of every power mode in the platform's file, all its cores at work; a dash where nothing is
-    modelled or was measured.
+    One row per power mode of the platform file; a dash marks a missing value.
     """
     platform = Platform.load(name)
-    made = table(["mode", "name", "cores", "MHz", "modelled W", "measured W", "off %"], text=2)
+    made = table(
+        ["mode", "name", "cores", "MHz", "modelled W", "measured W", "difference %"], text=2
+    )
     for index, mode in enumerate(json.loads(platform.to_json())["modes"]):
         modelled_w = platform.busy_power_w(index, mode["cores"])
         measured_w = mode.get("full_load_power_w", {}).get("value")

@@ -1,4 +1,4 @@
-"""The command ``integrity``: protection levels under injected faults and wrong settings."""
+"""Command ``integrity``: protection levels under injected faults and wrong settings."""
 
 from __future__ import annotations
 
@@ -47,21 +47,24 @@ def integrity(
     seed: Seed = 1,
     threads: Threads = None,
     mismatch: Annotated[
-        list[str] | None, typer.Option(help="Only this one; may be repeated. Else all.")
+        list[str] | None,
+        typer.Option(help="Difference of truth and model; repeatable.", show_default="all"),
     ] = None,
     hypotheses: Annotated[
-        bool, typer.Option("--hypotheses", help="What may be wrong at a site, at three sizes.")
+        bool, typer.Option("--hypotheses", help="Also the site's fault hypotheses, at three sizes.")
     ] = False,
     channel: Annotated[
         list[str] | None,
-        typer.Option(help="'as set', K=5 (a true Rician K of 5 dB), umi, inf-sl ...; repeat it."),
+        typer.Option(help="'as set', K=5 (a true Rician K of 5 dB), umi, inf-sl, …; repeatable."),
     ] = None,
     heads: Annotated[
-        list[int] | None, typer.Option(min=1, help="Radio heads listened to; may be repeated.")
+        list[int] | None, typer.Option(min=1, help="Number of received radio heads; repeatable.")
     ] = None,
     risk: Annotated[
         list[float] | None,
-        typer.Option(help="Target integrity risk per hour, not the vehicle's; may be repeated."),
+        typer.Option(
+            help="Target integrity risk per hour; repeatable.", show_default="the vehicle's"
+        ),
     ] = None,
     vary: Vary = None,
     compare: Compare = None,
@@ -71,15 +74,17 @@ def integrity(
     out: Out = None,
     as_json: AsJson = False,
 ) -> None:
-    """Inject faults and wrong settings, and count what the protection level still covers.
+    """Inject faults and wrong settings, and evaluate the protection level.
 
-    Array turned or badly calibrated, odometer worse than stated, radio heads elsewhere or hidden:
-    by channel, by number of radio heads. With --out a stopped campaign goes on where it stopped.
-    Prints the share of the time that is ok, the share of that with an error beyond the level, the
-    longest time beyond the alert limit without an alarm, the integrity risk per hour, and level by
-    error; ≤ is the end of a 95 % interval. In a narrow terminal the last of them are left out.
-    Writes integrity.parquet, report.html (table and Stanford diagrams), parts/ and manifest.json;
-    with --vary or --compare, which drive every case of other values or files too, compared.parquet.
+    Cases: array rotated or badly calibrated, odometer worse than specified, radio heads moved or
+    hidden; for each channel and number of radio heads. --out continues an interrupted campaign.
+
+    Columns: share of the time with state ok; share of that time with an error above the protection
+    level; maximum time above the alert limit without an alarm; integrity risk per hour; level
+    divided by error. ≤ is the upper end of a 95 % interval. A narrow terminal omits the last ones.
+
+    Writes integrity.parquet, report.html (table and Stanford diagrams), parts/ and manifest.json.
+    --vary and --compare repeat every case and write compared.parquet.
     """
     import polars as pl
 
@@ -137,12 +142,12 @@ def integrity(
 
 
 def _beside(cases: Sequence[Case], percents: list[float]) -> list[Compared]:
-    """Each case beside the same one of the first variant; nothing where there is but one."""
+    """Compares each case with that of the first variant; empty for a single variant."""
     from access_av.study.compare import beside_first
 
     if len({case.variant for case in cases}) == 1:
         return []
-    # By place among a variant's own: number of radio heads and risk may be what is varied.
+    # Pair the cases by their order, because number of radio heads and risk can be varied.
     seen: Counter[tuple[str, str, str]] = Counter()
     of_case: dict[tuple[str, str, int], list[Case]] = {}
     for case in cases:
@@ -163,14 +168,14 @@ def _power_of_ten(key: str) -> Cell:
     return lambda one: "–" if one[key] is None else f"{one[key]:.0e}"
 
 
-# Cells of a case. What all cases have in common stands above the table.
+# Settings of a case. Settings that all cases share are printed above the table.
 _SETTINGS: tuple[tuple[str, Cell], ...] = (
     ("variant", lambda one: one["variant"]),
     ("channel", lambda one: one["channel"]),
     ("heads", lambda one: str(one["heads"])),
-    ("asked/h", _power_of_ten("asked_risk_per_hour")),
+    ("target/h", _power_of_ten("asked_risk_per_hour")),
 )
-# Most important first; "≤" is the end of the 95 % interval of what stands before it.
+# Results, the most important first; "≤": upper end of the 95 % interval of the column before.
 _FOUND: tuple[tuple[str, Cell], ...] = (
     ("ok %", lambda one: f"{100.0 * one['availability']:.1f}"),
     ("beyond", _power_of_ten("exceedance_share")),
@@ -183,18 +188,18 @@ _FOUND: tuple[tuple[str, Cell], ...] = (
 
 
 def _show(records: Sequence[dict[str, Any]]) -> None:
-    """Print a row for each case, in as many columns as the terminal has room for."""
+    """Prints a row per case, with as many columns as the terminal can show."""
     common = [
         f"{name} {cell(records[0])}"
         for name, cell in _SETTINGS
         if name != "variant" and len({cell(one) for one in records}) == 1
     ]
     columns: list[tuple[str, Cell]] = [
-        ("world", lambda one: "as stated" if one["mismatch"] == "none" else one["mismatch"]),
+        ("truth", lambda one: "nominal" if one["mismatch"] == "none" else one["mismatch"]),
         *((name, cell) for name, cell in _SETTINGS if len({cell(one) for one in records}) > 1),
         *_FOUND,
     ]
-    console.print(", ".join([f"{records[0]['runs']} drives each", *common]), soft_wrap=True)
+    console.print(", ".join([f"{records[0]['runs']} runs each", *common]), soft_wrap=True)
     while True:
         made = table([name for name, _ in columns])
         for one in records:

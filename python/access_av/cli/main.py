@@ -1,4 +1,4 @@
-"""The command line, ``access-av``. Bad input ends with exit code 2 and one message."""
+"""Command line ``access-av``: invalid input gives one message and exit code 2."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from access_av.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-UsageError: Any = typer.BadParameter.__mro__[1]  # Typer names it by its heir alone
+UsageError: Any = typer.BadParameter.__mro__[1]  # Typer exports only a subclass of it
 
 
 @contextmanager
@@ -57,11 +57,11 @@ def _brief_usage_errors() -> Iterator[None]:
 
 
 class _Commands(TyperGroup):
-    """Commands whose usage errors do not repeat all that was typed, and whose help is filled."""
+    """Command group that shortens usage errors and reflows the help texts."""
 
     def get_command(self, context: Any, name: str) -> Any:
         command = super().get_command(context, name)
-        if command and command.help:  # A line break of the source is none of the paragraph.
+        if command and command.help:  # Join the lines of a paragraph.
             command.help = re.sub(r"(?<=\S)\n(?=\S)", " ", inspect.cleandoc(command.help))
         return command
 
@@ -95,7 +95,8 @@ def _show_version(wanted: bool) -> None:
 @app.callback()
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show it.")
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
     ] = False,
 ) -> None:
     pass
@@ -113,7 +114,7 @@ for _what in ("site", "vehicle", "scenario", "platform", "plant"):
 
 
 def main() -> None:
-    """Entry point: turns every bad input into one message and exit code 2."""
+    """Runs the command line; reports invalid input as one message with exit code 2."""
     write_what_can_be_written()
     try:
         try:

@@ -1,4 +1,4 @@
-"""The commands ``new``: files of one's own to begin with."""
+"""Commands ``new`` and ``export``: example files, import and export of sites."""
 
 from __future__ import annotations
 
@@ -15,67 +15,74 @@ from access_av.site_files.drawn import Drawn
 if TYPE_CHECKING:
     from access_av.site_files.picture import Placed
 
-Target = Annotated[Path, typer.Argument(help="The file to write, for example mine.toml.")]
-Force = Annotated[bool, typer.Option("--force", help="Write over a file that is there.")]
+Target = Annotated[Path, typer.Argument(help="File to write, for example mine.toml.")]
+Force = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
 Road = Annotated[
     Path | None,
     typer.Option(
-        help="CSV (x_m, y_m), GeoJSON (a LineString) or DXF (curves of one layer that join)."
+        help="Road: CSV (x_m, y_m), GeoJSON (LineString) or DXF (joining curves of a layer)."
     ),
 ]
 Heads = Annotated[
     Path | None,
-    typer.Option(help="CSV (x_m, y_m, z_m, name, pci), GeoJSON (Points) or DXF (points, blocks)."),
+    typer.Option(
+        help="Radio heads: CSV (x_m, y_m, z_m, name, pci), GeoJSON or DXF (points, blocks)."
+    ),
 ]
 Walls = Annotated[
     Path | None,
-    typer.Option(help="GeoJSON (LineStrings, Polygons) or DXF (curves and faces of a layer)."),
+    typer.Option(help="Walls: GeoJSON (LineStrings, Polygons) or DXF (curves and faces)."),
 ]
 Picture = Annotated[
-    Path | None, typer.Option("--underlay", help="PNG or JPEG to lie under the site's maps.")
+    Path | None, typer.Option("--underlay", help="PNG or JPEG as background of the site's maps.")
 ]
 PicturePoints = Annotated[
     str | None,
     typer.Option(
         "--underlay-points",
         metavar="X1,Y1,X2,Y2",
-        help="Two pixels of it, from its upper left corner, --underlay-length-m apart.",
+        help="Two pixels of the background, from its upper left corner.",
     ),
 ]
 PictureLength = Annotated[
-    float | None, typer.Option("--underlay-length-m", min=0.0, help="Measured length between them.")
+    float | None, typer.Option("--underlay-length-m", min=0.0, help="Distance of the two pixels.")
 ]
 PictureScale = Annotated[
     float | None,
-    typer.Option("--underlay-metres-per-pixel", min=0.0, help="Of it, where that is known."),
+    typer.Option("--underlay-metres-per-pixel", min=0.0, help="Scale of the background."),
 ]
 PictureZero = Annotated[
     str | None,
     typer.Option(
-        "--underlay-zero", metavar="X,Y", help="Pixel of the map's zero; else its lower left."
+        "--underlay-zero", metavar="X,Y", help="Pixel of the map origin.", show_default="lower left"
     ),
 ]
 OriginText = Annotated[
     str | None,
     typer.Option(
-        "--origin", metavar="LAT,LON", help="The map's zero, of GeoJSON in degrees; else the first."
+        "--origin",
+        metavar="LAT,LON",
+        help="Map origin for GeoJSON in degrees.",
+        show_default="first point",
     ),
 ]
-RoadLayer = Annotated[str, typer.Option(help="Layer of a DXF that holds the road.")]
-HeadsLayer = Annotated[str, typer.Option(help="Layer of a DXF that holds the radio heads.")]
-WallsLayer = Annotated[str, typer.Option(help="Layer of a DXF that holds the walls.")]
+RoadLayer = Annotated[str, typer.Option(help="DXF layer of the road.")]
+HeadsLayer = Annotated[str, typer.Option(help="DXF layer of the radio heads.")]
+WallsLayer = Annotated[str, typer.Option(help="DXF layer of the walls.")]
 TwoPoints = Annotated[
     str | None,
-    typer.Option(metavar="X1,Y1,X2,Y2", help="Two points of a DXF, with --length-m between them."),
+    typer.Option(metavar="X1,Y1,X2,Y2", help="Two points of a DXF, --length-m apart."),
 ]
 Length = Annotated[
-    float | None, typer.Option("--length-m", min=0.0, help="Measured length between two points.")
+    float | None, typer.Option("--length-m", min=0.0, help="Distance of --two-points.")
 ]
 MetresPerUnit = Annotated[
-    float | None, typer.Option(min=0.0, help="Of a DXF, where that is known: 0.001 of mm.")
+    float | None, typer.Option(min=0.0, help="Unit of a DXF, for example 0.001 for mm.")
 ]
 
-app = typer.Typer(no_args_is_help=True, help="Begin a plant, site, vehicle, scenario or node file.")
+app = typer.Typer(
+    no_args_is_help=True, help="Write an example plant, site, vehicle, scenario or node file."
+)
 
 
 def _numbers(option: str, text: str, count: int) -> list[float]:
@@ -84,7 +91,7 @@ def _numbers(option: str, text: str, count: int) -> list[float]:
     except ValueError:
         found = []
     if len(found) != count:
-        raise InputError(f"{option} {text}: {count} numbers are needed, with commas between")
+        raise InputError(f"{option} {text}: write {count} numbers, separated by commas")
     return found
 
 
@@ -93,7 +100,7 @@ def _origin(text: str | None) -> tuple[float, float] | None:
         return None
     latitude, longitude = _numbers("--origin", text, 2)
     if abs(latitude) > 90.0 or abs(longitude) > 180.0:
-        raise InputError(f"--origin {text}: latitude, then longitude, in degrees")
+        raise InputError(f"--origin {text}: write latitude, then longitude, in degrees")
     return latitude, longitude
 
 
@@ -107,11 +114,11 @@ def _scale_m(
 
     of_points, of_length, of_unit = options
     if (two_points is None) != (length_m is None):
-        raise InputError(f"{of_points} and {of_length} go together")
+        raise InputError(f"{of_points} and {of_length} must be given together")
     if two_points is None or length_m is None:
         return metres_per_unit
     if metres_per_unit is not None:
-        raise InputError(f"{of_unit}: not beside {of_points}, which say it as well")
+        raise InputError(f"{of_unit}: omit it, because {of_points} determines the scale")
     x1, y1, x2, y2 = _numbers(of_points, two_points, 4)
     return dxf.metres_per_unit((x1, y1, x2, y2), length_m)
 
@@ -124,18 +131,18 @@ def _placed(
     metres_per_pixel: float | None,
     zero: str | None,
 ) -> Placed | None:
-    """Where a picture lies under the maps of the site in a file; its path counts from there."""
+    """Returns the placement of a background image; its path is relative to ``file``."""
     from access_av.site_files.picture import Placed, size_px
 
     options = ("--underlay-points", "--underlay-length-m", "--underlay-metres-per-pixel")
     scale_m = _scale_m(points, length_m, metres_per_pixel, options)
     if picture is None:
         if scale_m is not None or zero is not None:
-            raise InputError("--underlay is missing: it names the picture")
+            raise InputError("--underlay is missing: add the path of the background image")
         return None
     if scale_m is None:
         raise InputError(
-            f"{picture}: say how large it is: --underlay-points X1,Y1,X2,Y2 with "
+            f"{picture}: the scale is missing: add --underlay-points X1,Y1,X2,Y2 with "
             "--underlay-length-m, or --underlay-metres-per-pixel"
         )
     _, height_px = size_px(picture)
@@ -156,9 +163,9 @@ def _write(
     from access_av.tables.results_directory import write_whole
 
     if file.is_dir():
-        raise InputError(f"{file}: is a folder; name the file to write")
+        raise InputError(f"{file}: is a folder; give the path of a file")
     if file.exists() and not force:
-        raise InputError(f"{file}: is there already; --force writes over it")
+        raise InputError(f"{file}: exists already; --force overwrites it")
     kinds: dict[str, Any] = {
         "plant": _core.Plant,
         "site": _core.Site,
@@ -168,7 +175,7 @@ def _write(
     name = "".join(it if it.isalnum() or it in "-_" else "-" for it in file.stem) or kind
     text = new(kind, name, str(file), drawn, placed)
     to_fill = missing(kind, drawn)
-    # A node's file is for access-av-node, which checks it itself.
+    # access-av-node checks a node file.
     warnings: list[_core.SettingsWarning] = []
     if kind in kinds:
         whole = new(kind, name, str(file), drawn, placed, filled=True) if to_fill else text
@@ -188,7 +195,7 @@ def _write(
 
 
 def _report(drawn: Drawn) -> None:
-    """Prints what was imported, what was not, and what needs attention."""
+    """Prints imported and omitted items, and warnings."""
     from access_av.cli.terminal import plain, show_warning
     from access_av.site_files.curves import length_m
 
@@ -208,7 +215,7 @@ def _report(drawn: Drawn) -> None:
     for what, count in drawn.skipped.items():
         console.print(f"Not imported: {plain(what)}: {count}", soft_wrap=True)
     if not drawn.skipped:
-        console.print("Not imported: nothing was left out.", soft_wrap=True)
+        console.print("Not imported: nothing.", soft_wrap=True)
     for note in drawn.notes:
         show_warning(note)
 
@@ -227,7 +234,7 @@ def _next(kind: str, file: Path) -> str:
 
 
 def _site_command(kind: str, begins: str, example: str) -> None:
-    """Add a command that begins a file with a site in it."""
+    """Adds a command that writes a file with a site."""
 
     def command(
         file: Target,
@@ -274,27 +281,27 @@ def _site_command(kind: str, begins: str, example: str) -> None:
 
 _site_command(
     "plant",
-    "Begin a plant file: site, vehicle, fleet, prices and the accuracy that is needed.",
+    "Write a plant file: site, vehicle, fleet, prices and required accuracy.",
     "--road road.geojson",
 )
-_site_command("site", "Begin a site file: a road, radio heads and walls.", "--heads heads.csv")
+_site_command("site", "Write a site file: road, radio heads and walls.", "--heads heads.csv")
 
 
 @app.command(epilog="Example: [bold]access-av new vehicle mine.toml[/]")
 def vehicle(file: Target, force: Force = False) -> None:
-    """Begin a vehicle file: antennas, odometer, wake-up and platform."""
+    """Write a vehicle file: antennas, odometer, wake-up and platform."""
     _write("vehicle", file, force)
 
 
 @app.command(epilog="Example: [bold]access-av new scenario mine.toml[/]")
 def scenario(file: Target, force: Force = False) -> None:
-    """Begin a scenario file: a site, a vehicle, and the world around them."""
+    """Write a scenario file: site, vehicle and environment."""
     _write("scenario", file, force)
 
 
 @app.command(epilog="Example: [bold]access-av new node node.toml[/]")
 def node(file: Target, force: Force = False) -> None:
-    """Begin a node file: what access-av-node reads and writes on a vehicle."""
+    """Write a node file: inputs and outputs of access-av-node on a vehicle."""
     _write("node", file, force)
 
 
@@ -304,18 +311,18 @@ export_app = typer.Typer()
 @export_app.command(epilog="Example: [bold]access-av export yard yard.geojson[/]")
 def export(
     site: Annotated[
-        str, typer.Argument(help="Shipped name, or path of a TOML file, of a site or a plant.")
+        str, typer.Argument(help="Site or plant: shipped name, or path of a TOML file.")
     ],
-    file: Annotated[Path, typer.Argument(help="Name that ends in .geojson or .csv.")],
+    file: Annotated[Path, typer.Argument(help="File to write: .geojson or .csv.")],
     origin: OriginText = None,
     german: Annotated[
         bool, typer.Option("--german", help="CSV with semicolons and decimal commas.")
     ] = False,
 ) -> None:
-    """Write a site's road, radio heads and walls for other programs.
+    """Export a site's road, radio heads and walls.
 
-    GeoJSON holds them all, in degrees with --origin, else in metres; CSV holds the road, and the
-    radio heads in a second file beside it, NAME-heads.csv.
+    GeoJSON contains all of them, in degrees with --origin, otherwise in metres. CSV contains the
+    road; a second file, NAME-heads.csv, contains the radio heads.
     """
     from access_av import _core
     from access_av.site_files import csv_file, geojson

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have."""
+"""Arguments and options that several commands share."""
 
 from __future__ import annotations
 
@@ -18,64 +18,72 @@ if TYPE_CHECKING:
 
     from access_av._core import SettingsWarning
 
-ScenarioArgument = Annotated[str, typer.Argument(help="Shipped name, or path of a TOML file.")]
-ScenarioOption = Annotated[str, typer.Option(help="Shipped name, or path of a TOML file.")]
-PlatformOption = Annotated[str, typer.Option(help="Shipped name, or path of a TOML file.")]
-Runs = Annotated[int, typer.Option(min=1, max=1_000_000, help="Drives per setting.")]
-Seed = Annotated[int, typer.Option(min=0, max=2**64 - 1, help="Same seed, same results.")]
+ScenarioArgument = Annotated[
+    str, typer.Argument(help="Scenario: shipped name, or path of a TOML file.")
+]
+ScenarioOption = Annotated[
+    str, typer.Option(help="Scenario: shipped name, or path of a TOML file.")
+]
+PlatformOption = Annotated[
+    str, typer.Option(help="Platform: shipped name, or path of a TOML file.")
+]
+Runs = Annotated[int, typer.Option(min=1, max=1_000_000, help="Simulated runs per configuration.")]
+Seed = Annotated[int, typer.Option(min=0, max=2**64 - 1, help="Seed of the random numbers.")]
 Threads = Annotated[
-    int | None, typer.Option(min=1, max=1024, help="Worker threads; all cores if not given.")
+    int | None, typer.Option(min=1, max=1024, help="Worker threads.", show_default="all cores")
 ]
 Out = Annotated[
-    Path | None, typer.Option(help="Directory for the files; else a new one in results/.")
+    Path | None, typer.Option(help="Output folder.", show_default="a new one in results/")
 ]
 AllowLarge = Annotated[
-    bool, typer.Option("--allow-large", help="Also drives that take hours and gigabytes.")
+    bool, typer.Option("--allow-large", help="Permit runs of hours and gigabytes.")
 ]
 Overrides = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change one key; may be repeated."),
+    typer.Option("--set", metavar="KEY=VALUE", help="Value of one key of the file; repeatable."),
 ]
-ShardOption = Annotated[str, typer.Option(metavar="I/N", help="Only this share of the drives.")]
+ShardOption = Annotated[str, typer.Option(metavar="I/N", help="Run only part I of N parts.")]
 DaskOption = Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")]
 MaxRms = Annotated[
-    float | None, typer.Option(min=0.0, help="Largest RMS error over track and runs.")
+    float | None, typer.Option(min=0.0, help="Maximum RMS error over all runs, in m.")
 ]
 MaxError = Annotated[
     float | None,
-    typer.Option(min=0.0, help="So many percent of the errors (--percentile) are to be within it."),
+    typer.Option(min=0.0, help="Maximum error percentile (see --percentile), in m."),
 ]
 PercentileOption = Annotated[
     float | None,
-    typer.Option(help="Of --max-error-m: 50, 90, 95, 99 or 99.9.", show_default="99"),
+    typer.Option(help="Percentile of --max-error-m: 50, 90, 95, 99 or 99.9.", show_default="99"),
 ]
 Vary = Annotated[
     list[str] | None,
-    typer.Option("--vary", metavar="KEY=a,b,c", help="Values of a key side by side; repeatable."),
+    typer.Option("--vary", metavar="KEY=a,b,c", help="Compare values of a key; repeatable."),
 ]
 Compare = Annotated[
-    list[str] | None, typer.Option("--compare", help="Another file, side by side; repeatable.")
+    list[str] | None, typer.Option("--compare", help="Compare with another file; repeatable.")
 ]
 Percents = Annotated[
     list[float] | None,
-    typer.Option("--percentile", min=1.0, max=100.0, help="Compared percentiles; 50, 90 and 99."),
+    typer.Option(
+        "--percentile", min=1.0, max=100.0, help="Compared percentiles.", show_default="50, 90, 99"
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
-# Exit code where something was found, and not what was asked for.
+# Exit code if no result meets the requirement.
 MISSED = 3
 
-# What is said when a share of a campaign is done and others are not.
-OTHER_SHARES = "Share {} is done; other shares are not: run them, then this again."
+# Message of a part of a campaign whose other parts are missing.
+OTHER_SHARES = "Part {} is complete. Run the other parts, then repeat this command."
 
 
 def overridden(given: Iterable[str] | None) -> dict[str, Any]:
-    """The keys that ``--set`` names, with their values."""
+    """Returns the keys and values of ``--set``."""
     return dict(map(_override, given or ()))
 
 
 def _override(text: str) -> tuple[str, Any]:
-    """Split KEY=VALUE; the value is read as TOML, and as plain text where it is none."""
+    """Splits KEY=VALUE; the value is TOML, otherwise plain text."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise InputError(f"--set {text}: write KEY=VALUE, for example site.rician_k_db=10")
@@ -88,9 +96,9 @@ def _override(text: str) -> tuple[str, Any]:
 def load_scenario(
     name: str, *, allow_large: bool = False, overrides: Mapping[str, Any] | None = None
 ) -> Scenario:
-    """A shipped scenario, or a file's, for a command to run; what is doubtful of it is said.
+    """Loads a shipped scenario or a file, and prints its plausibility warnings.
 
-    With ``allow_large`` as if the file said so itself; with single keys set as ``overrides`` say.
+    ``allow_large`` sets the key of this name; ``overrides`` sets single keys.
     """
     scenario = read_scenario(name, allow_large=allow_large)
     if overrides:
@@ -101,7 +109,7 @@ def load_scenario(
 
 
 def load_site(name: str) -> Site:
-    """A shipped site, or a file's, for a command to run; what is doubtful of it is said."""
+    """Loads a shipped site or a file, and prints its plausibility warnings."""
     site = Site.load(name)
     look_for_underlay(site)
     announce(name, site.warnings())
@@ -111,7 +119,7 @@ def load_site(name: str) -> Site:
 def load_site_and_vehicle(
     site: str, vehicle: str, start: tuple[float, float, float] | None = None
 ) -> tuple[Site, Vehicle]:
-    """The same of a site and a vehicle on it; ``start`` is its pose where not its file's."""
+    """Loads a site and a vehicle, and prints warnings; ``start`` replaces the vehicle's pose."""
     plant, carrier = Site.load(site), Vehicle.load(vehicle)
     look_for_underlay(plant)
     there = carrier
@@ -123,7 +131,7 @@ def load_site_and_vehicle(
 
 
 def read_scenario(name: str, *, allow_large: bool) -> Scenario:
-    """A scenario to look at; nothing is said of it."""
+    """Loads a scenario without printing warnings."""
     if not allow_large:
         return Scenario.load(name)
     like = str(Path(name).absolute()) if Path(name).exists() else name
@@ -131,13 +139,13 @@ def read_scenario(name: str, *, allow_large: bool) -> Scenario:
 
 
 def look_for_underlay(site: Site) -> None:
-    """Refuse a picture that is missing or broken at once, and not when the page is written."""
+    """Rejects a missing or invalid background image before the simulation starts."""
     from access_av.site_files.picture import underlay
 
     underlay(site)
 
 
 def announce(name: str, warnings: Iterable[SettingsWarning]) -> None:
-    """Say what is most likely not what was meant, and what to write."""
+    """Prints plausibility warnings with the suggested values."""
     for warning in warnings:
         show_warning(f"{name}: {warning}")

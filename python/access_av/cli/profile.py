@@ -1,4 +1,4 @@
-"""The command ``profile``: time and energy of the computation on this machine."""
+"""Command ``profile``: time and energy of the computation on this computer."""
 
 from __future__ import annotations
 
@@ -17,25 +17,29 @@ app = typer.Typer()
     epilog="Example: [bold]access-av profile --name my-board --out my-board.toml[/]",
 )
 def profile(
-    out: Annotated[Path | None, typer.Option(help="Write the platform file here.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Platform file to write.")] = None,
     name: Annotated[str, typer.Option(help="Name of the platform.")] = "this-machine",
-    mode: Annotated[list[int] | None, typer.Option(help="Only these power modes.")] = None,
+    mode: Annotated[
+        list[int] | None, typer.Option(help="Power mode; repeatable.", show_default="all")
+    ] = None,
     window_s: Annotated[
-        float, typer.Option(min=0.05, max=3600.0, help="Time per workload, and idle before it.")
+        float, typer.Option(min=0.05, max=3600.0, help="Duration per workload, and idle before it.")
     ] = 5.0,
     cpu_mhz: Annotated[
-        float | None, typer.Option(min=1.0, max=1e5, help="Clock, where the machine does not say.")
+        float | None,
+        typer.Option(min=1.0, max=1e5, help="Clock frequency, if the computer does not report it."),
     ] = None,
     sysfs_root: Annotated[
-        Path, typer.Option(help="Read sensors and modes below this folder, in the place of /.")
+        Path, typer.Option(help="Folder that contains sys/ with sensors and modes.")
     ] = Path("/"),
     as_json: AsJson = False,
 ) -> None:
-    """Measure what estimating angles takes on this machine, and write it as a platform file.
+    """Measure time and energy of angle estimation on this computer, and write a platform file.
 
-    In each power mode (nvpmodel, cpufreq, else the present one), for each method and for the SSB
-    chain: wall and CPU time per execution, and the energy above idle from INA3221, INA238 or RAPL,
-    as an interval. Where there is no sensor it says so. The mode that was found is put back.
+    For each power mode (nvpmodel, cpufreq, otherwise the present one), each method and the SSB
+    chain: wall and CPU time per execution, and the energy above idle with its interval (INA3221,
+    INA238 or RAPL). Without a sensor, the energy is reported as not measured. The original power
+    mode is restored.
     """
     from access_av.device.profile import profile as measure
     from access_av.tables.results_directory import json_text, write_whole

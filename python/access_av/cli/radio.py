@@ -1,4 +1,4 @@
-"""Commands about the radio of a site: ``import-paths``, ``plan``."""
+"""Commands for the radio of a site: ``import-paths``, ``plan``."""
 
 from __future__ import annotations
 
@@ -27,27 +27,28 @@ app = typer.Typer()
 def import_paths(
     table: Annotated[
         Path,
-        typer.Argument(help="Parquet or CSV, one row per path."),
+        typer.Argument(help="Ray-traced paths: Parquet or CSV, one row per path."),
     ],
-    site: Annotated[str, typer.Option(help="Radio heads: shipped name, or TOML file.")],
-    carrier_mhz: Annotated[float, typer.Option(min=100.0, help="Frequency they were traced at.")],
-    out: Annotated[Path, typer.Option(help="npz file, for a scenario's channel.paths.")],
+    site: Annotated[str, typer.Option(help="Site: shipped name, or path of a TOML file.")],
+    carrier_mhz: Annotated[float, typer.Option(min=100.0, help="Carrier of the traced paths.")],
+    out: Annotated[Path, typer.Option(help="npz file to write, for channel.paths of a scenario.")],
 ) -> None:
-    """Make paths that a ray tracer found into a channel that scenarios can name.
+    """Convert ray-traced paths into a channel for scenarios.
 
-    A scenario with [bold]channel = { model = "paths", paths = "FILE.npz" }[/] then drives through
-    them, by snapshots or by samples.
+    A scenario uses it by [bold]channel = { model = "paths", paths = "FILE.npz" }[/], for snapshots
+    and for samples.
 
-    One row is one path, all in the map's frame: x_m, y_m, z_m (of the array); pci; gain_re, gain_im
-    (amplitude between isotropic antennas); delay_s (from radio head to array); azimuth_rad,
-    elevation_rad (of arrival, from the horizon up); ssb_index where a cell has several radio heads.
+    One row is one path in the map frame: x_m, y_m, z_m (position of the array); pci; gain_re,
+    gain_im (amplitude between isotropic antennas); delay_s (from radio head to array); azimuth_rad,
+    elevation_rad (of arrival, upwards from the horizon); ssb_index if a cell has several radio
+    heads.
     """
     from access_av.radio import ray_paths
 
     found = ray_paths.import_paths(table, load_site(site), out, carrier_mhz=carrier_mhz)
     console.print(
         f"{out}: {found['paths']} paths between {found['heads']} radio heads and "
-        f"{found['places']} places",
+        f"{found['places']} positions",
         soft_wrap=True,
     )
 
@@ -61,22 +62,23 @@ def plan(
     masts: Annotated[
         Path | None,
         typer.Option(
-            help="CSV of candidates: name, x_m, y_m, z_m; else places round the weakest of the "
-            "route."
+            help="CSV of candidate masts: name, x_m, y_m, z_m.",
+            show_default="positions around the weakest point of the route",
         ),
     ] = None,
-    add: Annotated[int, typer.Option(min=1, help="Radio heads to add.")] = 1,
+    add: Annotated[int, typer.Option(min=1, help="Number of radio heads to add.")] = 1,
     eirp_dbm: Annotated[
-        float | None, typer.Option(help="What they send; else as the site's first.")
+        float | None,
+        typer.Option(help="EIRP of the new radio heads.", show_default="EIRP of the site's first"),
     ] = None,
     out: Out = None,
     as_json: AsJson = False,
 ) -> None:
-    """Tell what brings a site to the next 3GPP service level, and where to put radio heads.
+    """Plan radio heads, and report the changes that reach the next 3GPP service level.
 
-    By the 90th percentile along the route of the bound: each mast is tried. Prints which service
-    levels the bound then allows; where the site as it is falls short of the next one, and what
-    mends that: cells that send more often, a better odometer, more antennas, the radio heads.
+    Selects the masts with the smallest 90th percentile of the error bound along the route. Prints
+    the service levels that the bound then permits, the weakest positions of the present site, and
+    the effect of single changes: SSBs more often, a better odometer, more antennas, radio heads.
     Writes masts.parquet, scenario.toml with the new radio heads, and manifest.json.
     """
     from access_av.radio.placement import plan as plan_heads

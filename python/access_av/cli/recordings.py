@@ -1,4 +1,4 @@
-"""Commands that look into recordings: ``scan``, ``aoa``, ``angles``."""
+"""Commands that evaluate recordings of samples: ``scan``, ``aoa``, ``angles``."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ from access_av.errors import InputError
 app = typer.Typer()
 
 NOT_FOUND = """\
-Try --centre-hz if the recording's centre is not as it states; --ssb-freq-hz and --scs-khz, which
-find weaker cells; with them --cfo-ppm 20 for poor oscillators; a recording of 160 ms or more, the
-longest time between the SSBs of a cell."""
+Possible remedies:
+  --centre-hz, if the recording contains a wrong centre frequency
+  --ssb-freq-hz and --scs-khz, which find weaker cells; also --cfo-ppm 20 for poor oscillators
+  a recording of at least 160 ms, the maximum SSB period of a cell"""
 
 
 @app.command(
@@ -32,45 +33,52 @@ longest time between the SSBs of a cell."""
 def scan(
     recordings: Annotated[
         list[Path],
-        typer.Argument(help="SigMF recordings; with --sample-rate-hz one raw cf32 file a channel."),
+        typer.Argument(
+            help="SigMF recordings; with --sample-rate-hz raw cf32 files, one per channel."
+        ),
     ],
     ssb_freq_hz: Annotated[
         float | None,
-        typer.Option(min=0.0, help="Centre of the SSB; else the raster is searched."),
+        typer.Option(min=0.0, help="Centre of the SSB.", show_default="all of the raster"),
     ] = None,
     scs_khz: Annotated[
-        int | None, typer.Option(help="Subcarrier spacing, 15 or 30; else both are tried.")
+        int | None, typer.Option(help="Subcarrier spacing: 15 or 30.", show_default="both")
     ] = None,
     cfo_ppm: Annotated[
         float | None,
-        typer.Option(min=0.0, help="With --ssb-freq-hz: largest offset of the oscillators."),
+        typer.Option(min=0.0, help="Maximum oscillator offset, with --ssb-freq-hz."),
     ] = None,
     centre_hz: Annotated[
-        float | None, typer.Option(min=0.0, help="Centre of the recording; else as recorded.")
+        float | None,
+        typer.Option(min=0.0, help="Centre of the recording.", show_default="as recorded"),
     ] = None,
     sample_rate_hz: Annotated[
-        float | None, typer.Option(help="The files are raw cf32, and this is their rate.")
+        float | None, typer.Option(help="Sample rate of raw cf32 files.")
     ] = None,
     spacing_wavelengths: Annotated[
         float | None,
-        typer.Option(min=0.01, max=10.0, help="Antenna spacing; else as recorded, or 0.5."),
+        typer.Option(
+            min=0.01, max=10.0, help="Antenna spacing.", show_default="as recorded, or 0.5"
+        ),
     ] = None,
     calibration: Annotated[
         str | None,
         typer.Option(
-            metavar="GAINS", help="Gain of each channel, as 1,0.9+0.2j,1j,-1; else as recorded."
+            metavar="GAINS",
+            help="Channel gains, for example 1,0.9+0.2j,1j,-1.",
+            show_default="as recorded",
         ),
     ] = None,
     unconfirmed: Annotated[
-        bool, typer.Option(help="Also SSBs too weak for their message to be decoded.")
+        bool, typer.Option(help="Also list SSBs without a decoded message.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Find every SSB in recordings of cells that nobody has described.
+    """Find every SSB in recordings of unknown cells.
 
-    Prints cell, beam, time, frequency offset, strength and message of each SSB whose message passes
-    its checksum, and with several channels the angle it arrives from, its standard deviation by the
-    receiver's noise alone. Channels that are clipped, silent or exchanged are named.
+    Prints cell, beam, time, frequency offset, SNR and message of each SSB with a valid checksum.
+    With several channels also the angle of arrival with its standard deviation (receiver noise
+    only). Clipped, silent and exchanged channels are reported.
     """
     from access_av._core import Recording
     from access_av.signal import nr
@@ -106,12 +114,12 @@ def scan(
         if cells:
             show_cells(path.name, cells)
         else:
-            console.print(f"{path}: no SSB found. Looked for were", soft_wrap=True)
+            console.print(f"{path}: no SSB found. Searched:", soft_wrap=True)
             for where in result.looked:
                 console.print(f"  {where}", soft_wrap=True)
             console.print(NOT_FOUND, soft_wrap=True)
         if weak:
-            console.print(f"{len(weak)} more without a message: --unconfirmed lists them.")
+            console.print(f"{len(weak)} SSBs without a decoded message: --unconfirmed lists them.")
     if as_json:
         print(json_text(found))
 
@@ -124,16 +132,17 @@ def aoa(
         typer.Option(
             min=0.01,
             max=10.0,
-            help="Antennas in a row with this spacing in wavelengths; else as recorded.",
+            help="Spacing of a linear array, in wavelengths.",
+            show_default="as recorded",
         ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Estimate angles of arrival from a multi-antenna recording.
 
-    Reference bursts calibrate the channels, every other annotated burst is estimated. Azimuths
-    are counter-clockwise from the array's broadside, standard deviations by the receiver's noise
-    alone.
+    Reference bursts calibrate the channels; every other annotated burst gives an angle. Azimuths
+    are counter-clockwise from the array's broadside. Standard deviations cover the receiver noise
+    only.
     """
     from access_av.signal.recorded_angles import estimate_bursts
     from access_av.tables.results_directory import json_text
@@ -152,25 +161,25 @@ def aoa(
 )
 def angles(
     recording: Annotated[Path, typer.Argument(help="SigMF recording of the array.")],
-    site: Annotated[str, typer.Option(help="Radio heads: shipped name, or TOML file.")],
+    site: Annotated[str, typer.Option(help="Site: shipped name, or path of a TOML file.")],
     vehicle: Annotated[
-        str, typer.Option(help="Array, receiver, estimator: shipped name, or TOML file.")
+        str, typer.Option(help="Vehicle: shipped name, or path of a TOML file.")
     ] = "default",
     start_time_s: Annotated[
-        float, typer.Option(help="Time of the first sample by the odometry's clock.")
+        float, typer.Option(help="Time of the first sample, odometry clock, in s.")
     ] = 0.0,
     out: Out = None,
     as_json: AsJson = False,
 ) -> None:
-    """Make a log of angles of a recording's samples, for locate.
+    """Estimate the angles of a recording's SSBs, as input of locate.
 
-    Every SSB of the site's radio heads, as the vehicle's receiver and estimator find it. Writes
-    angles.csv and angles.parquet, either of which [bold]access-av locate --recording[/] takes, with
-    site.toml and vehicle.toml beside them.
+    Uses the vehicle's receiver and estimator for every SSB of the site's radio heads. Writes
+    angles.csv, angles.parquet (inputs of [bold]access-av locate --recording[/]), site.toml and
+    vehicle.toml.
 
-    phase_sigma_rad is all of the error that is believed, the receiver's noise and the site's
-    scatter (rician_k_db); phase_noise_sigma_rad is the noise alone. The array's mounting and
-    calibration are in neither: the vehicle's file states them, and locate reckons with them.
+    phase_sigma_rad covers receiver noise and the site's scatter (rician_k_db),
+    phase_noise_sigma_rad only receiver noise. Neither covers mounting and calibration of the array,
+    whose standard deviations are in the vehicle file.
     """
     from access_av.drives.angle_log import estimate_angles
     from access_av.tables.results_directory import ResultsDirectory, json_text
@@ -209,5 +218,5 @@ def _gains(text: str) -> list[complex]:
         return [complex(part.replace(" ", "")) for part in text.split(",")]
     except ValueError as error:
         raise InputError(
-            f"--calibration {text}: write one complex number a channel, as 1,0.9+0.2j,1j,-1"
+            f"--calibration {text}: write one complex number per channel, such as 1,0.9+0.2j,1j,-1"
         ) from error

@@ -1,4 +1,4 @@
-"""The command ``run``: drive one scenario."""
+"""Command ``run``: simulate one scenario."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ def run(
     percentile: Percents = None,
     overrides: Overrides = None,
 ) -> None:
-    """Drive one scenario and write its trajectories.
+    """Simulate one scenario and write its trajectories.
 
     Writes trajectories.parquet, executions.parquet, trajectory.tum and truth.tum (the first run),
-    report.html, scenario.toml with every default, and manifest.json; with --vary or --compare also
-    compared.parquet.
+    report.html, scenario.toml with all default values, and manifest.json. With --vary or --compare
+    also compared.parquet.
     """
     import polars as pl
 
@@ -68,7 +68,7 @@ def run(
         result = simulate(
             chosen, runs=runs, seed=seed, threads=threads, keep_trajectories=True, progress=tick
         )
-    if result.trajectories is None or result.executions is None:  # they were asked for
+    if result.trajectories is None or result.executions is None:  # keep_trajectories is set
         raise RuntimeError("the simulation kept no trajectories")
     directory.write_table("trajectories.parquet", result.trajectories)
     directory.write_table("executions.parquet", result.executions)
@@ -100,5 +100,5 @@ def run(
     if assumed:
         console.print(in_words(assumed), soft_wrap=True)
     if (levels := result.service_levels) and not all(verdict.reached for verdict in levels):
-        console.print(f"What brings it further: access-av plan {scenario}", soft_wrap=True)
+        console.print(f"Possible improvements: access-av plan {scenario}", soft_wrap=True)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

@@ -1,4 +1,4 @@
-"""Variants side by side: what ``--vary`` and ``--compare`` drive, and how it is shown."""
+"""Variants of ``--vary`` and ``--compare``: simulation and output."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def variants(
     others: Mapping[str, T],
     changed: Callable[[T, dict[str, Any]], T],
 ) -> dict[str, T]:
-    """What is driven, the same with other values of its keys, and others, by their labels."""
+    """Returns baseline, variants with other key values, and other files, by their labels."""
     from access_av.run.pairs import AS_IT_IS
     from access_av.study.compare import varied
 
@@ -37,7 +37,7 @@ def of_scenario(
     vary: Sequence[str] | None,
     others: Mapping[str, _core.Scenario],
 ) -> dict[str, _core.Scenario]:
-    """The same of a scenario."""
+    """Returns the variants of a scenario."""
     return variants(scenario, vary, others, lambda it, keys: it.with_overrides(keys))
 
 
@@ -48,7 +48,7 @@ def side_by_side(
     seed: int,
     threads: int | None,
 ) -> list[Compared]:
-    """Drive variants in the same worlds; nothing where there is but one."""
+    """Simulates the variants in equal environments; empty for a single variant."""
     from access_av.study.compare import compare
 
     if len(scenarios) == 1:
@@ -65,7 +65,7 @@ def side_by_side(
 
 
 def write_compared(found: Sequence[Compared], directory: ResultsDirectory) -> None:
-    """Write ``compared.parquet``; nothing without variants."""
+    """Writes ``compared.parquet`` if there are variants."""
     from access_av.study.compare import table as rows_of
 
     if found:
@@ -73,20 +73,20 @@ def write_compared(found: Sequence[Compared], directory: ResultsDirectory) -> No
 
 
 def records(found: Sequence[Compared]) -> list[dict[str, Any]]:
-    """Variants for JSON, as ``compared.parquet`` has them."""
+    """Returns the rows of ``compared.parquet``."""
     from access_av.study.compare import table as rows_of
 
     return rows_of(found).to_dicts() if found else []
 
 
 def show_compared(found: Sequence[Compared]) -> None:
-    """Show variants in the terminal; nothing without any."""
+    """Prints the comparison of variants, if any."""
     if not found:
         return
     percents, driven = found[0].percents, found[0].driven
-    head = ["variant", *(f"{it:g} % within / m" for it in percents), "reliability"]
+    head = ["variant", *(f"p{it:g} / m" for it in percents), "reliability"]
     head += ["energy / J", "difference"]
-    made = table(head, text=1, title=f"Side by side, {driven.runs} {driven.rows} each")
+    made = table(head, text=1, title=f"Comparison, {driven.runs} {driven.rows} each")
     for it in found:
         energy_j = it.driven.energy_j
         made.add_row(

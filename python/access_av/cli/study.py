@@ -1,4 +1,4 @@
-"""The command ``study``: a plant's question, a plant's answer."""
+"""Command ``study``: localization accuracy, remedies and cost of a plant."""
 
 from __future__ import annotations
 
@@ -34,27 +34,32 @@ app = typer.Typer()
     epilog="Example: [bold]access-av new plant mine.toml; access-av study mine.toml[/]",
 )
 def study(
-    plant: Annotated[str, typer.Argument(help="Shipped name, or path of a plant's TOML file.")],
+    plant: Annotated[str, typer.Argument(help="Plant: shipped name, or path of a TOML file.")],
     runs: Annotated[
         int | None,
-        typer.Option(min=2, max=100_000, help="Trips as believed; else about a minute's worth."),
+        typer.Option(
+            min=2,
+            max=100_000,
+            help="Runs with the nominal channel.",
+            show_default="about one minute",
+        ),
     ] = None,
     seed: Seed = 1,
     threads: Threads = None,
     out: Out = None,
     always_mend: Annotated[
-        bool, typer.Option("--always-mend", help="Drive remedies also where the target is kept.")
+        bool, typer.Option("--always-mend", help="Simulate remedies even if the target is met.")
     ] = False,
     vary: Vary = None,
     compare: Compare = None,
     percentile: Percents = None,
     as_json: AsJson = False,
 ) -> None:
-    """Tell whether a plant's localization is good enough, where not, what mends it and its cost.
+    """Evaluate the localization of a plant: accuracy, weak positions, remedies and cost.
 
     Writes report.html, study.json, errors.parquet, drives.parquet, places.parquet, places.csv,
-    points.parquet, trajectories.parquet (the drive that the page plays), plant.toml with every
-    default, and manifest.json; with --vary or --compare also compared.parquet.
+    points.parquet, trajectories.parquet (the run that the report plays), plant.toml with all
+    default values, and manifest.json. With --vary or --compare also compared.parquet.
     """
     from access_av.report.compared import compared_section
     from access_av.report.study import render_study

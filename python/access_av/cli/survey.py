@@ -1,4 +1,4 @@
-"""The command ``survey``: site and vehicle as ordinary drives show them."""
+"""Command ``survey``: site and vehicle parameters estimated from ordinary drives."""
 
 from __future__ import annotations
 
@@ -23,30 +23,40 @@ def survey(
         list[Path],
         typer.Argument(help="Folders with odometry.csv or .mcap, angles.csv, vehicle.toml."),
     ],
-    site: Annotated[str, typer.Option(help="Radio heads and road: shipped name, or TOML file.")],
-    vehicle: Annotated[
-        str, typer.Option(help="Array, odometer, localizer: shipped name, or TOML file.")
-    ],
+    site: Annotated[str, typer.Option(help="Site: shipped name, or path of a TOML file.")],
+    vehicle: Annotated[str, typer.Option(help="Vehicle: shipped name, or path of a TOML file.")],
     position_std_m: Annotated[
         float,
-        typer.Option(min=1e-3, max=100.0, help="Of a radio head's x and y, if the site has none."),
+        typer.Option(
+            min=1e-3,
+            max=100.0,
+            help="Prior σ of radio-head x and y, in m, if the site file has none.",
+        ),
     ] = 2.0,
     mounting_std_rad: Annotated[
-        float, typer.Option(min=1e-6, max=3.2, help="Of the array's direction, if none is stated.")
+        float,
+        typer.Option(
+            min=1e-6, max=3.2, help="Prior σ of the mounting, in rad, if the vehicle file has none."
+        ),
     ] = 0.05,
     phase_std_rad: Annotated[
-        float, typer.Option(min=1e-6, max=3.2, help="Of the phase per element, if none is stated.")
+        float,
+        typer.Option(
+            min=1e-6,
+            max=3.2,
+            help="Prior σ of the phase per element, in rad, if the vehicle file has none.",
+        ),
     ] = 0.1,
     threads: Threads = None,
     out: Out = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find out from ordinary drives where the radio heads stand and how the array is mounted.
+    """Survey radio-head positions and array mounting from ordinary drives.
 
-    Places of radio heads, direction of the array and its phase per element are adjusted together
-    until the angles of all drives fit best; the road and the drives' starts hold the frame. What
-    the drives say nothing of is named and left as it was. Writes site.toml and vehicle.toml with
-    what was learnt and its standard deviations, survey.parquet, covariance.json and manifest.json.
+    Estimates the positions, the mounting of the array and its phase per element jointly from the
+    angles of all drives. The road and the start poses define the frame. Parameters that the drives
+    do not determine are reported and stay unchanged. Writes site.toml and vehicle.toml with the
+    estimates and their standard deviations, survey.parquet, covariance.json and manifest.json.
     """
     from access_av.drives import self_survey
     from access_av.tables.results_directory import ResultsDirectory, json_text
@@ -85,26 +95,26 @@ def survey(
         figures = {"angles": found.angles, "used": found.used, "nis": found.nis}
         print(json_text({**figures, "parameters": rows.to_dicts(), "directory": directory.path}))
         return
-    made = table(["", "unit", "before", "found", "deviation"], title="Surveyed by driving", text=2)
+    made = table(["parameter", "unit", "before", "estimate", "σ"], title="Survey", text=2)
     for it in found.parameters:
-        learnt = (f"{it.found:.4f}", f"{it.std:.4f}") if it.is_learnt else ("–", "nothing learnt")
+        learnt = (f"{it.found:.4f}", f"{it.std:.4f}") if it.is_learnt else ("–", "not determined")
         made.add_row(it.key, it.unit, f"{it.before:.4f}", *learnt)
     console.print(made)
     if found.used < 0.5 * found.angles:
         show_warning(
-            f"{found.angles - found.used} of {found.angles} angles do not fit, and were left out; "
-            "check site, vehicle and the drives' starts"
+            f"{found.angles - found.used} of {found.angles} angles are outliers and were left out; "
+            "check site, vehicle and start poses"
         )
     for it in found.parameters:
         if not it.is_as_believed:
             console.print(
-                f"{it.key} is {it.found - it.before:+.3f} {it.unit} from where it was said to be, "
-                f"with a standard deviation of {it.std_before:g}: survey it again",
+                f"{it.key} deviates by {it.found - it.before:+.3f} {it.unit} from the given value "
+                f"with standard deviation {it.std_before:g}: measure it again",
                 soft_wrap=True,
             )
     console.print(
-        f"{found.used} of {found.angles} angles; mean squared innovation over its variance "
-        f"{found.nis:.2f} (1 where noise is as stated)",
+        f"{found.used} of {found.angles} angles used; mean normalized innovation squared "
+        f"{found.nis:.2f} (expected: 1)",
         soft_wrap=True,
     )
     console.print(f"{directory.path}/site.toml, vehicle.toml", soft_wrap=True)

@@ -1,4 +1,4 @@
-"""What the command line shows: tables that fit the terminal, progress, errors."""
+"""Terminal output: tables that fit the terminal, progress, errors."""
 
 from __future__ import annotations
 
@@ -39,29 +39,29 @@ if TYPE_CHECKING:
     from access_av.signal.recorded_angles import BurstAngle
     from access_av.tables.columns.tables import Table
 
-# What is printed may come from files: it is text, never markup. Styles are given beside it.
+# Printed texts can come from files, therefore markup is disabled.
 console = Console(highlight=False, markup=False)
 errors = Console(stderr=True, highlight=False, markup=False)
 
 NARROW = 80
-# Where there is no terminal: how long nothing is said of what goes on, at first and at most.
+# Without a terminal: time to the first progress line, and maximum time between lines, in s.
 FIRST_LINE_S, MOST_SILENT_S = 2.0, 60.0
 
 
 def is_narrow() -> bool:
-    """Whether tables should leave out what can be found in the files."""
+    """Returns whether the terminal is too narrow for all columns."""
     return console.width < NARROW
 
 
 def write_what_can_be_written() -> None:
-    """Write a question mark where the terminal's encoding lacks a sign."""
+    """Replaces characters that the terminal cannot encode by a question mark."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
 
 
 def give_up_output() -> None:
-    """Write no more to a standard output that took nothing: at its end Python would try again."""
+    """Discards pending output of a closed standard output, which Python would write at exit."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -70,9 +70,9 @@ def give_up_output() -> None:
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar on the error stream; gives the function that moves it.
+    """Shows progress on the error stream; yields the function that updates it.
 
-    Where that is no terminal: a line after two seconds, and then ever more seldom.
+    Without a terminal it prints a line after two seconds, then at increasing intervals.
     """
     if not errors.is_terminal:
         with _lines(title) as tick:
@@ -93,7 +93,7 @@ def progress(title: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def _lines(title: str) -> Iterator[Callable[[int, int], None]]:
-    """Progress as lines, for logs: each after half as much time again as has passed."""
+    """Prints progress as lines, each after 1.5 times the elapsed time."""
     known: list[tuple[int, int]] = []
     ended, begun_s = Event(), time.monotonic()
 
@@ -119,7 +119,7 @@ def _lines(title: str) -> Iterator[Callable[[int, int], None]]:
 
 
 def table(head: Sequence[str], *, title: str = "", text: int = 1) -> RichTable:
-    """An empty table; the first ``text`` columns hold words, the others numbers."""
+    """Returns an empty table; the first ``text`` columns are left-aligned."""
     made = RichTable(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
     for index, name in enumerate(head):
         made.add_column(name, justify="left" if index < text else "right", overflow="fold")
@@ -127,13 +127,13 @@ def table(head: Sequence[str], *, title: str = "", text: int = 1) -> RichTable:
 
 
 def width(made: RichTable) -> int:
-    """Columns of the terminal that a table takes when no cell is wrapped."""
+    """Returns the width of a table without wrapped cells, in characters."""
     unbounded = console.options.update(max_width=10_000)
     return console.measure(made, options=unbounded).maximum
 
 
 def show_error(error: Exception) -> None:
-    """One message for a bad input."""
+    """Prints one error message."""
     if isinstance(error, OSError) and error.filename is not None:
         message = f"{error.filename}: {error.strerror}"
     else:
@@ -143,13 +143,13 @@ def show_error(error: Exception) -> None:
 
 
 def show_warning(message: str) -> None:
-    """One message for an item that was left out, or is remarkable."""
+    """Prints one warning."""
     errors.print("warning:", style="yellow", end=" ")
     errors.print(brief(plain(message)), soft_wrap=True)
 
 
 def plain(text: str) -> str:
-    r"""Text with control characters written out: a terminal is to obey nobody's file.
+    r"""Returns text with escaped control characters, so that no file controls the terminal.
 
     Examples
     --------
@@ -163,7 +163,7 @@ def plain(text: str) -> str:
 
 
 def show_points(points: pl.DataFrame, title: str = "") -> None:
-    """Operating points as a table."""
+    """Prints operating points as a table."""
     head = ["mode", "method", "energy J", "RMS m", "worst X m", "worst Y m", "executions"]
     if is_narrow():
         head = ["mode", "method", "J", "RMS m", "X m", "Y m"]
@@ -183,7 +183,7 @@ def show_points(points: pl.DataFrame, title: str = "") -> None:
 
 
 def show_simulation(result: Simulation, title: str, energy_boundary: str | None) -> None:
-    """Errors and executions of many drives, in one table, and what their joules count."""
+    """Prints errors, executions and energy of a simulation as a table."""
     steps, runs = result.steps, result.runs
     made = table(["", "value", "95 % interval"], title=title)
     rows: dict[str, tuple[Any, str]] = {
@@ -191,7 +191,7 @@ def show_simulation(result: Simulation, title: str, energy_boundary: str | None)
         "mean error / m": (result.mean_error_m, ""),
     }
     for each in result.percentiles or ():
-        rows[f"{each.percent:g} % of errors within / m"] = each.value, each.interval
+        rows[f"{each.percent:g}th percentile of the error / m"] = each.value, each.interval
     rows |= {
         "worst mean error along the track, X / m": (steps["mean_abs_error_x_m"].max(), ""),
         "worst mean error along the track, Y / m": (steps["mean_abs_error_y_m"].max(), ""),
@@ -201,13 +201,13 @@ def show_simulation(result: Simulation, title: str, energy_boundary: str | None)
     }
     if runs["found_s"].fill_null(1.0).max() != 0.0:
         found = runs.height - runs["found_s"].null_count()
-        rows["runs in which the vehicle was found"] = found, ""
-        rows["driven until found, median / m"] = runs["found_m"].median(), ""
-        rows["driven until found, most / m"] = runs["found_m"].max(), ""
+        rows["runs with a successful search"] = found, ""
+        rows["distance until found, median / m"] = runs["found_m"].median(), ""
+        rows["distance until found, maximum / m"] = runs["found_m"].max(), ""
     consistency = result.consistency
     if consistency is not None and consistency.anees is not None:
         interval = consistency.anees_interval if runs.height > 1 else None
-        rows["NEES per axis (1: errors as large as stated)"] = (
+        rows["NEES per axis (expected: 1)"] = (
             consistency.anees,
             "" if interval is None else f"{interval[0]:.3g} to {interval[1]:.3g}",
         )
@@ -224,10 +224,10 @@ def show_simulation(result: Simulation, title: str, energy_boundary: str | None)
 
 
 def show_service_levels(verdicts: Sequence[Verdict], title: str = "") -> None:
-    """Which 3GPP service levels are reached."""
-    head = ["3GPP level", "accuracy m", "asked", "within", "at least (95 %)", ""]
+    """Prints the 3GPP service levels and whether they are reached."""
+    head = ["3GPP level", "accuracy m", "required", "within", "at least (95 %)", "result"]
     if is_narrow():
-        head = ["level", "m", "asked", "within", "at least", ""]
+        head = ["level", "m", "required", "within", "at least", "result"]
     made = table(head, title=title)
     for verdict in verdicts:
         made.add_row(
@@ -242,12 +242,12 @@ def show_service_levels(verdicts: Sequence[Verdict], title: str = "") -> None:
 
 
 def show_plan(found: Plan) -> None:
-    """The masts that were chosen, and the next best."""
+    """Prints the selected masts, and the next best ones."""
     console.print(
-        f"{found.scenario.name}: 90 % of the route within {found.before_m:.3f} m at best; with "
-        f"{', '.join(found.chosen)} within {found.after_m:.3f} m."
+        f"{found.scenario.name}: 90th percentile of the error bound along the route "
+        f"{found.before_m:.3f} m; with {', '.join(found.chosen)} {found.after_m:.3f} m."
     )
-    made = table(["mast", "alone: 90 % within m"])
+    made = table(["mast", "90th percentile with this mast only, m"])
     for row in found.ranking.head(10).iter_rows(named=True):
         made.add_row(row["name"], f"{row['p90_bound_m']:.3f}")
     console.print(made)
@@ -255,20 +255,20 @@ def show_plan(found: Plan) -> None:
 
 
 def show_next_level(found: NextLevel) -> None:
-    """Where the site falls short of the next service level, and what mends that."""
+    """Prints where the site fails the next service level, and the effect of changes."""
     console.print(found.in_words())
-    made = table([f"what would mend that (as it is {found.share:.2%})", "within", "enough"])
+    made = table([f"change (baseline {found.share:.2%})", "within", "reached"])
     for change in found.changes:
         made.add_row(change.what, f"{change.share:.2%}", "yes" if change.reaches else "no")
     console.print(made)
 
 
 def show_bound(summary: dict[str, Any], verdicts: Sequence[Verdict]) -> None:
-    """The bound along the route, and how each radio head is received there."""
-    made = table(["least RMS error of any localizer", "m"], title=summary["scenario"])
-    for name, key in (("median of the route", "median_m"), ("90 % of it below", "p90_m")):
+    """Prints the bound along the route, and the SNR of each radio head."""
+    made = table(["lower bound of the RMS error", "m"], title=summary["scenario"])
+    for name, key in (("median along the route", "median_m"), ("90th percentile", "p90_m")):
         made.add_row(name, f"{summary[key]:.3f}")
-    made.add_row("worst place", f"{summary['max_m']:.3f}")
+    made.add_row("worst position", f"{summary['max_m']:.3f}")
     console.print(made)
     made = table(["radio head", "PCI", "SSB", "distance m", "SNR dB", "visible"])
     for head in summary["heads"]:
@@ -287,7 +287,7 @@ def show_bound(summary: dict[str, Any], verdicts: Sequence[Verdict]) -> None:
 
 
 def show_columns(columns: Table) -> None:
-    """The columns of one table."""
+    """Prints the columns of one table."""
     where = columns.where.replace("`", "")
     console.print(columns.name, style="bold", end="")
     console.print(f"  {columns.row}. {where}.")
@@ -298,7 +298,7 @@ def show_columns(columns: Table) -> None:
 
 
 def show_angles(log: AngleLog) -> None:
-    """Angles of a recording by SSB, in the median."""
+    """Prints the angles of a recording: counts and medians per SSB."""
     made = table(["PCI", "SSB", "angles", "resolved", "SNR dB", "σ rad", "σ noise rad"], text=0)
     for row in log.by_ssb().iter_rows():
         *counts, snr_db, sigma_rad, noise_rad = row
@@ -307,7 +307,7 @@ def show_angles(log: AngleLog) -> None:
 
 
 def show_bursts(bursts: Sequence[BurstAngle]) -> None:
-    """Angles of a recording's bursts, with their errors where the truth is known."""
+    """Prints the angles of bursts, with errors if the truth is known."""
     made = table(["sample", "azimuth °", "σ °", "SNR dB", "truth °", "error °", "doubt"], text=0)
     for burst in bursts:
         azimuth_deg, truth_deg = burst.azimuth_from_broadside_deg, burst.truth_deg
@@ -327,7 +327,7 @@ def show_bursts(bursts: Sequence[BurstAngle]) -> None:
 
 
 def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
-    """SSBs of one recording, one a row; a narrow terminal leaves out where on the air they were."""
+    """Prints the SSBs of one recording; a narrow terminal omits their time and frequency."""
     with_angles = any("azimuth_deg" in cell for cell in cells)
     columns = ["PCI", "SSB", "SFN", "SNR dB", "CFO Hz"]
     if with_angles:

@@ -1,4 +1,4 @@
-"""The command ``tune``: a wake-up policy for one's own road and objective."""
+"""Command ``tune``: optimization of a wake-up policy for a scenario."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
-# Of those that are known, the percentiles that a terminal is shown.
+# Percentiles shown in the terminal.
 SHOWN_PERCENTS = (50.0, 90.0, 99.0)
 
 
@@ -41,17 +41,18 @@ def tune(
     percentile: PercentileOption = None,
     max_rms_m: MaxRms = None,
     max_worst_m: Annotated[
-        float | None, typer.Option(min=0.0, help="Largest error of a run, in nine of ten runs.")
+        float | None, typer.Option(min=0.0, help="Maximum error in 90 % of the runs, in m.")
     ] = None,
     max_energy_j: Annotated[
-        float | None, typer.Option(min=0.0, help="Mean energy of a trip; then least error.")
+        float | None,
+        typer.Option(min=0.0, help="Maximum energy of a trip, in J; minimizes the error."),
     ] = None,
     platform: Annotated[
-        str, typer.Option(help="Computer whose energy counts: shipped name, or TOML file.")
+        str, typer.Option(help="Platform: shipped name, or path of a TOML file.")
     ] = "jetson-agx-xavier-engine",
-    mode: Annotated[int, typer.Option(min=0, max=255, help="Its power mode.")] = 0,
+    mode: Annotated[int, typer.Option(min=0, max=255, help="Power mode of the platform.")] = 0,
     designs: Annotated[
-        int, typer.Option(min=2, max=10_000, help="Points tried in each of three rounds.")
+        int, typer.Option(min=2, max=10_000, help="Points per round; three rounds.")
     ] = 64,
     runs: Runs = 20,
     seed: Seed = 1,
@@ -62,13 +63,13 @@ def tune(
 ) -> None:
     """Tune gains, weights and set points of a scenario's wake-up policy.
 
-    Least energy that keeps the error, or least error that keeps the energy. What is found is driven
-    again in runs that the search has not seen, beside what was there before, which stays where
-    nothing better is found. Writes vehicle.toml, tuned.json, scenario.toml (as it was) and
-    manifest.json; drives are kept in results/parts, so that a command that was stopped goes on.
+    Minimizes the energy under an error limit, or the error under an energy limit. The result and
+    the given policy are compared in new runs; without an improvement the given policy remains.
+    Writes vehicle.toml, tuned.json, scenario.toml (unchanged) and manifest.json. results/parts
+    keeps the runs, so that a repeated command continues.
 
-    Exit code 0: what is asked is kept, as far as the drives tell. 3: it is missed, also by what was
-    found; which of it, and by how much, is said.
+    Exit code 0: the limits are met in these runs. 3: a limit is missed; the message gives its
+    margin.
     """
     from access_av.designs.table import Constraints, row_of
     from access_av.designs.tune import space_of
@@ -139,8 +140,8 @@ def tune(
         console.print(f"{directory.path / 'vehicle.toml'}", soft_wrap=True)
     if not is_kept:
         errors.print(
-            "missed: no set point of this policy keeps what is asked; more radio heads, a better "
-            f"odometer or a surveyed road may: access-av plan {scenario}",
+            "missed: no set point of this policy meets the limits. More radio heads, a better "
+            f"odometer or a surveyed road can help: access-av plan {scenario}",
             style="red",
             soft_wrap=True,
         )
@@ -157,19 +158,19 @@ def _show(found: Tuned, space: Space) -> None:
             made.add_row(key, ends, f"{values[dimension.key]:.4g}")
         console.print(made)
     both = (found.before, found.after) if found.is_better else (found.before,)
-    made = table(["in runs not seen before", "as it was", "tuned"][: 1 + len(both)])
+    made = table(["in new runs", "baseline", "tuned"][: 1 + len(both)])
     made.add_row("energy of a trip / J", *(f"{it.mean_energy_j:.3f}" for it in both))
     made.add_row("RMS error / m", *(f"{it.rms_m:.3f}" for it in both))
     for each in zip(*(it.percentiles(SHOWN_PERCENTS) for it in both), strict=True):
-        name = f"{each[0].percent:g} % of errors within / m (95 %)"
+        name = f"{each[0].percent:g}th percentile of the error / m (95 %)"
         made.add_row(name, *(f"{it.value:.3f} ({it.interval})" for it in each))
     made.add_row("executions", *(f"{it.executions.mean():.0f}" for it in both))
     console.print(made)
     if not found.is_better:
-        console.print("Nothing better was found: the policy stays as it was.")
+        console.print("No improvement found: the policy is unchanged.")
         return
     mean_j, low_j, high_j = found.less[0]
     if mean_j >= 0.0:
-        console.print(f"Energy less by {mean_j:.3f} J (95 %: {low_j:.3f} to {high_j:.3f})")
+        console.print(f"Energy saved: {mean_j:.3f} J (95 %: {low_j:.3f} to {high_j:.3f})")
     else:
-        console.print(f"Energy more by {-mean_j:.3f} J (95 %: {-high_j:.3f} to {-low_j:.3f})")
+        console.print(f"Additional energy: {-mean_j:.3f} J (95 %: {-high_j:.3f} to {-low_j:.3f})")

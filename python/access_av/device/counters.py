@@ -1,8 +1,8 @@
-"""Power sensors and energy counters that the kernel offers, none of them counted twice.
+"""Power sensors and energy counters of the kernel, without double counting.
 
 INA3221 by ``hwmon`` (JetPack 5 and later) or ``iio`` (JetPack 4), INA238 by ``hwmon`` (Thor), RAPL
-by ``powercap`` (x86). Where a sensor holds the others, as ``VDD_IN`` holds the rails and ``psys``
-the packages, it alone is read.
+by ``powercap`` (x86). If one sensor includes the others, as ``VDD_IN`` the rails and ``psys`` the
+packages, only this sensor is read.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-# Rails that hold all others of their board.
+# Rails that include all others of their board.
 TOTALS = ("VDD_IN", "POM_5V_IN", "VIN")
 # INA3221, SBOS576: 13 bits, 40 µV at the shunt and 8 mV at the bus.
 INA3221 = {"shunt_v": 40e-6, "bus_v": 8e-3}
 # INA238, SBOSA20: 16 bits, 5 µV at the shunt and 3.125 mV at the bus.
 INA238 = {"shunt_v": 5e-6, "bus_v": 3.125e-3}
-# Shunts of Jetson boards where the file does not say: 5 mΩ.
+# Default shunt of Jetson boards, if the file gives none: 5 mΩ.
 USUAL_SHUNT_OHM = 5e-3
-# Voltage of a rail whose file does not say: only the size of its steps hangs on it.
+# Default rail voltage (V); only the resolution of the power depends on it.
 USUAL_RAIL_V = 5.0
-# The energy unit that RAPL counts in, 2^-14 J (Intel SDM, MSR_RAPL_POWER_UNIT), and how often.
+# Energy unit of RAPL, 2^-14 J (Intel SDM, MSR_RAPL_POWER_UNIT), and its update interval.
 RAPL_UNIT_J = 2.0**-14
 RAPL_PERIOD_S = 1e-3
-# How often a file is read that is empty, a millisecond apart.
+# Number of read attempts of an empty file, at intervals of 1 ms.
 READS = 500
 
 
 class SensorError(InputError):
-    """A sensor that cannot be read, or says what cannot be."""
+    """Unreadable sensor, or impossible value."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,11 @@ class Rail:
     Attributes
     ----------
     voltage, current, power
-        Files in mV, mA and ``power_unit_w``; voltage and current where both are there, else power.
+        Files in mV, mA and ``power_unit_w``; voltage and current if both exist, otherwise power.
     bus_v, current_a
-        How far what it says may be from what it sees: half a step of its converter, and the last
-        digit of the file.
+        Maximum rounding error: half a step of the converter plus the last digit of the file.
     period_s
-        Time between two conversions, where the kernel says.
+        Time between two conversions, if the kernel reports it.
     """
 
     label: str
@@ -64,7 +63,7 @@ class Rail:
     period_s: float | None
 
     def read_w(self) -> tuple[float, float]:
-        """Power, and how far rounding may have taken it from what was seen, in watts."""
+        """Returns the power and its maximum rounding error, in watts."""
         if self.voltage is not None and self.current is not None:
             volt, ampere = _number(self.voltage) * 1e-3, _number(self.current) * 1e-3
             return volt * ampere, self.bus_v * abs(ampere) + self.current_a * abs(volt)
@@ -76,25 +75,25 @@ class Rail:
 
 @dataclass(frozen=True)
 class Zone:
-    """One RAPL zone: a counter in µJ that starts again at ``range_j``."""
+    """One RAPL zone: a counter in µJ that wraps around at ``range_j``."""
 
     label: str
     energy: Path
     range_j: float
 
     def read_j(self) -> float:
-        """What the counter says, in joules."""
+        """Returns the counter value in joules."""
         return _number(self.energy) * 1e-6
 
 
 @dataclass(frozen=True)
 class Counters:
-    """What is read together and added up: either rails or zones.
+    """Sensors that are read together and added: either rails or zones.
 
     Attributes
     ----------
     name
-        The sensors, for people.
+        Display name of the sensors.
     """
 
     name: str
@@ -103,7 +102,7 @@ class Counters:
 
     @property
     def period_s(self) -> float | None:
-        """Time between two values, where it is known."""
+        """Returns the time between two values, if it is known."""
         if self.zones:
             return RAPL_PERIOD_S
         known = [rail.period_s for rail in self.rails if rail.period_s is not None]
@@ -111,12 +110,12 @@ class Counters:
 
 
 def find(sysfs: Path) -> Counters | None:
-    """Look for the sensors of the machine whose ``/sys`` this is; ``None`` where it has none.
+    """Finds the sensors below a ``/sys`` folder; ``None`` if there are none.
 
     Raises
     ------
     SensorError
-        When there are some and they may not be read.
+        Sensors without read permission.
     """
     found = _choose([*_hwmon(sysfs), *_iio(sysfs)])
     counters = found or _rapl(sysfs)
@@ -129,7 +128,7 @@ def find(sysfs: Path) -> Counters | None:
 
 
 def _choose(rails: list[Rail]) -> Counters | None:
-    """The rail that holds the others, or all of them."""
+    """Returns the rail that includes the others, otherwise all rails."""
     total = [rail for rail in rails if rail.label in TOTALS]
     chosen = tuple(total[:1] or rails)
     if not chosen:
@@ -139,7 +138,7 @@ def _choose(rails: list[Rail]) -> Counters | None:
 
 
 def _hwmon(sysfs: Path) -> Iterator[Rail]:
-    """Rails of INA3221 and INA238 by hwmon; channel 7 of an INA3221 sums the others."""
+    """Returns rails of INA3221 and INA238 by hwmon; channel 7 of an INA3221 is the sum."""
     for chip in _places(sysfs, "bus/i2c/devices/*/hwmon/hwmon*", "class/hwmon/hwmon*"):
         name = _text(chip / "name")
         if name == "ina238":
@@ -176,7 +175,7 @@ def _rail(
 
 
 def _iio(sysfs: Path) -> Iterator[Rail]:
-    """Rails of INA3221 by iio (JetPack 4)."""
+    """Returns rails of INA3221 by iio (JetPack 4)."""
     for device in _places(
         sysfs,
         "bus/i2c/devices/*/iio:device*",
@@ -206,17 +205,17 @@ def _iio(sysfs: Path) -> Iterator[Rail]:
 
 
 def _places(sysfs: Path, *patterns: str) -> list[Path]:
-    """Directories by any of their names, each once."""
+    """Returns the matching directories without duplicates."""
     found = {place.resolve(): place for pattern in patterns for place in sysfs.glob(pattern)}
     return [found[place] for place in sorted(found)]
 
 
 def _rapl(sysfs: Path) -> Counters | None:
-    """Top zones of RAPL: the platform where it is counted, else the packages."""
+    """Returns the top zones of RAPL: the platform if available, otherwise the packages."""
     zones = []
     for zone in sorted(sysfs.glob("class/powercap/intel-rapl:*")):
         most = _text(zone / "max_energy_range_uj")
-        # Zones with a second number are parts of the first.
+        # Skip sub-zones, whose names have a second number.
         if zone.name.count(":") == 1 and (zone / "energy_uj").is_file() and most is not None:
             zones.append(
                 Zone(_text(zone / "name") or zone.name, zone / "energy_uj", float(most) * 1e-6)
@@ -242,7 +241,7 @@ def _number(file: Path) -> float:
         for _ in range(READS):
             if text.strip():
                 break
-            # A file that is no kernel's may be met empty, in the middle of being written.
+            # Retry an empty file, because a simulated sensor may be writing it.
             sleep(1e-3)
             text = file.read_text(encoding="utf-8")
         return float(text)

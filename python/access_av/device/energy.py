@@ -1,8 +1,8 @@
-"""Energy of a window from what a sensor said in it, as an interval.
+"""Energy of a time window from sensor values, as an interval.
 
-The interval holds what the sensor cannot tell: the steps it counts in, how old its value is at
-either end of the window, and what happened between two values. It does not hold the gain error of
-the sensor itself (INA3221: 0.25 % and its shunt's tolerance).
+The interval covers the resolution of the sensor, the age of its value at both ends of the window,
+and the power between two values. It does not cover the gain error of the sensor (INA3221: 0.25 %
+plus the tolerance of the shunt).
 """
 
 from __future__ import annotations
@@ -25,54 +25,54 @@ if TYPE_CHECKING:
 
     from access_av.device.counters import Counters
 
-# Time between two looks at a sensor; varied by half, so that no load keeps step with it.
+# Mean interval of sensor reads (s); varied by half, so that no load is synchronous to it.
 LOOK_S = 2e-3
-# A value that is old by one period at each end errs by 2 % at most in a window of as many.
+# Minimum number of periods in a window: an age of one period at each end is then 2 %.
 LEAST_PERIODS = 100
 # Two-sided 99.9 % of a normal distribution.
 SURE = 3.29
-# One steady load does not draw ten times its median power, nor a tenth of it.
+# Maximum ratio of the power of a steady load to its median, in both directions.
 MOST_FACTOR = 10.0
 
 
 class TooShortError(SensorError):
-    """A window in which the sensor has too few values."""
+    """Window with too few sensor values."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A value and how far the truth may be from it, either way."""
+    """A value and the half-width of its symmetric interval."""
 
     value: float
     half_width: float
 
     @property
     def low(self) -> float:
-        """Lower end."""
+        """Returns the lower end."""
         return self.value - self.half_width
 
     @property
     def high(self) -> float:
-        """Upper end."""
+        """Returns the upper end."""
         return self.value + self.half_width
 
     def scaled(self, factor: float) -> Interval:
-        """Both times a factor."""
+        """Returns value and half-width multiplied by a factor."""
         return Interval(self.value * factor, self.half_width * factor)
 
 
 @dataclass(frozen=True)
 class Window:
-    """Energy of a stretch of time.
+    """Energy of a time window.
 
     Attributes
     ----------
     start_s, duration_s
-        By the clock it was read with, and how long it was.
+        Start time by the clock of the reads, and duration.
     energy_j
-        All that the sensor saw.
+        Total energy by the sensor.
     is_constant
-        Whether the sensor said the same all the time.
+        Whether all sensor values were equal.
     """
 
     start_s: float
@@ -82,17 +82,17 @@ class Window:
 
     @property
     def power_w(self) -> Interval:
-        """Mean power."""
+        """Returns the mean power in watts."""
         return self.energy_j.scaled(1.0 / self.duration_s)
 
 
 def above_idle(busy: Window, idle: Window) -> Interval:
-    """Energy of a busy window above what the idle board draws in the same time, in joules.
+    """Returns the energy of a busy window above that of the idle board, in joules.
 
     Raises
     ------
     SensorError
-        When the sensor says the same of both, all the time: it stands still.
+        Constant equal values of both windows, because the sensor has stopped.
     """
     if busy.is_constant and idle.is_constant and busy.power_w.value == idle.power_w.value:
         raise SensorError("the sensor stopped: it says the same, idle and busy")
@@ -105,19 +105,19 @@ def above_idle(busy: Window, idle: Window) -> Interval:
 
 @dataclass
 class Recording:
-    """Reads sensors on a thread of its own for as long as it is open, then gives the window.
+    """Reads sensors in a thread while it is open, and returns the window.
 
     Attributes
     ----------
     clock
         Monotonic time in seconds.
     look_s
-        Mean time between two looks.
+        Mean interval of the reads in seconds.
     start_s, end_s
-        When it was opened and closed.
+        Times of opening and closing.
     times_s, values, rounded_w
-        What each look found: when; watts of all rails, or joules of each zone; how far rounding
-        may have taken the watts.
+        Result of each read: time; watts of all rails, or joules of each zone; maximum rounding
+        error of the watts.
     """
 
     counters: Counters
@@ -160,7 +160,7 @@ class Recording:
             self._failed = error
 
     def look(self) -> None:
-        """Read the sensors once."""
+        """Reads the sensors once."""
         before_s = self.clock()
         if self.counters.zones:
             read = [zone.read_j() for zone in self.counters.zones]
@@ -172,12 +172,12 @@ class Recording:
         self.times_s.append(0.5 * (before_s + self.clock()))
 
     def window(self) -> Window:
-        """Energy between opening and closing.
+        """Returns the energy between opening and closing.
 
         Raises
         ------
         SensorError
-            When the sensor failed, stopped or jumped, or the window is too short for it.
+            Failed, stopped or jumping sensor, or a window that is too short.
         """
         if self._failed is not None:
             raise self._failed
@@ -197,30 +197,30 @@ def energy_sampled(
     period_s: float | None,
     bounds_s: tuple[float, float],
 ) -> Window:
-    r"""Energy from samples of power, held from one to the next.
+    r"""Returns the energy of power samples, each held until the next one.
 
     Parameters
     ----------
     times_s, power_w, rounded_w
-        When it was read, what it said, and how far rounding may have taken that; shape (n,).
+        Times, values and maximum rounding errors of the reads, shape (n,).
     period_s
-        Time between two conversions; ``None`` to take it from how often the value changes.
+        Time between two conversions. Default: estimated from the changes of the value.
     bounds_s
         Start and end of the window.
 
     Notes
     -----
-    Between two values the power is not known. Its unseen part is taken from what a value differs
-    from the next by (von Neumann), :math:`\delta^2 = \tfrac12 \overline{(p_{k+1}-p_k)^2}`, and the
-    energy errs by :math:`3.29\,\delta\sqrt{\sum h_k^2}` over steps of :math:`h_k`. A slow drift
-    takes no part in it. Each end may be off by one step.
+    The power between two values is unknown. Its variance is estimated from successive differences
+    (von Neumann), :math:`\delta^2 = \tfrac12 \overline{(p_{k+1}-p_k)^2}`, and the
+    energy error is :math:`3.29\,\delta\sqrt{\sum h_k^2}` over steps of :math:`h_k`. A slow drift
+    does not contribute. Each end has an error of at most one step.
     """
     start_s, end_s = bounds_s
     duration_s = end_s - start_s
     changes = np.flatnonzero(np.diff(power_w)) + 1
     look_s = float(np.median(np.diff(times_s))) if times_s.size > 1 else duration_s
     if period_s is None:
-        # Changes by a single step say how fast the power drifts, not how often it is measured.
+        # Ignore changes by a single step, which show the drift and not the conversion rate.
         jumps = np.flatnonzero(np.abs(np.diff(power_w)) > 3.0 * rounded_w[1:]) + 1
         gaps_s = np.diff(times_s[jumps])
         period_s = float(np.quantile(gaps_s, 0.1)) if gaps_s.size else look_s
@@ -230,7 +230,7 @@ def energy_sampled(
     _refuse_jumps(power_w, times_s, "W")
     edges_s = np.concatenate([[start_s], times_s[1:], [end_s]])
     energy_j = float(np.sum(power_w * np.diff(edges_s)))
-    # One value per conversion.
+    # Keep one value per conversion.
     stride = max(round(hold_s / look_s), 1)
     kept_w, kept_s = power_w[::stride], times_s[::stride]
     delta_w = float(np.sqrt(0.5 * np.mean(np.diff(kept_w) ** 2)))
@@ -246,14 +246,14 @@ def energy_counted(
     ranges_j: list[float],
     bounds_s: tuple[float, float],
 ) -> Window:
-    """Energy from counters that start again at their range.
+    """Returns the energy of counters that wrap around at their range.
 
     Parameters
     ----------
     times_s, counters_j
-        When they were read, shape (n,), and what they said, shape (n, zones).
+        Times of the reads, shape (n,), and counter values, shape (n, zones).
     ranges_j
-        Where each starts again.
+        Range of each counter.
     bounds_s
         Start and end of the window; the counter is read at both.
     """
@@ -269,13 +269,13 @@ def energy_counted(
     period_s = max(float(np.median(gaps_s)) if gaps_s.size else duration_s, look_s)
     _refuse_short(duration_s, period_s)
     _refuse_stopped(times_s, changes, end_s)
-    # Power from every tenth new value to the next: one that comes late makes no jump.
+    # Compute the power over ten new values, so that a late value causes no jump.
     edges = np.append(changes[:-10:10], changes[-1])
     total_j = np.concatenate([[0.0], np.cumsum(added_j)])
     power_w = np.diff(total_j[edges]) / np.diff(times_s[edges])
     _refuse_jumps(power_w, times_s[edges[:-1]], "W")
     energy_j = float(total_j[-1])
-    # How old a value may be at either end; and the window is a little longer than its readings.
+    # Add the age of the value at both ends, and the time before the first and after the last read.
     age_s = float(np.max(np.diff(np.concatenate([[start_s], times_s[changes], [end_s]]))))
     outside_s = duration_s - float(times_s[-1] - times_s[0])
     ends_j = float(np.max(power_w)) * (age_s + outside_s)
@@ -294,7 +294,7 @@ def _refuse_short(duration_s: float, period_s: float) -> None:
 
 
 def _refuse_stopped(times_s: NDArray[np.float64], changes: NDArray[np.int64], end_s: float) -> None:
-    """Refuse a value that used to change and then stays the same."""
+    """Raises an error for a value that changed and then stays constant."""
     if changes.size < 10:
         return
     gaps_s = np.diff(np.concatenate([times_s[changes], [end_s]]))

@@ -22,7 +22,7 @@ BOUNDARIES = {
 
 @dataclass(frozen=True)
 class Figure:
-    """A number with its provenance and, where it is known, the range that holds it.
+    """A number with its provenance and, if known, its range.
 
     ``provenance`` is ``measured``, ``fitted``, ``datasheet``, ``projected`` or ``assumed``.
     """
@@ -42,7 +42,7 @@ class PowerMode:
     Attributes
     ----------
     base_wake_up_ms
-        Shortest interval between executions the computer manages, by method.
+        Minimum interval between executions on this computer, by method.
     energy_per_execution_j
         Energy of one execution, by method.
     """
@@ -56,7 +56,7 @@ class PowerMode:
 
 @dataclass(frozen=True)
 class Platform:
-    """A platform file, checked.
+    """Validated platform file.
 
     Examples
     --------
@@ -68,31 +68,31 @@ class Platform:
 
     @classmethod
     def load(cls, name_or_path: str) -> Platform:
-        """Load a shipped platform by its name, or else a platform file by its path.
+        """Loads a shipped platform by its name, or a platform file by its path.
 
         Raises
         ------
         SettingsError
-            When there is neither, or the file cannot be used; names the key and what is allowed.
+            Unknown name, or unusable file; the message names the key and the allowed values.
         """
         return cls(_core.Platform.load(name_or_path))
 
     @staticmethod
     def names() -> list[str]:
-        """Names of the shipped platforms."""
+        """Returns the names of the shipped platforms."""
         return _core.Platform.names()
 
     @staticmethod
     def schema_json() -> str:
-        """JSON Schema of a platform file."""
+        """Returns the JSON Schema of a platform file."""
         return _core.Platform.schema_json()
 
     def to_toml(self) -> str:
-        """The platform as TOML, every default written out."""
+        """Returns the platform as TOML with all default values."""
         return self.core.to_toml()
 
     def with_energy(self, energies_j: Mapping[int, Mapping[str, Figure]]) -> Platform:
-        """Give this platform other energies per execution, by mode number and method."""
+        """Returns the platform with other energies per execution, by mode number and method."""
         return Platform(
             self.core.with_overrides(
                 {
@@ -105,12 +105,12 @@ class Platform:
 
     @cached_property
     def name(self) -> str:
-        """Short name."""
+        """Returns the short name."""
         return str(json.loads(self.core.to_json())["name"])
 
     @cached_property
     def modes(self) -> tuple[PowerMode, ...]:
-        """Power modes, in the file's order."""
+        """Returns the power modes in the order of the file."""
         return tuple(
             PowerMode(
                 number=mode["mode"],
@@ -127,7 +127,7 @@ class Platform:
 
     @cached_property
     def energy_boundary(self) -> str:
-        """What the energies per execution count, in words."""
+        """Returns the boundary of the energies per execution as text."""
         found = {
             figure.boundary
             for mode in self.modes

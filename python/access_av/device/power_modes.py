@@ -1,4 +1,4 @@
-"""Power modes of the machine: nvpmodel's, cpufreq's, else the one it is in."""
+"""Power modes of the computer: of nvpmodel, of cpufreq, otherwise the present one."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from access_av.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-# Clocks of cpufreq to go through, where there are more.
+# Maximum number of cpufreq clocks to measure.
 MOST_CLOCKS = 5
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @dataclass(frozen=True)
 class Mode:
-    """A power mode; clocks in MHz, ``None`` where memory has no limit of its own."""
+    """A power mode; clocks in MHz, ``None`` if the memory has no separate limit."""
 
     number: int
     name: str
@@ -32,12 +32,12 @@ class Mode:
 
 
 class ModeError(InputError):
-    """A mode that the machine does not take."""
+    """A mode that cannot be selected."""
 
 
 @dataclass(frozen=True)
 class Board:
-    """What can be switched on a machine.
+    """Power modes of a computer and their selection.
 
     Attributes
     ----------
@@ -50,12 +50,12 @@ class Board:
     sysfs: Path
 
     def switch(self, mode: Mode) -> None:
-        """Change to a mode.
+        """Selects a mode.
 
         Raises
         ------
         ModeError
-            When it does not take it, as those that need a reboot.
+            Mode that cannot be selected, for example because it needs a reboot.
         """
         if self.kind == "nvpmodel":
             _nvpmodel("-m", str(mode.number))
@@ -67,7 +67,7 @@ class Board:
 
     @contextmanager
     def restored(self) -> Iterator[None]:
-        """Put back the mode that was found, whatever happens, signals included."""
+        """Restores the original mode on exit, also after signals."""
         if self.kind == "present":
             yield
             return
@@ -95,18 +95,18 @@ class Board:
 
 
 def find(root: Path, sysfs: Path, cpu_mhz: float | None = None) -> Board:
-    """Power modes of the machine whose ``/`` and ``/sys`` these are.
+    """Finds the power modes of the computer with these ``/`` and ``/sys`` folders.
 
-    ``cpu_mhz`` is the clock where the machine does not say.
+    ``cpu_mhz`` is the clock if the computer does not report it.
 
     Raises
     ------
     InputError
-        When the clock is neither given nor known.
+        Unknown clock.
     """
     most_mhz = cpu_mhz or _most_mhz(sysfs) or _cpuinfo_mhz(root) or _cpuinfo_mhz(Path("/"))
     if most_mhz is None:
-        raise InputError("this machine does not say its CPU's clock; give it by --cpu-mhz")
+        raise InputError("the CPU clock of this computer is unknown; add --cpu-mhz")
     file = root / "etc/nvpmodel.conf"
     if file.is_file():
         modes = parse_nvpmodel(file.read_text(encoding="utf-8", errors="replace"), most_mhz)
@@ -123,14 +123,14 @@ def find(root: Path, sysfs: Path, cpu_mhz: float | None = None) -> Board:
 
 
 def parse_nvpmodel(text: str, most_mhz: float) -> list[Mode]:
-    """Power modes of an ``nvpmodel.conf``.
+    """Parses the power modes of an ``nvpmodel.conf``.
 
     Parameters
     ----------
     text
         The file.
     most_mhz
-        The CPU's own limit, for modes that set none (``MAX_FREQ -1``).
+        Limit of the CPU, for modes without a limit (``MAX_FREQ -1``).
 
     Examples
     --------
@@ -163,12 +163,12 @@ def parse_nvpmodel(text: str, most_mhz: float) -> list[Mode]:
 
 
 def chosen(board: Board, numbers: list[int] | None) -> list[Mode]:
-    """The modes of these numbers, or all.
+    """Returns the modes with these numbers, or all.
 
     Raises
     ------
     InputError
-        When there is no such mode.
+        Unknown mode.
     """
     by_number: Mapping[int, Mode] = {mode.number: mode for mode in board.modes}
     for number in numbers or []:
@@ -212,7 +212,7 @@ def _policies(sysfs: Path) -> list[Path]:
 
 
 def _clocks(sysfs: Path) -> list[float]:
-    """Clocks that cpufreq offers, in MHz, the fastest first; a few of them spread out."""
+    """Returns evenly spread clocks of cpufreq in MHz, the fastest first."""
     offered: set[int] = set()
     for policy in _policies(sysfs):
         file = policy / "scaling_available_frequencies"

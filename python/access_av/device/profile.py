@@ -1,4 +1,4 @@
-"""Profile the device that this runs on, and write what was measured as a platform file."""
+"""Profiles this computer, and returns the measurements as a platform file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from access_av.device.counters import Counters
 
 NO_SENSOR = "no power sensor on this machine (looked for INA3221, INA238, RAPL)"
-# The radio is beside the computer: its figures are order of magnitude, to be replaced by its own.
+# The radio is not measured: order-of-magnitude values, to be replaced by those of the device.
 RECEIVER = {
     "counted": True,
     "on_time_ms": 5.0,
@@ -43,7 +43,7 @@ RECEIVER = {
         "boundary": "marginal",
     },
 }
-# How long each workload is run where there is no energy to be measured.
+# Duration of each workload without energy measurement (s).
 TIMING_S = 1.0
 
 
@@ -54,11 +54,11 @@ class Measured:
     Attributes
     ----------
     energy_j
-        Of one execution, above idle; ``None`` where it was not measured.
+        Energy of one execution above idle; ``None`` if it was not measured.
     why_not
-        Why it was not.
+        Reason for a missing energy.
     idle, busy
-        The windows that it was taken from.
+        Windows of the measurement.
     """
 
     mode: Mode
@@ -70,7 +70,7 @@ class Measured:
     busy: Window | None = None
 
     def record(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
+        """Returns the values for JSON."""
         windows = {"idle": self.idle, "busy": self.busy}
         return {
             "mode": self.mode.number,
@@ -93,14 +93,14 @@ class Measured:
 
 @dataclass(frozen=True)
 class Profile:
-    """What was measured on a device.
+    """Measurements on a computer.
 
     Attributes
     ----------
     sensors
-        What measured the energy; ``None`` where nothing did.
+        Sensors of the energy; ``None`` without a sensor.
     warnings
-        What could not be measured, and why.
+        Missing measurements with reasons.
     """
 
     machine: str
@@ -109,15 +109,15 @@ class Profile:
     warnings: tuple[str, ...]
 
     def platform(self, name: str) -> _core.Platform:
-        """The measurements as a platform.
+        """Returns the measurements as a platform.
 
-        Base wake-up times are the 99th percentiles of the SSB chain and the method, one after the
-        other. Cycles are median CPU times at the fastest mode's clock.
+        A base wake-up time is the sum of the 99th percentiles of the SSB chain and the method.
+        Cycles are median CPU times multiplied by the clock of the fastest mode.
 
         Raises
         ------
         InputError
-            When nothing was measured.
+            No measurement.
         """
         if not self.measured:
             raise InputError("no power mode could be measured: " + "; ".join(self.warnings))
@@ -188,23 +188,23 @@ def profile(
     cpu_mhz: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Profile:
-    """Measure every workload in every power mode.
+    """Measures every workload in every power mode.
 
     Parameters
     ----------
     root
-        ``/``, or a folder that is laid out like it, or like its ``/sys``.
+        ``/``, or a folder with the layout of ``/`` or ``/sys``.
     modes
-        Numbers of the power modes; all of them when ``None``.
+        Numbers of the power modes. Default: all.
     window_s
-        How long each workload runs, and how long the idle board is watched before.
+        Duration of each workload, and of the idle measurement before it, in seconds.
     cpu_mhz
-        The clock, where the machine does not say.
+        Clock in MHz, if the computer does not report it.
 
     Raises
     ------
     InputError
-        When there is no such folder or mode, or a window is too short for the sensor.
+        Unknown folder or mode, or a window that is too short for the sensor.
     """
     if not root.is_dir():
         raise InputError(f"--sysfs-root {root}: no such directory")
@@ -264,7 +264,7 @@ def _measure(
         energy_j = above_idle(busy, idle).scaled(1.0 / timing.executions)
         if energy_j.low <= 0.0:
             raise SensorError(
-                f"{energy_j.value:.3g} ± {energy_j.half_width:.3g} J is not told from idle"
+                f"{energy_j.value:.3g} ± {energy_j.half_width:.3g} J is not distinct from idle"
             )
     except TooShortError:
         raise
@@ -274,7 +274,7 @@ def _measure(
 
 
 def _machine(root: Path) -> str:
-    """What the machine calls itself."""
+    """Returns the name of the computer."""
     model = root / "proc/device-tree/model"
     if model.is_file():
         return model.read_text(encoding="utf-8", errors="replace").strip("\0 \n")

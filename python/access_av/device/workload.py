@@ -1,7 +1,6 @@
-"""What is timed: each estimator on an SSB's snapshots, and the chain that makes them.
+"""Timed workloads: each estimator on the snapshots of an SSB, and the SSB receiver.
 
-One execution is one call from Python, what the estimator itself takes and about a microsecond of
-handing over.
+One execution is one call from Python: the estimator plus about one microsecond of call overhead.
 """
 
 from __future__ import annotations
@@ -22,13 +21,13 @@ if TYPE_CHECKING:
 ANTENNAS, SNAPSHOTS = 4, 20
 CHAIN = "ssb-chain"
 SAMPLE_RATE_HZ, CARRIER_HZ = 7.68e6, 3.7008e9
-# Fewer have no 99th percentile.
+# Minimum number of executions for a 99th percentile.
 LEAST_EXECUTIONS = 100
 
 
 @dataclass(frozen=True)
 class Timing:
-    """Time of one execution in seconds, and how many there were."""
+    """Time of one execution in seconds, and the number of executions."""
 
     executions: int
     median_s: float
@@ -38,10 +37,11 @@ class Timing:
 
 
 def workloads() -> dict[str, Callable[[], object]]:
-    """One execution of each method, and of the SSB chain, by name.
+    """Returns functions that execute each method and the SSB chain once, by name.
 
-    The chain finds the cell in the samples of one half frame of four antennas, decodes it and makes
-    its observation: what a receiver does that has lost the cell. One that tracks it does less.
+    The chain finds the cell in the samples of one half frame of four antennas, decodes it and
+    computes its observation, as a receiver that has lost the cell. A receiver that tracks the cell
+    needs less time.
     """
     rng = np.random.default_rng(1)
     steering = np.exp(1j * np.pi * np.cos(1.0) * np.arange(ANTENNAS))
@@ -65,7 +65,7 @@ def workloads() -> dict[str, Callable[[], object]]:
 
 
 def repeat(work: Callable[[], object], least_s: float) -> Timing:
-    """Execute again and again for at least so long, and often enough for a 99th percentile."""
+    """Repeats a workload for a minimum duration, and often enough for a 99th percentile."""
     work()
     wall_ns, cpu_ns = [], []
     clock, cpu = time.perf_counter_ns, time.thread_time_ns

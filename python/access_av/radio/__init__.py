@@ -1,1 +1,1 @@
-"""The radio of a site: channels, ray-traced paths, where radio heads stand and what would help."""
+"""Radio of a site: channels, ray-traced paths, placement of radio heads, improvements."""

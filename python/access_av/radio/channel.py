@@ -1,6 +1,6 @@
-"""The channels that a scenario's ``[channel]`` can name, by themselves.
+"""Link-level access to the channel models of a scenario's ``[channel]``.
 
-``umi``, ``inf-sl``, ``inf-dl``, ``inf-sh`` and ``inf-dh`` are those of 3GPP TR 38.901 (V19.2).
+``umi``, ``inf-sl``, ``inf-dl``, ``inf-sh`` and ``inf-dh`` are models of 3GPP TR 38.901 (V19.2).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def drops(
     carrier_mhz: float = 3500.0,
     seed: int = 1,
 ) -> pl.DataFrame:
-    """Independent links of a model, as a calibration drops them.
+    """Draws independent links of a model, as in a 3GPP calibration.
 
     Parameters
     ----------
@@ -36,14 +36,14 @@ def drops(
     distance_m
         Horizontal distance of each link.
     head_height_m
-        Height of the radio head; the model's own (10 m in ``umi``, 1.5 m in ``inf-sl`` and
-        ``inf-dl``, 8 m in ``inf-sh`` and ``inf-dh``) when ``None``.
+        Height of the radio head. Default: that of the model (10 m in ``umi``, 1.5 m in ``inf-sl``
+        and ``inf-dl``, 8 m in ``inf-sh`` and ``inf-dh``).
     array_height_m
         Height of the array.
     carrier_mhz
-        Carrier.
+        Carrier frequency.
     seed
-        Same seed, same drops.
+        Seed of the random numbers.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def drops(
     Raises
     ------
     ValueError
-        For another model, or numbers that are not finite and positive.
+        Unknown model, or numbers that are not finite and positive.
 
     Examples
     --------

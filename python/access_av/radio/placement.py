@@ -1,4 +1,4 @@
-"""Where to put the next radio heads: candidate masts, ranked by the bound."""
+"""Placement of additional radio heads: candidate masts, ranked by the error bound."""
 
 from __future__ import annotations
 
@@ -24,32 +24,32 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
 MOST_MASTS = 1000
-# Physical cell identities (TS 38.211, 7.4.2.1); each new head gets the lowest that is free.
+# Physical cell identities (TS 38.211, 7.4.2.1); each new head gets the lowest free one.
 CELLS = 1008
-# SSB indices that a burst has at every carrier (TS 38.213, 4.1); each new head gets the least used:
-# cells that send at once drown one another.
+# SSB indices of a burst at every carrier (TS 38.213, 4.1). Each new head gets the least used one,
+# because cells that transmit simultaneously interfere.
 SSB_INDICES = range(4)
-# Where no masts are given: so far from the weakest place of the route, and in so many directions.
+# Default candidates: distances from the weakest position of the route (m), number of directions.
 BESIDE_M = (15.0, 40.0)
 DIRECTIONS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Plan(Result):
-    """Which masts to equip.
+    """Selected masts.
 
     Attributes
     ----------
     scenario
-        The scenario with them.
+        The scenario with the new radio heads.
     before_m, after_m
-        90th percentile along the route of the bound of the horizontal error, without and with them.
+        90th percentile of the error bound along the route, without and with the new radio heads.
     chosen
         Names of the masts, the best one first.
     ranking
-        One row per mast, as the only one added; columns ``masts`` of :mod:`access_av.columns`.
+        One row per mast, added alone; columns ``masts`` of :mod:`access_av.columns`.
     verdicts
-        Service levels that the bound allows with them.
+        Service levels that the bound permits with the new radio heads.
     """
 
     scenario: _core.Scenario
@@ -68,24 +68,24 @@ def plan(
     eirp_dbm: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Plan:
-    """Choose masts for further radio heads, by the 90th percentile of the bound along the route.
+    """Selects masts for radio heads by the 90th percentile of the error bound along the route.
 
-    One is chosen by trying each. Of several, each next one is the best beside those chosen before,
-    and then each is exchanged for another as long as that helps.
+    The first mast is the best of all candidates. Each further mast is the best addition to the
+    previous ones. Then masts are exchanged as long as the percentile improves.
 
     Parameters
     ----------
     scenario
         A scenario, or the name or path of one.
     masts
-        Candidates: a table, or the CSV file of one, with the columns ``name, x_m, y_m, z_m``; when
-        ``None``, places beside the road round where the bound is largest.
+        Candidates: a table or a CSV file with the columns ``name, x_m, y_m, z_m``. Default:
+        positions next to the road around the largest bound.
     add
-        How many radio heads to add.
+        Number of radio heads to add.
     eirp_dbm
-        What they send; like the site's first radio head when ``None``.
+        EIRP of the new radio heads. Default: that of the site's first radio head.
     progress
-        Called as ``progress(done, total)`` with numbers of bounds computed for the first choice.
+        Called as ``progress(done, total)`` with the number of computed bounds.
 
     Returns
     -------
@@ -95,9 +95,9 @@ def plan(
     Raises
     ------
     InputError
-        For a table that lacks a column or a number, and more masts to choose than there are.
+        Missing column or number, or fewer candidates than ``add``.
     SettingsError
-        For a mast where no radio head can be.
+        Mast at an invalid position.
 
     Examples
     --------
@@ -184,10 +184,10 @@ def _p90_m(scenario: _core.Scenario) -> float:
 
 
 def _beside(scenario: _core.Scenario, site: dict[str, Any]) -> list[dict[str, Any]]:
-    """Places round where the bound is largest, as high as the site's first radio head."""
+    """Returns positions around the largest bound, at the height of the site's first radio head."""
     route = along_route(scenario)
     weakest = route.row(int(route["bound_m"].arg_max() or 0), named=True)
-    # A trip may begin somewhere on the road; no mast stands on what lies before, either.
+    # Keep the masts off the road, including the part before the start of the trip.
     whole = along_route(scenario.with_overrides({"motion.start_at_m": 0.0}))
     width_m = (site.get("road") or {}).get("width_m", 0.0)
     z_m = site["radio_heads"][0]["position_m"][2]

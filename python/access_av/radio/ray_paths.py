@@ -1,9 +1,9 @@
-"""Paths that a ray tracer has found, in the file that drives the simulator.
+"""Converts ray-traced paths to the file format of the simulator.
 
-A table has one row per path: ``x_m, y_m, z_m`` (place of the array), ``pci``, ``gain_re, gain_im``
-(between isotropic antennas), ``delay_s``, and ``azimuth_rad, elevation_rad`` of arrival, all in the
-map's frame; ``ssb_index`` where a cell has several heads. ``docs/ray-tracing.md`` says how to make
-one with Sionna RT.
+A table has one row per path in the map frame: ``x_m, y_m, z_m`` (position of the array), ``pci``,
+``gain_re, gain_im`` (between isotropic antennas), ``delay_s``, ``azimuth_rad, elevation_rad`` of
+arrival, and ``ssb_index`` if a cell has several radio heads. ``docs/ray-tracing.md`` describes how
+to compute such a table with Sionna RT.
 """
 
 from __future__ import annotations
@@ -28,37 +28,36 @@ if TYPE_CHECKING:
 _NUMBERS = ("gain_re", "gain_im", "delay_s", "azimuth_rad", "elevation_rad")
 _PLACE = ("x_m", "y_m", "z_m")
 
-# Phases hold at one frequency; an SSB's place in the carrier is within so much of it.
+# Maximum difference of the traced frequency and the carrier, because phases depend on it.
 _SAME_CARRIER = 0.01
 
 
 def import_paths(
     table: pl.DataFrame | str | Path, site: _core.Site | str, out: str | Path, *, carrier_mhz: float
 ) -> dict[str, int]:
-    """Write the paths of a table as the simulator reads them.
+    """Writes the paths of a table as an npz file for the simulator.
 
     Parameters
     ----------
     table
-        One row per path, or the Parquet or CSV file of one.
+        Table with one row per path, or its Parquet or CSV file.
     site
-        The site whose radio heads the paths are from, or its name or path.
+        Site of the radio heads, or its name or path.
     out
-        The npz file; a scenario names it as ``channel.paths``.
+        npz file to write; ``channel.paths`` of a scenario names it.
     carrier_mhz
-        Frequency that the paths were traced at.
+        Carrier frequency of the traced paths.
 
     Returns
     -------
     dict
-        Numbers of ``heads``, ``places`` and ``paths``.
+        Number of ``heads``, ``places`` and ``paths``.
 
     Raises
     ------
     InputError
-        For a table that lacks a column, a number or a radio head, names it and the row; for
-        another carrier than the site's; for paths that cannot be of this site, such as ones shorter
-        than the straight way. Nothing is written then.
+        Missing column, number or radio head (with the row); a carrier other than the site's; paths
+        that contradict the site, for example shorter than the line of sight. No file is written.
 
     Examples
     --------
@@ -148,19 +147,19 @@ def from_arrays(
     *,
     floor_db: float = 40.0,
 ) -> pl.DataFrame:
-    """The table of paths in arrays, as ray tracers return them.
+    """Converts the arrays of a ray tracer to a table of paths.
 
     Parameters
     ----------
     places_m
-        Places, shape (places, 3).
+        Positions, shape (places, 3).
     pcis
         Physical cell identity of each radio head.
     gain, delay_s, azimuth_rad, zenith_rad
-        Shape (places, heads, paths); a negative delay is no path. Angles of arrival point to where
-        the wave comes from; the zenith counts from straight up.
+        Shape (places, heads, paths); a negative delay means no path. Angles of arrival point to the
+        origin of the wave; the zenith angle is measured from the vertical.
     floor_db
-        Paths weaker than the strongest of their link by more are left out.
+        Paths weaker than the strongest one of their link by more than this are left out.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What would bring a site and a vehicle to the next positioning service level of 3GPP."""
+"""Changes that bring a site and a vehicle to the next 3GPP positioning service level."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ MOST_ANTENNAS = 8  # of the bound
 
 @dataclass(frozen=True)
 class Change:
-    """One thing made better.
+    """Effect of one change.
 
     Attributes
     ----------
     what
-        In words.
+        Description of the change.
     share
-        Share of positions within the level's accuracy that the bound then allows.
+        Share of positions within the level's accuracy by the bound, after the change.
     reaches
-        Whether that is enough.
+        Whether this share reaches the level.
     """
 
     what: str
@@ -43,20 +43,20 @@ class Change:
 
 @dataclass(frozen=True)
 class NextLevel:
-    """The lowest level that the bound does not allow, and what would change that.
+    """The lowest service level that the bound excludes, and the effect of changes.
 
     Attributes
     ----------
     level
         The level.
     share
-        Share of positions within its accuracy that the bound allows.
+        Share of positions within its accuracy by the bound.
     short_share
-        Share of the route where that is less than the level asks.
+        Share of the route where this share is below the required availability.
     weakest_along_m, weakest_x_m, weakest_y_m
-        Where it is least: distance along the route, and place.
+        Weakest position: distance along the route, and coordinates.
     changes
-        Each by itself, from what is a setting of the cells to what has to be bought and mounted.
+        Effect of each single change, ordered from cell settings to new equipment.
     """
 
     level: service_levels.Level
@@ -69,21 +69,21 @@ class NextLevel:
 
     @property
     def cheapest(self) -> Change | None:
-        """The first change that is enough by itself."""
+        """Returns the first change that reaches the level alone."""
         return next((change for change in self.changes if change.reaches), None)
 
     def in_words(self) -> str:
-        """Where it falls short, and the cheapest change."""
-        cheapest = self.cheapest.what if self.cheapest else "none alone is enough"
+        """Returns the shortfall and the cheapest change as text."""
+        cheapest = self.cheapest.what if self.cheapest else "no single change"
         return (
-            f"As it is, the site falls short of level {self.level.name} on {self.short_share:.1%} "
-            f"of the route, most of all {self.weakest_along_m:.0f} m along, at "
-            f"({self.weakest_x_m:.0f}, {self.weakest_y_m:.0f}) m. What mends that and is usually "
-            f"the cheapest: {cheapest}."
+            f"The site fails level {self.level.name} on {self.short_share:.1%} of the route. "
+            f"Weakest position: {self.weakest_along_m:.0f} m along the route, at "
+            f"({self.weakest_x_m:.0f}, {self.weakest_y_m:.0f}) m. Cheapest change that reaches "
+            f"the level: {cheapest}."
         )
 
     def as_record(self) -> dict[str, Any]:
-        """Plain values for JSON."""
+        """Returns the values for JSON."""
         return {
             "level": self.level.name,
             "share": self.share,
@@ -96,23 +96,23 @@ class NextLevel:
 
 
 def next_level(scenario: _core.Scenario | str, planned: Plan | None = None) -> NextLevel | None:
-    """What would bring a scenario to the next service level.
+    """Evaluates changes that bring a scenario to the next service level.
 
-    Tried are, each by itself: SSBs twice as often, an odometer with half the errors, twice the
-    antennas, and the radio heads of a plan where there is one. The order is that of their usual
-    cost, which is assumed.
+    Each change is evaluated alone: SSBs twice as often, an odometer with half the errors, twice the
+    number of antennas, and the radio heads of a plan, if any. They are ordered by their usual cost,
+    which is an assumption.
 
     Parameters
     ----------
     scenario
         A scenario, or the name or path of one.
     planned
-        Radio heads to add to it.
+        Radio heads to add.
 
     Returns
     -------
     NextLevel or None
-        ``None`` where the bound allows every level.
+        ``None`` if the bound permits every level.
 
     Examples
     --------
@@ -160,7 +160,7 @@ def next_level(scenario: _core.Scenario | str, planned: Plan | None = None) -> N
 
 
 def _settings(scenario: _core.Scenario) -> dict[str, dict[str, Any]]:
-    """Changes in words, and the settings that make them."""
+    """Returns descriptions of the changes and their settings."""
     site, vehicle = (json.loads(part.to_json()) for part in (scenario.site, scenario.vehicle))
     made = {}
     period_ms = site["ssb"]["period_ms"] / 2.0

@@ -1,18 +1,17 @@
-"""Angle of arrival with 2 to 16 antennas: in a row, or with `direction` in any places.
+"""Angles of arrival with 2 to 16 antennas: a linear array, or any positions with `direction`.
 
 Angles are measured from the array's axis, in rad, 0 to pi; the electrical angle, the phase step
 from one antenna to the next, is ``2 pi (d / lambda) cos(angle)``. Snapshots are complex arrays
-``(antennas, snapshots)`` or ``(batch, antennas, snapshots)``; nothing removes their mean, so
-despread pilots (the same vector in every snapshot) are welcome. Their noise must be independent: a
-smoothed channel estimate says the same several times over, and goes through `whiten` first.
+``(antennas, snapshots)`` or ``(batch, antennas, snapshots)``. Their mean is not removed, so that
+despread pilots (equal vectors in all snapshots) can be used. Their noise must be independent. A
+smoothed channel estimate has correlated noise and must be passed through `whiten` first.
 
-Every estimate says what it is worth. ``p_value`` tests whether plane waves in white noise explain
-what was received; where they do not, ``verdict`` says whether reflections (or antennas unlike those
-described) or another source are the cause, and the standard deviations hold what that displaces,
-as far as the residual shows it. A model that holds is doubted once in a hundred times. With few
-snapshots the noise itself is uncertain: standard deviations allow for that, and with fewer than
-eight degrees of freedom (one snapshot of up to five antennas, two of two or three) no angle is
-reliable. Samples of one modulus are taken for phases, in which half of the noise is missing.
+``p_value`` tests whether plane waves in white noise explain the snapshots (false-alarm rate 1 %).
+If they do not, ``verdict`` gives the cause: reflections or a wrong array model, or another source.
+The standard deviations then include the displacement that the residual shows. They also include the
+uncertainty of the noise variance of few snapshots. With fewer than eight degrees of freedom (one
+snapshot of up to five antennas, two snapshots of two or three antennas) no angle is reliable.
+Samples of constant modulus are treated as phases, which contain only half of the noise.
 
 Examples
 --------
@@ -80,37 +79,37 @@ __all__ = [
     "whiten",
 ]
 
-# Of the largest eigenvalue: what a smoothing has left less of than this is rounding.
+# Eigenvalues below this fraction of the largest one are rounding errors.
 _LEAST_EIGENVALUE = 1e-4
 
 
 def whiten(
     channel: NDArray[np.complexfloating], covariance: NDArray[np.complexfloating]
 ) -> NDArray[np.complex128]:
-    """Snapshots in independent noise of a channel estimate whose noise is not.
+    """Converts a channel estimate with correlated noise to snapshots with independent noise.
 
-    With the eigenvectors ``u_j`` of the covariance and its eigenvalues ``l_j``, look ``j`` of an
-    antenna is ``u_j^H h / sqrt(l_j)``. There are as many as the estimate has degrees of freedom, be
-    it of ever so many subcarriers, and what `maximum_likelihood` makes of them is as honest as of
-    snapshots.
+    With the eigenvectors ``u_j`` and eigenvalues ``l_j`` of the covariance, snapshot ``j`` of an
+    antenna is ``u_j^H h / sqrt(l_j)``. The number of snapshots is the number of degrees of freedom
+    of the estimate, independent of the number of subcarriers. `maximum_likelihood` gives consistent
+    standard deviations for them.
 
     Parameters
     ----------
     channel : ndarray
-        Complex, ``(antennas, subcarriers)``; all antennas are smoothed alike.
+        Complex, ``(antennas, subcarriers)``; equal smoothing for all antennas.
     covariance : ndarray
         Complex, ``(subcarriers, subcarriers)``, Hermitian: ``E[e e^H]`` of an antenna's noise ``e``
-        over its variance.
+        divided by its variance.
 
     Returns
     -------
     ndarray
-        Complex, ``(antennas, looks)``, in noise of that variance.
+        Complex, ``(antennas, snapshots)``, with noise of that variance.
 
     Raises
     ------
     ValueError
-        Shapes that do not fit, values that are not finite, or a covariance of nothing.
+        Wrong shapes, values that are not finite, or a covariance without positive eigenvalue.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What the annotations of a recording state of its array: ``aoa:truth``, checked."""
+"""Array data in the annotations of a recording (``aoa:truth``), validated."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from access_av.errors import InputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Spacings that an array may have, in wavelengths, as the command line has them.
+# Permitted element spacings in wavelengths, equal to those of the command line.
 SPACINGS = (0.01, 10.0)
 
 
 @dataclass(frozen=True)
 class ArrayTruth:
-    """What one annotation states; ``None`` of what it does not.
+    """Array data of one annotation; missing values are ``None``.
 
     Attributes
     ----------
     azimuth_from_broadside_deg
-        Measured azimuth, counter-clockwise from the array's broadside, a quarter turn clockwise of
-        its axis; of a row, which does not tell elevation from azimuth, 90° less the angle from its
-        axis. Recordings that state ``angle_from_axis_deg`` (of a row) or ``azimuth_from_axis_deg``
-        (counter-clockwise from the axis) instead are understood.
+        Measured azimuth in degrees, counter-clockwise from the array's broadside, which is 90°
+        clockwise of the axis. For a linear array: 90° minus the angle from its axis. The keys
+        ``angle_from_axis_deg`` (linear array) and ``azimuth_from_axis_deg`` (counter-clockwise from
+        the axis) are accepted instead.
     element_spacing_wavelengths
-        Distance between neighbouring antennas in a row.
+        Element spacing of a linear array, in wavelengths.
     element_places_wavelengths
-        Where antennas are that are not in a row, along the array's axis and to its left, of shape
+        Antenna positions of another array in wavelengths, along the axis and to its left, shape
         (channels, 2).
     channel_phases
-        Factors of modulus one by which the channels' phases are off, of shape (channels,).
+        Phase errors of the channels as factors of modulus one, shape (channels,).
     """
 
     azimuth_from_broadside_deg: float | None = None
@@ -44,12 +44,12 @@ class ArrayTruth:
 
     @classmethod
     def of(cls, annotation: dict[str, Any], channels: int) -> ArrayTruth:
-        """Read an annotation.
+        """Reads an annotation.
 
         Raises
         ------
         InputError
-            For a value of another type, or out of range.
+            Value of a wrong type or out of range.
 
         Examples
         --------
@@ -69,7 +69,7 @@ class ArrayTruth:
 
 
 def from_broadside_deg(azimuth_from_axis_deg: float) -> float:
-    """Between −180° and 180°; broadside is a quarter turn clockwise of the axis.
+    """Returns an azimuth from broadside, −180° to 180°; broadside is 90° clockwise of the axis.
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""Manifolds fitted to measured snapshots, and snapshots of arrays whose elements are switched.
+"""Fits array manifolds to measured snapshots.
 
-Both are reached through `access_av.aoa`.
+Public interface: `access_av.aoa`.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class ManifoldFit:
 
 
 class _Series:
-    """Responses of places times a Fourier series in the azimuth for each antenna."""
+    """Responses of the positions times a Fourier series in the azimuth for each antenna."""
 
     def __init__(self, places: NDArray[np.float64] | None, coefficients: NDArray[np.complex128]):
         self.places, self.coefficients = places, coefficients
@@ -77,7 +77,7 @@ class _Series:
         self.directions = self.table / np.maximum(lengths, 1e-12)
 
     def at(self, azimuths: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """The responses, ``(azimuths, antennas)``."""
+        """Returns the responses, ``(azimuths, antennas)``."""
         order = self.coefficients.shape[1] // 2
         series = _harmonics(azimuths, order) @ self.coefficients.T
         responses: NDArray[np.complex128] = _geometry(self.places, azimuths) * series
@@ -86,7 +86,7 @@ class _Series:
     def azimuths(
         self, snapshots: NDArray[np.complex128]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Azimuth of the maximum for each snapshot, and the share of its power that is left."""
+        """Returns each snapshot's azimuth of the maximum, and its unexplained share of power."""
         beams = np.abs(snapshots.conj() @ self.directions.T) ** 2
         best = beams.argmax(axis=1)
         rows = np.arange(len(beams))
@@ -100,7 +100,7 @@ class _Series:
     def misfits(
         self, snapshots: NDArray[np.complex128], azimuths: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Share of the power of each unit-length snapshot beside the response to its azimuth."""
+        """Returns each unit-length snapshot's share of power outside the response."""
         expected = self.at(azimuths)
         power = np.maximum(np.sum(np.abs(expected) ** 2, axis=1), 1e-300)
         left: NDArray[np.float64] = (
@@ -118,9 +118,9 @@ def fit_manifold(
     unknown_orientation: bool = False,
     terms: int | None = None,
 ) -> ManifoldFit:
-    """Manifold of an array from snapshots of single sources at known azimuths.
+    """Fits the manifold of an array to snapshots of single sources at known azimuths.
 
-    The response of antenna ``n`` is that of its place, ``exp(2j pi (x cos(azimuth) + y
+    The response of antenna ``n`` is that of its position, ``exp(2j pi (x cos(azimuth) + y
     sin(azimuth)))``, times a Fourier series ``sum c[n, k] exp(1j k azimuth)`` of ``k = -terms ..
     terms``. The series represents gains, coupling, patterns of the elements and errors of their
     places; without places it represents the geometry too. Coefficients are fitted by least squares,
@@ -176,7 +176,7 @@ def fit_manifold(
     )
     names, members = np.unique(labels, return_inverse=True)
     folds = members % min(_FOLDS, len(names))
-    # The gain and phase of a snapshot say nothing about the array.
+    # Normalize the gain and phase of each snapshot, which do not depend on the array.
     received = received / np.linalg.norm(received, axis=1, keepdims=True)
 
     def left_out(order: int) -> tuple[float, NDArray[np.float64]]:
@@ -195,7 +195,7 @@ def fit_manifold(
 
     most = _MOST_TERMS if terms is None else terms
     fewest = 0 if terms is None else terms
-    # Each coefficient takes an azimuth of its own.
+    # The number of coefficients is limited by the number of different azimuths.
     distinct = len(np.unique(np.round(azimuths, 3)))
     limit = max((distinct - 1) // 2, 0)
     if fewest > limit and not unknown_orientation:
@@ -291,7 +291,7 @@ def _fit(
     order: int,
     unknown_orientation: bool,
 ) -> tuple[_Series, NDArray[np.float64]]:
-    """The series of an order, and the orientation of every group."""
+    """Fits the series of an order, and the orientation of every group."""
     antennas = received.shape[1]
     present = np.unique(members)
     coefficients = np.zeros((antennas, 2 * order + 1), np.complex128)
@@ -301,14 +301,14 @@ def _fit(
     given = places is not None
     for round_number in range(_ROUNDS):
         if unknown_orientation:
-            # Turn every group to the directions that the manifold so far sees.
+            # Rotate every group to the directions estimated with the present manifold.
             found, _ = series.azimuths(received)
             turns = [_centre(_wrapped(found - azimuths)[members == group]) for group in present]
             orientations = np.array(turns)
         turned = azimuths + orientations[np.searchsorted(present, members)]
         base = _geometry(places, turned) * np.ones_like(received)
         basis = _harmonics(turned, order)
-        # Gains of the snapshots, by the manifold so far, or by the first antenna's phase.
+        # Estimate the snapshot gains with the present manifold, or from the first antenna's phase.
         if given or round_number > 0:
             expected = series.at(turned)
         else:
@@ -317,7 +317,7 @@ def _fit(
         gains = np.sum(received * expected.conj(), axis=1) / power
         rest = np.sum(np.abs(received - gains[:, None] * expected) ** 2, axis=1)
         weights = 1 / (1 + rest / max(float(np.median(rest)), 1e-12))
-        # Weighted least squares for every antenna, the same basis for all.
+        # Solve weighted least squares for every antenna with a common basis.
         weights = weights * np.abs(gains) ** 2
         target = received / gains[:, None] * base.conj()
         weighted = basis.conj() * weights[:, None]
@@ -329,7 +329,7 @@ def _fit(
 
 
 def _centre(angles: NDArray[np.float64]) -> float:
-    """The median on the circle: around the angle that the mean distance is smallest to."""
+    """Returns the circular median: the angle with the smallest mean distance."""
     trials = np.linspace(-np.pi, np.pi, 180, endpoint=False)
     distances = np.abs(_wrapped(angles[:, None] - trials)).mean(axis=0)
     middle = trials[distances.argmin()]
@@ -337,7 +337,7 @@ def _centre(angles: NDArray[np.float64]) -> float:
 
 
 def _deviation(errors: NDArray[np.float64]) -> float:
-    """RMS of the errors, those beyond three standard deviations of the others clipped there."""
+    """Returns the RMS of the errors, clipped at three robust standard deviations."""
     limit = 3 * np.median(np.abs(errors)) / _MEDIAN_OF_GAUSSIAN
     return float(np.sqrt(np.mean(np.minimum(errors**2, limit**2))))
 

@@ -1,4 +1,4 @@
-"""Names of the angle-of-arrival methods, as written and as shown."""
+"""Names of the angle-of-arrival methods: keys and display names."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ LABELS = {"music": "MUSIC", "esprit": "ESPRIT", "root_music": "Root-MUSIC"}
 
 
 def label(method: str, *, adaptive: bool = False) -> str:
-    """Name of a method as a reader sees it; ``adaptive`` where the wake-up time is.
+    """Returns the display name of a method; ``adaptive`` marks an adaptive wake-up time.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Synchronization signal blocks (SSBs) of 5G NR: find them in samples and recordings, build them.
+"""Synchronization signal blocks (SSBs) of 5G NR: search in samples and recordings, generation.
 
 Examples
 --------
@@ -48,7 +48,7 @@ __all__ = [
 
 
 class Cells(list[Cell]):
-    """SSBs in order of time.
+    """SSBs in the order of time.
 
     Attributes
     ----------
@@ -70,16 +70,16 @@ def search(
     centre_frequency_hz: float,
     **settings: Any,
 ) -> Cells:
-    """Find every SSB in samples. A `Searcher` keeps its plans between calls.
+    """Finds every SSB in samples. For repeated calls, `Searcher` is faster.
 
     Parameters
     ----------
     samples
         Complex samples, ``(samples,)`` or ``(antennas, samples)``.
     sample_rate_hz
-        Any usual rate that holds an SSB: 3.84 Msps at least.
+        Any usual rate of at least 3.84 Msps, the bandwidth of an SSB.
     centre_frequency_hz
-        Frequency that stands at 0 Hz in the samples.
+        Frequency at 0 Hz of the samples.
     **settings
         ``ssb_freq_hz``, ``scs_khz``, ``cfo_ppm``, ``spacing_wavelengths``, ``places_wavelengths``
         and ``calibration`` of :func:`scan`.
@@ -113,17 +113,17 @@ def scan_as_recorded(
     calibration: Sequence[complex] | None = None,
     **where: Any,
 ) -> Scan:
-    """Find every SSB of a recording; what its annotations say of the array is believed.
+    """Finds every SSB of a recording, with the array data of its annotations.
 
     Parameters
     ----------
     recording
         The recording.
     spacing_wavelengths
-        Distance between neighbouring antennas in a row; without it what the annotations state,
-        spacing or places, else 0.5.
+        Element spacing of a linear array. Default: spacing or positions of the annotations,
+        otherwise 0.5.
     calibration
-        Complex gain of each channel; without it that of the annotation around each SSB, if any.
+        Complex gain of each channel. Default: the annotation at each SSB, if any.
     **where
         ``centre_frequency_hz``, ``ssb_freq_hz``, ``scs_khz`` and ``cfo_ppm`` of :func:`scan`.
 
@@ -132,7 +132,7 @@ def scan_as_recorded(
     RecordingError
         A rate, band or length that cannot be searched; samples that are not finite.
     InputError
-        Annotations that state of the array what cannot be.
+        Invalid array data in the annotations.
     """
     metadata = json.loads(recording.metadata_json())
     truths = stated_truths(recording, metadata)
@@ -170,10 +170,10 @@ def _same(one: Cell, other: Cell) -> bool:
 
 
 def record(cell: Cell) -> dict[str, Any]:
-    """Plain values of one SSB, for JSON; angles in degrees, absent without an array.
+    """Returns the values of one SSB for JSON; angles in degrees, absent without an array.
 
-    ``sample_start`` is the sample nearest to the SSB's beginning, ``sample_offset`` what is left
-    to it.
+    ``sample_start`` is the sample nearest to the start of the SSB, ``sample_offset`` the remaining
+    fraction.
     """
     start = round(cell.sample_start)
     values: dict[str, Any] = {

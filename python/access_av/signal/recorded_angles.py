@@ -1,8 +1,8 @@
-"""Angles of arrival from a recording of an array: calibrate, then estimate each burst.
+"""Angles of arrival from a recording of an array: calibration, then one estimate per burst.
 
-A recording's annotations say what is where. A burst whose label starts with ``reference`` was sent
-from broadside and calibrates the channels for the bursts after it; an annotation may also bring its
-own ``channel_calibration``. Every other annotated burst is estimated.
+The annotations of a recording mark its bursts. A burst with a label that starts with ``reference``
+was sent from broadside and calibrates the channels for later bursts. An annotation can also contain
+a ``channel_calibration``. Every other annotated burst is estimated.
 """
 
 from __future__ import annotations
@@ -28,33 +28,33 @@ if TYPE_CHECKING:
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
-# Longest burst that is taken for one: a tenth of a second at 100 MHz.
+# Maximum length of a burst in samples: 0.1 s at 100 Msps.
 MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True)
 class BurstAngle:
-    """Where one burst came from.
+    """Angle of arrival of one burst.
 
     Attributes
     ----------
     sample_start
         First sample of the burst.
     azimuth_from_broadside_deg
-        Counter-clockwise from the array's broadside, which is a quarter turn clockwise of its axis,
-        seen from above.
+        Azimuth in degrees, counter-clockwise (seen from above) from the array's broadside, which is
+        90° clockwise of the axis.
     sigma_deg
-        Standard deviation: of noise and, where the doubt is of reflections, of what they do.
+        Standard deviation in degrees: noise and, if detected, reflections.
     snr_db
-        Per antenna and sample.
+        SNR per antenna and sample, in dB.
     verdict
-        ``resolved``, or ``unresolved:`` and why noise and geometry leave it in doubt.
+        ``resolved``, or ``unresolved:`` with the reason (noise or geometry).
     doubt
-        Why it should not be relied on, a plane wave that does not fit included; empty where it may.
+        Reason why the angle is unreliable, including a misfit of the plane wave; otherwise empty.
     p_value
-        Probability that a plane wave in white noise fits as badly as this or worse.
+        Probability of an equal or larger misfit of a plane wave in white noise.
     truth_deg
-        Measured azimuth, where annotated.
+        Measured azimuth in degrees, if annotated.
     """
 
     sample_start: int
@@ -68,41 +68,40 @@ class BurstAngle:
     truth_deg: float | None = None
 
     def as_record(self) -> dict[str, Any]:
-        """Plain values for JSON; ``truth_deg`` only where it is known."""
+        """Returns the values for JSON; ``truth_deg`` only if it is known."""
         return {key: value for key, value in asdict(self).items() if value is not None}
 
 
 def estimate_bursts(
     path: str | Path, *, spacing_wavelengths: float | None = None
 ) -> list[BurstAngle]:
-    """Estimate the angle of every annotated burst by one-source maximum likelihood.
+    """Estimates the angle of every annotated burst by one-source maximum likelihood.
 
-    Where the annotations state the antennas' places they are not in a row: azimuth and elevation
-    are then estimated together.
+    If the annotations contain antenna positions, azimuth and elevation are estimated jointly.
 
     Parameters
     ----------
     path
         SigMF recording: its name, its ``.sigmf-meta`` or its ``.sigmf-data``.
     spacing_wavelengths
-        Distance between neighbouring antennas; taken from the metadata when ``None``.
+        Element spacing. Default: from the metadata.
 
     Raises
     ------
     RecordingError
-        When the recording cannot be read.
+        Unreadable recording.
     InputError
-        When it has one channel only, no annotated burst, or does not state the spacing.
+        Recording with one channel, without annotated burst, or without element spacing.
 
     Notes
     -----
-    Channel k sits at (k − 1.5)·d along the array, to the left of broadside for larger k, and
+    Channel k is at (k − 1.5)·d along the array, to the left of broadside for larger k, and
     receives exp(−j2π·distance/λ). A wave from azimuth α to the left reaches larger k earlier, so
     the phase step is 2π(d/λ) sin α = 2π(d/λ) cos θ with θ = 90° − α, the angle from the axis.
 
-    A plane wave is equally strong at every antenna. What differs between channels in a burst is
-    gain and multipath and says nothing of the direction, so every channel is brought to the same
-    power and only its phase is calibrated.
+    A plane wave has equal power at every antenna. Power differences between the channels of a burst
+    are gain and multipath and contain no direction. Therefore every channel is normalized to equal
+    power, and only its phase is calibrated.
     """
     recording = Recording.open(path)
     if recording.channels < 2:
@@ -161,7 +160,7 @@ def _estimate(
     spacing_wavelengths: float | None,
     phases: NDArray[np.complex128] | None,
 ) -> tuple[float, float, aoa.DirectionEstimate | aoa.AngleEstimate]:
-    """Azimuth from broadside (°), its standard deviation (rad), and the estimate."""
+    """Returns azimuth from broadside (°), its standard deviation (rad), and the estimate."""
     if places is not None:
         source = aoa.direction(snapshots, places, calibration=phases)
         azimuth_deg = from_broadside_deg(math.degrees(float(source.azimuth_rad)))
@@ -175,7 +174,7 @@ def _estimate(
 
 
 def mean_absolute_error_deg(bursts: Sequence[BurstAngle]) -> float | None:
-    """Mean distance from the annotated truth; ``None`` where nothing is annotated."""
+    """Returns the mean absolute error against the annotated truth; ``None`` without truth."""
     errors = [
         abs((burst.azimuth_from_broadside_deg - burst.truth_deg + 180.0) % 360.0 - 180.0)
         for burst in bursts
@@ -185,12 +184,12 @@ def mean_absolute_error_deg(bursts: Sequence[BurstAngle]) -> float | None:
 
 
 def stated_truths(recording: Recording, metadata: dict[str, Any]) -> list[ArrayTruth]:
-    """What each annotation of a recording states of the array.
+    """Returns the array data of each annotation of a recording.
 
     Raises
     ------
     InputError
-        Naming the annotation that states what cannot be.
+        Invalid annotation; the message names it.
     """
     truths = []
     for index, annotation in enumerate(metadata.get("annotations", [])):
@@ -202,7 +201,7 @@ def stated_truths(recording: Recording, metadata: dict[str, Any]) -> list[ArrayT
 
 
 def stated_places(truths: Sequence[ArrayTruth]) -> NDArray[np.float64] | None:
-    """Where the antennas are that are not in a row, by the first annotation that states it."""
+    """Returns the antenna positions of the first annotation that contains them."""
     places = (truth.element_places_wavelengths for truth in truths)
     return next((it for it in places if it is not None), None)
 
@@ -210,7 +209,7 @@ def stated_places(truths: Sequence[ArrayTruth]) -> NDArray[np.float64] | None:
 def stated_spacing(
     truths: Sequence[ArrayTruth], metadata: dict[str, Any], frequency_hz: float | None
 ) -> float | None:
-    """Spacing in wavelengths from an annotation's truth, or from the description's metres."""
+    """Returns the spacing in wavelengths from an annotation, or from metres in the description."""
     for truth in truths:
         if truth.element_spacing_wavelengths is not None:
             return truth.element_spacing_wavelengths
@@ -223,6 +222,6 @@ def stated_spacing(
 
 
 def _equalised(snapshots: NDArray[np.complex64]) -> NDArray[np.complex64]:
-    """Every channel at unit mean power; a silent one stays as it is."""
+    """Normalizes every channel to unit mean power; a silent channel is unchanged."""
     power = np.mean(np.abs(snapshots) ** 2, axis=1, keepdims=True)
     return (snapshots / np.sqrt(np.where(power > 0.0, power, 1.0))).astype(np.complex64)

@@ -1,4 +1,4 @@
-"""Directions from antennas that one receiver is connected to one after another: `access_av.aoa`."""
+"""Directions from a switched array: one receiver, connected to one antenna after another."""
 
 from __future__ import annotations
 
@@ -63,13 +63,13 @@ def switched_direction(
     *,
     frequency_hz: tuple[float, float],
 ) -> SwitchedEstimate:
-    """Azimuth and frequency of a tone, jointly, from samples of one antenna after another.
+    """Estimates azimuth and frequency of a tone jointly from the samples of a switched array.
 
     Maximum likelihood: the pair of azimuth ``a`` and frequency ``f`` that maximizes
     ``|sum x(t) exp(-2j pi f t) conj(response[element(t)](a))|^2`` over the power of the response.
-    An element that is visited every ``T`` seconds leaves frequencies ``1 / T`` apart alike, and
-    only the manifold tells them apart. The frequency range should therefore be narrower than ``1 /
-    T`` if the oscillators permit.
+    If an element is visited every ``T`` seconds, frequencies ``1 / T`` apart are ambiguous and only
+    the manifold separates them. The frequency range should therefore be narrower than ``1 / T`` if
+    the oscillators permit.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def switched_direction(
             f"frequency_hz is ({low}, {high}): a lowest and a highest frequency are needed"
         )
     table = _table(manifold, antennas)
-    # Every sample weighs alike: a response is as strong as the element's number of samples.
+    # Every sample has equal weight, so that a response is weighted by its number of samples.
     powers = np.sqrt(np.abs(table) ** 2 @ counts)
     beams = table.conj() / powers[:, None]
     each = np.eye(antennas)[visited]
@@ -138,8 +138,7 @@ def switched_direction(
         power = power[np.arange(len(power)), found]
         better = power > best
         best[better], frequency[better], place[better] = power[better], trial, found[better]
-    # Newton's method for the frequency, the response of the best direction being replaced by what
-    # is received.
+    # Newton's method for the frequency; the received response replaces that of the best direction.
     centred = times - times.mean()
     for _ in range(_STEPS):
         turned = received * np.exp(-2j * np.pi * frequency[:, None] * times)
@@ -197,7 +196,7 @@ def _checked(
 
 
 def _table(manifold: ArrayLike | ManifoldFit, antennas: int) -> NDArray[np.complex128]:
-    """Responses of the search, ``(azimuths, antennas)``."""
+    """Returns the responses of the search, ``(azimuths, antennas)``."""
     if isinstance(manifold, ManifoldFit):
         table = manifold.responses
     else:

@@ -1,1 +1,1 @@
-"""Tables and files: their columns, whether a given one can be used, where results are written."""
+"""Tables and files: columns, validation of given tables, results on disk."""

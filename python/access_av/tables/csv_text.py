@@ -16,7 +16,7 @@ from access_av.errors import InputError
 if TYPE_CHECKING:
     from pathlib import Path
 
-# Separators of columns; the first is taken where the header has equally many.
+# Separators of columns, in the order of preference for equal counts in the header.
 SEPARATORS = (",", ";", "\t")
 DECIMAL_COMMA = r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$"
 THOUSANDS = re.compile(r"[+-]?\d{1,3}([,.'\u2019 \u00a0\u202f]\d{3})+([.,]\d+)?")
@@ -32,7 +32,7 @@ class Lines:
     Attributes
     ----------
     separator
-        Separator of its columns.
+        Separator of the columns.
     names
         Names of the columns, without blanks around them.
     rows
@@ -48,23 +48,22 @@ class Lines:
 
 
 def read(path: Path, schema: dict[str, Any] | None = None) -> pl.DataFrame:
-    """Reads a CSV file in UTF-8, as `locate` reads its logs.
+    """Reads a CSV file in UTF-8, in the format of the logs of `locate`.
 
-    Columns are separated by commas, semicolons or tabs; after the latter two, numbers may have a
-    decimal comma. Blanks around cells, blank lines and lines that begin with ``#`` are ignored.
+    Columns are separated by commas, semicolons or tabs; with semicolons and tabs, numbers may have
+    a decimal comma. Blanks around cells, blank lines and lines that begin with ``#`` are ignored.
 
     Parameters
     ----------
     path
         The file.
     schema
-        Types of columns that are not inferred.
+        Column types that override the inferred ones.
 
     Raises
     ------
     InputError
-        For another encoding, a column that is there twice, and a row with more or fewer cells than
-        the header.
+        Another encoding, a repeated column, or a row whose number of cells differs from the header.
     """
     lines = _lines(path)
     text_schema = {str(index): pl.String for index in range(len(lines.names))}
@@ -74,7 +73,7 @@ def read(path: Path, schema: dict[str, Any] | None = None) -> pl.DataFrame:
         text = pl.read_csv(body, has_header=False, schema=text_schema, separator=lines.separator)
     cells = pl.all().str.strip_chars()
     text = text.select(pl.when(cells != "").then(cells).name.keep())
-    # A separator at the end of each line makes a column without a name.
+    # Drop the unnamed column caused by a separator at the end of each line.
     kept = [
         index
         for index, name in enumerate(lines.names)
@@ -92,12 +91,12 @@ def read(path: Path, schema: dict[str, Any] | None = None) -> pl.DataFrame:
 
 
 def line_of(path: Path, row: int) -> int:
-    """Returns the line number of a row; both count as editors and tables do, from 1 and from 0."""
+    """Returns the line number (from 1) of a row (from 0)."""
     return _lines(path).numbers[row]
 
 
 def has_thousands_separators(text: str) -> bool:
-    """Whether a cell is a number in groups of three digits.
+    """Returns whether a cell is a number in groups of three digits.
 
     Examples
     --------
@@ -159,7 +158,7 @@ def _header(path: Path, line: bytes, separator: str) -> list[str]:
 
 
 def _count(path: Path, line: bytes, separator: str, number: int) -> int:
-    """Number of cells of a line."""
+    """Returns the number of cells of a line."""
     if b'"' not in line:
         return line.count(separator.encode()) + 1
     if line.count(b'"') % 2:
@@ -176,7 +175,7 @@ def _cells(path: Path, line: bytes, separator: str, number: int) -> list[str]:
 
 
 def _inferred(column: pl.Series) -> pl.Series:
-    """A column of text as numbers or truth values if all its cells are such."""
+    """Converts a text column to numbers or Booleans if all its cells permit it."""
     if column.null_count() == len(column):
         return column
     for kind in (pl.Int64, pl.Float64):

@@ -1,4 +1,4 @@
-"""Numbers as a reader wants them."""
+"""Numbers as text for reports."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import Any
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number as a reader wants it; a dash for none."""
+    """Returns a number as text; a dash for ``None``."""
     return "–" if value is None else unsigned_zero(f"{value:,.{digits}f}")
 
 
 def unsigned_zero(text: str) -> str:
-    """A number's text, without a sign where nothing but zeros is left of it.
+    """Removes the sign of a number's text that contains only zeros.
 
     Examples
     --------
@@ -22,7 +22,7 @@ def unsigned_zero(text: str) -> str:
 
 
 def value_text(value: Any) -> str:
-    """A claim's stated or obtained value, whatever its shape."""
+    """Returns a value of a claim (number, list or table) as text."""
     if value is None:
         return "none"
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""Results on disk: a directory per command, a ``latest`` link, tables, trajectories."""
+"""Results on disk: one directory per command, a ``latest`` link, tables, trajectories."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ RESULTS = Path("results")
 
 
 class Lock:
-    """Keeps a folder from being written by two at a time, as long as this object is there."""
+    """Locks a folder against a second writer during the lifetime of the object."""
 
     def __init__(self, folder: Path):
         self._descriptor = os.open(folder, os.O_RDONLY)
@@ -45,7 +45,7 @@ class Lock:
             message = f"{folder}: another run is writing here; give another --out"
             raise InputError(message) from error
         except OSError:
-            pass  # a file system without locks
+            pass  # The file system has no locks.
 
     def __del__(self) -> None:
         os.close(self._descriptor)
@@ -53,14 +53,14 @@ class Lock:
 
 @dataclass(frozen=True)
 class ResultsDirectory:
-    """Where one command's results go. Files appear whole: written beside, then renamed."""
+    """Results directory of one command. Files are written to a temporary name, then renamed."""
 
     path: Path
     lock: Lock
 
     @classmethod
     def create(cls, command: str, out: Path | None = None) -> ResultsDirectory:
-        """Make the directory: ``out``, or a new one under ``results/``."""
+        """Creates the directory: ``out``, or a new one in ``results/``."""
         if out is None:
             out = _new(command)
         if out.exists() and not out.is_dir():
@@ -71,9 +71,9 @@ class ResultsDirectory:
         return cls(out, lock)
 
     def link_latest(self) -> None:
-        """Point ``results/latest`` here, if this directory is one under ``results``.
+        """Sets the link ``results/latest`` to this directory, if it is in ``results``.
 
-        With ``--out`` elsewhere the working directory stays as it is.
+        With another ``--out``, the link is unchanged.
         """
         if RESULTS.resolve() not in self.path.resolve().parents:
             return
@@ -84,20 +84,20 @@ class ResultsDirectory:
             fresh.symlink_to(here, target_is_directory=True)
             fresh.replace(RESULTS / "latest")
         except OSError as error:
-            # The work is done and written; only its short name is missing.
+            # Ignore the error, because only the link is missing.
             warnings.warn(f"{RESULTS / 'latest'}: {error.strerror}", stacklevel=2)
             fresh.unlink(missing_ok=True)
 
     def write_text(self, name: str, text: str) -> Path:
-        """Write a text file."""
+        """Writes a text file."""
         return write_whole(self.path / name, text)
 
     def write_json(self, name: str, value: object) -> Path:
-        """Write a JSON file."""
+        """Writes a JSON file."""
         return self.write_text(name, json_text(value) + "\n")
 
     def write_table(self, name: str, table: pl.DataFrame) -> Path:
-        """Write a Parquet file."""
+        """Writes a Parquet file."""
         held = io.BytesIO()
         table.write_parquet(held, compression="zstd")
         return write_whole(self.path / name, held.getbuffer())
@@ -105,10 +105,10 @@ class ResultsDirectory:
     def write_manifest(
         self, *, repeat: Sequence[object] = (), warnings: Iterable[object] = (), **settings: Any
     ) -> Path:
-        """Write ``manifest.json``: version, commit where known, command, settings, their warnings.
+        """Writes ``manifest.json``: version, commit if known, command, settings, warnings.
 
-        ``command`` is what was typed; ``repeat``, where a command gives it, is what is to be typed
-        in this directory, so that what it was given is still what it was.
+        ``command`` is the given command line. ``repeat`` is the command line that repeats the run
+        in this directory, with the stored inputs.
         """
         return self.write_json(
             "manifest.json",
@@ -129,7 +129,7 @@ def _typed(command: Sequence[object]) -> str:
 
 
 def commit() -> str | None:
-    """The commit of a checkout that runs where it lies, ``-dirty`` where it was changed since."""
+    """Returns the commit of a source checkout, with ``-dirty`` after changes."""
     root = Path(__file__).resolve().parents[3]
     if not (root / ".git").exists() or not (root / "crates").is_dir():
         return None
@@ -141,14 +141,14 @@ def commit() -> str | None:
 
 
 def regular(path: Path, most_bytes: int) -> Path:
-    """The path of a regular file of at most so many bytes: a pipe or a device has no end.
+    """Returns the path of a regular file with a maximum size; rejects pipes and devices.
 
     Raises
     ------
     InputError
-        When it is something else.
+        Not a regular file, or too large.
     OSError
-        When there is none.
+        Missing file.
     """
     if not stat.S_ISREG((found := path.stat()).st_mode):
         raise InputError(f"{path}: not a regular file")
@@ -158,14 +158,14 @@ def regular(path: Path, most_bytes: int) -> Path:
 
 
 def write_whole(target: Path, content: str | bytes | memoryview, *, durable: bool = False) -> Path:
-    """Write a file beside its place and put it there; nothing is left of a failure.
+    """Writes a file to a temporary name and renames it; a failure leaves no file.
 
-    Several may write the same file at once: it is then that of one of them. A ``durable`` one is on
-    the disk before it is in its place. Devices and pipes are written to: a file put in the place of
-    one would be its end, and it may be ``/dev/null``.
+    With several simultaneous writers, the file is that of one of them. A ``durable`` file is
+    synchronized to disk before it is renamed. Devices and pipes such as ``/dev/null`` are written
+    directly, because renaming would replace them.
     """
     if isinstance(content, str):
-        # What names a file may hold bytes that are no text.
+        # File names may contain bytes that are not valid text.
         content = content.encode("utf-8", "backslashreplace")
     place = target.resolve() if target.is_symlink() else target
     if place.exists() and not place.is_file():
@@ -189,7 +189,7 @@ def write_whole(target: Path, content: str | bytes | memoryview, *, durable: boo
 
 
 def json_text(value: Any) -> str:
-    """JSON, with null for what is no finite number.
+    """Returns JSON, with null for numbers that are not finite.
 
     Examples
     --------
@@ -208,7 +208,7 @@ def json_text(value: Any) -> str:
 
 
 def _new(command: str) -> Path:
-    """A folder of its own, also for runs that begin at the same time."""
+    """Creates a new folder, unique also for runs with equal start times."""
     while True:
         now = datetime.now(timezone.utc).strftime("%Y-%m-%dT%H%M%S.%f")[:-3]
         with suppress(FileExistsError):
@@ -220,7 +220,7 @@ def _new(command: str) -> Path:
 def tum_trajectory(
     time_s: ArrayLike, x_m: ArrayLike, y_m: ArrayLike, heading_rad: ArrayLike
 ) -> str:
-    r"""Trajectory in the TUM format: ``t x y z qx qy qz qw`` a line, time to the nanosecond.
+    r"""Returns a trajectory in TUM format: lines ``t x y z qx qy qz qw``, time resolution 1 ns.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def tum_trajectory(
     Returns
     -------
     str
-        n lines of exactly eight fields, single spaces, nothing trailing.
+        n lines of eight fields, separated by single spaces.
 
     Examples
     --------

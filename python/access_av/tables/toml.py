@@ -1,4 +1,4 @@
-"""TOML, and the TOML files that come with the package."""
+"""Reading of TOML files, including those of the package."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ MOST_BYTES = 4 << 20
 
 
 def read(file: Path) -> dict[str, Any]:
-    """Read a TOML file.
+    """Reads a TOML file.
 
     Raises
     ------
     InputError
-        When it is none, no regular file or larger than ``MOST_BYTES``.
+        Invalid TOML, not a regular file, or larger than ``MOST_BYTES``.
     """
     try:
         return tomllib.loads(regular(file, MOST_BYTES).read_text(encoding="utf-8"))
@@ -40,7 +40,7 @@ def read(file: Path) -> dict[str, Any]:
 
 @cache
 def shipped(*path: str) -> dict[str, Any]:
-    """Read a TOML file of this package, by its path inside it.
+    """Reads a TOML file of this package, by its path in the package.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Tables that a user gives: whether they can be read and hold what is needed of them."""
+"""Validation of given tables: readable, required columns, valid values."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from access_av.tables.results_directory import regular
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-# Reads a table and forgets it.
+# Program of the process that tries to read a table.
 TRY = "import sys, polars; polars.read_parquet(sys.argv[1], glob=False)"
 
-# Bytes of a file; a year of paths through a plant has less.
+# Maximum file size in bytes.
 MOST_BYTES = 4 << 30
 
 
 def read(path: Path, what: str, schema: dict[str, Any] | None = None) -> pl.DataFrame:
-    """Read CSV or Parquet, by the name's ending; ``schema`` overrides the types of CSV columns.
+    """Reads CSV or Parquet, by the file extension; ``schema`` overrides types of CSV columns.
 
     Raises
     ------
     InputError
-        When the file is no table, and so not ``what``; no regular file; or too large.
+        Not a table (``what`` in the message), not a regular file, or too large.
     """
     regular(path, MOST_BYTES)
     try:
@@ -39,13 +39,13 @@ def read(path: Path, what: str, schema: dict[str, Any] | None = None) -> pl.Data
             return csv_text.read(path, schema)
         _try(path, what)
         return pl.read_parquet(path, glob=False)
-    # Of some damage Polars makes a panic of its own.
+    # Polars panics for some damaged files.
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         raise InputError(f"{path}: not a {what}: {error}") from None
 
 
 def _try(path: Path, what: str) -> None:
-    """Let another process read Parquet first: some damage ends the one that reads it."""
+    """Reads Parquet in another process first, because some damaged files abort the process."""
     done = subprocess.run([sys.executable, "-c", TRY, str(path)], capture_output=True, check=False)
     if done.returncode < 0:
         raise InputError(f"{path}: not a {what}: it is damaged")
@@ -54,12 +54,12 @@ def _try(path: Path, what: str) -> None:
 def check(
     rows: pl.DataFrame, where: str, *, numbers: Iterable[str], other: Iterable[str] = ()
 ) -> None:
-    """Refuse a table that lacks a column, a number in ``numbers``, or anything in ``other``.
+    """Rejects a table with a missing column, or missing values in ``numbers`` or ``other``.
 
     Raises
     ------
     InputError
-        Naming the table as ``where``, the column and the row.
+        The message names the table (``where``), the column and the row.
 
     Examples
     --------
@@ -93,7 +93,7 @@ def check(
 
 
 def _row(where: str, index: int) -> str:
-    """The line of a CSV file, or the row of another table, counted from 1."""
+    """Returns the line of a CSV file, or the row of another table, counted from 1."""
     path = Path(where)
     if path.suffix.lower() == ".csv" and path.is_file():
         return f"line {csv_text.line_of(path, index)}"
@@ -101,12 +101,12 @@ def _row(where: str, index: int) -> str:
 
 
 def check_types(rows: pl.DataFrame, where: str, what: str) -> None:
-    """Refuse a table that lacks a column of :data:`access_av.columns.TABLES`.
+    """Rejects a table without a column of :data:`access_av.columns.TABLES`.
 
     Raises
     ------
     InputError
-        Naming the table as ``where``, and the column.
+        The message names the table (``where``) and the column.
     """
     for name in TABLES[what].columns:
         found = rows.schema.get(name, pl.Unknown())

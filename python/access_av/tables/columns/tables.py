@@ -1,4 +1,4 @@
-"""The tables: what a row is, which names it has, and when a value is null."""
+"""Tables: meaning of a row, columns, and conditions of null values."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Table:
-    """A table: what a row is, where it is found, its columns in order, when a value is null."""
+    """Table: meaning of a row, files, ordered columns, conditions of null values."""
 
     name: str
     row: str
@@ -22,21 +22,21 @@ class Table:
     null: Mapping[str, str] = field(default_factory=dict)
 
     def records(self) -> list[dict[str, str]]:
-        """Name, unit, meaning and null-when of each column."""
+        """Returns name, unit, meaning and null condition of each column."""
         return [
             {**vars(GLOSSARY[name]), "null": self.null.get(name, "never")} for name in self.columns
         ]
 
 
-_NO_COVARIANCE = "the localizer does not know its own error"
-_NOT_GUARDED = "the localizer is not guarded"
-_NO_ANGLE = "the snapshots carry no angle"
+_NO_COVARIANCE = "the localizer has no covariance"
+_NOT_GUARDED = "no integrity monitor"
+_NO_ANGLE = "no angle could be estimated"
 _NOT_COMPARED = "the angle was not compared with a prediction"
 _NOT_FOUND = "the first pose was not found"
-_NONE_KNOWS = "no run knows its pose yet"
+_NONE_KNOWS = "no run has a pose yet"
 _NO_MODE = "every SSB (campaign P): no power mode"
-_NO_FIGURE = "the platform has no figure for the method"
-_NO_ARRAY = "one channel only; the key is absent then"
+_NO_FIGURE = "the platform has no energy of the method"
+_NO_ARRAY = "one channel (the key is absent)"
 _UNDECODED = "the message was not decoded"
 
 _SETTING = (
@@ -73,15 +73,15 @@ _IN_THE_WORST = (
 _PERCENTILES_NULL = {
     **dict.fromkeys(
         (name for name in _PERCENTILES if "low" not in name),
-        "for so much of the time the place is not known",
+        "the position is unknown for a larger share of the time",
     ),
     **dict.fromkeys(
         (name for name in _PERCENTILES if "low" in name or "high" in name),
-        "one run has no interval; or the drives are too few to say",
+        "one run, or too few runs for an interval",
     ),
 }
 _IN_THE_WORST_NULL = {
-    **dict.fromkeys(("rms_error_m", "p90_max_error_m"), "in some run it was not found"),
+    **dict.fromkeys(("rms_error_m", "p90_max_error_m"), "the vehicle was not found in a run"),
     **_PERCENTILES_NULL,
 }
 _POSE = ("x_m", "y_m", "heading_rad")
@@ -137,7 +137,7 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "executions",
-            "An angle estimate, and what became of it",
+            "An angle estimate and its use by the localizer",
             "`executions.parquet` of `access-av run`; `access_av.simulate(…).executions`",
             (
                 "run", "time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "estimator_snr_db",
@@ -153,7 +153,7 @@ TABLES: Mapping[str, Table] = {
             "An SSB of a run",
             "`access_av.statistics.nees(…)`",
             ("run", "time_s", "nees"),
-            {"nees": f"{_NO_COVARIANCE}, or an area of it; or the first pose is not known yet"},
+            {"nees": f"{_NO_COVARIANCE} or a singular one, or the first pose is not known yet"},
         ),
         Table(
             "mean_nees",
@@ -167,28 +167,28 @@ TABLES: Mapping[str, Table] = {
             "`odometry.csv` of `access-av synth`; `access-av locate --odometry`",
             ("time_s", "distance_m", "speed_mps", "yaw_rate_radps"),
             {
-                "distance_m": "absent where the speeds tell it, or left and right wheel",
-                "speed_mps": "absent where the distances tell it, or left and right wheel",
-                "yaw_rate_radps": "there is no gyroscope; the column is absent then",
+                "distance_m": "speeds or wheel columns are given (the column is absent)",
+                "speed_mps": "distances or wheel columns are given (the column is absent)",
+                "yaw_rate_radps": "no gyroscope (the column is absent)",
             },
         ),
         Table(
             "poses",
-            "An odometry sample, and where the vehicle was",
+            "An odometry sample with the pose of the vehicle",
             "`poses.parquet` of `access-av locate`; `access_av.locate(…).poses`",
             _POSES,
             _POSES_NULL,
         ),
         Table(
             "smoothed",
-            "The same as seen from the end of the drive",
+            "An odometry sample with the smoothed pose of the vehicle",
             "`smoothed.parquet` of `access-av locate --smooth`; `access_av.locate(…).smoothed`",
             _POSES,
             {**_POSES_NULL, **dict.fromkeys((*_LEVELS, "integrity"), "always")},
         ),
         Table(
             "angles",
-            "An angle, and what became of it",
+            "An angle and its use by the localizer",
             "`angles.parquet` of `access-av locate`; `access_av.locate(…).angles`. A CSV log of "
             "angles for `access-av locate --recording` has some of the first seven: docs/locate.md",
             ("time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "accepted", "reason", *_COMPARED),
@@ -196,26 +196,26 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "recorded_angles",
-            "An angle of a recording, not located yet",
+            "An angle estimated from a recording",
             "`angles.csv` and `angles.parquet` of `access-av angles`; "
             "`access_av.estimate_angles(…).angles`; `access-av locate --recording`",
             ("time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "phase_noise_sigma_rad", "resolved"),
         ),
         Table(
             "findings",
-            "A constant of the vehicle that the localizer estimates",
+            "A vehicle parameter that the localizer estimates",
             "`findings.parquet` of `access-av locate`; `access_av.locate(…).findings`",
             ("constant", "constant_unit", "stated_value", "found_value", "found_value_std"),
         ),
         Table(
             "located_errors",
-            "A pose whose truth is known",
+            "A pose with known truth",
             "`access_av.drives.error_m(…)`",
             ("time_s", "error_m", "error_x_m", "error_y_m"),
         ),
         Table(
             "bound_route",
-            "An SSB of the drive, every SSB being used",
+            "An SSB of the drive (the bound uses every SSB)",
             "`bound.parquet` of `access-av bound`; `access_av.bound(…).route`",
             (
                 "time_s", "along_m", "x_m", "y_m", "bound_m", "along_std_m", "across_std_m",
@@ -224,14 +224,14 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "bound_map",
-            "A square of the site, at its middle",
+            "A square of the site, at its centre",
             "`map.parquet` of `access-av bound`; `access_av.bound(…).site`",
             ("x_m", "y_m", "bound_m"),
-            {"bound_m": "the radio heads leave a direction open"},
+            {"bound_m": "the radio heads do not determine the position"},
         ),
         Table(
             "channel_drops",
-            "A link, dropped at random",
+            "A randomly drawn link",
             "`access_av.channel.drops(…)`",
             (
                 "line_of_sight", "path_loss_db", "shadowing_db", "rician_k_db", "delay_spread_s",
@@ -250,17 +250,17 @@ TABLES: Mapping[str, Table] = {
                 "exceedance_share_high", "runs_with_exceedances", "time_to_alert_s",
                 "level_over_error", *_RISKS, "p90_error_m", "max_error_m",
             ),
-            dict.fromkeys(_RISKS[1:], "the drives are too short for a tail"),
+            dict.fromkeys(_RISKS[1:], "the runs are too short for a tail estimate"),
         ),
         Table(
             "masts",
-            "A candidate mast, as the only one that is added",
+            "A candidate mast, added alone",
             "`masts.parquet` of `access-av plan`; `access_av.plan(…).ranking`",
             ("name", "x_m", "y_m", "z_m", "p90_bound_m"),
         ),
         Table(
             "survey",
-            "A number of site or vehicle that was surveyed by driving",
+            "A surveyed parameter of site or vehicle",
             "`survey.parquet` of `access-av survey`; `access_av.survey(…).table()`",
             ("key", "unit", "before", "std_before", "found", "std", "is_learnt"),
         ),
@@ -274,7 +274,7 @@ TABLES: Mapping[str, Table] = {
             ),
             dict.fromkeys(
                 ("least_expected_snr_db", "most_expected_snr_db"),
-                "walls keep it out of sight all along",
+                "walls hide the radio head along the whole route",
             ),
         ),
         Table(
@@ -296,7 +296,7 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "operating_points",
-            "An operating point of a reading of the paper",
+            "An operating point of an interpretation of the paper",
             "`operating_points.parquet` of `access-av evaluate`; `access-av explore --json`; all "
             "but `reading`: `access_av.evaluate(…).points`",
             (
@@ -315,14 +315,14 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "study_errors",
-            "An epoch of a drive of a study, ten of them a second",
+            "An epoch of a run of a study (10 Hz)",
             "`errors.parquet` of `access-av study`",
             ("variant", "run", "time_s", "error_m", "protection_level_m"),
-            {"protection_level_m": "the position may not be relied on"},
+            {"protection_level_m": "the state is not ok"},
         ),
         Table(
             "study_drives",
-            "A drive of a study",
+            "A run of a study",
             "`drives.parquet` of `access-av study`",
             ("variant", "run", "executions", "listened", "duration_s"),
         ),
@@ -336,15 +336,15 @@ TABLES: Mapping[str, Table] = {
                 "heads_visible", "best_snr_db",
             ),
             {
-                "level_m": "the position may never be relied on there",
-                "dilution_of_degree_m": "no radio head in reach tells of the distance along the "
+                "level_m": "the state is never ok there",
+                "dilution_of_degree_m": "no visible radio head determines the position along the "
                 "road",
-                "best_snr_db": "walls keep every radio head out of sight",
+                "best_snr_db": "walls hide every radio head",
             },
         ),
         Table(
             "study_points",
-            "A way to operate the vehicle, in a power mode",
+            "A configuration of the vehicle in a power mode",
             "`points.parquet` of `access-av study`",
             (
                 "variant", "method", "wake_up", "mode", "mode_name", "target_error_m",
@@ -361,7 +361,7 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "compared",
-            "A percentile of the error of one of several variants",
+            "A percentile of the error of a variant",
             "`compared.parquet` of `access-av run`, `study`, `locate` and `integrity`, with --vary "
             "or --compare",
             (
@@ -383,21 +383,21 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "designs",
-            "A design of a scenario in the worst of its worlds, over the runs that all designs see",
+            "A design of a scenario in its worst environment, over runs common to all designs",
             "`designs.parquet` of `access-av designs`; `kept` of `access-av choose --json`",
             ("design", *_IN_THE_WORST, "on_front"),
             {"energy_j": _NO_FIGURE, **_IN_THE_WORST_NULL},
         ),
         Table(
             "design_worlds",
-            "A design of a scenario in one of several worlds",
+            "A design of a scenario in one of several environments",
             "`worlds.parquet` of `access-av designs`",
             ("design", *_IN_THE_WORST),
             {"energy_j": _NO_FIGURE, **_IN_THE_WORST_NULL},
         ),
         Table(
             "errors",
-            "A setting of a reading and an SSB",
+            "A setting of an interpretation and an SSB",
             "`errors.parquet` of `access-av evaluate`; all but `reading`: "
             "`access_av.evaluate(…).errors`",
             (
@@ -413,7 +413,7 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "claims",
-            "A claim of the paper under a reading",
+            "A claim of the paper under an interpretation",
             "`claims.json` of `access-av evaluate`",
             (
                 "reading", "id", "says", "where", "stated", "obtained", "interval", "unit",
@@ -421,11 +421,11 @@ TABLES: Mapping[str, Table] = {
                 "deviation", "tolerance",
             ),
             {
-                "obtained": "it could not be judged, is not testable, or nothing is within the "
+                "obtained": "the claim is not judged or not testable, or no point is within the "
                 "budget",
-                "interval": "nothing in it is drawn, or it is of modes",
+                "interval": "obtained is not random, or is a set of modes",
                 **dict.fromkeys(
-                    ("deviation", "tolerance"), "its rule has no tolerance, or it is not judged"
+                    ("deviation", "tolerance"), "no tolerance in the rule, or claim not judged"
                 ),
             },
         ),
@@ -462,7 +462,7 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "ablations",
-            "A reading and a power mode, with a constant in the controller's place",
+            "An interpretation and a power mode, with a constant in place of the controller",
             "`ablations.parquet` of `access-av evaluate`",
             (
                 "reading", "mode", "constant_ms", "executions", "constant_executions",
@@ -480,7 +480,7 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "ours",
-            "A power mode: our localizer and wake-up beside the paper's adaptive point",
+            "A power mode: localizer and wake-up of this project, and the paper's adaptive point",
             "`ours.parquet` of `access-av evaluate`",
             (
                 "mode", "map", "executions", "papers_executions", "energy_j", "papers_energy_j",
@@ -492,28 +492,28 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "fair",
-            "One way to localize in mode 0, with what it is told",
+            "A localization method in mode 0, with its information",
             "`fair.parquet` of `access-av evaluate`",
             (
                 "real_odometer", "map", "who", "executions", "rms_error_m", "rms_low_m",
                 "rms_high_m", "worst_error_m",
             ),
-            {"worst_error_m": "it is the bound"},
+            {"worst_error_m": "the row is the bound"},
         ),
         Table(
             "freedoms",
-            "A freedom of the energy fit, beside those above it",
+            "A free parameter of the energy fit, in addition to the rows above",
             "`freedoms.parquet` of `access-av evaluate`",
             (
                 "freedom", "free_numbers", "solved_numbers", "claims_reproduced",
                 "agree_by_construction", "agree_by_arithmetic", "average_saving_percent",
                 "keep_energy", "keep_both",
             ),
-            {"average_saving_percent": "it could not be judged"},
+            {"average_saving_percent": "the claim is not judged"},
         ),
         Table(
             "chosen",
-            "A value of something that the paper leaves open: the shipped one, or another",
+            "A value of an open choice of the paper: the shipped value or an alternative",
             "`chosen.parquet` of `access-av evaluate --unknowns`; `access-av chosen --json`",
             (
                 "what", "value", "why", "is_shipped", "executions", "worst_error_m",
@@ -522,7 +522,7 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "unknowns",
-            "A claim and something that the paper leaves open",
+            "A claim and an open choice of the paper",
             "`unknowns.parquet` of `access-av evaluate --unknowns`",
             (
                 "claim", "dimension", "first", "total", "first_low", "first_high", "total_low",
@@ -541,12 +541,12 @@ TABLES: Mapping[str, Table] = {
             ),
             {
                 **dict.fromkeys(("half_frame", "sfn", "mib_bits"), _UNDECODED),
-                "lmax": "neither band nor broadcast channel tell",
+                "lmax": "neither band nor PBCH determines it",
                 **dict.fromkeys(
                     ("azimuth_deg", "sigma_deg", "verdict", "doubt", "p_value"), _NO_ARRAY
                 ),
-                "angle_deg": f"{_NO_ARRAY}, or antennas not in a row",
-                "elevation_deg": "antennas in a row; the key is absent then",
+                "angle_deg": f"{_NO_ARRAY}, or an array that is not linear",
+                "elevation_deg": "linear array (the key is absent)",
             },
         ),
         Table(
@@ -557,7 +557,7 @@ TABLES: Mapping[str, Table] = {
                 "sample_start", "azimuth_from_broadside_deg", "sigma_deg", "snr_db", "label",
                 "verdict", "doubt", "p_value", "truth_deg",
             ),
-            {"truth_deg": "not annotated; the key is absent then"},
+            {"truth_deg": "not annotated (the key is absent)"},
         ),
     )
 }  # fmt: skip
