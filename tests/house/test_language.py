@@ -103,6 +103,7 @@ PLAIN = [
     "docs/integrity.md",
     "docs/live.md",
     "docs/locate.md",
+    "docs/measured.md",
     "docs/node-messages.md",
     "docs/node.md",
     "docs/outlook.md",
