@@ -1,5 +1,5 @@
-"""Designs of a scenario: what can be varied, driven, and compared; ``access-av designs``.
+"""Designs of a scenario: variation, simulation and comparison (``access-av designs``).
 
-``space`` says what may be chosen, ``driven`` drives each choice, ``front`` compares them, and
-``search`` decides which are driven how often; ``suggested`` leaves that to Optuna.
+``space`` defines the designs, ``driven`` simulates each of them, ``front`` compares them, and
+``search`` selects the number of runs of each; ``suggested`` uses Optuna for this.
 """

@@ -1,4 +1,4 @@
-"""Drives of designs: the same runs for each, so that differences are theirs and not chance's."""
+"""Simulation of designs with common random numbers, so that differences are not random."""
 
 from __future__ import annotations
 
@@ -25,29 +25,29 @@ if TYPE_CHECKING:
 
     from access_av.run.campaign import Campaign
 
-    # What runs of a scenario found, by name.
+    # Results of the runs of a scenario, by name.
     Part: TypeAlias = Mapping[str, NDArray[Any]]
 
-# Every so many SSBs, the error along the track is kept.
+# Interval of the stored errors along the track, in SSBs.
 TRACK_EVERY = 25
-# Of every so many SSBs the error of each run is kept: percentiles hardly depend on the others.
+# Interval of the stored errors of each run, in SSBs, sufficient for percentiles.
 ERROR_EVERY = 10
-# The computer in whose name all drive: only its energy figures would differ.
+# Platform of all runs, because only the energies depend on the platform.
 ANY_BOARD = "jetson-agx-xavier"
 
 
 @dataclass(frozen=True)
 class Design:
-    """One choice of everything that varies.
+    """One combination of values.
 
     Attributes
     ----------
     values
-        What was chosen, by key.
+        Values by key.
     label
-        What of it differs from design to design, for people.
+        Display name: values that differ between designs.
     world
-        In what world it is driven; empty where there is only one.
+        Name of the environment; empty if there is only one.
     """
 
     values: Mapping[str, Any]
@@ -58,29 +58,29 @@ class Design:
 
     @property
     def driven(self) -> str:
-        """What decides its drives: the scenario, without the computer it has been resolved for."""
+        """Returns the scenario without its platform, which determines the runs."""
         board = {"vehicle.platform.name": ANY_BOARD, "vehicle.platform.mode": 0}
         return self.scenario.with_overrides(board).to_toml()
 
 
 @dataclass(frozen=True)
 class Driven:
-    """A design and what its drives found.
+    """A design and the results of its runs.
 
     Attributes
     ----------
     square_m2, energy_j
-        Mean squared horizontal error and energy of each run, shape (runs,); infinite where the
-        vehicle was never found, or the platform has no figure.
+        Mean squared horizontal error and energy of each run, shape (runs,); infinite if the
+        vehicle was never found, or the platform has no energy.
     worst_m
-        Largest error of each run.
+        Maximum error of each run.
     error_m
-        Horizontal error of each run, shape (runs, times); infinite where the place is not known.
+        Horizontal error of each run, shape (runs, times); infinite while the position is unknown.
     track_s, track_m2
-        Times, and mean squared error over the runs at them.
+        Times, and mean squared error over the runs at these times.
     worlds
-        The same in each world, where it was driven in several. All else is then of the world in
-        which it is worst: energy of one, errors of one.
+        Results in each environment, if there are several. The other attributes are then those of
+        the environment with the maximum energy or error, respectively.
     """
 
     design: Design
@@ -96,26 +96,26 @@ class Driven:
 
     @property
     def rms_m(self) -> float:
-        """Root mean square error over track and runs."""
+        """Returns the root mean square error over track and runs."""
         return float(np.sqrt(np.mean(self.square_m2)))
 
     @property
     def p90_worst_m(self) -> float:
-        """Largest error of a run, in nine of ten."""
+        """Returns the 90th percentile over the runs of the maximum error."""
         return float(np.quantile(self.worst_m, 0.9))
 
     @property
     def mean_energy_j(self) -> float:
-        """Mean energy of a trip."""
+        """Returns the mean energy of a trip."""
         return float(np.mean(self.energy_j))
 
     def percentiles(
         self, percents: Sequence[float] = PERCENTS, *, of_seen: bool = False
     ) -> list[Percentile]:
-        """Percentiles of the horizontal error; each of the world in which it is largest.
+        """Returns percentiles of the horizontal error, each of the environment with the maximum.
 
-        With ``of_seen`` the intervals are those of the bootstrap alone, which does not know that
-        what was not seen may yet happen: designs are compared by them.
+        With ``of_seen`` the intervals are those of the bootstrap, which ignores events that did not
+        occur in the runs. Comparisons of designs use them.
         """
         if self.worlds:
             each = [world.percentiles(percents, of_seen=of_seen) for world in self.worlds]
@@ -129,10 +129,10 @@ class Driven:
 
 
 def in_worst(worlds: Sequence[Driven]) -> Driven:
-    """A design that was driven in several worlds, as it is in the worst of them.
+    """Returns the results of a design in its worst environments.
 
-    Its energy is that of the world in which it takes most, its errors are those of the world in
-    which their mean square is largest.
+    The energy is that of the environment with the maximum energy, the errors are those of the
+    environment with the maximum mean square.
     """
     if len(worlds) == 1:
         return worlds[0]
@@ -147,12 +147,12 @@ def designs_of(
     given: Mapping[str, Any] | None = None,
     world: str = "",
 ) -> list[Design]:
-    """The scenario with each of the choices, in a world of that name and what is given in it.
+    """Returns the designs: the scenario with each choice, in one environment.
 
     Raises
     ------
     InputError
-        When a choice cannot be: names it, the key, and what is allowed.
+        Invalid choice; the message names it, the key and the allowed values.
     """
     platforms: dict[str, Platform] = {}
     found = []
@@ -180,7 +180,7 @@ def in_worlds(
     choices: Sequence[Mapping[str, Any]],
     worlds: Mapping[str, Mapping[str, Any]],
 ) -> list[tuple[Design, ...]]:
-    """The scenario with each of the choices, each in every world."""
+    """Returns the designs: the scenario with each choice, in every environment."""
     by_world = [designs_of(scenario, choices, given, name) for name, given in worlds.items()]
     return list(zip(*by_world, strict=True))
 
@@ -194,7 +194,7 @@ def drive(
     seed: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[dict[str, NDArray[Any]] | None]:
-    """Drive each design in the runs from ``first_run`` on; designs that drive alike do it once."""
+    """Simulates each design from run ``first_run``; designs with equal runs are simulated once."""
     texts = [design.driven for design in designs]
     different = list(dict.fromkeys(texts))
     tasks = [
@@ -213,7 +213,7 @@ def drive(
 
 
 def simulated(scenario: str, seed: int, first_run: int, runs: int) -> dict[str, NDArray[Any]]:
-    """A part: runs of a scenario, on one thread."""
+    """Simulates one part: runs of a scenario, in one thread."""
     found = _core.simulate(
         Scenario.from_toml(scenario),
         runs,
@@ -222,7 +222,7 @@ def simulated(scenario: str, seed: int, first_run: int, runs: int) -> dict[str, 
         threads=1,
         errors_every=ERROR_EVERY,
     )
-    if found.errors_m is None:  # they were asked for
+    if found.errors_m is None:  # keep_trajectories is set
         raise RuntimeError("the simulation kept no errors")
     error_m = np.hypot(found.errors_m[..., 0], found.errors_m[..., 1])
     columns = ("executions", "listened", "rms_error_m", "max_error_m")
@@ -236,7 +236,7 @@ def simulated(scenario: str, seed: int, first_run: int, runs: int) -> dict[str, 
 
 
 def joined(design: Design, parts: Sequence[Part]) -> Driven:
-    """A design with all its parts, and the energy of each of its runs."""
+    """Joins the parts of a design, and adds the energy of each run."""
     executions, listened, rms_m, worst_m = (
         np.concatenate([part[name] for part in parts])
         for name in ("executions", "listened", "rms_error_m", "max_error_m")

@@ -1,4 +1,4 @@
-"""Which designs no other beats, and how sure that is."""
+"""Pareto front of designs, and its confidence."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 
 def differences(one: Driven, others: Sequence[Driven]) -> NDArray[np.float64]:
-    """Run by run, how much more energy and squared error one has than each other.
+    """Returns paired differences of energy and squared error of one design to each other one.
 
-    Only the runs that both have; shape (others, 2, 3): mean and the ends of its 95 % interval.
+    Uses the common runs. Shape (others, 2, 3): mean and the ends of its 95 % interval.
     """
     found = np.empty((len(others), 2, 3))
     for row, other in enumerate(others):
@@ -42,7 +42,7 @@ def _interval(mine: NDArray[np.float64], its: NDArray[np.float64]) -> tuple[floa
 
 
 def student(freedom: int) -> float:
-    """Two-sided 95 % quantile of Student's t, by Hill's expansion; exact for 1 and 2.
+    """Returns the two-sided 95 % quantile of Student's t (Hill's expansion; exact for 1 and 2).
 
     Examples
     --------
@@ -61,14 +61,14 @@ def student(freedom: int) -> float:
 
 
 def front(driven: Sequence[Driven]) -> list[int]:
-    """Designs that no other beats in mean energy and mean error, by energy."""
+    """Returns the Pareto front of mean energy and mean error, ordered by energy."""
     energy_j, square_m2 = aims(driven)
     found = not_beaten(energy_j, square_m2)
     return [int(index) for index in found if np.isfinite(energy_j[index])]
 
 
 def aims(driven: Sequence[Driven]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean energy and mean squared error of each design."""
+    """Returns mean energy and mean squared error of each design."""
     return (
         np.array([each.mean_energy_j for each in driven]),
         np.array([float(np.mean(each.square_m2)) for each in driven]),
@@ -76,16 +76,17 @@ def aims(driven: Sequence[Driven]) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def not_beaten(energy_j: NDArray[np.float64], square_m2: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Places of those that no other has less energy and less error than, by energy."""
+    """Returns the indices of the Pareto front, ordered by energy."""
     order = np.lexsort((square_m2, energy_j))
     best_m2 = np.minimum.accumulate(np.concatenate([[np.inf], square_m2[order][:-1]]))
     return order[square_m2[order] < best_m2]
 
 
 def may_be_front(driven: Sequence[Driven]) -> list[int]:
-    """Designs that no other is better than with 95 %: the front's confidence.
+    """Returns the designs that may be on the Pareto front, with 95 % confidence.
 
-    One is beaten where another is surely no worse in both, and surely better in one.
+    A design is excluded if another one is significantly better in one objective and not worse in
+    the other.
     """
     on_front = front(driven)
     rivals = [driven[index] for index in on_front]

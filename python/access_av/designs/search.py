@@ -1,4 +1,4 @@
-"""Which designs are driven how often: all of them, or fewer and fewer, ever more."""
+"""Number of runs of each design: all runs, or successive halving."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ if TYPE_CHECKING:
     from access_av.designs.driven import Design, Driven, Part
     from access_av.run.campaign import Campaign
 
-# Successive halving: of the designs left, one in so many goes on to so many times the runs.
+# Successive halving: factor of fewer designs and more runs per round.
 KEEP_ONE_IN = 3
 FIRST_RUNS = 2
 
 
 @dataclass(frozen=True)
 class Found:
-    """Designs that were driven to the end, and what it took.
+    """Designs with all runs, and the number of simulated runs.
 
     Attributes
     ----------
     driven
-        Those that were driven in all runs.
+        Designs with all runs.
     drives
-        Drives in all, as if each design had driven by itself.
+        Total number of runs, counted per design.
     """
 
     driven: list[Driven]
@@ -39,7 +39,7 @@ class Found:
 
 
 def rounds(runs: int, *, halving: bool) -> list[int]:
-    """After how many runs the designs are compared.
+    """Returns the numbers of runs after which the designs are compared.
 
     Examples
     --------
@@ -62,21 +62,21 @@ def search(
     halving: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Found | None:
-    """Drive the designs.
+    """Simulates the designs.
 
     Parameters
     ----------
     designs
-        Each in every world: it is judged in the worst of them.
+        Designs in every environment; each is rated in its worst one.
     runs
-        Drives of each design that is kept to the end, in each world.
+        Number of runs of each remaining design in each environment.
     halving
-        Whether designs that are behind are left out before; all see the same runs.
+        Whether inferior designs are dropped early; all designs use the same runs.
 
     Returns
     -------
     Found
-        ``None`` where parts are missing that another shard computes.
+        ``None`` if parts of another shard are missing.
     """
     if not designs:
         raise InputError("no designs to drive")
@@ -108,7 +108,7 @@ def search(
 
 
 def ranking(driven: Sequence[Driven]) -> list[int]:
-    """Designs in order: the front, then the front of the others, and so on."""
+    """Returns the designs in order of Pareto rank."""
     energy_j, square_m2 = aims(driven)
     left = np.arange(len(driven))
     found: list[int] = []

@@ -1,4 +1,4 @@
-"""What may be chosen: keys of a scenario, and the values each may take."""
+"""Space of designs: keys of a scenario and their values."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MOST_DESIGNS = 100_000
-# The table of a space file that holds the worlds, and keys of a scenario that nobody can choose.
+# Table of a space file with the environments, and keys that cannot be chosen.
 WORLD = "world"
 NOT_CHOSEN = ("channel", "truth", "faults", "site.rician_k_db")
 
 
 @dataclass(frozen=True)
 class Dimension:
-    """One key and the values it may take: a list of choices, or from ``low`` to ``high``."""
+    """One key and its values: a list of choices, or a range from ``low`` to ``high``."""
 
     key: str
     choices: tuple[Any, ...] = ()
@@ -35,7 +35,7 @@ class Dimension:
     is_log: bool = False
 
     def at(self, coordinate: float) -> Any:
-        """The value at a coordinate from 0 up to 1.
+        """Returns the value at a coordinate from 0 to 1.
 
         Examples
         --------
@@ -51,15 +51,14 @@ class Dimension:
 
 @dataclass(frozen=True)
 class Space:
-    """All that may be chosen together, and the worlds in which each choice is to prove itself.
+    """Dimensions of the designs, and the environments in which each design is rated.
 
     Attributes
     ----------
     dimensions
-        Keys of the scenario that are chosen.
+        Keys of the scenario that can be chosen.
     worlds
-        Keys of the scenario that are given, by name of the world; a single world that changes
-        nothing where the space states none.
+        Fixed keys of each environment, by its name. Default: one environment without changes.
     """
 
     dimensions: tuple[Dimension, ...]
@@ -67,7 +66,7 @@ class Space:
 
     @classmethod
     def read(cls, file: Path) -> Space:
-        """Read a space file.
+        """Reads a space file.
 
         Raises
         ------
@@ -82,9 +81,9 @@ class Space:
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> Space:
-        """A space from nested tables: lists are choices, ``low`` and ``high`` a range.
+        """Returns a space from nested tables: lists are choices, ``low`` and ``high`` a range.
 
-        The table ``world`` holds what is not chosen but given, lists alone.
+        The table ``world`` contains the environments as lists.
 
         Raises
         ------
@@ -111,13 +110,13 @@ class Space:
         for dimension in found:
             if any(f"{dimension.key}.".startswith(f"{key}.") for key in NOT_CHOSEN):
                 raise InputError(
-                    f"{dimension.key}: nobody chooses that; write [{WORLD}] {dimension.key} = […], "
-                    "and every design is judged in the worst of these worlds"
+                    f"{dimension.key}: this key cannot be chosen; write [{WORLD}] "
+                    f"{dimension.key} = […], and every design is rated in its worst environment"
                 )
         return cls(found, _worlds(table[WORLD])) if WORLD in table else cls(found)
 
     def as_record(self) -> dict[str, Any]:
-        """Plain values: what each key may be, and the worlds."""
+        """Returns the values of each key and the environments as plain data."""
         keys = {
             each.key: list(each.choices)
             if each.choices
@@ -127,17 +126,17 @@ class Space:
         return {"keys": keys, "worlds": {name: dict(given) for name, given in self.worlds.items()}}
 
     def grid(self) -> list[dict[str, Any]]:
-        """Every combination of the choices.
+        """Returns every combination of the choices.
 
         Raises
         ------
         InputError
-            When a key has a range instead of choices, or there are too many combinations.
+            A range in place of choices, or too many combinations.
         """
         return _combinations(self.dimensions)
 
     def sobol(self, count: int) -> list[dict[str, Any]]:
-        """So many points spread evenly, without those that are the same design twice."""
+        """Returns designs at the points of a Sobol sequence, without duplicates."""
         points = sobol(count, len(self.dimensions))
         found: dict[str, dict[str, Any]] = {}
         for point in points:
@@ -148,7 +147,7 @@ class Space:
 
 
 def sobol(count: int, dimensions: int) -> NDArray[np.float64]:
-    """Points of a Sobol sequence from 0 up to 1, of shape (count, dimensions).
+    """Returns points of a Sobol sequence from 0 to 1, shape (count, dimensions).
 
     Examples
     --------
@@ -157,7 +156,7 @@ def sobol(count: int, dimensions: int) -> NDArray[np.float64]:
     """
     from scipy.stats import qmc
 
-    # So many that SciPy has no doubt of their balance; the first of them.
+    # Draw a power of two, because SciPy warns otherwise, and keep the first points.
     drawn = qmc.Sobol(dimensions, scramble=False, bits=32).random_base2(
         max(count - 1, 0).bit_length()
     )
@@ -165,7 +164,7 @@ def sobol(count: int, dimensions: int) -> NDArray[np.float64]:
 
 
 def shown(values: Mapping[str, Any]) -> str:
-    """Values by the last part of their keys, for people.
+    """Returns the values as text, with the last part of their keys.
 
     Examples
     --------
@@ -194,7 +193,7 @@ def _combinations(dimensions: Sequence[Dimension]) -> list[dict[str, Any]]:
 
 
 def _worlds(table: Any) -> dict[str, dict[str, Any]]:
-    """Every combination of what is given, by its name."""
+    """Returns every combination of the fixed keys, by its name."""
     found = _dimensions(table, "") if isinstance(table, dict) else []
     if not found:
         raise InputError(f"{WORLD}: no key with a list of values")

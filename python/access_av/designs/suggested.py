@@ -1,7 +1,7 @@
-"""Designs that Optuna suggests, in the light of those that were driven (extra ``optuna``).
+"""Designs suggested by Optuna from the results of earlier designs (extra ``optuna``).
 
-It is asked and told; its own storage, in which what was killed stays running, is not used. What was
-driven lies in parts: the same seed suggests the same designs again, and those are there already.
+Optuna's ask-and-tell interface is used without its storage, in which killed trials stay active.
+Results are stored in parts: an equal seed suggests equal designs, whose results exist already.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from access_av.designs.space import Space
     from access_av.run.campaign import Campaign
 
-# Designs that are asked for before the last ones are told: enough for all workers.
+# Number of designs per batch, enough for all workers.
 BATCH = 16
-# What a design is told as whose vehicle is never found, or that has no energy figure.
+# Objective value of a design without position or without energy.
 HOPELESS = 1e12
 
 
@@ -38,12 +38,12 @@ def suggested(
     seed: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> Found:
-    """Drive so many designs that Optuna's NSGA-II suggests, for least energy and least error.
+    """Simulates designs that Optuna's NSGA-II suggests, to minimize energy and error.
 
     Raises
     ------
     InputError
-        When Optuna is not there.
+        Optuna is not installed.
     """
     try:
         import optuna
@@ -64,7 +64,7 @@ def suggested(
         made = drive(campaign, every, first_run=0, runs=runs, seed=seed)
         parts: list[Part] = [part for part in made if part is not None]
         if len(parts) < len(made):
-            raise InputError("--optuna looks at all drives: it cannot be shared by --shard")
+            raise InputError("--optuna needs all runs: omit --shard")
         for number, (trial, worlds) in enumerate(zip(trials, designs, strict=True)):
             mine = parts[number * len(worlds) : (number + 1) * len(worlds)]
             driven = _judged(worlds, mine)
@@ -74,7 +74,7 @@ def suggested(
         done += len(trials)
         if progress is not None:
             progress(done, count)
-    # Once more, all together: a label says what differs from design to design.
+    # Label all designs together, because a label contains the differing values.
     designs = in_worlds(scenario, [chosen for chosen, _ in kept.values()], space.worlds)
     judged = [
         _judged(worlds, mine) for worlds, (_, mine) in zip(designs, kept.values(), strict=True)
@@ -87,7 +87,7 @@ def _judged(worlds: Sequence[Design], parts: Sequence[Part]) -> Driven:
 
 
 def _values(trial: Any, space: Space) -> dict[str, Any]:
-    """What a trial suggests; choices by their number, as they may be tables."""
+    """Returns the values of a trial; choices by index, because they can be tables."""
     found = {}
     for dimension in space.dimensions:
         if dimension.choices:

@@ -1,4 +1,4 @@
-"""The table of driven designs, and what is asked of it afterwards."""
+"""Table of simulated designs, and queries of it."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
 
     from access_av.designs.driven import Driven
 
-# Columns that may hold nothing known.
+# Columns that can contain unknown values.
 NUMBERS = dict.fromkeys(("energy_j", "rms_error_m", "p90_max_error_m", *names()), pl.Float64)
 ENERGY = "energy"
-# Of the error that is bound, where none is given: what 3GPP's levels 2, 3 and 5 ask for.
+# Default percentile of the error limit: availability of 3GPP's levels 2, 3 and 5.
 USUAL_PERCENT = 99.0
-# Column of those that keep what they have to: whether they do so with 95 %.
+# Column: whether the limits are met with 95 % confidence.
 SURELY = "is_sure"
 
 
 def rows_of(driven: Sequence[Driven]) -> pl.DataFrame:
-    """One row per design: what was chosen, energy, errors, and whether it may be of the front.
+    """Returns one row per design: choice, energy, errors, and membership of the Pareto front.
 
-    Where designs were driven in several worlds, each is as it is in the worst of them.
+    With several environments, each row is that of the worst one.
     """
     on_front = set(may_be_front(driven))
     return pl.DataFrame(
@@ -44,7 +44,7 @@ def rows_of(driven: Sequence[Driven]) -> pl.DataFrame:
 
 
 def rows_of_worlds(driven: Sequence[Driven]) -> pl.DataFrame:
-    """One row per design and world; none where there is only one."""
+    """Returns one row per design and environment; empty for a single environment."""
     return pl.DataFrame(
         [
             {"design": index, **row_of(world)}
@@ -57,7 +57,7 @@ def rows_of_worlds(driven: Sequence[Driven]) -> pl.DataFrame:
 
 
 def row_of(one: Driven) -> dict[str, Any]:
-    """What was chosen, energy and errors of one design."""
+    """Returns choice, energy and errors of one design."""
     return {
         "choice": one.design.label,
         "world": one.design.world,
@@ -77,23 +77,23 @@ def _known(value: float) -> float | None:
 
 @dataclass(frozen=True)
 class Constraints:
-    """What a design has to keep; ``None`` leaves one open.
+    """Limits of a design; ``None`` means no limit.
 
     Attributes
     ----------
     max_energy_j
-        Mean energy of a trip.
+        Maximum mean energy of a trip.
     max_rms_m
-        Root mean square error over track and runs.
+        Maximum root mean square error over track and runs.
     max_worst_m
-        Largest error of a run, in nine of ten.
+        Maximum of the 90th percentile over the runs of the maximum error.
     max_error_m, percentile
-        So many percent of the errors are to be no larger than this; 99 where it is not given.
+        Maximum of this percentile of the error. Default percentile: 99.
 
     Raises
     ------
     InputError
-        For a percentile that is not one of :data:`~access_av.statistics.percentiles.PERCENTS`.
+        Percentile that is not one of :data:`~access_av.statistics.percentiles.PERCENTS`.
     """
 
     max_energy_j: float | None = None
@@ -109,32 +109,32 @@ class Constraints:
 
     @property
     def percent(self) -> float:
-        """The percentile that is bound, in percent."""
+        """Returns the limited percentile, in percent."""
         return USUAL_PERCENT if self.percentile is None else self.percentile
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing is to be kept."""
+        """Returns whether there is no limit."""
         return not self._judged({})
 
     @property
     def binds_energy_alone(self) -> bool:
-        """Whether no error is bound."""
+        """Returns whether only the energy is limited."""
         return self._judged({}).keys() <= {ENERGY}
 
     def excess(self, row: Mapping[str, Any]) -> dict[str, float]:
-        """By what factor a design goes beyond each constraint; at most 1 where it keeps it."""
+        """Returns the ratio of value and limit for each limit; at most 1 if it is met."""
         return {
             name: np.inf if value is None or bound <= 0.0 else value / bound
             for name, (value, bound) in self._judged(row).items()
         }
 
     def keeps(self, row: Mapping[str, Any]) -> bool:
-        """Whether a design keeps all of them."""
+        """Returns whether a design meets all limits."""
         return all(factor <= 1.0 for factor in self.excess(row).values())
 
     def keeps_surely(self, row: Mapping[str, Any]) -> bool:
-        """Whether it does so with 95 %: the percentile by the high end of its interval."""
+        """Returns whether all limits are met with 95 % confidence (upper end of the interval)."""
         high_m = row[column(self.percent).replace("_error_m", "_error_high_m")]
         of_percentile = self.max_error_m is None or (
             high_m is not None and high_m <= self.max_error_m
@@ -142,7 +142,7 @@ class Constraints:
         return of_percentile and self.keeps(row)
 
     def in_words(self, row: Mapping[str, Any]) -> list[str]:
-        """What a design has of each, and what is asked.
+        """Returns value and limit of each limited quantity as text.
 
         Examples
         --------
@@ -165,7 +165,7 @@ class Constraints:
         return told
 
     def instead(self, name: str, factor: float) -> str:
-        """A constraint that allows so many times as much, beside what it allows.
+        """Returns a limit multiplied by a factor, and the present limit, as text.
 
         Examples
         --------
@@ -174,13 +174,13 @@ class Constraints:
         """
         _, bound = self._judged({})[name]
         unit = "J" if name == ENERGY else "m"
-        # Rounded up, so that what is allowed is enough.
+        # Round up, so that the design meets the limit.
         needed = math.nextafter(bound * factor, 0.0)
         step = 10.0 ** (math.floor(math.log10(needed)) - 2)
         return f"{name} {math.ceil(needed / step) * step:.3g} {unit} instead of {bound:g} {unit}"
 
     def kept(self, rows: pl.DataFrame) -> pl.DataFrame:
-        """Designs that keep all of them; first those that do so with 95 %, then by energy.
+        """Returns the designs that meet all limits, by 95 % confidence, then by energy.
 
         Examples
         --------
@@ -205,7 +205,7 @@ class Constraints:
         return f"{self.percent:g} % of errors within"
 
     def _judged(self, row: Mapping[str, Any]) -> dict[str, tuple[float | None, float]]:
-        """What a row has of each that is bound, and the bound."""
+        """Returns value and limit of each limited quantity of a row."""
         every = {
             ENERGY: (row.get("energy_j"), self.max_energy_j),
             "RMS error": (row.get("rms_error_m"), self.max_rms_m),
@@ -222,12 +222,12 @@ def _ends(row: Mapping[str, Any], percent: float) -> tuple[float | None, float |
 
 
 def what_to_change(constraints: Constraints, rows: pl.DataFrame) -> list[str]:
-    """Where no design keeps all constraints: what each would have to be, the others kept.
+    """Returns the limits that would have to change if no design meets all limits.
 
     Raises
     ------
     InputError
-        When there are no designs.
+        No designs.
     """
     if rows.is_empty():
         raise InputError("no designs to choose from")

@@ -1,11 +1,11 @@
-"""Gains, weights and set points of a wake-up policy for one's own road and objective.
+"""Optimization of gains, weights and set points of a wake-up policy.
 
-Rounds of evenly spread points, each round in a box a third as wide around the best so far; all
-points see the same runs, and what was there before is one of them. What is chosen by what it
-reached in these runs looks better in them than it is. So the best few are driven again in other
-runs. Of these two go on to a third lot: the best one, and the best one whose errors keep what is
-asked by the high end of their intervals, too. There they are driven beside what was there before,
-which remains unless one of them is better.
+Each round simulates evenly spread points in a box that is a third as wide as the last one, around
+the best point so far. All points use the same runs, and the given policy is one of the points.
+Selection by these runs is biased; therefore the best points are simulated again in new runs. Two of
+them are compared with the given policy in a third set of runs: the best one, and the best one that
+meets the limits with the upper ends of its intervals. The given policy remains unless one of them
+is better.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from access_av.designs.table import Constraints
     from access_av.run.campaign import Campaign
 
-# What may be tuned of each policy: key, least, most; on a logarithmic scale where positive.
+# Tunable keys of each policy: key, minimum, maximum; logarithmic scale if positive.
 Range = tuple[str, float, float]
 PID: list[Range] = [
     ("kp", 0.05, 5.0),
@@ -60,17 +60,17 @@ NARROWER = 3.0
 
 @dataclass(frozen=True)
 class Tuned:
-    """A policy before and after, over runs that the search has not seen.
+    """A policy before and after tuning, in new runs.
 
     Attributes
     ----------
     before, after
-        The same, where nothing better was found.
+        Policy before and after; equal without an improvement.
     less
-        By how much energy (J) and squared error (m²) are less, run by run: mean and the ends of
-        the 95 % interval, shape (2, 3).
+        Paired differences before − after of energy (J) and squared error (m²): mean and the ends
+        of the 95 % interval, shape (2, 3).
     drives
-        Drives in all.
+        Total number of runs.
     """
 
     before: Driven
@@ -80,12 +80,12 @@ class Tuned:
 
     @property
     def is_better(self) -> bool:
-        """Whether something better than before was found."""
+        """Returns whether tuning found an improvement."""
         return self.after is not self.before
 
 
 def space_of(scenario: Scenario) -> Space:
-    """What may be tuned of a scenario's wake-up policy.
+    """Returns the tunable keys of a scenario's wake-up policy.
 
     Examples
     --------
@@ -99,7 +99,7 @@ def space_of(scenario: Scenario) -> Space:
         table: Any = policy
         for step in key.split(".")[:-1]:
             table = table.get(step, {})
-        # Neither a set point of another kind, nor gains of what is due at a fixed time.
+        # Skip set points of another kind, and gains of fixed wake-up times.
         if key.endswith("offset_db") and table.get("kind") != "expected":
             continue
         if key.startswith("due.") and policy["due"]["policy"] != "pid":
@@ -118,25 +118,25 @@ def tune(
     seed: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Tuned:
-    """Tune a scenario's wake-up policy.
+    """Tunes a scenario's wake-up policy.
 
     Parameters
     ----------
     constraints
-        What is to be kept. The objective is least energy; where only energy is bound, least error:
-        of its percentile where one is given, else of RMS.
+        Limits. The objective is minimum energy. If only the energy is limited, it is the minimum
+        error: of the percentile if given, otherwise RMS.
     designs
-        Points a round.
+        Number of points per round.
     runs
-        Drives of each point, of the best few again, and of the comparison in the end.
+        Number of runs per point, of the second simulation and of the final comparison.
 
     Raises
     ------
     InputError
-        When nothing is to be kept, or the platform has no energy figure for the method.
+        No limit, or a platform without the energy of the method.
     """
     if constraints.is_empty:
-        raise InputError("nothing is to be kept: give a largest error or a largest energy")
+        raise InputError("no limit given: add a maximum error or a maximum energy")
     space = space_of(scenario)
     if not space.dimensions:
         raise InputError(f"{scenario.name}: its wake-up policy has nothing to tune")
@@ -155,12 +155,12 @@ def tune(
             progress(done, (ROUNDS * designs + 1) * runs)
     if not np.isfinite(tried[0].mean_energy_j):
         name = tried[0].design.platform.name
-        raise InputError(f"platform {name} has no energy figure for this method")
+        raise InputError(f"platform {name} has no energy of this method")
     finalists = [it.design for it in tried if it.design.values]
     again = _driven(campaign, finalists, runs, runs, seed)
     safest, best_found = (min(again, key=it).design for it in (goal.with_margin, goal.as_found))
     last = [as_it_was, safest, *([best_found] if best_found is not safest else [])]
-    # Of equals the first: what was there before.
+    # Prefer the first of equal ones, which is the given policy.
     before, *others = _driven(campaign, last, 2 * runs, runs, seed)
     after = min([before, *others], key=goal.as_found)
     less = -differences(after, [before])[0][:, [0, 2, 1]]
@@ -169,16 +169,16 @@ def tune(
 
 @dataclass(frozen=True)
 class _Goal:
-    """What comes first is least: by how far it is beyond the constraints, then the objective."""
+    """Order of designs: violation of the limits, then objective."""
 
     constraints: Constraints
 
     def as_found(self, driven: Driven) -> tuple[float, float]:
-        """By what was found."""
+        """Returns the sort key by the mean results."""
         return self._rank(driven, with_margin=False)
 
     def with_margin(self, driven: Driven) -> tuple[float, float]:
-        """By the high end of the errors' intervals: who is lucky once is not better."""
+        """Returns the sort key by the upper ends of the errors' intervals."""
         return self._rank(driven, with_margin=True)
 
     def _rank(self, driven: Driven, *, with_margin: bool) -> tuple[float, float]:
@@ -210,7 +210,7 @@ def _driven(
 
 
 def _around(dimension: Dimension, value: float) -> Dimension:
-    """A range as much narrower around a value, within what it was."""
+    """Returns a narrower range around a value, within the present one."""
     low, high = dimension.low, dimension.high
     if dimension.is_log:
         factor = (high / low) ** (0.5 / NARROWER)

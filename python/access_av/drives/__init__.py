@@ -1,4 +1,4 @@
-"""Recorded drives: written from a scenario, located, compared with a truth.
+"""Recorded drives: synthesis from a scenario, localization, comparison with a truth.
 
 Examples
 --------

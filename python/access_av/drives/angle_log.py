@@ -1,4 +1,4 @@
-"""Logs of angles: made of a recording's samples, written, and read where they are Parquet."""
+"""Logs of angles: estimation from samples, writing, and reading of Parquet."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from access_av._core import Site, Vehicle
 
-# Of a log's columns those that are used to locate.
+# Columns of a log that localization uses.
 USED = (
     "time_s", "pci", "ssb_index", "phase_rad", "phase_sigma_rad", "angle_rad", "angle_sigma_rad",
     "snr_db", "resolved",
@@ -34,16 +34,15 @@ class AngleLog:
     Attributes
     ----------
     angles
-        One row per angle. ``phase_sigma_rad`` is all of the error that is believed, the receiver's
-        noise and the site's scatter; ``phase_noise_sigma_rad`` is the former alone. How well the
-        array is mounted and calibrated is in neither. An angle that is not ``resolved`` is used
-        with caution.
+        One row per angle. ``phase_sigma_rad`` covers receiver noise and the site's scatter,
+        ``phase_noise_sigma_rad`` only receiver noise. Neither covers mounting and calibration of
+        the array. An angle that is not ``resolved`` gets a reduced weight.
     site
-        Whose radio heads were listened to.
+        Site whose radio heads were received.
     vehicle
-        The vehicle, its receiver set so that these deviations are taken as they are meant.
+        Vehicle whose receiver settings match these standard deviations.
     warnings
-        What looks wrong with the recording.
+        Suspected faults of the recording.
     """
 
     angles: pl.DataFrame
@@ -52,7 +51,7 @@ class AngleLog:
     warnings: list[str]
 
     def by_ssb(self) -> pl.DataFrame:
-        """Number of angles of each SSB, how many are resolved, medians of SNR and deviations."""
+        """Returns per SSB: number of angles, resolved angles, medians of SNR and σ."""
         return (
             self.angles.group_by("pci", "ssb_index")
             .agg(
@@ -64,13 +63,13 @@ class AngleLog:
         )
 
     def csv(self) -> str:
-        """The angles as CSV; comments before the header say what the deviations hold."""
+        """Returns the angles as CSV; leading comments explain the standard deviations."""
         rician_k_db = json.loads(self.site.to_json())["rician_k_db"]
         return (
-            "# phase_sigma_rad: all of the error that is believed, receiver noise and the site's "
+            "# phase_sigma_rad: receiver noise and the site's "
             f"scatter (rician_k_db = {rician_k_db:g})\n"
-            "# phase_noise_sigma_rad: receiver noise alone\n"
-            "# the array's mounting and calibration are in neither, but in the vehicle's file\n"
+            "# phase_noise_sigma_rad: receiver noise only\n"
+            "# not included: mounting and calibration of the array (vehicle file)\n"
             f"{self.angles.cast({'resolved': pl.UInt8}).write_csv()}"
         )
 
@@ -82,7 +81,7 @@ def estimate_angles(
     vehicle: Vehicle | str | Path = "default",
     start_time_s: float = 0.0,
 ) -> AngleLog:
-    """Estimate the angles of a recording as the vehicle's receiver finds them, and locate nothing.
+    """Estimates the angles of a recording with the vehicle's receiver, without localization.
 
     Parameters
     ----------
@@ -98,9 +97,9 @@ def estimate_angles(
     Raises
     ------
     RecordingError
-        When the recording cannot be used, or holds no SSB of the site.
+        Unusable recording, or no SSB of the site.
     SettingsError
-        When the site or vehicle file cannot be used.
+        Unusable site or vehicle file.
 
     Examples
     --------
@@ -124,12 +123,12 @@ def estimate_angles(
 
 
 def columns_of(path: str | Path) -> dict[str, NDArray[np.float64]] | None:
-    """The columns of a log that is Parquet, NaN where there is no value; ``None`` of other files.
+    """Returns the columns of a Parquet log, NaN for missing values; ``None`` for other files.
 
     Raises
     ------
     InputError
-        When it is damaged, or a column that is used holds no numbers.
+        Damaged file, or a used column without numbers.
     """
     path = Path(path)
     if path.suffix.lower() != ".parquet":

@@ -1,4 +1,4 @@
-"""Recorded drives: write them from a scenario, find out where the vehicle was."""
+"""Recorded drives: synthesis from a scenario, and localization."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ if TYPE_CHECKING:
 # Maximum interval between two poses of the truth that is interpolated linearly (s).
 MOST_TRUTH_GAP_S = 1.0
 
-# Minimum share of the drive for which the truth has to be known.
+# Minimum share of the drive with known truth.
 MIN_COMPARED = 0.5
 
 # Median distance (m) between truth and drive above which they are in different frames.
 OTHER_FRAME_M = 1e4
 
-# Extent of the truth relative to the drive's below which its positions are no metres, and the
-# extent of the drive (m) from which on this is decided. A degree is 1e5 m.
+# Extent of the truth relative to that of the drive below which its unit is not metres, and minimum
+# extent of the drive (m) for this test. A degree is 1e5 m.
 MIN_EXTENT = 1e-3
 MIN_EXTENT_OF_DRIVE_M = 1.0
 
-# Maximum share of a drive that may be unavailable without making it unreliable.
+# Maximum unavailable share of a reliable drive.
 MAX_UNAVAILABLE = 0.2
 
-# Units per second that times are in by mistake.
+# Wrong time units, in units per second.
 TIME_UNITS = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 
 FINDINGS = {"constant": pl.String, "constant_unit": pl.String}
@@ -48,16 +48,16 @@ DATATYPES = ("ci16_le", "cf32_le")
 
 @dataclass(frozen=True)
 class SynthesizedDrive:
-    """A drive that was written.
+    """Result of a synthesis.
 
     Attributes
     ----------
     recording
-        The SigMF metadata.
+        SigMF metadata file.
     bursts
-        SSB bursts in it.
+        Number of SSB bursts.
     samples
-        Samples per antenna.
+        Number of samples per antenna.
     """
 
     recording: Path
@@ -76,7 +76,7 @@ def synthesize(
     datatype: str = "ci16_le",
     progress: Callable[[float], object] | None = None,
 ) -> SynthesizedDrive:
-    """Record a scenario's drive as somebody on the vehicle would have.
+    """Synthesizes the recording of a scenario's drive.
 
     Writes ``iq.sigmf-meta`` and ``iq.sigmf-data`` (all antennas, the truth in the annotations),
     ``odometry.csv``, ``site.toml``, ``vehicle.toml``, ``scenario.toml`` and ``truth.tum``.
@@ -84,26 +84,26 @@ def synthesize(
     Parameters
     ----------
     scenario
-        What is driven, or its name or path.
+        Scenario, or its name or path.
     directory
-        Where the files go; made if it is not there.
+        Output folder; created if missing.
     seed, run
-        The random streams.
+        Seed and number of the random stream.
     duration_s
-        Seconds from the start on; the whole drive without.
+        Duration from the start in seconds. Default: the whole drive.
     continuous
-        Also the time between the SSB bursts, which makes the files many times larger.
+        Whether samples between the SSB bursts are written, which multiplies the file size.
     datatype
         ``ci16_le`` or ``cf32_le``.
     progress
-        Called with the share of the drive that is recorded, from 0 to 1.
+        Called with the completed share of the drive, from 0 to 1.
 
     Raises
     ------
     SettingsError
-        When the scenario cannot be sent as samples.
+        Scenario without simulation at sample level.
     InputError
-        When the datatype is another one.
+        Unknown datatype.
 
     Examples
     --------
@@ -137,7 +137,7 @@ def log_angles(
     run: int = 0,
     duration_s: float | None = None,
 ) -> int:
-    """Record a scenario's drive as the angles that the vehicle's receiver finds in it.
+    """Synthesizes a scenario's drive as a log of the angles found by the vehicle's receiver.
 
     Writes ``angles.csv`` with the angle of every SSB, ``odometry.csv``, ``site.toml``,
     ``vehicle.toml``, ``scenario.toml`` and ``truth.tum``.
@@ -155,7 +155,7 @@ def log_angles(
     Raises
     ------
     SettingsError
-        When what an SSB brings hangs on when it is heard (samples, latency, noisy SNR).
+        Scenario whose angles depend on the reception times (samples, latency, noisy SNR).
 
     Examples
     --------
@@ -170,29 +170,28 @@ def log_angles(
 
 @dataclass(frozen=True)
 class Drive:
-    """A located drive. :mod:`access_av.columns` says what each table's columns are.
+    """A located drive. :mod:`access_av.columns` describes the columns of the tables.
 
     Attributes
     ----------
     poses
-        One row per odometry sample. ``searching`` as long as the first pose is not known; the
-        pose is then the mean of where the vehicle may be.
+        One row per odometry sample. While ``searching``, the pose is the mean of the possible
+        positions.
     angles
-        One row per angle: SSB, angle, and what the localizer did with it.
+        One row per angle: SSB, angle, and its use by the localizer.
     remarks
-        What was wrong with the input, or remarkable about the drive; of remarks that differ in
-        numbers only the first stands for all.
+        Faults of the input and other observations; of remarks that differ only in numbers, the
+        first one.
     diagnoses
-        Those of the remarks that name what is wrong with the input as it was given, confirmed by
-        the localizer itself.
+        Remarks about wrong inputs that the localizer has confirmed.
     suspicions
-        Those of the diagnoses that did harm: the drive is not to be relied on.
+        Diagnoses that displaced the drive, which is therefore not reliable.
     findings
-        What the drive showed of the vehicle by its end: one row per constant, as stated and as
-        found, with its standard deviation; none where the localizer does not look for it.
+        Estimated vehicle parameters at the end of the drive: one row per parameter with nominal
+        value, estimate and standard deviation.
     smoothed
-        ``poses`` as seen from the end of the drive, from the first known one on; ``None`` unless
-        asked for. Protection levels are not smoothed.
+        Smoothed ``poses`` from the first known one; ``None`` unless requested. Protection levels
+        are not smoothed.
     """
 
     poses: pl.DataFrame
@@ -206,17 +205,17 @@ class Drive:
 
     @property
     def lost_share(self) -> float:
-        """Share of the time that the angles came from elsewhere than expected.
+        """Returns the share of the time in which the angles contradicted the position.
 
-        1 where the vehicle was never found.
+        The value is 1 if the vehicle was never found.
         """
         return self._core.lost_share
 
     @property
     def unavailable_share(self) -> float:
-        """Share of the time, from the first known pose on, in which the position was unavailable.
+        """Returns the share of the time since the first known pose without an available position.
 
-        1 if the vehicle was never found.
+        The value is 1 if the vehicle was never found.
         """
         known = self.poses.filter(~pl.col("searching"))
         if known.is_empty():
@@ -226,7 +225,7 @@ class Drive:
 
     @property
     def is_reliable(self) -> bool:
-        """Whether the drive can be relied on.
+        """Returns whether the drive is reliable.
 
         The vehicle was found, its position was available for four fifths of the time and at the
         end, and no reported fault of the input displaced it by more than 0.5 m.
@@ -235,15 +234,15 @@ class Drive:
         return not (is_lost or self.suspicions)
 
     def write_mcap(self, path: str | Path) -> None:
-        """Write poses, verdicts and diagnostics as MCAP (ROS 2); no poses while searching."""
+        """Writes poses, verdicts and diagnostics as MCAP (ROS 2); no poses while searching."""
         self._core.write_mcap(path)
 
     def write_tum(self, path: str | Path) -> None:
-        """Write the poses, from the first that is known on, as a TUM trajectory."""
+        """Writes the poses from the first known one as a TUM trajectory."""
         self._core.write_tum(path)
 
     def write_smoothed_tum(self, path: str | Path) -> None:
-        """Write the smoothed poses as a TUM trajectory."""
+        """Writes the smoothed poses as a TUM trajectory."""
         self._core.write_smoothed_tum(path)
 
 
@@ -260,50 +259,47 @@ def locate(
     from_scratch: bool = False,
     smooth: bool = False,
 ) -> Drive:
-    """Locate a recorded drive.
+    """Locates a recorded drive.
 
     Parameters
     ----------
     site
-        Radio heads and, where there is one, the road; or the name or path of a site file.
+        Site, or the name or path of a site file.
     odometry
-        CSV with the columns ``time_s``, ``distance_m`` or ``speed_mps`` or both and, from a
-        gyroscope or from the wheels, ``yaw_rate_radps``; or of left and right wheel ``left_m`` and
-        ``right_m``, or ``left_mps`` and ``right_mps``, where the vehicle states
-        ``odometer.track_width_m``; or an MCAP file or a rosbag2 folder with
-        ``nav_msgs/msg/Odometry``. Where the twist of that tells no yaw rate, it is taken from a
-        ``sensor_msgs/msg/Imu`` beside it, or of the pose's orientation; the remarks say which.
+        CSV with the columns ``time_s``, ``distance_m`` or ``speed_mps`` or both, and optionally
+        ``yaw_rate_radps``. For two wheels: ``left_m`` and ``right_m``, or ``left_mps`` and
+        ``right_mps``, with ``odometer.track_width_m`` of the vehicle. Or an MCAP file or a rosbag2
+        folder with ``nav_msgs/msg/Odometry``. If its twist has no yaw rate, the yaw rate is that of
+        a ``sensor_msgs/msg/Imu`` or of the pose's orientation; a remark names the source.
     recording
         SigMF recording of the array's samples, or a log of angles, CSV or Parquet, with the columns
         ``time_s``, ``pci`` and either ``phase_rad`` (electrical angle) with ``phase_sigma_rad``, or
-        ``angle_rad`` (from the array's axis) with ``angle_sigma_rad``; ``ssb_index`` and ``snr_db``
-        may be there.
-        What is stated as the deviation is taken for all of the error: the site's ``rician_k_db``
-        adds nothing.
+        ``angle_rad`` (from the array axis) with ``angle_sigma_rad``; optionally ``ssb_index`` and
+        ``snr_db``. The standard deviation covers the whole error: the site's ``rician_k_db`` adds
+        nothing.
     vehicle
-        Array, odometer, and how the vehicle locates itself; or the name or path of a vehicle
-        file. Its wake-up policy is honoured.
+        Vehicle, or the name or path of a vehicle file. Its wake-up policy is applied.
     topic
-        Topic of the odometry in a bag with several.
+        Odometry topic, if the bag contains several.
     imu_topic
-        Topic of the IMU that tells the yaw rate, also where the odometry does.
+        IMU topic for the yaw rate, in place of the odometry's yaw rate.
     start_time_s
         Time of the recording's first sample by the odometry's clock.
     start
-        Initial pose (x in metres, y in metres, heading in radians) in place of the vehicle's.
-        Without any, the vehicle is found: along the road by two radio heads or more, elsewhere by
-        three.
+        Start pose (x in metres, y in metres, heading in radians) in place of the vehicle's.
+        Without a start pose the vehicle is searched for, with at least two radio heads along a road
+        and three elsewhere.
     from_scratch
-        Find the vehicle along the road even if its file has an initial pose.
+        Whether to search for the vehicle even if its file has a start pose.
     smooth
-        Also look back from the end of the drive: every pose by all angles, before it and after.
+        Whether to add the smoothed trajectory, which uses all angles for every pose.
 
     Raises
     ------
     RecordingError
-        When the recording or the odometry cannot be used.
+        Unusable recording or odometry.
     SettingsError
-        When the site or vehicle file cannot be used.
+        Unusable site or vehicle file.
 
     Examples
     --------
@@ -353,7 +349,7 @@ def _poses(columns: Mapping[str, Any]) -> pl.DataFrame:
 
 
 def read_tum(file: str | Path) -> pl.DataFrame:
-    """A TUM trajectory as ``time_s``, ``x_m``, ``y_m``, ``heading_rad``; ``#`` begins a comment.
+    """Reads a TUM trajectory: ``time_s``, ``x_m``, ``y_m``, ``heading_rad``; ``#`` is a comment.
 
     Raises
     ------
@@ -364,15 +360,15 @@ def read_tum(file: str | Path) -> pl.DataFrame:
 
 
 def error_m(poses: pl.DataFrame, truth: str | Path | pl.DataFrame) -> pl.DataFrame:
-    """Horizontal error at the poses' times; the truth is interpolated linearly.
+    """Returns the horizontal error at the times of the poses; interpolates the truth linearly.
 
     Parameters
     ----------
     poses
-        Poses of a located drive. Poses before the first known one are left out, and poses before,
-        after or in a gap of more than a second of the truth.
+        Poses of a located drive. Poses before the first known one are left out, and poses outside
+        the truth or in a gap of more than one second of it.
     truth
-        TUM trajectory, at times of its own, or the table of :func:`read_tum`. Its headings are not
+        TUM trajectory with its own times, or the table of :func:`read_tum`. Its headings are not
         used.
 
     Raises
@@ -380,7 +376,7 @@ def error_m(poses: pl.DataFrame, truth: str | Path | pl.DataFrame) -> pl.DataFra
     RecordingError
         When the file is no TUM trajectory.
     InputError
-        When the truth is known for less than half of the drive, or is in another frame.
+        Truth for less than half of the drive, or in another frame.
     """
     known = poses.filter(~pl.col("searching")).sort("time_s")
     true = truth if isinstance(truth, pl.DataFrame) else read_tum(truth)
@@ -405,7 +401,7 @@ def error_m(poses: pl.DataFrame, truth: str | Path | pl.DataFrame) -> pl.DataFra
 
 
 def _between(known: pl.DataFrame, true: pl.DataFrame) -> pl.DataFrame:
-    """The poses at which the truth is known, with its poses before and after each."""
+    """Returns the poses with known truth, each with the true poses before and after it."""
     before = true.rename({"x_m": "x0", "y_m": "y0"}).with_columns(t0="time_s")
     after = true.rename({"x_m": "x1", "y_m": "y1"}).with_columns(t1="time_s")
     return (
@@ -416,7 +412,7 @@ def _between(known: pl.DataFrame, true: pl.DataFrame) -> pl.DataFrame:
 
 
 def _why_apart(known: pl.DataFrame, true: pl.DataFrame) -> str:
-    """Why a truth covers little of a drive, and how to fix it."""
+    """Returns the reason why a truth covers little of a drive, and the remedy."""
     for unit, per_second in TIME_UNITS.items():
         scaled = true.with_columns(pl.col("time_s") / per_second)
         if _between(known, scaled).height >= MIN_COMPARED * known.height:
@@ -432,7 +428,7 @@ def _why_apart(known: pl.DataFrame, true: pl.DataFrame) -> str:
 
 
 def _check_frame(which: str, known: pl.DataFrame, true: pl.DataFrame, errors: pl.DataFrame) -> None:
-    """Reject positions of another frame or unit than the map's."""
+    """Rejects positions in another frame or unit than the map's."""
     apart_m = errors["error_m"].median()
     if isinstance(apart_m, float) and apart_m > OTHER_FRAME_M:
         x_m, y_m = true["x_m"][0], true["y_m"][0]
@@ -464,25 +460,25 @@ def _interval_s(of: pl.DataFrame) -> str:
 
 
 def in_stretches(drive: Drive, truth: pl.DataFrame, name: str) -> Errors:
-    """A drive's errors in stretches, which pair with those of the same drive located otherwise.
+    """Splits the errors of a drive into sections, for comparison of variants of the drive.
 
-    Of one drive alone: an error that stays for all of it, such as that of a plan of the site, is
-    in every stretch alike. So the interval of a difference says whether it is more than chance on
-    this drive, and not what it is on others.
+    An error that is constant during the drive, such as a displaced site plan, is common to all
+    sections. The interval of a difference therefore shows its significance for this drive, and not
+    its value for other drives.
 
     Parameters
     ----------
     drive
         A located drive.
     truth
-        What :func:`read_tum` made of the truth.
+        Truth, as returned by :func:`read_tum`.
     name
-        What the variant is called.
+        Name of the variant.
 
     Raises
     ------
     InputError
-        When truth and drive share no time.
+        Truth and drive without common time.
     """
     searching = drive.poses.select("time_s", still="searching")
     poses = drive.poses.with_columns(searching=pl.lit(value=False))
@@ -496,7 +492,7 @@ def in_stretches(drive: Drive, truth: pl.DataFrame, name: str) -> Errors:
 
 
 def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:
-    """The drive in a few numbers; errors only where the truth is known."""
+    """Returns the main figures of the drive; errors only with known truth."""
     numbers = {
         "duration_s": float(drive.poses["time_s"][-1] - drive.poses["time_s"][0]),
         "angles": float(drive.angles.height),
@@ -524,10 +520,10 @@ def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:
 
 
 def _honesty(poses: pl.DataFrame, against: pl.DataFrame) -> dict[str, float]:
-    """Compare what the localizer said of its error with the error.
+    """Compares the error with the reported uncertainty.
 
-    Mean NEES over both axes; shares of the time ``ok`` and, of all time, beyond the protection
-    level while ``ok``.
+    Returns the mean NEES over both axes, the share of the time in state ``ok``, and the share of
+    the time with state ``ok`` and an error above the protection level.
     """
     xx, xy, yy = (pl.col(f"covariance_{it}_m2") for it in ("xx", "xy", "yy"))
     dx, dy = pl.col("error_x_m"), pl.col("error_y_m")

@@ -1,14 +1,14 @@
-"""Radio heads and array as ordinary drives show them: a survey by the vehicle itself.
+"""Survey of radio heads and array from ordinary drives of the vehicle.
 
-Prediction-error identification: given site and vehicle, what a tracker finds new in each angle is
+Prediction-error identification: for correct site and vehicle, the innovations of a tracker are
 independent and normal, so that
 
     Λ(θ) = ½ Σ ν(θ)² / S + ½ Σ (θ − θ₀)² / σ₀²
 
 is the negative logarithm of the posterior of the parameters θ, over all angles of all drives
-(Schweppe 1965; Ljung, System Identification, 7.4). Gauss–Newton finds its least; the derivatives of
-ν are central differences, each a replay of every drive. The road, if there is one, and the drives'
-starts hold the frame.
+(Schweppe 1965; Ljung, System Identification, 7.4). Gauss–Newton finds its minimum; the derivatives
+of ν are central differences, each a replay of every drive. The road, if any, and the start poses
+define the frame.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
     Met = tuple[Numbers, Numbers, Flags]
 
-# A parameter whose deviation did not fall below this share of what it was before is not surveyed.
+# Maximum ratio of posterior and prior standard deviation of a surveyed parameter.
 LEARNT = 0.7
 MOST_ITERATIONS = 20
-# Done when no parameter moves by more than this share of its deviation.
+# Convergence: maximum step of a parameter relative to its standard deviation.
 STILL = 0.05
-# Steps of the central differences: small against what bends, large against rounding.
+# Steps of the central differences: small against the curvature, large against rounding.
 STEP_M, STEP_RAD = 0.02, 2e-4
 
 
@@ -53,11 +53,11 @@ class SurveyDrive:
     Attributes
     ----------
     name
-        What it is called in messages.
+        Name in messages.
     log
-        Its odometry and angles.
+        Odometry and angles.
     start_m_rad
-        Where it begins: x and y in metres, heading in radians.
+        Start pose: x and y in metres, heading in radians.
     """
 
     name: str
@@ -67,18 +67,18 @@ class SurveyDrive:
 
 @dataclass(frozen=True)
 class Parameter:
-    """Something that is surveyed.
+    """A surveyed parameter.
 
     Attributes
     ----------
     key
-        Its key in the site or vehicle file.
+        Key in the site or vehicle file.
     unit
         ``m`` or ``rad``.
     before, std_before
-        What was believed, and its standard deviation.
+        Given value and its standard deviation.
     found, std
-        What the drives say together with that, and its standard deviation.
+        Estimate from the drives and the given value, and its standard deviation.
     """
 
     key: str
@@ -90,33 +90,33 @@ class Parameter:
 
     @property
     def is_learnt(self) -> bool:
-        """Whether the drives say something of it."""
+        """Returns whether the drives determine the parameter."""
         return self.std < LEARNT * self.std_before
 
     @property
     def is_as_believed(self) -> bool:
-        """Whether it is within three standard deviations of what was believed."""
+        """Returns whether the estimate is within three prior standard deviations."""
         return abs(self.found - self.before) < 3.0 * self.std_before
 
 
 @dataclass(frozen=True, eq=False)
 class Survey(Result):
-    """What a survey found.
+    """Result of a survey.
 
     Attributes
     ----------
     parameters
-        Everything that was surveyed.
+        Surveyed parameters.
     covariance
-        Of them, shape (n, n).
+        Covariance of the parameters, shape (n, n).
     site, vehicle
-        With what was learnt, and its standard deviations.
+        Settings with the estimates and their standard deviations.
     angles, used
-        How many there were, and how many counted.
+        Number of angles, and number without outliers.
     nis
-        Mean squared innovation over its variance; 1 where everything is as believed.
+        Mean normalized innovation squared; 1 for a correct model.
     iterations
-        Steps of Gauss–Newton.
+        Number of Gauss–Newton steps.
     """
 
     parameters: list[Parameter]
@@ -129,21 +129,21 @@ class Survey(Result):
     iterations: int
 
     def table(self) -> pl.DataFrame:
-        """One row per parameter, as ``access_av.columns.TABLES["survey"]`` has it."""
+        """Returns one row per parameter; columns ``access_av.columns.TABLES["survey"]``."""
         rows = [{**vars(it), "is_learnt": it.is_learnt} for it in self.parameters]
         return pl.DataFrame(rows)
 
 
 def read_drive(folder: str | Path) -> SurveyDrive:
-    """Read a drive: ``odometry.csv`` or ``odometry.mcap``, ``angles.csv``, ``vehicle.toml``.
+    """Reads a drive: ``odometry.csv`` or ``odometry.mcap``, ``angles.csv``, ``vehicle.toml``.
 
-    The vehicle file tells the drive's start (``start.pose``), and how far apart the wheels are
-    (``odometer.track_width_m``) where the odometry is that of left and right wheel.
+    The vehicle file contains the start pose (``start.pose``) and, for odometry of two wheels, the
+    track width (``odometer.track_width_m``).
 
     Raises
     ------
     InputError
-        When a file is missing, or the start.
+        Missing file or start pose.
     RecordingError, SettingsError
         When a file is unusable.
     """
@@ -178,27 +178,27 @@ def survey(
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Survey:
-    """Refine where radio heads stand and how the array is mounted and calibrated.
+    """Estimates radio-head positions, and mounting and calibration of the array, from drives.
 
     Parameters
     ----------
     site, vehicle
-        What is believed, or its name or path.
+        Nominal settings, or their names or paths.
     drives
-        Drives, or their folders as :func:`read_drive` takes them.
+        Drives, or their folders (see :func:`read_drive`).
     position_std_m
-        Standard deviation of a radio head's place in each of x and y where the site states none.
+        Prior standard deviation of a radio head's x and y, if the site has none.
     mounting_std_rad, phase_std_rad
-        Those of the array's direction and of its phase per element where the vehicle states none.
+        Prior standard deviations of mounting and phase per element, if the vehicle has none.
     threads
-        Worker threads; all cores if not given.
+        Number of worker threads. Default: all cores.
     progress
-        Called with the replays that are done and that there are at most.
+        Called with the number of completed replays and their maximum.
 
     Raises
     ------
     InputError
-        When no angle of the drives is to a radio head of the site.
+        No angle of a radio head of the site.
     SettingsError, RecordingError
         When a file is unusable.
     """
@@ -245,7 +245,7 @@ class _Model:
         self.steps = np.where(np.arange(len(keys)) < 2 * len(heads), STEP_M, STEP_RAD)
 
     def believed(self, values: Numbers, stds: Numbers) -> tuple[_core.Site, _core.Vehicle]:
-        """Site and vehicle with these parameters, known so well."""
+        """Returns site and vehicle with these parameters and standard deviations."""
         count = len(self.heads)
         places, place_stds = values[: 2 * count].reshape(-1, 2), stds[: 2 * count].reshape(-1, 2)
         changed: dict[str, Any] = {}
@@ -263,7 +263,7 @@ class _Model:
 
 
 class _Problem:
-    """The drives as functions of the parameters."""
+    """Innovations of the drives as functions of the parameters."""
 
     def __init__(
         self,
@@ -276,7 +276,7 @@ class _Problem:
         self.progress, self.done = progress, 0
 
     def meet(self, values: Numbers, stds: Numbers, used: list[Flags] | None) -> list[Met]:
-        """Innovations, their variances and whether they counted, drive by drive."""
+        """Returns innovations, variances and outlier flags of each drive."""
         site, vehicle = self.model.believed(values, stds)
 
         def drive(index: int) -> Met:
@@ -294,13 +294,13 @@ class _Problem:
         return found
 
     def misfit(self, values: Numbers, used: list[Flags]) -> float:
-        """Twice Λ(θ), but for a constant."""
+        """Returns 2 Λ(θ) up to a constant."""
         prior = float(np.sum(((values - self.model.before) / self.model.stds_before) ** 2))
         met = self.meet(values, np.zeros_like(values), used)
         return prior + sum(_normalised(*each) for each in met)
 
     def linearised(self, values: Numbers, used: list[Flags]) -> tuple[Numbers, Numbers]:
-        """Gradient and Gauss–Newton Hessian of Λ(θ), the information matrix."""
+        """Returns gradient and Gauss–Newton Hessian (information matrix) of Λ(θ)."""
         exact = np.zeros_like(values)
         met = self.meet(values, exact, used)
         slopes = []
@@ -326,7 +326,7 @@ def _identify(problem: _Problem) -> Survey:
     iterations, moved = 0, math.inf
     while iterations < MOST_ITERATIONS and moved > STILL:
         iterations += 1
-        # What does not fit even in view of what is not known does not count.
+        # Exclude outliers with respect to the present uncertainty.
         used = [each[2] for each in problem.meet(values, stds, None)]
         gradient, information = problem.linearised(values, used)
         covariance = np.linalg.inv(information)
@@ -340,7 +340,7 @@ def _identify(problem: _Problem) -> Survey:
     met = problem.meet(values, np.zeros_like(values), used)
     counted = sum(int(each[2].sum()) for each in met)
     learnt = stds < LEARNT * model.stds_before
-    # A place is one thing: both of its coordinates, or neither.
+    # Accept both coordinates of a position, or none.
     places = learnt[: 2 * len(model.heads)].reshape(-1, 2)
     places[:] = places.any(axis=1, keepdims=True)
     site, vehicle = model.believed(
