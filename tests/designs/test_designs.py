@@ -443,8 +443,8 @@ def test_a_design_is_judged_in_the_worst_of_its_worlds(
     kept = Constraints(max_error_m=0.3).kept(rows)
     assert kept["choice"].to_list() == ["interval_ms 2000"]
     page = render_designs(Scenario.load("paper"), found.driven, rows, of_worlds)
-    assert "Worst world" in page
-    assert "In each world" in page
+    assert "Worst environment" in page
+    assert "Each environment" in page
 
 
 def test_what_too_few_drives_say_is_not_called_kept() -> None:

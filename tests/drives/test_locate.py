@@ -420,7 +420,7 @@ def test_a_drive_is_located_by_variants_side_by_side(access_av: Cli, tmp_path: P
     assert worse["delta_m"] == pytest.approx(worse["percentile_m"] - first["percentile_m"])
     assert worse["delta_m"] > 0.0
     assert (same["delta_m"], same["delta_low_m"], same["delta_high_m"]) == (0.0, 0.0, 0.0)
-    assert "Side by side" in (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "Comparison of variants" in (tmp_path / "out" / "report.html").read_text("utf-8")
 
     refused = access_av(*command, "--vary", "odometer.scale=1.03")
     assert refused.code == 2

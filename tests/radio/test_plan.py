@@ -222,7 +222,7 @@ def test_cases_of_an_integrity_campaign_stand_side_by_side(
     assert compared["delta_m"].to_list()[1::2] == pytest.approx((other - as_it_is).to_list())
     page = (tmp_path / "out" / "report.html").read_text()
     assert f"array 1 degree off; {varied}; as set; 4 radio heads" in page
-    assert "Side by side" in page
+    assert "Comparison of variants" in page
 
 
 def test_hypotheses_are_of_three_sizes_and_can_be_driven(tmp_path: Path) -> None:

@@ -1,1 +1,1 @@
-"""Reports as HTML files that load nothing: pages of a drive, a located drive, a bound."""
+"""Reports as self-contained HTML files: simulated drive, located drive, bound, designs, study."""

@@ -1,4 +1,4 @@
-"""Charts as Vega-Lite: what all of them share."""
+"""Common functions of the Vega-Lite charts."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import polars as pl
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# Okabe and Ito's colours: told apart on light and dark, in print and by colour-blind readers.
+# Colours of Okabe and Ito: distinct on light and dark, in print and for colour-blind readers.
 BLUE, ORANGE, GREEN, GREY, PURPLE = "#2f7ed8", "#d55e00", "#009e73", "#8a8f98", "#b48ead"
 POINTS_PER_LINE = 160
-# Errors below a millimetre are drawn as one.
+# Minimum drawn error (m).
 LEAST_M = 1e-3
 # Size of a map on a wide screen.
 MAP_WIDTH_PX, LEAST_HEIGHT_PX = 1000.0, 220.0
@@ -25,7 +25,7 @@ Spec = dict[str, Any]
 
 
 def thinned(series: pl.DataFrame, points: int = POINTS_PER_LINE) -> pl.DataFrame:
-    """Enough points for a line on a screen, rounded to what can be seen."""
+    """Reduces a line to the points and digits that a screen can show."""
     step = max(1, series.height // points)
     return series.gather_every(step).with_columns(pl.col(pl.Float64).round(4))
 
@@ -33,16 +33,16 @@ def thinned(series: pl.DataFrame, points: int = POINTS_PER_LINE) -> pl.DataFrame
 def to_scale(
     x_m: tuple[float, float], y_m: tuple[float, float], tallest_px: float
 ) -> tuple[list[float], list[float], int]:
-    """Domains of a map's axes and its height, a metre being as long on both on a wide screen.
+    """Returns the domains of a map's axes and its height, with equal scales on a wide screen.
 
-    What does not fill its place is shown with more of its surroundings.
+    Remaining space shows more of the surroundings.
 
     Parameters
     ----------
     x_m, y_m
-        From where to where is to be shown at least.
+        Minimum range of each axis.
     tallest_px
-        Greatest height of the map.
+        Maximum height of the map.
 
     Examples
     --------
@@ -69,18 +69,18 @@ def with_labels(
     upward: pl.Expr,
     shown: Sequence[tuple[float, float]] = (),
 ) -> pl.DataFrame:
-    """Points with a column ``label``: the name, or all names at the first of those too close.
+    """Adds a column ``label``: the name, or all names at the first of several close points.
 
     Parameters
     ----------
     points
-        What is drawn.
+        Points of the chart.
     name
         Column of the names.
     across, upward
-        Where a point is drawn, in the units of the axes' scales (a logarithm where they are such).
+        Coordinates of a point in the units of the axes (logarithms on logarithmic axes).
     shown
-        Places besides the points that the axes reach to.
+        Further positions that the axes include.
 
     Examples
     --------
@@ -103,13 +103,13 @@ def with_labels(
 
 
 def time_axis(column: str = "time_s") -> alt.X:
-    """Time from the first of the data to the last: a recording's clock may count from 1970."""
+    """Returns a time axis from the first to the last time, because clocks may count from 1970."""
     return alt.X(f"{column}:Q", title="time / s", scale=alt.Scale(zero=False, nice=False))
 
 
 def finish(chart: alt.Chart | alt.LayerChart, *, height: int, description: str) -> Spec:
-    """The chart as Vega-Lite, as wide as its place."""
-    # A fine map has more points than Altair takes by default.
+    """Returns the chart as Vega-Lite, with the width of its container."""
+    # A fine map has more points than the default limit of Altair.
     with alt.data_transformers.disable_max_rows():
         spec: Spec = chart.properties(width="container", height=height).to_dict()
     spec["description"] = description

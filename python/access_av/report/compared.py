@@ -1,4 +1,4 @@
-"""Variants side by side, as a table of a page."""
+"""Comparison of variants as a table of a report."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def compared_section(found: Sequence[Compared]) -> str:
-    """A section of the page; nothing without variants."""
+    """Returns a section of the report; empty without variants."""
     if not found:
         return ""
     percents = found[0].percents
@@ -30,12 +30,12 @@ def compared_section(found: Sequence[Compared]) -> str:
         for it in found
     ]
     head = (
-        "Variant", *(f"{percent:g} % within" for percent in percents),
-        f"{percents[-1]:g} %, against the first", "Reliability", "Energy of a trip",
+        "Variant", *(f"Percentile {percent:g}" for percent in percents),
+        f"Percentile {percents[-1]:g}, difference to the first", "Reliability", "Energy of a trip",
     )  # fmt: skip
     return section(
-        "Side by side",
-        f"{found[0].driven.runs} {found[0].driven.rows} of each, in the same worlds; differences "
-        "are of pairs of them, with 95 % intervals.",
+        "Comparison of variants",
+        f"Horizontal error, {found[0].driven.runs} {found[0].driven.rows} each, in equal "
+        "environments. Differences are paired, with 95 % intervals.",
         table(head, rows, numbers=range(1, len(percents) + 1)),
     )

@@ -1,4 +1,4 @@
-"""The page of ``access-av designs``: a table, energy against error, error over time."""
+"""Report of ``access-av designs``: table, energy against error, error over time."""
 
 from __future__ import annotations
 
@@ -23,36 +23,36 @@ if TYPE_CHECKING:
     from access_av.designs.driven import Driven
     from access_av.report.chart import Spec
 
-# Designs that are drawn, those of them over time, and those in the table: the front first, then by
-# energy.
+# Maximum number of designs in the chart, in the chart over time, and in the table, ordered by front
+# and energy.
 MOST_DESIGNS, MOST_TRACKS, POINTS_PER_TRACK, MOST_ROWS = 4000, 40, 60, 100
-# More numbers beside their points could not be read.
+# Maximum number of labelled points.
 MOST_NAMES = 30
 
 COMPARED = (
-    "All designs drove the same runs. The Pareto front are those than which no other takes less "
-    "energy and has a smaller RMS error, as far as 95 % confidence tells. "
+    "All designs use equal runs. The Pareto front contains the designs for which no other design "
+    "has less energy and a smaller RMS error, with 95 % confidence. "
 )
 IN_WORST = (
-    "Each design was driven in {count} worlds ({names}), which nobody can choose: it stands here "
-    "as it is in the worst of them. "
+    "Each design was simulated in {count} environments ({names}). The table shows its worst "
+    "environment. "
 )
 
 
 def render_designs(
     scenario: Scenario, driven: Sequence[Driven], rows: pl.DataFrame, of_worlds: pl.DataFrame
 ) -> str:
-    """The designs of a scenario as an HTML page that loads nothing.
+    """Returns the designs of a scenario as a self-contained HTML page.
 
     Parameters
     ----------
     scenario
-        What was driven.
+        Simulated scenario.
     driven
-        The designs.
+        Designs.
     rows, of_worlds
-        What :func:`~access_av.designs.table.rows_of` and
-        :func:`~access_av.designs.table.rows_of_worlds` make of them.
+        Results of :func:`~access_av.designs.table.rows_of` and
+        :func:`~access_av.designs.table.rows_of_worlds`.
     """
     ordered = rows.sort("on_front", "energy_j", descending=[True, False], nulls_last=True)
     known = ordered.drop_nulls(["energy_j", "rms_error_m"])
@@ -68,23 +68,23 @@ def render_designs(
     else:
         specs["designs"] = _energy_against_error(known.head(MOST_DESIGNS))
         told = (
-            "Within which error 99 % of all positions are. Orange: on the Pareto front, with the "
-            "95 % interval by the bootstrap over whole drives. The numbers are those of the table."
+            "99th percentile of the horizontal error. Orange: Pareto front, with the 95 % interval "
+            "of the bootstrap over whole runs. The numbers are those of the table."
         )
         sections.append(section("Energy against error", told, figure("designs")))
         specs["tracks"] = _over_time(driven, known)
-        told = "RMS error of one design over its runs; choose which below."
+        told = "RMS error of one design over its runs. Select the design below the chart."
         sections.append(section("Over the drive", told, figure("tracks")))
     if not of_worlds.is_empty():
-        sections.append(section("In each world", "", _table(of_worlds)))
-    written = source("Scenario, all defaults written out", scenario.to_toml())
+        sections.append(section("Each environment", "", _table(of_worlds)))
+    written = source("Scenario with all default values", scenario.to_toml())
     sections.append(section("Provenance", "", written))
     front = int(rows["on_front"].sum())
     return sheet(
         specs,
         title=f"ACCESS-AV designs: {escape(scenario.name)}",
         kicker="ACCESS-AV designs",
-        headline=f"{front} of {rows.height} designs may be on the Pareto front of energy and error",
+        headline=f"{front} of {rows.height} designs on the Pareto front of energy and error",
         lead=escape(scenario.description),
         tiles=_tiles(rows, runs),
         meta=escape(f"Scenario “{scenario.name}”, version {version('access-av')}."),
@@ -93,28 +93,32 @@ def render_designs(
 
 
 def _tiles(rows: pl.DataFrame, runs: int) -> str:
-    tiles = [tile(str(rows.height), f"designs, {runs} drives of each")]
+    tiles = [tile(str(rows.height), f"designs, {runs} runs each")]
     if (energy_j := rows["energy_j"].min()) is not None:
-        tiles.append(tile(f"{value_text(energy_j)} J", "least energy of a trip"))
+        tiles.append(tile(f"{value_text(energy_j)} J", "minimum energy of a trip"))
     if (error_m := rows["p99_error_m"].min()) is not None:
-        tiles.append(tile(f"{value_text(error_m)} m", "least error that 99 % are within"))
+        tiles.append(tile(f"{value_text(error_m)} m", "minimum 99th percentile of the error"))
     return "".join(tiles)
 
 
 def _table(rows: pl.DataFrame) -> str:
-    """Designs side by side; the first :data:`MOST_ROWS` of them."""
+    """Returns the table of the first :data:`MOST_ROWS` designs."""
     worlds = (rows["world"] != "").any()
     judged = "on_front" in rows.columns
-    head = ["No.", "Design", *(["World" if not judged else "Worst world"] if worlds else [])]
+    head = [
+        "No.",
+        "Design",
+        *(["Environment" if not judged else "Worst environment"] if worlds else []),
+    ]
     numbers = range(len(head), len(head) + 7)
-    head += ["Energy / J", "Median / m", "90 % / m", "99 % / m", "95 % interval of that"]
+    head += ["Energy / J", "Median / m", "p90 / m", "p99 / m", "95 % interval of p99"]
     head += ["RMS / m", "Estimates", *(["Pareto front"] if judged else [])]
     cells = []
     for row in rows.head(MOST_ROWS).iter_rows(named=True):
         cells.append(
             [
                 str(row["design"]),
-                escape(row["choice"] or "as it is"),
+                escape(row["choice"] or "baseline"),
                 *([escape(row["world"])] if worlds else []),
                 number(row["energy_j"], 2),
                 *(number(row[f"p{percent}_error_m"]) for percent in (50, 90, 99)),
@@ -125,19 +129,19 @@ def _table(rows: pl.DataFrame) -> str:
             ]
         )
     more = rows.height - MOST_ROWS
-    below = f'<p class="note">{more} more are in the Parquet file beside this page.</p>'
+    below = f'<p class="note">{more} more designs are in the Parquet file of this report.</p>'
     return table(head, cells, numbers=numbers) + (below if more > 0 else "")
 
 
 def _energy_against_error(drawn: pl.DataFrame) -> Spec:
-    """Energy against the 99th percentile of the error, with the numbers of the front's designs."""
+    """Returns the chart of energy against the 99th percentile of the error."""
     columns = ("design", "choice", "energy_j", "p99_error_m", "rms_error_m", "executions")
     ends = ("p99_error_low_m", "p99_error_high_m")
     points = drawn.select(
         *columns,
         *ends,
         "on_front",
-        # Without a percentile there is no place for it.
+        # Skip designs without a percentile.
     ).drop_nulls("p99_error_m")
     front = points.filter("on_front")
     x = alt.X("energy_j:Q", title="energy of a trip / J", scale=alt.Scale(type="log"))
@@ -145,17 +149,19 @@ def _energy_against_error(drawn: pl.DataFrame) -> Spec:
         alt.Tooltip("design:Q", title="No."),
         alt.Tooltip("choice:N", title="design"),
         alt.Tooltip("energy_j:Q", title="energy / J", format=".3g"),
-        alt.Tooltip("p99_error_m:Q", title="99 % within / m", format=".3g"),
+        alt.Tooltip("p99_error_m:Q", title="99th percentile / m", format=".3g"),
         alt.Tooltip("rms_error_m:Q", title="RMS / m", format=".3g"),
         alt.Tooltip("executions:Q", title="estimates", format=".0f"),
     ]
 
     def layer(rows: pl.DataFrame, colour: str, opacity: float) -> Any:
-        y = alt.Y("p99_error_m:Q", title="99 % of errors within / m", scale=alt.Scale(zero=False))
+        y = alt.Y(
+            "p99_error_m:Q", title="99th percentile of the error / m", scale=alt.Scale(zero=False)
+        )
         marks = alt.Chart(rows).mark_circle(size=70, color=colour, opacity=opacity)
         return marks.encode(x=x, y=y, tooltip=tooltip)
 
-    # Of a layer without rows Vega warns in the console.
+    # Omit an empty layer, which causes a warning of Vega in the console.
     others, known = points.filter(~pl.col("on_front")), front.drop_nulls(list(ends))
     layers = [] if others.is_empty() else [layer(others, GREY, 0.5)]
     if not known.is_empty():
@@ -174,7 +180,7 @@ def _energy_against_error(drawn: pl.DataFrame) -> Spec:
 
 
 def _over_time(driven: Sequence[Driven], known: pl.DataFrame) -> Spec:
-    """RMS error over the drive, of the design that is chosen."""
+    """Returns the chart of the selected design's RMS error over the drive."""
     nearest = known.head(MOST_TRACKS)
     names = [
         f"{design}: {choice or 'as it is'}"

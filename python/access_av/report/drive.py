@@ -1,4 +1,4 @@
-"""The page of ``access-av run``: error and executions against time, integrity."""
+"""Report of ``access-av run``: error and executions against time, integrity."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ if TYPE_CHECKING:
     from access_av.statistics.integrity import Integrity
 
 
-# Of those that are known, the percentiles that head the page.
+# Percentiles at the top of the report.
 SHOWN_PERCENTS = (50.0, 90.0, 99.0)
 
 
 def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str = "") -> str:
-    """The drives of one scenario as an HTML page that loads nothing.
+    """Returns the runs of one scenario as a self-contained HTML page.
 
     Parameters
     ----------
     scenario
-        The scenario that was driven.
+        Simulated scenario.
     result
-        What :func:`access_av.simulate` returned, trajectories kept.
+        Result of :func:`access_av.simulate` with ``keep_trajectories=True``.
     seed
-        Its seed.
+        Seed of the simulation.
     beside
-        A section on other variants, as HTML.
+        HTML section with the comparison of variants.
     """
     if result.trajectories is None or result.executions is None:
-        raise InputError("the page of a drive needs its trajectories: keep_trajectories=True")
+        raise InputError("the report needs trajectories: set keep_trajectories=True")
     operation = result.operation
     runs, duration_s = result.runs.height, float(result.steps["time_s"][-1])
     specs: dict[str, Spec] = {
@@ -50,14 +50,14 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str 
     }
     sections = [
         section(
-            "In operation",
+            "Operation",
             "" if operation is None else f"{operation.in_words()} {operation.what_helps()}".strip(),
             _errors(result),
         ),
-        section("On the map", f"The first drive. {PLAYED}", figure("map")),
+        section("Map", f"The first run. {PLAYED}", figure("map")),
         section(
             "Error over the drive",
-            "Distance between estimate and truth at each SSB, over the runs.",
+            "Horizontal distance of estimate and truth at each SSB, quantiles over the runs.",
             figure("error"),
         ),
     ]
@@ -83,8 +83,8 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str 
             section(
                 "Service levels",
                 "Horizontal accuracy and availability of TS 22.261, 7.3.2.2, and the industrial "
-                "target of TR 38.857, over all runs. Reached is what the low end of the 95 % "
-                "interval reaches.",
+                "target of TR 38.857, over all runs. A level is reached if the lower end of the "
+                "95 % interval reaches it.",
                 service_levels(levels),
             )
         )
@@ -92,12 +92,12 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str 
     sections.append(
         section(
             "Provenance",
-            "Simulated by this version from the scenario below and the seed above.",
-            source("Scenario, all defaults written out", scenario.to_toml()),
+            "Simulated by this version with the scenario below and the seed above.",
+            source("Scenario with all default values", scenario.to_toml()),
         )
     )
     tiles = [
-        tile(f"{each.value:.3f} m", f"{each.percent:g} % of errors are within")
+        tile(f"{each.value:.3f} m", f"{each.percent:g}th percentile of the horizontal error")
         for each in result.percentiles or ()
         if each.percent in SHOWN_PERCENTS
     ]
@@ -105,16 +105,16 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str 
         energy_j = value_text(result.runs["energy_j"].mean())
         tiles.append(tile(f"{energy_j} J", f"energy of a run: {boundary}"))
     estimates = result.runs["executions"].sum() / runs
-    tiles.append(tile(f"{estimates:,.0f}", "angles estimated in a run"))
+    tiles.append(tile(f"{estimates:,.0f}", "angles estimated per run"))
     if operation is not None and integrity is not None:
-        tiles.append(tile(f"{operation.reliable:.1%}", "of the time the position may be relied on"))
-        beyond = f"of {operation.epochs:,} errors beyond the protection level meanwhile"
+        tiles.append(tile(f"{operation.reliable:.1%}", "availability (state ok)"))
+        beyond = f"of {operation.epochs:,} errors above the protection level in state ok"
         tiles.append(tile(f"{integrity.exceedances:,}", beyond))
     return sheet(
         specs,
         title=f"ACCESS-AV drive: {escape(scenario.name)}",
         kicker="ACCESS-AV drive",
-        headline=f"{result.error_quantiles_m[0.9]:.2f} m or less for nine tenths of the time",
+        headline=f"90 % of the errors are below {result.error_quantiles_m[0.9]:.2f} m",
         lead=escape(f"{scenario.description} {in_words(flattering(scenario))}".strip()),
         tiles="".join(tiles),
         meta=escape(
@@ -126,10 +126,10 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str 
 
 
 def _errors(result: Simulation) -> str:
-    """Percentiles of the error, their intervals, and the means."""
+    """Returns the table of error percentiles, their intervals, and the means."""
     rows = [
         (
-            f"{each.percent:g} % of all positions within",
+            f"{each.percent:g}th percentile",
             f"{each.value:.3f} m",
             each.interval if each.low is None else f"{each.interval} m",
         )
@@ -138,16 +138,16 @@ def _errors(result: Simulation) -> str:
     if result.mean_error_m is not None:
         rows.append(("mean", f"{result.mean_error_m:.3f} m", "–"))
     rows.append(("root mean square", f"{result.rms_error_m:.3f} m", "–"))
-    return table(("Horizontal error", "", "95 % interval"), rows, numbers=(1, 2))
+    return table(("Horizontal error", "value", "95 % interval"), rows, numbers=(1, 2))
 
 
 def _integrity_text(integrity: Integrity, alert_limit_m: float) -> str:
     shares = ", ".join(f"{state} {share:.2%}" for state, share in integrity.state_shares.items())
     return (
-        "The protection level is what the vehicle says its error is within, but for the risk that "
-        "it is allowed; above the alert limit the position is of no use. The Stanford diagram "
-        "counts how often an error met with a level. Right of the diagonal the level did not hold; "
-        f"the dashed lines are the alert limit, {alert_limit_m:g} m. {integrity.epochs:,} "
-        f"positions: {shares}. The level is {integrity.median_level_over_error:.1f} times the "
-        "error in the median."
+        "The protection level is the vehicle's bound of its error for the target integrity risk. "
+        "A position with a level above the alert limit is not available. The Stanford diagram "
+        "counts pairs of error and level. Right of the diagonal, the error exceeds the level. "
+        f"Dashed lines: alert limit, {alert_limit_m:g} m. {integrity.epochs:,} "
+        f"positions: {shares}. Median ratio of level and error: "
+        f"{integrity.median_level_over_error:.1f}."
     )

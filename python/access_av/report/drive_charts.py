@@ -1,4 +1,4 @@
-"""Charts of one scenario's drives and of its bound."""
+"""Charts of a scenario's runs and of its error bound."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from access_av.run.error_bound import ErrorBound
     from access_av.run.simulation import Simulation
 
-# Bins of the Stanford diagram per factor of ten: 12 % wide.
+# Bins of the Stanford diagram per decade: 12 % wide.
 BINS_PER_DECADE = 20
 TALLEST_MAP_PX = 900.0
 ROAD_STEP_M = 2.0
@@ -28,7 +28,7 @@ MARGIN_M = 25.0
 
 
 def error_against_time(steps: pl.DataFrame) -> Spec:
-    """Quantiles of the horizontal error over the runs, against time."""
+    """Returns the chart of error quantiles over the runs against time."""
     names = {"p50_error_m": "median", "p90_error_m": "90th percentile", "rms_error_m": "RMS"}
     chart = _lines(
         steps,
@@ -41,7 +41,7 @@ def error_against_time(steps: pl.DataFrame) -> Spec:
 
 
 def executions_against_time(executions: pl.DataFrame, runs: int, duration_s: float) -> Spec:
-    """Angle estimates per second, mean over the runs, one bar a time, stacked by radio head."""
+    """Returns the chart of angle estimates per second (mean over the runs), by radio head."""
     bar_s = max(1.0, math.ceil(duration_s / 80.0))
     rates = (
         executions.group_by(
@@ -76,7 +76,7 @@ def executions_against_time(executions: pl.DataFrame, runs: int, duration_s: flo
 
 
 def stanford(trajectories: pl.DataFrame, alert_limit_m: float) -> Spec:
-    """Error against protection level, counted; beyond the diagonal the level did not hold."""
+    """Returns the Stanford diagram: counts of error and protection level."""
     bins = (
         trajectories.filter(pl.col("protection_level_m").is_not_null())
         .select(error=_bin(horizontal_error_m()), level=_bin(pl.col("protection_level_m")))
@@ -136,7 +136,7 @@ def _bin(length_m: pl.Expr) -> pl.Expr:
 
 
 def bound_along_route(route: pl.DataFrame) -> Spec:
-    """The bound against the distance driven, and its parts along and across the road."""
+    """Returns the chart of the bound along the road, with its components."""
     names = {"bound_m": "horizontal", "along_std_m": "along the road", "across_std_m": "across it"}
     chart = _lines(
         route,
@@ -145,11 +145,11 @@ def bound_along_route(route: pl.DataFrame) -> Spec:
         x=("along_m", "along the road / m"),
         y=("bound_m", "least RMS error / m"),
     )
-    return finish(chart, height=260, description="Least RMS error of any localizer on the route")
+    return finish(chart, height=260, description="Lower bound of the RMS error along the route")
 
 
 def bound_over_site(bound: ErrorBound) -> Spec:
-    """The bound over the site, with road and radio heads."""
+    """Returns the map of the bound, with road and radio heads."""
     step_m = bound.map_step_m
     squares = bound.site.drop_nulls("bound_m").select(
         left_m=(pl.col("x_m") - 0.5 * step_m).round(2),
@@ -190,12 +190,12 @@ def bound_over_site(bound: ErrorBound) -> Spec:
     return finish(
         alt.LayerChart(layer=layers),
         height=frame.height_px,
-        description="Map of the least RMS error over the site, with the road and the radio heads",
+        description="Map of the lower bound of the RMS error, with road and radio heads",
     )
 
 
 def drive_on_map(scenario: Scenario, result: Simulation) -> Spec:
-    """Where the first drive went, and that drive played along time."""
+    """Returns the animated map of the first run."""
     site = scenario.site
     heads, steps = heads_of(site), steps_of(result)
     way = thinned(steps.select("time_s", "x_m", "y_m"), POINTS_PER_WAY)
@@ -210,7 +210,7 @@ def drive_on_map(scenario: Scenario, result: Simulation) -> Spec:
 
 
 def _road(route: pl.DataFrame) -> pl.DataFrame:
-    """The road's course, a point every ``ROAD_STEP_M``: bends have to look like bends."""
+    """Returns points of the road at intervals of ``ROAD_STEP_M``, which show its bends."""
     moved = (pl.col("along_m") / ROAD_STEP_M).floor()
     return route.filter(moved.diff().fill_null(1.0) > 0.0).select(
         pl.col("x_m", "y_m", "along_m").round(2)
@@ -225,7 +225,7 @@ def _lines(
     x: tuple[str, str],
     y: tuple[str, str],
 ) -> alt.Chart:
-    """A line for each column of ``names``; ``x`` and ``y`` are columns and their titles."""
+    """Returns one line per column of ``names``; ``x`` and ``y`` are columns with titles."""
     (across, x_title), (upward, y_title) = x, y
     rows = (
         thinned(table.select(across, *names))

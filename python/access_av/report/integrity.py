@@ -1,4 +1,4 @@
-"""The page of ``access-av integrity``: a table, and a Stanford diagram of each case."""
+"""Report of ``access-av integrity``: table, and Stanford diagram of each case."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from access_av.run.integrity_campaign import Case
 
 HEAD = (
-    "World", "Channel", "Radio heads", "Available", "Beyond while ok", "95 %, up to",
-    "Runs with it", "Time to alert / s", "Level / error", "90 % of errors / m",
-    "Risk per hour: asked", "Obtained", "95 %, up to",
+    "Truth", "Channel", "Radio heads", "Availability", "Error above level in ok", "95 %, up to",
+    "Runs with error above level", "Time to alert / s", "Level / error", "Error, p90 / m",
+    "Target risk per hour", "Risk per hour", "95 %, up to",
 )  # fmt: skip
 
 
 def _world(case: dict[str, Any]) -> str:
-    """How the world of a case departs from what is believed, and by which variant."""
-    world = "all as stated" if case["mismatch"] == "none" else str(case["mismatch"])
+    """Returns the difference of truth and nominal model of a case, and its variant."""
+    world = "nominal" if case["mismatch"] == "none" else str(case["mismatch"])
     return world if case["variant"] == AS_IT_IS else f"{world}; {case['variant']}"
 
 
@@ -37,7 +37,7 @@ def render_integrity(
     seed: int,
     beside: str = "",
 ) -> str:
-    """The campaign, its rows in the table, and a section on variants, as a page by itself."""
+    """Returns the campaign as a self-contained HTML page."""
     rows = [
         (
             escape(_world(one)),
@@ -70,14 +70,14 @@ def render_integrity(
         specs,
         title=f"ACCESS-AV integrity: {escape(first.name)}",
         kicker="ACCESS-AV integrity",
-        headline="What the protection level is worth where the world is otherwise",
+        headline="Protection level under faults and wrong settings",
         lead=escape(first.description),
         tiles=tile(
             f"{worst['exceedance_share']:.1e}",
-            f"of the errors beyond the protection level while ok, worst case: {_world(worst)}",
+            f"of the errors in state ok above the protection level, worst case: {_world(worst)}",
         )
-        + tile(f"{least['availability']:.1%}", f"of the time ok, worst case: {_world(least)}"),
-        meta=escape(f"{runs} drives of each case, seed {seed}, version {version('access-av')}."),
+        + tile(f"{least['availability']:.1%}", f"availability, worst case: {_world(least)}"),
+        meta=escape(f"{runs} runs of each case, seed {seed}, version {version('access-av')}."),
         sections=warnings(first.warnings())
         + f"<section><h2>Cases</h2>{table(HEAD, rows, numbers=range(2, 13))}</section>"
         + beside

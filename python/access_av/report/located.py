@@ -1,4 +1,4 @@
-"""The page of ``access-av locate``: where the vehicle was, and how well that is known."""
+"""Report of ``access-av locate``: track, error, innovations, estimated parameters."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from access_av.report.chart import Spec
 
 MOST_REMARKS = 50
-UNRELIABLE = "Not to be relied on"
-TRACK_TEXT = "Where the vehicle was, in the map's frame; drawn to scale on a wide screen. " + PLAYED
+UNRELIABLE = "Not reliable"
+TRACK_TEXT = "Track of the vehicle in the map frame, to scale on a wide screen. " + PLAYED
 
 
 def render_located(
@@ -34,27 +34,27 @@ def render_located(
     truth: pl.DataFrame | None = None,
     beside: str = "",
 ) -> str:
-    """A located drive as an HTML page that loads nothing.
+    """Returns a located drive as a self-contained HTML page.
 
     Parameters
     ----------
     drive
-        What :func:`access_av.locate` returned.
+        Result of :func:`access_av.locate`.
     site, vehicle
-        What was believed of both.
+        Nominal settings.
     numbers
-        What :func:`access_av.drives.summary` returned.
+        Result of :func:`access_av.drives.summary`.
     truth
-        What :func:`access_av.drives.read_tum` returned, where the truth is known.
+        Result of :func:`access_av.drives.read_tum`, if the truth is known.
     beside
-        A section on other variants, as HTML.
+        HTML section with the comparison of variants.
     """
     specs: dict[str, Spec] = {}
     sections = []
     operation = Operation.under(vehicle, drive.poses)
     if operation is not None:
         told = f"{operation.in_words()} {operation.what_helps()}".strip()
-        sections.append(section("In operation", told, ""))
+        sections.append(section("Operation", told, ""))
     if drive.remarks:
         sections.append(section("Remarks", "", _list(drive.remarks)))
     known = drive.poses.filter(~pl.col("searching"))
@@ -70,8 +70,8 @@ def render_located(
     if not drive.findings.is_empty():
         sections.append(
             section(
-                "Found on the way",
-                "Constants of the vehicle, by the end of the drive, beside what its file states.",
+                "Estimated vehicle parameters",
+                "Estimates at the end of the drive, and the nominal values of the vehicle file.",
                 _findings(drive.findings),
             )
         )
@@ -83,14 +83,14 @@ def render_located(
         sections.append(
             section(
                 "Angles",
-                "How far each angle was from what was expected of it, in standard deviations of "
-                "the difference; nine in ten are below the dashed line where all is as stated.",
+                "Innovation of each angle divided by its standard deviation. With a correct model, "
+                "90 % are below the dashed line.",
                 places + _by_head(drive.angles),
             )
         )
     sections.append(beside)
-    believed = source("Site, all defaults written out", site.to_toml())
-    believed += source("Vehicle, all defaults written out", vehicle.to_toml())
+    believed = source("Site with all default values", site.to_toml())
+    believed += source("Vehicle with all default values", vehicle.to_toml())
     sections.append(section("Provenance", "", believed))
     return sheet(
         specs,
@@ -108,7 +108,7 @@ def _headline(drive: Drive, numbers: dict[str, float]) -> str:
     if not drive.is_reliable:
         return UNRELIABLE
     if "p90_error_m" in numbers:
-        return f"{numbers['p90_error_m']:.2f} m or less in nine of ten epochs"
+        return f"90 % of the errors are below {numbers['p90_error_m']:.2f} m"
     return f"{numbers['angles']:,.0f} angles in {numbers['duration_s']:.0f} s"
 
 
@@ -117,22 +117,22 @@ def _tiles(drive: Drive, numbers: dict[str, float]) -> str:
     tiles = {
         "duration": f"{numbers['duration_s']:.1f} s",
         "angles": f"{numbers['angles']:,.0f}",
-        "of them accepted": f"{share:.1%}",
+        "accepted angles": f"{share:.1%}",
     }
     if drive.lost_share:
-        tiles["of the time lost"] = f"{drive.lost_share:.1%}"
+        tiles["share of time lost"] = f"{drive.lost_share:.1%}"
     for name, text in {
         "rms_error_m": "RMS of the horizontal error",
-        "p90_error_m": "its 90th percentile",
-        "smoothed_rms_error_m": "RMS, smoothed",
+        "p90_error_m": "90th percentile of the horizontal error",
+        "smoothed_rms_error_m": "RMS of the smoothed error",
     }.items():
         if name in numbers:
             tiles[text] = f"{numbers[name]:.3f} m"
     if "nees_per_axis" in numbers:
-        tiles["NEES per axis (1: errors as large as stated)"] = f"{numbers['nees_per_axis']:.2f}"
+        tiles["NEES per axis (expected: 1)"] = f"{numbers['nees_per_axis']:.2f}"
     if "beyond_while_ok" in numbers and drive.poses["integrity"].null_count() == 0:
-        tiles["of the time ok: the position may be relied on"] = f"{numbers['ok_share']:.1%}"
-        tiles["of the time ok, but beyond the protection level"] = (
+        tiles["availability (state ok)"] = f"{numbers['ok_share']:.1%}"
+        tiles["of the time ok with an error above the protection level"] = (
             f"{numbers['beyond_while_ok']:.2%}"
         )
     return "".join(tile(value, text) for text, value in tiles.items())
@@ -165,16 +165,18 @@ def _errors(
 
 
 def _error_text(drive: Drive, numbers: dict[str, float]) -> str:
-    text = "Standard deviation of the position by the localizer's own covariance"
+    text = "Standard deviation of the position by the localizer's covariance"
     if "rms_error_m" in numbers:
         text += ", and the error against the truth"
     if drive.poses["integrity"].null_count() < drive.poses.height:
-        text += "; the protection level is what the error is promised to stay below while ok"
+        text += (
+            "; in state ok the error is below the protection level with the target integrity risk"
+        )
     return text + "."
 
 
 def _steps(drive: Drive, truth: pl.DataFrame | None) -> pl.DataFrame:
-    """The drive as it is played: where it was located, and how far off where that is known."""
+    """Returns the located poses for the animation, with errors if the truth is known."""
     poses = drive.poses.select(
         "time_s", "x_m", "y_m", "searching", "integrity", "protection_level_m"
     )

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 TALLEST_MAP_PX = 700.0
 POINTS_PER_TRACK = 1500
-# Ninety in a hundred of what is normally distributed are nearer than so many deviations.
+# 90 % quantile of the absolute value of a standard normal variable.
 P90_SIGMAS = 1.645
 
 TRACKS = {"truth": GREY, "as driven": BLUE, "smoothed": GREEN}
@@ -41,18 +41,18 @@ ERRORS = {
 
 
 def track(drive: Drive, lines: dict[str, pl.DataFrame], site: Site, steps: pl.DataFrame) -> Spec:
-    """Where the vehicle was, in the map's frame, and that played along time.
+    """Returns the animated map of the vehicle's track.
 
     Parameters
     ----------
     drive
-        The located drive.
+        Located drive.
     lines
         Poses by their name in ``TRACKS``.
     site
-        What is believed of the site.
+        Nominal site.
     steps
-        The drive, as :func:`access_av.report.played.played` takes it.
+        Steps of the drive for :func:`access_av.report.played.played`.
     """
     heads = heads_of(site)
     table = pl.concat(
@@ -80,7 +80,7 @@ def track(drive: Drive, lines: dict[str, pl.DataFrame], site: Site, steps: pl.Da
 
 
 def error(lines: dict[str, pl.DataFrame]) -> Spec:
-    """What is known of the error against time: the error, its deviation, its protection level.
+    """Returns the chart of error, standard deviation and protection level against time.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def error(lines: dict[str, pl.DataFrame]) -> Spec:
 
 
 def angles(compared: pl.DataFrame) -> Spec:
-    """Normalised innovation of each angle against time: how many deviations from the expected."""
+    """Returns the chart of the normalised innovation of each angle against time."""
     dots = (
         alt.Chart(thinned(compared.select("time_s", "deviations", "verdict"), 2000))
         .mark_circle(size=16, opacity=0.6)
@@ -129,7 +129,7 @@ def angles(compared: pl.DataFrame) -> Spec:
 
 
 def heads(compared: pl.DataFrame) -> Spec:
-    """90th percentile of the normalised innovations of each radio head, and the normal one."""
+    """Returns the chart of each radio head's 90th percentile of the normalised innovations."""
     order = compared.sort("pci", "ssb_index")["head"].unique(maintain_order=True).to_list()
     percentiles = compared.group_by("head").agg(
         pl.col("deviations").quantile(0.9, "linear").round(3), angles=pl.len()

@@ -1,4 +1,4 @@
-"""A page that loads nothing: style, charts and the code that draws them are inside."""
+"""Self-contained HTML page with style, charts and their code."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ if TYPE_CHECKING:
 
 
 def sheet(specs: Mapping[str, Spec], **fields: object) -> str:
-    """A page of sections under a headline; the fields are those of ``sheet.html``."""
+    """Returns a page of sections; the fields are those of ``sheet.html``."""
     return fill(_read("sheet.html"), specs, **fields)
 
 
 def fill(template: str, specs: Mapping[str, Spec], **fields: object) -> str:
-    """A template with its fields, its charts, style and code filled in.
+    """Fills fields, charts, style and code into a template.
 
     Parameters
     ----------
     template
-        The template's text.
+        Text of the template.
     specs
-        Charts by the ``id`` of their place.
+        Charts by the ``id`` of their element.
     fields
-        What goes into the template's other fields, as HTML.
+        HTML of the other fields.
     """
     return Template(template).substitute(
         fields,
@@ -45,7 +45,7 @@ def fill(template: str, specs: Mapping[str, Spec], **fields: object) -> str:
 
 
 def bundle() -> str:
-    """The code that draws charts; made once in a process, which takes a second or two."""
+    """Returns the code that draws charts; built once per process in one or two seconds."""
     return vl_convert.javascript_bundle()  # type: ignore[call-arg]  # its stub errs
 
 

@@ -1,4 +1,4 @@
-"""Fragments of the report's HTML."""
+"""HTML fragments of the reports."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ if TYPE_CHECKING:
     from access_av.run.service_levels import Verdict
 
 
-# Kind of badge by how a service level was judged.
+# Kind of badge for each result of a service level.
 OUTCOMES = {"reached": "yes", "too few drives": "fit", "not reached": "no"}
 
 
 def badge(text: str, kind: str) -> str:
-    """A small label: ``kind`` is ``yes``, ``no``, ``fit``, ``arithmetic`` or ``construction``."""
+    """Returns a badge; ``kind`` is ``yes``, ``no``, ``fit``, ``arithmetic`` or ``construction``."""
     return f'<span class="badge {kind}">{escape(text)}</span>'
 
 
 def tile(value: str, text: str) -> str:
-    """One number of the summary."""
+    """Returns a tile with one number of the summary."""
     return f'<div class="tile"><b>{escape(value)}</b><span>{escape(text)}</span></div>'
 
 
 def figure(chart_id: str, caption: str = "", title: str = "") -> str:
-    """A place for a chart."""
+    """Returns the element of a chart."""
     heading = f"<h3>{escape(title)}</h3>" if title else ""
     below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
     return f'<figure>{heading}<div class="chart" id="{chart_id}"></div>{below}</figure>'
@@ -39,10 +39,10 @@ def table(
     numbers: Sequence[int] = (),
     kind: str = "cards",
 ) -> str:
-    """A table; ``numbers`` are the columns set to the right. Cells are HTML already.
+    """Returns a table; ``numbers`` are the right-aligned columns. Cells contain HTML.
 
-    On a narrow screen each row of ``cards`` becomes a card whose lines are named after the head; a
-    ``matrix`` keeps its columns, and leaves out of its cells what is small or in a ``span``.
+    On a narrow screen, each row of ``cards`` becomes a card with the column names; a ``matrix``
+    keeps its columns, and hides the ``small`` and ``span`` elements of its cells.
     """
 
     def cell(tag: str, column: int, content: str) -> str:
@@ -64,7 +64,7 @@ def table(
 
 
 def service_levels(verdicts: Iterable[Verdict]) -> str:
-    """A table of 3GPP's positioning service levels, and which are reached."""
+    """Returns the table of 3GPP's positioning service levels with their results."""
     rows = [
         (
             escape(verdict.level.name),
@@ -81,20 +81,20 @@ def service_levels(verdicts: Iterable[Verdict]) -> str:
 
 
 def section(title: str, text: str, body: str) -> str:
-    """A part of the page, with a heading and a paragraph where there is text."""
+    """Returns a section with a heading and an optional paragraph."""
     lead = f"<p>{escape(text)}</p>" if text else ""
     return f"<section><h2>{escape(title)}</h2>{lead}{body}</section>"
 
 
 def warnings(found: Iterable[object]) -> str:
-    """What of the settings is most likely not what was meant; nothing where all is plausible."""
+    """Returns the section of plausibility warnings; empty without warnings."""
     items = "".join(f"<li>{escape(str(it))}</li>" for it in found)
-    text = "Each of these can be, and is most likely not what was meant:"
+    text = "These values are valid, but implausible:"
     return section("Check these settings first", text, f"<ul>{items}</ul>") if items else ""
 
 
 def source(title: str, text: str) -> str:
-    """A file to unfold."""
-    # What scrolls can be reached by keyboard.
+    """Returns a file in a collapsed element."""
+    # tabindex makes the scrolling text accessible by keyboard.
     shown = f'<pre tabindex="0">{escape(text)}</pre>'
     return f"<details><summary>{escape(title)}</summary>{shown}</details>"

@@ -1,4 +1,4 @@
-"""The page of ``access-av bound``: the bound along the route and over the site."""
+"""Report of ``access-av bound``: the bound along the route and over the site."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _ENOUGH = {True: ("enough", "yes"), False: ("not enough", "no")}
 
 
 def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:
-    """The bound of one scenario as an HTML page that loads nothing.
+    """Returns the bound of one scenario as a self-contained HTML page.
 
     Parameters
     ----------
     bound
-        What :func:`access_av.bound` returned.
+        Result of :func:`access_av.bound`.
     missed
-        The next service level, which it falls short of.
+        The next service level, which the site fails.
     """
     summary = bound.summary()
     scenario = bound.scenario
@@ -52,31 +52,31 @@ def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:
         for one in summary["heads"]
     ]
     sections = (
-        "<section><h2>Along the route</h2><p>Posterior Cramér–Rao bound, an angle to every radio "
-        "head being used at every SSB: no localizer that knows what the scenario says has a "
+        "<section><h2>Along the route</h2><p>Posterior Cramér–Rao bound with an angle of every "
+        "radio head at every SSB: no localizer with the information of the scenario has a "
         f"smaller root mean square error.</p>{figure('route')}</section>"
         f"<section><h2>Over the site</h2><p>{_map_text(bound)}</p>{figure('site')}</section>"
         "<section><h2>Radio heads</h2><p>By the link budget, before shadowing and fading. Visible: "
-        f"share of the route’s SSBs with an SNR of {VISIBLE_SNR_DB:g} dB or more, down to which "
-        f"3GPP wants SSBs detected (TS 38.133).</p>{table(head, rows, numbers=range(1, 8))}"
-        "</section><section><h2>Service levels</h2><p>Of TS 22.261, 7.3.2.2, and TR 38.857, with "
-        "Gaussian errors as small as the bound allows: what is not reached here no localizer "
-        f"reaches.</p>{service_levels(bound.verdicts)}{_missed(missed)}</section>"
+        f"share of the route’s SSBs with an SNR of {VISIBLE_SNR_DB:g} dB or more, the detection "
+        f"limit of 3GPP (TS 38.133).</p>{table(head, rows, numbers=range(1, 8))}"
+        "</section><section><h2>Service levels</h2><p>Levels of TS 22.261, 7.3.2.2, and TR 38.857 "
+        "for Gaussian errors as small as the bound. No localizer reaches a level that is not "
+        f"reached here.</p>{service_levels(bound.verdicts)}{_missed(missed)}</section>"
         "<section><h2>Provenance</h2>"
-        f"{source('Scenario, all defaults written out', scenario.to_toml())}</section>"
+        f"{source('Scenario with all default values', scenario.to_toml())}</section>"
     )
     return sheet(
         specs,
         title=f"ACCESS-AV bound: {escape(scenario.name)}",
         kicker="ACCESS-AV bound",
-        headline=f"{summary['p90_m']:.2f} m or less on nine tenths of the route, at best",
+        headline=f"RMS error bound: {summary['p90_m']:.2f} m or less on 90 % of the route",
         lead=escape(scenario.description),
         tiles="".join(
-            tile(f"{summary[key]:.3f} m", f"least RMS error, {text}")
+            tile(f"{summary[key]:.3f} m", f"bound of the RMS error, {text}")
             for key, text in (
-                ("median_m", "median of the route"),
+                ("median_m", "median along the route"),
                 ("p90_m", "90th percentile"),
-                ("max_m", "worst place"),
+                ("max_m", "worst position"),
             )
         ),
         meta=escape(f"Scenario “{scenario.name}”, version {version('access-av')}."),
@@ -85,26 +85,26 @@ def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:
 
 
 def _missed(level: NextLevel | None) -> str:
-    """Where it falls short, and what each change by itself would make of that."""
+    """Returns the shortfall, and the effect of each single change."""
     if level is None:
         return ""
     rows = [
         (escape(it.what), f"{it.share:.2%}", badge(*_ENOUGH[it.reaches])) for it in level.changes
     ]
-    head = (f"Change, for level {escape(level.level.name)}", "within", "")
+    head = (f"Change, for level {escape(level.level.name)}", "within", "result")
     return f"<p>{escape(level.in_words())}</p>{table(head, rows, numbers=(1,))}"
 
 
 def _map_text(bound: ErrorBound) -> str:
     if bound.site["bound_m"].is_null().all():
         return (
-            "One radio head alone leaves a direction open: without a past no place of the site has "
-            "a position. The road and the radio head are shown."
+            "One radio head does not determine a position without earlier angles. The map shows "
+            "only road and radio head."
         )
     return (
-        f"Of a vehicle that has listened on {MAP_TRAVEL_M:g} m of way "
-        f"({bound.map_angles:.0f} independent angles to each radio head), knows its heading to "
-        f"{bound.map_heading_std_rad * 1e3:.1f} mrad and nothing of its place. Squares of "
-        f"{bound.map_step_m:g} m; none where the radio heads leave a direction open. "
-        "Drawn to scale on a wide screen."
+        f"Bound of a vehicle after {MAP_TRAVEL_M:g} m of reception "
+        f"({bound.map_angles:.0f} independent angles of each radio head), with a heading σ of "
+        f"{bound.map_heading_std_rad * 1e3:.1f} mrad and an unknown position. Squares of "
+        f"{bound.map_step_m:g} m; no square where the radio heads do not determine the position. "
+        "To scale on a wide screen."
     )

@@ -1,4 +1,4 @@
-"""One drive played along time on a map: where the vehicle is, how far off, and whom it hears."""
+"""Animation of one drive on a map: position, error, and received radio heads."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
     from access_av.run.simulation import Simulation
 
 MOST_STEPS = 300
-# page.js lets the slider of this name run by itself.
+# page.js animates the slider of this name.
 SLIDER = "at_s"
 DATA = "played"
 CAPTION = (
-    "Slider and button play one drive along time. Lines lead to the radio heads whose angles were "
-    "estimated since the step before; the vehicle is green while its position may be relied on."
+    "Slider and button play one drive. Lines lead to the radio heads whose angles were estimated "
+    "since the previous step. The vehicle is green in state ok."
 )
 
 
 def steps_of(result: Simulation, run: int = 0) -> pl.DataFrame:
-    """Steps of one simulated drive, trajectories kept, as :func:`played` takes them."""
+    """Returns the steps of one simulated run for :func:`played` (needs trajectories)."""
     if result.trajectories is None:
-        raise ValueError("a drive that is played needs its trajectory: keep_trajectories=True")
+        raise ValueError("the animation needs trajectories: set keep_trajectories=True")
     return result.trajectories.filter(run=run).select(
         "time_s",
         "searching",
@@ -41,9 +41,9 @@ def steps_of(result: Simulation, run: int = 0) -> pl.DataFrame:
 
 
 def heard_of(result: Simulation, run: int = 0) -> pl.DataFrame:
-    """Angles of one simulated drive, trajectories kept: ``time_s``, ``pci`` and ``ssb_index``."""
+    """Returns the angles of one simulated run: ``time_s``, ``pci`` and ``ssb_index``."""
     if result.executions is None:
-        raise ValueError("a drive that is played needs its executions: keep_trajectories=True")
+        raise ValueError("the animation needs executions: set keep_trajectories=True")
     return result.executions.filter(run=run).select("time_s", "pci", "ssb_index")
 
 
@@ -54,19 +54,19 @@ def played(
     heard: pl.DataFrame,
     heads: pl.DataFrame,
 ) -> alt.LayerChart:
-    """A map with one drive on it, at the time that a slider tells.
+    """Returns a map with one drive at the time of a slider.
 
     Parameters
     ----------
     frame, base
-        The map.
+        Map.
     steps
         ``time_s``, ``x_m``, ``y_m``, ``searching``, ``integrity``, ``protection_level_m`` and
-        ``error_m`` of a drive, the last three null where they are not known.
+        ``error_m`` of a drive; unknown values of the last three are null.
     heard
         ``time_s``, ``pci`` and ``ssb_index`` of each angle.
     heads
-        Radio heads, as of :func:`access_av.report.site_map.heads_of`.
+        Radio heads of :func:`access_av.report.site_map.heads_of`.
     """
     began_s, ended_s = float(steps["time_s"][0]), float(steps["time_s"][-1])
     step_s = max(0.1, math.ceil(10.0 * (ended_s - began_s) / MOST_STEPS) / 10.0)
@@ -117,12 +117,12 @@ def played(
 
 
 def _told(step: dict[str, float | str | bool | None], began_s: float) -> str:
-    """What a step says of itself."""
+    """Returns the text of a step."""
     parts = []
     if step["searching"]:
-        parts.append("searching its first position")
+        parts.append("searching")
     elif step["error_m"] is not None:
-        parts.append(f"{step['error_m']:.2f} m off")
+        parts.append(f"error {step['error_m']:.2f} m")
     level_m = step["protection_level_m"]
     if level_m is not None and not step["searching"]:
         parts.append(f"protection level {level_m:.2f} m")

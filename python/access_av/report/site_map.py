@@ -1,4 +1,4 @@
-"""Maps of a site to scale: what lies beneath, walls, radio heads, and where all of it is drawn."""
+"""Maps of a site to scale: background image, walls, radio heads, and the frame."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Chart = TypeVar("Chart", bound=alt.Chart)
 
 @dataclass(frozen=True)
 class Frame:
-    """Where a map's axes begin and end; a metre is as long on both.
+    """Range of a map's axes, with equal scales.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Frame:
 
     @classmethod
     def about(cls, places: list[pl.DataFrame], margin_m: float, tallest_px: float) -> Frame:
-        """The frame of some places (``x_m``, ``y_m``) with a margin about them."""
+        """Returns the frame of positions (``x_m``, ``y_m``) with a margin."""
         every = pl.concat(it.select(pl.col("x_m", "y_m").cast(pl.Float64)) for it in places)
         (x_low, y_low), (x_high, y_high) = every.min().row(0), every.max().row(0)
         return cls.between(
@@ -48,13 +48,13 @@ class Frame:
     def between(
         cls, x_m: tuple[float, float], y_m: tuple[float, float], tallest_px: float
     ) -> Frame:
-        """The frame that shows so much at least."""
+        """Returns the frame with this minimum range."""
         *domains, height_px = to_scale(x_m, y_m, tallest_px)
         across, upward = (alt.Scale(domain=it, nice=False, zero=False) for it in domains)
         return cls(across, upward, height_px)
 
     def put(self, chart: Chart, *, ends: bool = False, **more: Any) -> Chart:
-        """A chart with its ``x_m`` and ``y_m``, and with ``ends`` ``x2_m`` and ``y2_m``, drawn."""
+        """Encodes ``x_m`` and ``y_m`` of a chart, and with ``ends`` also ``x2_m`` and ``y2_m``."""
         if ends:
             more |= {"x2": "x2_m:Q", "y2": "y2_m:Q"}
         return chart.encode(
@@ -64,7 +64,7 @@ class Frame:
         )
 
     def beneath(self, site: _core.Site) -> list[alt.Chart]:
-        """What of a site lies beneath all else: its picture, where it has one, and its walls."""
+        """Returns the lowest layers of a map: background image, if any, and walls."""
         made = []
         if (it := underlay(site)) is not None:
             edges = {"x_m": it.left_m, "x2_m": it.right_m, "y_m": it.low_m, "y2_m": it.high_m}
@@ -80,7 +80,7 @@ class Frame:
         return made
 
     def masts(self, heads: pl.DataFrame, colour: str = GREEN) -> list[alt.Chart]:
-        """Radio heads and their names."""
+        """Returns the layer of radio heads with names."""
         places = alt.Chart(heads)
         mark = places.mark_point(
             shape="triangle-up", filled=True, size=170, color=colour, stroke="#ffffff", opacity=1.0
@@ -90,7 +90,7 @@ class Frame:
 
 
 def heads_of(site: _core.Site) -> pl.DataFrame:
-    """Radio heads of a site: ``name``, ``pci``, ``ssb_index``, ``x_m`` and ``y_m``."""
+    """Returns the radio heads of a site: ``name``, ``pci``, ``ssb_index``, ``x_m``, ``y_m``."""
     heads = json.loads(site.to_json())["radio_heads"]
     return pl.DataFrame(
         [
@@ -107,7 +107,7 @@ def heads_of(site: _core.Site) -> pl.DataFrame:
 
 
 def walls_of(site: _core.Site) -> list[dict[str, float]]:
-    """Straight walls of a site, from ``x_m``, ``y_m`` to ``x2_m``, ``y2_m``."""
+    """Returns the wall segments of a site, from ``x_m``, ``y_m`` to ``x2_m``, ``y2_m``."""
     return [
         {"x_m": x_m, "y_m": y_m, "x2_m": x2_m, "y2_m": y2_m}
         for wall in json.loads(site.to_json()).get("walls", ())
