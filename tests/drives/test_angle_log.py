@@ -61,7 +61,7 @@ def test_a_log_of_angles_locates_as_its_samples_do(
     text = (out / "angles.csv").read_text()
     comments = [line for line in text.splitlines() if line.startswith("#")]
     assert "receiver noise and the site's scatter (rician_k_db = " in comments[0]
-    assert "phase_noise_sigma_rad: receiver noise alone" in comments[1]
+    assert "phase_noise_sigma_rad: receiver noise only" in comments[1]
     rows = pl.read_parquet(out / "angles.parquet")
     assert rows.columns == list(TABLES["recorded_angles"].columns)
     assert (rows["phase_sigma_rad"] > rows["phase_noise_sigma_rad"]).all()
