@@ -148,7 +148,7 @@ def test_evaluate_shows_tables_in_a_narrow_terminal(access_av: Cli, tmp_path: Pa
     arguments = ("--reading", "gate", "--runs", "1", "--out", str(tmp_path / "e"))
     done = access_av("evaluate", *arguments, columns=60)
     assert done.code == 0, done.err
-    assert "Claims met under" in done.out
+    assert "Claims under" in done.out
     tables = done.out.split("Claims of the paper")[0]
     assert max(map(len, tables.splitlines())) <= 60
 

@@ -76,6 +76,7 @@ def synth(
     directory = ResultsDirectory.create("synth", out)
     if angles:
         count = drives.log_angles(chosen, directory.path, seed=seed, run=run, duration_s=duration_s)
+        directory.write_manifest(scenario=chosen.name, seed=seed, run=run)
         console.print(f"{count} angles: {directory.path / 'angles.csv'}", soft_wrap=True)
         return
     with progress("Recording") as tick:
@@ -89,6 +90,7 @@ def synth(
             datatype=datatype,
             progress=lambda share: tick(round(100 * share), 100),
         )
+    directory.write_manifest(scenario=chosen.name, seed=seed, run=run)
     console.print(
         f"{made.bursts} bursts, {made.samples} samples per antenna: {made.recording}",
         soft_wrap=True,

@@ -27,6 +27,7 @@ from access_av.cli import (
     profile,
     radio,
     recordings,
+    rerun,
     run,
     study,
     survey,
@@ -104,7 +105,7 @@ def _options(
 
 for _room in (
     *(study, paper, codesign, run, bound, radio, integrity, designs, tune),
-    *(recordings, drives, survey, profile, balance, columns),
+    *(recordings, drives, survey, profile, balance, columns, rerun),
 ):
     app.add_typer(_room.app)
 app.add_typer(new.app, name="new", cls=_Commands)

@@ -131,7 +131,7 @@ def angles(compared: pl.DataFrame) -> Spec:
 def heads(compared: pl.DataFrame) -> Spec:
     """Returns the chart of each radio head's 90th percentile of the normalised innovations."""
     order = compared.sort("pci", "ssb_index")["head"].unique(maintain_order=True).to_list()
-    percentiles = compared.group_by("head").agg(
+    percentiles = compared.group_by("head", maintain_order=True).agg(
         pl.col("deviations").quantile(0.9, "linear").round(3), angles=pl.len()
     )
     bars = (

@@ -80,5 +80,9 @@ class Alarms:
         return cls(
             **counted.row(0, named=True),
             longest_silence_s=longest_s or 0.0,
-            duration_s=float(steps.group_by("run").agg(pl.col("time_s").max())["time_s"].sum()),
+            duration_s=float(
+                steps.group_by("run", maintain_order=True)
+                .agg(pl.col("time_s").max())["time_s"]
+                .sum()
+            ),
         )

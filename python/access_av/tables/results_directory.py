@@ -24,6 +24,7 @@ import numpy as np
 
 from access_av import interrupt
 from access_av.errors import InputError
+from access_av.tables.inputs import inputs
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -31,7 +32,8 @@ if TYPE_CHECKING:
     import polars as pl
     from numpy.typing import ArrayLike
 
-RESULTS = Path("results")
+# Directory of results in the working directory, or another one given by the environment.
+RESULTS = Path(os.environ.get("ACCESS_AV_RESULTS") or "results")
 
 
 class Lock:
@@ -107,8 +109,9 @@ class ResultsDirectory:
     ) -> Path:
         """Writes ``manifest.json``: version, commit if known, command, settings, warnings.
 
-        ``command`` is the given command line. ``repeat`` is the command line that repeats the run
-        in this directory, with the stored inputs.
+        ``command`` is the given command line, ``directory`` its working directory, and ``inputs``
+        are size and checksum of the files that it names. ``repeat`` is the command line that
+        repeats the run in this directory, with the stored inputs.
         """
         return self.write_json(
             "manifest.json",
@@ -116,6 +119,8 @@ class ResultsDirectory:
                 "version": version("access-av"),
                 "commit": commit(),
                 "command": ["access-av", *sys.argv[1:]],
+                "directory": str(Path.cwd()),
+                "inputs": inputs(sys.argv[1:], self.path),
                 "written": datetime.now(timezone.utc).isoformat(timespec="seconds"),
                 **({"repeat": _typed(repeat)} if repeat else {}),
                 **settings,

@@ -1,0 +1,176 @@
+"""`access-av rerun` repeats every command that writes a results directory."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from access_av.tables.inputs import inputs
+
+SCENARIO = """\
+like = "paper-real-odometry-2"
+name = "short"
+[motion]
+start_at_m = 285.0
+"""
+SPACE = "[vehicle.platform]\nmode = [0, 2]\n"
+DRIVE = ("--site", "drive/site.toml", "--vehicle", "drive/vehicle.toml")
+RECORDED = ("--recording", "drive/iq.sigmf-meta", "--odometry", "drive/odometry.csv")
+COMMANDS = {
+    "run": (
+        *("run", "short.toml", "--runs", "2", "--set", "site.radio_heads[0].eirp_dbm=5"),
+        *("--vary", "site.rician_k_db=0,20", "--compare", "short.toml"),
+    ),
+    "synth": ("synth", "short.toml"),
+    "angles": ("angles", "drive/iq.sigmf-meta", *DRIVE),
+    "locate": ("locate", *RECORDED, *DRIVE, "--truth", "drive/truth.tum", "--smooth"),
+    "survey": ("survey", "log1", "log2", *DRIVE),
+    "bound": ("bound", "short.toml", "--map-step-m", "60"),
+    "plan": ("plan", "short.toml"),
+    "designs": ("designs", "short.toml", "--space", "space.toml", "--runs", "2"),
+    "tune": ("tune", "short.toml", "--runs", "2", "--designs", "2", "--max-error-m", "3"),
+    "integrity": ("integrity", "short.toml", "--runs", "2", "--mismatch", "none"),
+    "evaluate": ("evaluate", "--reading", "gate", "--runs", "1"),
+    "study": ("study", "paper", "--runs", "2"),
+}
+
+
+def access_av(where: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "access_av", *arguments],
+        cwd=where,
+        env={**os.environ, "COLUMNS": "200"},
+        capture_output=True,
+        text=True,
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a scenario, a space of designs, and three recorded drives."""
+    where = tmp_path_factory.mktemp("rerun")
+    (where / "short.toml").write_text(SCENARIO)
+    (where / "space.toml").write_text(SPACE)
+    drives = (
+        ("drive", ()),
+        ("log1", ("--angles",)),
+        ("log2", ("--angles", "--run", "1")),
+    )
+    for name, options in drives:
+        done = access_av(where, "synth", "short.toml", *options, "--out", name)
+        assert done.returncode == 0, done.stderr
+    return where
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_results_of_every_command_are_repeated(name: str, folder: Path) -> None:
+    done = access_av(folder, *COMMANDS[name], "--out", f"of-{name}")
+    assert done.returncode in (0, 3), done.stderr
+    repeated = access_av(folder, "rerun", f"of-{name}", "--json")
+    assert repeated.returncode == 0, repeated.stdout + repeated.stderr
+    record = json.loads(repeated.stdout)
+    assert record["identical"]
+    assert record["differences"] == record["changed_inputs"] == []
+    files = [it for it in (folder / f"of-{name}").rglob("*") if it.is_file()]
+    assert record["files"] == sum("parts" not in it.parts for it in files) > 1
+    assert record["written_by"] == record["repeated_by"]
+
+
+def test_every_command_with_results_is_tried() -> None:
+    from access_av.cli.main import app
+
+    source = Path(__file__).parents[2] / "python/access_av"
+    creating = [
+        file
+        for file in (*source.glob("cli/*.py"), source / "report/paper/results.py")
+        if "ResultsDirectory.create(" in file.read_text(encoding="utf-8")
+    ]
+    number = sum(
+        it.read_text(encoding="utf-8").count("ResultsDirectory.create(") for it in creating
+    )
+    assert number == len(COMMANDS)
+    assert app.registered_groups
+
+
+@pytest.fixture
+def results(folder: Path, tmp_path: Path) -> Path:
+    done = access_av(folder, "run", "short.toml", "--out", str(tmp_path / "mine"))
+    assert done.returncode == 0, done.stderr
+    return tmp_path / "mine"
+
+
+def test_differences_are_listed(folder: Path, results: Path) -> None:
+    table = pl.read_parquet(results / "executions.parquet")
+    moved = table.with_columns(pl.col("time_s") + 0.25)
+    moved.write_parquet(results / "executions.parquet")
+    (results / "truth.tum").write_text("0 0 0\n" + (results / "truth.tum").read_text())
+    (results / "report.html").unlink()
+    (results / "notes.txt").write_text("mine")
+    manifest = json.loads((results / "manifest.json").read_text())
+    (results / "manifest.json").write_text(json.dumps({**manifest, "seed": 7}))
+    done = access_av(folder, "rerun", str(results))
+    assert done.returncode == 3, done.stderr
+    lines = dict(line.split(": ", 1) for line in done.stdout.splitlines() if ": " in line)
+    assert lines["executions.parquet"] == "columns differ: time_s by up to 0.25"
+    assert lines["truth.tum"].startswith("line 1: '0 0 0' instead of ")
+    assert lines["report.html"] == "only in the new results"
+    assert lines["notes.txt"] == "missing in the new results"
+    assert lines["manifest.json"] == "entries differ: seed"
+    assert "5 of " in done.stdout
+
+
+def test_the_copy_of_the_settings_stands_in_for_a_changed_input(
+    folder: Path, results: Path
+) -> None:
+    scenario = folder / "short.toml"
+    try:
+        scenario.write_text(SCENARIO.replace("285", "280"))
+        changed = access_av(folder, "rerun", str(results), "--json")
+        scenario.unlink()
+        missing = access_av(folder, "rerun", str(results), "--json")
+    finally:
+        scenario.write_text(SCENARIO)
+    for done, said in ((changed, "has changed"), (missing, "is missing")):
+        assert said in " ".join(done.stderr.split())
+        record = json.loads(done.stdout)
+        # The page shows the settings as they were given, here those of the copy.
+        assert {it["file"] for it in record["differences"]} <= {"report.html"}, record
+        assert len(record["changed_inputs"]) == 1
+
+
+def test_what_cannot_be_repeated_is_named(folder: Path, results: Path) -> None:
+    def refused(*arguments: str) -> str:
+        done = access_av(folder, "rerun", *arguments)
+        assert done.returncode == 2, done.stdout
+        return " ".join(done.stderr.split())
+
+    assert "no results of a command here" in refused(str(folder))
+    assert "working directory is missing" in refused(str(results), "--directory", "nowhere")
+    assert "--keep takes a new directory" in refused(str(results), "--keep", str(folder))
+    manifest = json.loads((results / "manifest.json").read_text())
+    (results / "manifest.json").write_text(
+        json.dumps({**manifest, "command": ["access-av", "fly"]})
+    )
+    assert "the command failed again (exit code 2): access-av fly" in refused(str(results))
+    (results / "manifest.json").write_text("{}")
+    assert "`command` is missing" in refused(str(results))
+
+
+def test_inputs_are_the_files_that_arguments_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.toml", "b.csv", "mine.py", "iq.sigmf-meta", "iq.sigmf-data", "out/c.toml"):
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).write_text(name)
+    arguments = ["run", "a.toml", "--set", "road.file=b.csv", "--compare", "policy=mine.py:P"]
+    arguments += ["iq.sigmf-meta", "out/c.toml", "yard", "x" * 5000, "\0"]
+    found = inputs(arguments, Path("out"))
+    assert list(found) == ["a.toml", "b.csv", "mine.py", "iq.sigmf-meta", "iq.sigmf-data"]
+    assert found["a.toml"]["bytes"] == 6
