@@ -205,7 +205,7 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
         "truth.vehicle.array.mounting_rad", "0.0175"),
     "truth as a difference": (
         {"truth.site": {"radio_heads": {"dock": {"position_m": [2.0, 5.0, 8.0]}}}},
-        "truth.site.radio_heads[2].position_m", "its own place"),
+        "truth.site.radio_heads[2].position_m", "position in metres"),
     "truth in percent": (
         {"truth.vehicle": {"odometer": {"noise_m_per_sqrt_m": 3.0}}},
         "truth.vehicle.odometer.noise_m_per_sqrt_m", "3 % are 0.03"),

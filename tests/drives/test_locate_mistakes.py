@@ -65,8 +65,8 @@ OTHERS = pl.when(pl.int_range(pl.len()) % 2 == 0)
 
 # Kind, what is done to the files, and what has to be said of it: as a suspicion, whatever else ...
 SUSPECTED = {
-    "sign of the phase": (angles(phase_rad=-PHASE), "the other way round"),
-    "array mirrored": (mounted(-math.pi), "the other way round"),
+    "sign of the phase": (angles(phase_rad=-PHASE), "order of the array's antennas is reversed"),
+    "array mirrored": (mounted(-math.pi), "order of the array's antennas is reversed"),
     "angle in phase_rad": (angles(phase_rad=ANGLE), "phase_rad is the angle"),
     "phase in angle_rad": (lambda it: as_angle(it, PHASE), "angle_rad is the electrical angle"),
     "bearing in angle_rad": (
@@ -110,7 +110,7 @@ REMARKED = {
     ),
     "no yaw rate": (
         lambda it: setattr(it, "odometry", it.odometry.drop("yaw_rate_radps")),
-        "nothing tells how a differential drive turns",
+        "a differential drive has no source of the yaw rate",
     ),
     "no distance": (
         lambda it: setattr(it, "odometry", it.odometry.drop("distance_m")),
@@ -155,7 +155,7 @@ REFUSED = {
         odometry(yaw_rate_radps=pl.lit(math.nan)),
         "fewer than two usable samples; odometry line 2: left out, yaw_rate_radps is missing",
     ),
-    "clocks": (angles(time_s=TIME + 1e9), "must be told by one clock"),
+    "clocks": (angles(time_s=TIME + 1e9), "must use one clock"),
     "no radio head": (angles(pci=pl.lit(999)), "check pci and ssb_index"),
     "no deviation": (
         lambda it: setattr(it, "angles", it.angles.drop("phase_sigma_rad")),
@@ -258,7 +258,7 @@ def test_one_radio_head_elsewhere_is_named(tmp_path: Path) -> None:
     spoilt.heads_m[13] = (x + 6.0, y - 8.0)
     drive = spoilt.locate(tmp_path)
     (diagnosis,) = drive.diagnoses
-    assert "pci 13 stands near" in diagnosis
+    assert "pci 13 is near" in diagnosis
     place_m = re.findall(r"-?\d+\.\d", diagnosis)[:2]
     assert [float(it) for it in place_m] == pytest.approx([x, y], abs=0.5), diagnosis
     assert diagnosis in drive.remarks

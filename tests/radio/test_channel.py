@@ -210,7 +210,7 @@ def test_a_scenario_refuses_paths_of_another_site(
     other = site.with_overrides({"carrier_mhz": 3500.0})
     assert "channel.paths" in refused(table, other, carrier_mhz=3500.0)
     assert "of 3500 MHz" in refused(table, other, carrier_mhz=3500.0)
-    assert "no place within 1 m of the road" in refused(line_of_sight(site, LANE_M[:100]))
+    assert "no position within 1 m of the road" in refused(line_of_sight(site, LANE_M[:100]))
     of = site.with_overrides({"radio_heads[1].position_m": [10.0, 21.0, 7.0]})
     assert "another frame, or another plan" in refused(line_of_sight(of, LANE_M), of)
     alone = table.filter(pl.col("pci") != 3)

@@ -250,7 +250,7 @@ def test_other_bad_input() -> None:
         aoa.forward_backward(np.ones((3, 4)))
     with pytest.raises(ValueError, match="finite"):
         aoa.crb_rad(np.nan, 10)
-    with pytest.raises(ValueError, match="cannot be told apart"):
+    with pytest.raises(ValueError, match="cannot be separated"):
         aoa.crb_rad([1.0, 1.0], 10, joint=True)
     with pytest.raises(ValueError, match="sources requested"):
         aoa.crb_rad([0.5, 1.0, 1.5, 2.0], 10, joint=True)

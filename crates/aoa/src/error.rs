@@ -99,6 +99,6 @@ pub enum Error {
         antennas: usize,
     },
     /// The sources are too close or too coherent for a unique solution.
-    #[error("the sources cannot be told apart: the equations are singular")]
+    #[error("the sources cannot be separated: the equations are singular")]
     Singular,
 }

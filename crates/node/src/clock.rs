@@ -21,7 +21,7 @@ pub const INTERRUPTION_S: f64 = 0.25;
 /// Time in seconds without samples that come faster than in real time, after which those of an interruption are
 /// missing and not late.
 pub const CATCH_UP_S: f64 = 0.2;
-/// Minimum decrease of the delay, in seconds, by samples that come faster than in real time.
+/// Minimum decrease of the delay, in seconds, that shows that samples arrive faster than in real time.
 pub const CAUGHT_UP_S: f64 = 0.01;
 /// Minimum relative difference between the configured and the measured sample rate that indicates a
 /// wrong rate.
@@ -61,9 +61,11 @@ pub struct ArrivalClock {
 #[derive(Debug, Clone, Copy)]
 #[allow(clippy::struct_field_names, reason = "all fields are in seconds")]
 struct Interruption {
+    /// Time of the decision in seconds.
     decided_s: f64,
+    /// Missing time so far, in seconds.
     lost_s: f64,
-    /// Delay at the last postponement of the decision, in seconds.
+    /// Missing time at the last postponement of the decision, in seconds.
     before_s: f64,
 }
 

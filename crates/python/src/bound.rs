@@ -137,7 +137,7 @@ fn places(
     let (x_m, y_m) = (x_m.as_slice()?, y_m.as_slice()?);
     if x_m.len() != y_m.len() {
         return Err(PyValueError::new_err(format!(
-            "`x_m` has {} values and `y_m` {}; they must be as many",
+            "`x_m` has {} values and `y_m` {}; they must have equal lengths",
             x_m.len(),
             y_m.len()
         )));

@@ -179,8 +179,8 @@ impl PythonEstimator {
             None if !self.told_of_sigma.swap(true, Ordering::Relaxed) => PyErr::warn(
                 py,
                 &py.get_type::<PyUserWarning>(),
-                c"the estimator states no standard deviation; the Cramer-Rao bound at each SSB's \
-                  SNR is taken",
+                c"the estimator returns no standard deviation; the Cramer-Rao bound at each SSB's \
+                  SNR is used",
                 1,
             )?,
             _ => {}
@@ -257,7 +257,7 @@ pub fn estimate_cost(estimator: &Bound<'_, PyAny>) -> PyResult<EstimateCost> {
     };
     match (stated(ENERGY)?, stated(TIME)?) {
         (Some(_), Some(_)) => Err(refused(&format!(
-            "the estimator states both {ENERGY} and {TIME}; one of them is allowed"
+            "the estimator has both {ENERGY} and {TIME}; only one of them is allowed"
         ))),
         (Some(energy_j), None) => Ok(EstimateCost::EnergyJ(energy_j)),
         (None, Some(time_s)) => Ok(EstimateCost::TimeS(time_s)),

@@ -18,7 +18,7 @@ pub enum RecordingError {
         source: io::Error,
     },
     /// SigMF metadata without data, or data without metadata.
-    #[error("{present}: its other half {missing} is missing; a SigMF recording needs both")]
+    #[error("{present}: {missing} is missing; a SigMF recording needs both files")]
     HalfMissing {
         /// Existing file.
         present: String,

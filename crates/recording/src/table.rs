@@ -85,7 +85,7 @@ impl Table {
             let mut places = named.filter(|(_, column)| column == name).map(|(it, _)| it);
             let place = places.next();
             if places.next().is_some() {
-                let once = "each column may be there once";
+                let once = "each column may occur only once";
                 return Err(RecordingError::value(file, *name, "there twice", once));
             }
             if is_required && place.is_none() {

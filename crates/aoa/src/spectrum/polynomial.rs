@@ -97,8 +97,8 @@ impl<const N: usize> Spectrum<N> {
             let phase = |i: usize| TAU * i as f64 / intervals as f64 - PI;
             let mut low = (-PI, self.slope(-PI));
             for i in 1..=intervals {
-                // The last end of an interval equals the first bit by bit, so that no peak is lost
-                // or found twice.
+                // The end of the last interval is bit-identical to the start of the first one, so
+                // that no peak is lost or found twice.
                 let high = (phase(i), self.slope(phase(i % intervals)));
                 search.look_between(low, high, &mut peaks);
                 low = high;

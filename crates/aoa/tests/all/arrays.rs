@@ -141,8 +141,7 @@ fn unequal_channels_are_part_of_the_manifold() {
 
 #[test]
 fn the_bound_of_collinear_elements_equals_that_of_the_linear_array() {
-    // Three collinear elements and one element very close to the line: the bound is almost that of
-    // a linear array.
+    // A uniform linear array as a general manifold.
     struct Row;
     impl Manifold<4> for Row {
         fn response(&self, direction: Direction) -> [Complex64; 4] {

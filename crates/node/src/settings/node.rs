@@ -157,8 +157,8 @@ impl TomlFile for NodeSettings {
         check.that(
             self.samples.is_none() || self.angles.is_none(),
             "angles.file",
-            "there beside [samples]",
-            "angles come from one or the other",
+            "given together with [samples]",
+            "angles must come from only one of them",
         )?;
         check.that(
             self.odometry.is_some() || !self.messages.is_empty(),
@@ -188,8 +188,7 @@ impl TomlFile for NodeSettings {
         }
         if let Some(SampleSource::Raw { address, .. }) = &self.samples {
             let good = !matches!(address, Address::Udp(_));
-            let allowed =
-                "samples that are lost on the way would go unnoticed: use TCP, Unix or `-`";
+            let allowed = "lost samples would not be detected: use TCP, Unix or `-`";
             check.that(good, "samples.address", address, allowed)?;
         }
         if let Some(json) = &self.output.json {
@@ -206,7 +205,7 @@ impl TomlFile for NodeSettings {
             _ => 0,
         };
         let readers = samples + self.messages.iter().filter(|it| standard(it)).count();
-        let allowed = "standard input is read by one of them only";
+        let allowed = "only one input can read standard input";
         check.that(readers <= 1, "messages", "-", allowed)?;
         if let Some(stream) = self.samples.as_ref().and_then(SampleSource::stream) {
             let mut sorted = stream.antennas.clone();
@@ -218,7 +217,7 @@ impl TomlFile for NodeSettings {
                 each_once,
                 "samples.stream.antennas",
                 format!("{:?}", stream.antennas),
-                "each antenna must stand there once, from 0 on",
+                "each antenna must occur once, with numbers from 0",
             )?;
             if let Some(SampleSource::Zeromq { endpoints, .. }) = &self.samples {
                 check.that(

@@ -22,7 +22,7 @@ struct Shared {
     flushed: AtomicU64,
     /// Whether all later writes must fail.
     is_stopped: AtomicBool,
-    /// Whether the owner writes the end itself.
+    /// Whether the owner writes the end of the file itself.
     is_final: AtomicBool,
 }
 

@@ -100,7 +100,7 @@ pub const MISCONFIGURATIONS: [Misconfiguration; 12] = [
         for it in &mut drive.angles.angles {
             it.measured.phase_rad = -it.measured.phase_rad;
         }
-        words(&["antennas count the other way round"])
+        words(&["order of the array's antennas is reversed"])
     }),
     ("robot as road vehicle", |drive, _| {
         drive.vehicle.drive = DriveKind::Road;

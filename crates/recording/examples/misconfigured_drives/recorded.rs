@@ -17,11 +17,13 @@ gyroscope = { noise_rad_per_sqrt_s = 0.04, bias_std_radps = 0.005 }
 receiver = { lateness_s = 0.04 }
 start = { position_std_m = 0.05, heading_std_rad = 0.05 }
 array = { mounting_std_rad = 0.02, mounting_rad = ";
+/// Data sheet of the robot of "lost in the woods".
 const WOODS: &str = "drive = \"differential\"
 odometer = { rate_hz = 10.0, scale_std = 0.02, noise_m_per_sqrt_m = 0.02 }
 gyroscope = { noise_rad_per_sqrt_s = 0.025, bias_std_radps = 0.003 }
 start = { position_std_m = 0.05, heading_std_rad = 0.05 }
 array = { mounting_std_rad = 0.01, mounting_rad = ";
+/// Data sheet of the car of the ray-traced street.
 const STREET: &str = "odometer = { scale_std = 0.003, noise_m_per_sqrt_m = 0.01 }
 gyroscope = { noise_rad_per_sqrt_s = 0.003, bias_std_radps = 0.002 }
 start = { position_std_m = 0.1, heading_std_rad = 0.02 }

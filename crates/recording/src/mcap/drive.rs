@@ -91,9 +91,9 @@ fn twist(pose: &LocatedPose) -> Twist {
 /// Returns the diagnostic status of the input with the recent remarks.
 fn input(remarks: &[Remark]) -> DiagnosticStatus {
     let (level, message) = match remarks.len() {
-        0 => (DiagnosticLevel::Ok, "nothing to remark".to_owned()),
-        1 => (DiagnosticLevel::Warn, "1 remarkable item".to_owned()),
-        count => (DiagnosticLevel::Warn, format!("{count} remarkable items")),
+        0 => (DiagnosticLevel::Ok, "no remarks".to_owned()),
+        1 => (DiagnosticLevel::Warn, "1 remark".to_owned()),
+        count => (DiagnosticLevel::Warn, format!("{count} remarks")),
     };
     let texts = remarks.iter().map(|remark| remark.text.clone());
     DiagnosticStatus {
@@ -116,7 +116,7 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
     let (level, message) = match (accepted, lately.len()) {
         _ if pose.searching.is_some() => (DiagnosticLevel::Warn, "searching for the first pose"),
         _ if state == Some(IntegrityState::Unavailable) => {
-            (DiagnosticLevel::Error, "position not to be relied on")
+            (DiagnosticLevel::Error, "the position is not reliable")
         }
         _ if state == Some(IntegrityState::Degraded) => (
             DiagnosticLevel::Warn,
@@ -129,9 +129,9 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
         ),
         _ if pose.constants.is_some_and(|found| found.array_departs()) => (
             DiagnosticLevel::Warn,
-            "the array's mounting or calibration does not hold",
+            "the array deviates from its mounting or calibration",
         ),
-        (few, all) if 2 * few < all => (DiagnosticLevel::Warn, "most angles refused"),
+        (few, all) if 2 * few < all => (DiagnosticLevel::Warn, "most angles rejected"),
         _ => (DiagnosticLevel::Ok, "angles accepted"),
     };
     let mut cells: Vec<u16> = lately.iter().map(|execution| execution.ssb.pci).collect();

@@ -222,7 +222,7 @@ fn one_topic<'a>(
             "topic",
             "not given",
             format!(
-                "several topics hold odometry, choose one of {}",
+                "several topics contain odometry, choose one of {}",
                 several.join(", ")
             ),
         )),
@@ -328,7 +328,7 @@ impl Turning<'_> {
                 });
             };
             if let Some(why) = says_nothing(gyroscope) {
-                let allowed = "an IMU that tells its angular velocity must be on it";
+                let allowed = "it must have an IMU with a known angular velocity";
                 return Err(RecordingError::value(self.bag, asked, why, allowed));
             }
             return Ok(Some((topic, gyroscope)));
@@ -356,7 +356,7 @@ impl Turning<'_> {
                     "imu_topic",
                     "not given",
                     format!(
-                        "the odometry tells no yaw rate and several IMUs do, choose one of {}",
+                        "the odometry has no yaw rate and several IMUs have one, choose one of {}",
                         topics.join(", ")
                     ),
                 ))

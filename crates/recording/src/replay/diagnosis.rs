@@ -307,7 +307,7 @@ fn wrong_yaw_rate(
     let is_near = |it: &Evidence| apart_m(&as_given.path, &it.path) < HARMLESS_M;
     let turned = told_per_turned.map_or(
         String::from("angles come from elsewhere than expected"),
-        |told| format!("for each radian that the vehicle turns yaw_rate_radps tells {told:.2}"),
+        |told| format!("yaw_rate_radps is {told:.2} times the yaw rate of the vehicle"),
     );
     Ok(Some(Diagnosis {
         is_of_start: false,
@@ -324,10 +324,10 @@ fn missing_yaw_rate(given: &Drive<'_>, is_sound: bool) -> Option<Diagnosis> {
         return None;
     }
     let turns = match vehicle.drive {
-        DriveKind::Differential => "nothing tells how a differential drive turns",
-        DriveKind::Road if !is_on_road(given) => "nothing but angles tells how the vehicle turns",
+        DriveKind::Differential => "a differential drive has no source of the yaw rate",
+        DriveKind::Road if !is_on_road(given) => "the angles are the only source of the yaw rate",
         DriveKind::Road if vehicle.gyroscope.is_some() => {
-            "the vehicle has a gyroscope, but the road alone tells how it turns"
+            "the vehicle has a gyroscope, but the road is the only source of the yaw rate"
         }
         DriveKind::Road => return None,
     };

@@ -60,7 +60,7 @@ pub enum ReplayError {
     /// Angles and odometry have no common time.
     #[error(
         "no angle falls into the odometry's time: odometry is from {} to {} s, angles from {} to {} s, \
-         {:.3} s apart; both must be told by one clock",
+         {:.3} s apart; both must use one clock",
         odometry_s[0], odometry_s[1], angles_s[0], angles_s[1], apart_s(odometry_s, angles_s)
     )]
     Clocks {
@@ -71,14 +71,14 @@ pub enum ReplayError {
     },
     /// No angle is from a radio head of the site.
     #[error(
-        "not one of {angles} angles is of a radio head of the site; check pci and ssb_index in both"
+        "none of {angles} angles is from a radio head of the site; check pci and ssb_index in both"
     )]
     UnknownRadioHeads {
         /// Number of angles.
         angles: usize,
     },
     /// The odometry has fewer than two usable samples.
-    #[error("the odometry holds fewer than two usable samples{}", because(why.as_ref()))]
+    #[error("the odometry contains fewer than two usable samples{}", because(why.as_ref()))]
     NoOdometry {
         /// Error of the first unusable sample.
         why: Option<String>,
@@ -93,7 +93,7 @@ pub enum ReplayError {
         file: String,
     },
     /// The log has no usable angle.
-    #[error("the angle log holds no usable angle{}", because(why.as_ref()))]
+    #[error("the angle log contains no usable angle{}", because(why.as_ref()))]
     NoAngle {
         /// Error of the first unusable angle.
         why: Option<String>,

@@ -193,7 +193,7 @@ pub fn of_radio_heads(site: &Site) -> Vec<Hypothesis> {
                     name_of(site, one),
                     name_of(site, two)
                 ),
-                "which pci and ssb_index is sent from which place",
+                "the assignment of pci and ssb_index to positions",
                 Correction::Exchange(number, other),
             ));
         }
@@ -206,7 +206,7 @@ pub fn moved(site: &Site, number: usize, place: Point) -> Option<Hypothesis> {
     let head = site.radio_heads.get(number)?;
     let [x_m, y_m, _] = head.position_m;
     let meant = format!(
-        "{} stands near ({:.1}, {:.1}) m, {:.1} m from where the site has it",
+        "{} is near ({:.1}, {:.1}) m, {:.1} m from its position in the site file",
         name_of(site, head),
         place.x_m,
         place.y_m,
@@ -243,7 +243,7 @@ pub fn of_yaw_rate(constant_radps: Option<f64>) -> Vec<(f64, Hypothesis)> {
         let radps = radps + 0.0; // a negative zero is zero
         let meant = format!("yaw_rate_radps, which is {radps} throughout, says nothing");
         let correction = Correction::Odometry(|it| it.yaw_rate_radps = None);
-        let check = "what tells the yaw rate, and its column";
+        let check = "the source of the yaw rate, and its column";
         return vec![(0.0, Hypothesis::new(meant, check, correction))];
     }
     vec![
@@ -272,7 +272,7 @@ pub fn of_yaw_rate(constant_radps: Option<f64>) -> Vec<(f64, Hypothesis)> {
 pub fn of_drive() -> Vec<Hypothesis> {
     let table: [(&str, &str, Correction); 20] = [
         (
-            "the array's antennas count the other way round",
+            "the order of the array's antennas is reversed",
             "the sign of phase_rad, the order of the antennas, array.mounting_rad (half a turn)",
             Correction::Angle(|it, _| {
                 it.measured.phase_rad = -it.measured.phase_rad;

@@ -98,7 +98,7 @@ impl fmt::Display for ChannelFault {
             Fault::Duplicate { of } => {
                 write!(
                     f,
-                    "channel {channel} holds the same samples as channel {of}"
+                    "channel {channel} contains the same samples as channel {of}"
                 )
             }
             other => write!(f, "channel {channel}: {other:?}"),

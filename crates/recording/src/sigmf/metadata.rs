@@ -257,7 +257,7 @@ fn explain(file: &Path, path: &str, message: &str) -> RecordingError {
             allowed: "SigMF metadata must state it".to_owned(),
         };
     }
-    // "invalid type: string "x", expected f64"
+    // Format of the message: "invalid type: string "x", expected f64"
     let (found, expected) = message
         .split_once(", expected ")
         .unwrap_or((message, "another type"));

@@ -223,14 +223,14 @@ mod tests {
         Antennas::new(&Vehicle::from_library("paper", &Shipped).unwrap().array)
     }
 
-    /// Gains at the carrier near the radio head.
+    /// Returns the antenna gains at the carrier frequency.
     fn gains(fading: &RicianPropagation, phase_rad: f64, along_m: f64) -> [Complex64; ELEMENTS] {
         let mut gains = [Complex64::ZERO; ELEMENTS];
         fading.response(&sight(phase_rad, along_m), &row(), 0.0, &mut gains);
         gains
     }
 
-    /// Mean scatter power at antenna 0 over the runs, for a line of sight from broadside.
+    /// Returns the mean power of the scatter over runs and antennas.
     fn mean_power_of_scatter(k_db: f64, model: ScatterModel) -> f64 {
         let site = site(k_db);
         let runs = 4000;

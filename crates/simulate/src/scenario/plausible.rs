@@ -109,15 +109,17 @@ impl Scenario {
             .enumerate();
         found = found.into_iter().map(|it| it.beneath("vehicle")).collect();
         found.extend(heads.filter_map(|(index, (head, believed))| {
-            let [at, plan] = [head, believed].map(|it| Point::new(it.position_m[0], it.position_m[1]));
+            let [at, plan] =
+                [head, believed].map(|it| Point::new(it.position_m[0], it.position_m[1]));
             let moved_m = at.distance_m(plan);
             (moved_m > MOST_MOVED_M).then(|| Warning {
                 key: format!("site.radio_heads[{index}].position_m"),
                 value: format!("{:?}", head.position_m),
                 why: format!("that is {moved_m:.0} m from the nominal position"),
-                write: "write its own place, in metres in the frame of the site, not by how much it is \
-                        off"
-                    .to_owned(),
+                write:
+                    "write the position in metres in the frame of the site, not the deviation from \
+                        the nominal position"
+                        .to_owned(),
             })
         }));
         Ok(found.into_iter().map(|it| it.beneath("truth")).collect())

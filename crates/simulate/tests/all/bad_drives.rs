@@ -100,7 +100,7 @@ fn a_drive_without_errors_has_no_remarks() {
     assert_eq!(located.remarks, []);
     assert!(drive.worst(&located) < 4.5);
     let told = drive.diagnoses(&located);
-    assert!(told.contains("nothing to remark") && !told.contains("remarkable item"));
+    assert!(told.contains("no remarks") && !told.contains("1 remark"));
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn bad_odometry_is_reported_and_ignored() {
         assert!(text.contains(expected), "{text}: {expected}");
         assert!(told.contains(text), "{text}");
     }
-    assert!(told.contains("1 remarkable item"));
+    assert!(told.contains("1 remark"));
     // The state equals the state without the erroneous samples.
     assert_eq!(located.poses, sound.poses);
 }

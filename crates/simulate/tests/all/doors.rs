@@ -61,7 +61,7 @@ impl Localizer for StraightOn {
     }
 
     fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
-        assert!(time_s >= self.now_s, "the past is nobody's business");
+        assert!(time_s >= self.now_s, "past poses are not requested");
         Ok(PoseEstimate {
             time_s,
             pose: self.start.along_arc(self.driven_m, 0.0),

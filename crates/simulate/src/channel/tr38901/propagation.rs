@@ -19,7 +19,7 @@ use crate::random::Purpose;
 use crate::scenario::ChannelSettings;
 use crate::world::{Antennas, LineOfSight};
 
-/// Relative amplitude below which a scatter component is not computed.
+/// Relative power below which a scatter component is not computed.
 const NEGLIGIBLE: f64 = 1e-4;
 
 /// Soft state above which the link has a line of sight.

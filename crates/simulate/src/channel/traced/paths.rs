@@ -278,7 +278,7 @@ impl Paths {
         let untraced = |along_m: &f64| self.place_near(road.pose(*along_m).point()).is_none();
         if let Some(along_m) = metres.find(|it| inside.contains(it) && untraced(it)) {
             return PathsError::that(format!(
-                "no place within {REACH_M} m of the road {along_m} m along it"
+                "no position within {REACH_M} m of the road at {along_m} m"
             ));
         }
         Ok(())
