@@ -1,4 +1,4 @@
-"""The command ``codesign``: ours beside the paper's adaptive point, with the receiver counted."""
+"""Command ``codesign``: comparison with the paper's adaptive point, including the receiver."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ app = typer.Typer()
     epilog="Example: [bold]access-av codesign --runs 20[/]",
 )
 def codesign(
-    reading: Annotated[str, typer.Option(help="Name of a reading of the paper.")] = "gate",
+    reading: Annotated[str, typer.Option(help="Name of an interpretation of the paper.")] = "gate",
     runs: Runs = 100,
     seed: Seed = 1,
     threads: Threads = None,
     as_json: AsJson = False,
 ) -> None:
-    """Lay our tracker, policy and engine beside the paper's adaptive point, in each power mode.
+    """Compare tracker, policy and engine with the paper's adaptive point in each power mode.
 
-    Energies of a trip count executions and the receiver. Ranges take every parameter of the
-    platform files from one end to the other. In the second row of each mode an execution of ours
-    costs what the paper's does; in the third its cycles at the mode's clock. A share is of the
-    paper's energy, where the range is worst for us.
+    Energies of a trip include executions and receiver. Ranges cover all parameter ranges of the
+    platform files. Second row of each mode: with the paper's energy per execution. Third row: with
+    the energy of this project's cycles at the clock of the mode. The share is the energy relative
+    to the paper's, at the worst end of the range.
     """
     from access_av.paper.codesign import compare
     from access_av.tables.results_directory import json_text
@@ -47,13 +47,13 @@ def codesign(
         ]
         print(json_text(records))
         return
-    head = ["mode", "", "RMS m", "executions", "listened", "energy J", "share ≤"]
-    made = table(head, title=f"Reading {reading}, {runs} runs, seed {seed}", text=2)
+    head = ["mode", "point", "RMS m", "executions", "received", "energy J", "share ≤"]
+    made = table(head, title=f"Interpretation {reading}, {runs} runs, seed {seed}", text=2)
     for each in found:
         for name, point, share in (
             ("paper", each.paper, ""),
-            ("our policy", each.policy, f"{each.policy_ratio:.3f}"),
-            ("and engine", each.engine, f"{each.engine_ratio:.2g}"),
+            ("own policy", each.policy, f"{each.policy_ratio:.3f}"),
+            ("own policy and engine", each.engine, f"{each.engine_ratio:.2g}"),
         ):
             low_j, value_j, high_j = point.energy_j
             made.add_row(
@@ -68,6 +68,6 @@ def codesign(
     console.print(made)
     better = sum(each.is_better for each in found)
     console.print(
-        f"Better in error and energy at once in {better} of {len(found)} power modes. "
-        f"Boundary: {found[0].paper.boundary} (paper), {found[0].engine.boundary} (our engine)."
+        f"Smaller error and energy in {better} of {len(found)} power modes. "
+        f"Boundary: {found[0].paper.boundary} (paper), {found[0].engine.boundary} (own engine)."
     )

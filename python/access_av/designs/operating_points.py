@@ -1,4 +1,4 @@
-"""The design space: which operating points meet an energy budget and an accuracy bound."""
+"""Operating points that meet an energy budget and an accuracy limit."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Query:
-    """Bounds an operating point has to keep; ``None`` leaves one open.
+    """Limits of an operating point; ``None`` means no limit.
 
     Attributes
     ----------
     max_energy_j
-        Energy of one trip.
+        Maximum energy of one trip.
     max_rms_m
-        Root mean square of the horizontal error over the track and the runs.
+        Maximum root mean square of the horizontal error over the track and the runs.
     max_worst_m
-        Worst error along the track, in X and in Y: mean over the runs of the absolute error.
+        Maximum along the track, in X and in Y, of the mean absolute error over the runs.
     max_executions
-        Angle estimates in one trip.
+        Maximum number of angle estimates in one trip.
     modes
-        Power modes to choose from.
+        Permitted power modes.
     max_error_m, percentile
-        So many percent of the horizontal errors are to be no larger than this.
+        Maximum of this percentile of the horizontal error.
     """
 
     max_energy_j: float | None = None
@@ -65,19 +65,19 @@ class Query:
 
 
 def explore(points: pl.DataFrame, query: Query) -> pl.DataFrame:
-    """Operating points that meet a query, the one with the least energy first.
+    """Returns the operating points that meet a query, ordered by energy.
 
     Parameters
     ----------
     points
-        Operating points as :func:`access_av.evaluate` gives them.
+        Operating points of :func:`access_av.evaluate`.
     query
-        The bounds.
+        Limits.
 
     Returns
     -------
     polars.DataFrame
-        The rows that qualify, by energy, then by error. May be empty.
+        Matching rows, by energy, then by error. May be empty.
 
     Examples
     --------
@@ -105,7 +105,7 @@ def explore(points: pl.DataFrame, query: Query) -> pl.DataFrame:
 
 
 def pareto_front(points: pl.DataFrame) -> pl.DataFrame:
-    """Operating points that no other beats in both energy and RMS error, by energy."""
+    """Returns the Pareto front of energy and RMS error, ordered by energy."""
     ordered = points.filter(pl.col("energy_j").is_not_null()).sort("energy_j", "rms_error_m")
     best_so_far = pl.col("rms_error_m").cum_min().shift(1)
     return ordered.filter(best_so_far.is_null() | (pl.col("rms_error_m") < best_so_far))

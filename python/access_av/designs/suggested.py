@@ -1,7 +1,8 @@
 """Designs suggested by Optuna from the results of earlier designs (extra ``optuna``).
 
-Optuna's ask-and-tell interface is used without its storage, in which killed trials stay active.
-Results are stored in parts: an equal seed suggests equal designs, whose results exist already.
+Optuna's interface of ``ask`` and ``tell`` is used without its storage, because killed trials stay
+active there. Results are stored in parts: an equal seed suggests equal designs, whose results exist
+already.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Roads, radio heads and walls from the files that plants have, and back: CSV, GeoJSON, DXF."""
+"""Import and export of roads, radio heads and walls: CSV, GeoJSON, DXF."""

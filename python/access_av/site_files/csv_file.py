@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def read_road(path: Path) -> Drawn:
-    """Read the columns ``x_m`` and ``y_m``, a point of the road each row.
+    """Reads the columns ``x_m`` and ``y_m``: one point of the road per row.
 
     Raises
     ------
@@ -32,12 +32,12 @@ def read_road(path: Path) -> Drawn:
 
 
 def read_heads(path: Path) -> Drawn:
-    """Read the columns ``x_m``, ``y_m``, ``z_m`` and, where they are, ``name`` and ``pci``.
+    """Reads the columns ``x_m``, ``y_m``, ``z_m`` and optionally ``name`` and ``pci``.
 
     Raises
     ------
     InputError
-        When a column or number is missing, or a PCI is no whole number.
+        Missing column or number, or a PCI that is not an integer.
     """
     rows = validation.read(path, "table of radio heads", {"name": pl.String})
     validation.check(rows, str(path), numbers=("x_m", "y_m", "z_m"), other=())
@@ -60,13 +60,13 @@ def read_heads(path: Path) -> Drawn:
 
 
 def road_text(points_m: Sequence[tuple[float, float]], *, german: bool = False) -> str:
-    """Points of a road as CSV; ``german`` with semicolons and decimal commas."""
+    """Returns points of a road as CSV; ``german``: semicolons and decimal commas."""
     rows = [("x_m", "y_m"), *((f"{x_m:.4f}", f"{y_m:.4f}") for x_m, y_m in points_m)]
     return _text(rows, german=german)
 
 
 def heads_text(heads: Sequence[Head], *, german: bool = False) -> str:
-    """Radio heads as CSV."""
+    """Returns radio heads as CSV."""
     rows = [("name", "x_m", "y_m", "z_m", "pci")]
     for head in heads:
         pci = "" if head.pci is None else str(head.pci)

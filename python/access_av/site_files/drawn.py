@@ -13,9 +13,9 @@ from access_av.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-# Farther from the road no radio head is of any use; its file is of another place or unit.
+# Maximum distance of a radio head from the road (m); beyond it, place or unit of a file is wrong.
 FARTHEST_HEAD_M = 3000.0
-# No plant is larger; roads of more are in another unit.
+# Maximum length of a road (m); a longer one has another unit.
 LONGEST_ROAD_M = 50_000.0
 SHORTEST_ROAD_M = 2.0
 # Smallest turn that counts as a bend, in radians: 5 degrees.
@@ -33,11 +33,11 @@ class Head:
     Attributes
     ----------
     name
-        Name for people; empty where the file has none.
+        Display name; empty if the file has none.
     x_m, y_m, z_m
-        Place.
+        Position.
     pci
-        Physical cell identity; ``None`` where the file has none.
+        Physical cell identity; ``None`` if the file has none.
     """
 
     name: str
@@ -62,9 +62,9 @@ class Drawn:
     Attributes
     ----------
     road_m
-        Points of the road, in driving order; empty where its shape is given by segments.
+        Points of the road, in driving order; empty if segments give its shape.
     start
-        Where segments begin: x and y in metres, heading in radians.
+        Start pose of the segments: x and y in metres, heading in radians.
     segments
         Lines and arcs that join without a kink.
     heads
@@ -95,7 +95,7 @@ class Drawn:
 
     @property
     def bends(self) -> int:
-        """Number of stretches that turn by at least :data:`BEND_RAD` in one direction."""
+        """Returns the number of sections with a turn of at least :data:`BEND_RAD`."""
         turns = [it.turn_rad for it in self.segments] or _turns(self.road_m)
         directions = itertools.groupby(
             turns, key=lambda turn: 0.0 if abs(turn) < STRAIGHT_RAD else math.copysign(1.0, turn)

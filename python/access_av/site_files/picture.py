@@ -1,4 +1,4 @@
-"""A picture of a plant under its maps: PNG or JPEG, how large it is, and where it lies."""
+"""Background image of a plant's maps: PNG or JPEG, size and placement."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from access_av.tables.results_directory import regular
 if TYPE_CHECKING:
     from access_av import _core
 
-# A page holds it as text, a third longer, and stays below 2 MB.
+# Maximum size in bytes: base64 is a third longer, and a report stays below 2 MB.
 MOST_BYTES = 384 << 10
 PNG = b"\x89PNG\r\n\x1a\n"
 JPEG = b"\xff\xd8\xff"
-# JPEG's frame headers (ITU-T T.81, table B.1), which hold height and width.
+# JPEG's frame headers (ITU-T T.81, table B.1), which contain height and width.
 FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
 
 
 @dataclass(frozen=True)
 class Underlay:
-    """A picture in the map's frame.
+    """Background image in the map frame.
 
     Attributes
     ----------
     url
-        The picture itself, as a ``data:`` URL.
+        The image as a ``data:`` URL.
     left_m, right_m, low_m, high_m
-        Where its edges are.
+        Coordinates of its edges.
     """
 
     url: str
@@ -43,16 +43,16 @@ class Underlay:
 
 @dataclass(frozen=True)
 class Placed:
-    """A picture's file, and where it lies, as a site states it.
+    """File and placement of a background image, as in a site file.
 
     Attributes
     ----------
     file
-        Its path from the site's own place.
+        Path relative to the site file.
     metres_per_pixel
         Side of a pixel.
     zero_px
-        Pixel of the map's zero, from the upper left corner to the right and down.
+        Pixel of the map origin, from the upper left corner to the right and down.
     """
 
     file: str
@@ -61,12 +61,12 @@ class Placed:
 
 
 def underlay(site: _core.Site) -> Underlay | None:
-    """The picture under a site's maps; ``None`` where it names none.
+    """Returns the background image of a site's maps; ``None`` without one.
 
     Raises
     ------
     InputError
-        Where its file is not there, too large, or neither PNG nor JPEG.
+        Missing or too large file, or neither PNG nor JPEG.
     """
     named = json.loads(site.to_json()).get("underlay")
     if named is None:
@@ -84,12 +84,12 @@ def underlay(site: _core.Site) -> Underlay | None:
 
 
 def size_px(path: Path) -> tuple[int, int]:
-    """Width and height of a picture in pixels.
+    """Returns width and height of an image in pixels.
 
     Raises
     ------
     InputError
-        As of :func:`underlay`.
+        As for :func:`underlay`.
     """
     return _read(path)[1:3]
 
@@ -107,14 +107,14 @@ def _read(path: Path) -> tuple[str, int, int, bytes]:
 
 
 def _png(data: bytes) -> tuple[int, int] | None:
-    """From its first chunk, which is IHDR (ISO/IEC 15948, 11.2.2)."""
+    """Returns the size in the first chunk, IHDR (ISO/IEC 15948, 11.2.2)."""
     if len(data) < 33 or data[12:16] != b"IHDR":
         return None
     return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
 
 
 def _jpeg(data: bytes) -> tuple[int, int] | None:
-    """From its frame header (ITU-T T.81, B.2.2)."""
+    """Returns the size in the frame header (ITU-T T.81, B.2.2)."""
     at = 2
     while at + 9 <= len(data) and data[at] == 0xFF:
         marker, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4], "big")

@@ -1,4 +1,4 @@
-"""Road, radio heads and walls of a plant from its files, by the ending of each name."""
+"""Import of road, radio heads and walls, by the extension of each file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from access_av.site_files.georeference import Origin
 
-# Points of a written road, so near each other that a bend of 5 m radius is a bend to a millimetre.
+# Point spacing of an exported road (m): a bend of 5 m radius is exact to a millimetre.
 WRITTEN_STEP_M = 0.2
 
 
@@ -31,11 +31,11 @@ class Options:
     Attributes
     ----------
     origin
-        Latitude and longitude of the map's zero, of GeoJSON in degrees.
+        Latitude and longitude of the map origin, for GeoJSON in degrees.
     road_layer, heads_layer, walls_layer
         Layers of a DXF drawing.
     scale_m
-        Metres of a unit of it, confirmed.
+        Confirmed unit of a DXF drawing, in metres.
     """
 
     origin: Origin | None = None
@@ -48,7 +48,7 @@ class Options:
 def read(
     road: Path | None, heads: Path | None, options: Options, walls: Path | None = None
 ) -> Drawn:
-    """Road, radio heads and walls, in one frame.
+    """Reads road, radio heads and walls into one frame.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def read(
     Raises
     ------
     InputError
-        Where a file cannot be read, is of another kind, or the files are of different places.
+        Unreadable file, unknown format, or files of different places.
     """
     files = _Files(options)
     files.check_frames([it for it in (road, heads, walls) if it is not None])
@@ -83,7 +83,7 @@ def read(
 
 
 class _Files:
-    """The files of a plant; maps are read once and have one origin."""
+    """Files of a plant; maps are read once and have a common origin."""
 
     def __init__(self, options: Options) -> None:
         self.options = options
@@ -99,8 +99,8 @@ class _Files:
         in_metres = [it for it in paths if it not in geographic]
         if geographic and in_metres and self.options.origin is None:
             raise InputError(
-                f"{geographic[0]}: in geographic coordinates, and {in_metres[0]} in metres: say "
-                "where the metres’ zero is, --origin LATITUDE,LONGITUDE"
+                f"{geographic[0]}: in geographic coordinates, and {in_metres[0]} in metres: add "
+                "the origin of the metres, --origin LATITUDE,LONGITUDE"
             )
         for each in self.maps.values():
             self.origin = each.place(self.origin, given=self.options.origin is not None) or (
@@ -108,7 +108,7 @@ class _Files:
             )
 
     def add(self, drawn: Drawn, path: Path, what: str) -> Drawn:
-        """A plant with the road, the radio heads or the walls of a file."""
+        """Adds the road, the radio heads or the walls of a file."""
         ending = _ending(path)
         if ending == "geojson":
             held = self.maps[path]
@@ -144,7 +144,7 @@ def _ending(path: Path) -> str:
 
 
 def of_site(site: _core.Site) -> Drawn:
-    """A site's road, as points so near each other that its bends stay bends, and radio heads.
+    """Returns a site's road as points, its radio heads and walls.
 
     Examples
     --------

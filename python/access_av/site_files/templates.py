@@ -1,4 +1,4 @@
-"""New files for people to fill in: short, commented, with realistic values and their units."""
+"""Example files: short, commented, with realistic values and units."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ if TYPE_CHECKING:
     from access_av.site_files.picture import Placed
 
 KINDS = ("plant", "site", "vehicle", "scenario", "node")
-# What a new radio head is taken to be where its file does not say.
+# Default values of an imported radio head.
 HEAD = "position_std_m = 0.1\n{cell}eirp_dbm = 10.0 # to be looked up\neirp_std_db = 2.0\n"
-SSB_INDICES = 8  # of a burst at most carriers below 6 GHz (TS 38.213, 4.1)
+SSB_INDICES = 8  # SSB indices of a burst at most carriers below 6 GHz (TS 38.213, 4.1)
 FIRST_PCI = 21
 EXAMPLE_STOP_M = 320.0
 TRIPS = "trips_per_day = 40 # of one vehicle"
-# Stands for what is missing while the rest of a file is checked.
+# Placeholder of missing parts while the rest of a file is checked.
 STRAIGHT = Drawn(segments=[Segment(100.0)], heads=[Head("", 50.0, 10.0, 8.0)])
-WALL_POINTS = 100  # of a table (settings/walls.rs)
+WALL_POINTS = 100  # maximum number of points of a wall (settings/walls.rs)
 
 
 def new(
@@ -36,28 +36,28 @@ def new(
     """Returns the text of a new file.
 
     A site or plant with imported parts contains no road, radio head, stop or trip of the example:
-    these stand in comments, and :func:`missing` names them.
+    comments contain these, and :func:`missing` names them.
 
     Parameters
     ----------
     kind
         One of :data:`KINDS`.
     name
-        Its short name.
+        Short name.
     file
-        What the file is called, for the commands that its comments name.
+        Name of the file, for the commands in its comments.
     drawn
         Imported road, radio heads and walls, of a plant or a site.
     placed
-        A picture under its maps.
+        Background image of the maps.
     filled
         Whether missing keys are filled with placeholders, so that the others can be checked.
     """
     prefix = "site." if kind == "plant" else ""
     example = Template(_read("example_site.toml")).substitute(prefix=prefix)
-    road, heads = example.split("\n# Each sends", 1)
-    heads, example_walls = f"# Each sends{heads}".split("\n# Walls that", 1)
-    walls = f"\n# Walls that{example_walls}"
+    road, heads = example.split("\n# Different SSB", 1)
+    heads, example_walls = f"# Different SSB{heads}".split("\n# Walls in", 1)
+    walls = f"\n# Walls in{example_walls}"
     stops = f"stops = [{{ at_m = {EXAMPLE_STOP_M:.1f}, dwell_s = 15.0 }}]"
     trips = TRIPS
     if drawn is not None:
@@ -119,7 +119,7 @@ def _road(drawn: Drawn, prefix: str) -> str:
 
 
 def _walls(drawn: Drawn, prefix: str) -> str:
-    """Tables of walls; long ones in pieces of as many corners as a table may have."""
+    """Returns the tables of walls; walls with too many corners are split."""
     made = ""
     for wall in drawn.walls_m:
         for first in range(0, len(wall) - 1, WALL_POINTS - 1):
@@ -132,18 +132,18 @@ def _walls(drawn: Drawn, prefix: str) -> str:
 def _picture(placed: Placed, prefix: str) -> str:
     x_px, y_px = placed.zero_px
     return (
-        "\n# A picture that lies under its maps; nothing is computed from it.\n"
+        "\n# Background image of the maps; no result depends on it.\n"
         f"[{prefix}underlay]\n"
         f"file = {json.dumps(placed.file, ensure_ascii=False)}\n"
         f"metres_per_pixel = {placed.metres_per_pixel:.9g}\n"
-        f"zero_px = [{x_px:.3f}, {y_px:.3f}] # the map's zero, from the upper left corner\n"
+        f"zero_px = [{x_px:.3f}, {y_px:.3f}] # map origin, from the upper left corner\n"
     )
 
 
 def _heads(drawn: Drawn, prefix: str) -> str:
     taken = {head.pci for head in drawn.heads}
     free = (pci for pci in range(FIRST_PCI, 1008) if pci not in taken)
-    made = ["# Each sends its SSB at an index of its own: the strongest would drown the others."]
+    made = ["# Different SSB indices, because simultaneous SSBs interfere."]
     for index, head in enumerate(drawn.heads):
         pci = next(free) if head.pci is None else head.pci
         cell = f"pci = {pci}{' # to be looked up' if head.pci is None else ''}\n"

@@ -314,8 +314,8 @@ _GLOSSARY = {
     "unit": ("text", "Unit of stated and obtained"),
     "verdict": (
         "text",
-        "Of a claim: reproduced or not reproduced; agrees or differs, by arithmetic or by "
-        "construction; not judged; not testable. Of an angle: resolved, or the reason why it is "
+        "Claim: reproduced or not reproduced; agrees or differs, by arithmetic or by "
+        "construction; not judged; not testable. Angle: resolved, or the reason why it is "
         "ambiguous (noise or geometry)",
     ),
     "doubt": (
