@@ -401,7 +401,7 @@ def test_where_nothing_fits_it_says_what_would() -> None:
     assert " m instead of 0.15 m: " in advice[1]
     assert "design 1" in advice[1]
     advice = what_to_change(Constraints(max_energy_j=0.0, max_rms_m=0.0), rows)
-    assert advice[0].startswith("energy alone, however much is allowed, does not help")
+    assert advice[0].startswith("energy: no value of this limit alone is sufficient")
 
 
 def test_a_design_is_judged_in_the_worst_of_its_worlds(
@@ -452,10 +452,10 @@ def test_what_too_few_drives_say_is_not_called_kept() -> None:
     bound = Constraints(max_error_m=0.3, percentile=99.0)
     assert bound.keeps(row)
     assert not bound.keeps_surely(row)
-    assert "too few drives to say" in bound.in_words(row)[0]
-    assert bound.in_words({**row, "p99_error_high_m": 0.29})[0].endswith("kept")
+    assert "too few runs" in bound.in_words(row)[0]
+    assert bound.in_words({**row, "p99_error_high_m": 0.29})[0].endswith("met")
     assert bound.in_words({**row, "p99_error_m": 0.31})[0].endswith("missed")
-    assert bound.in_words({**row, "p99_error_high_m": None})[0].endswith("too few drives to say")
+    assert bound.in_words({**row, "p99_error_high_m": None})[0].endswith("too few runs")
     with pytest.raises(InputError, match=r"percentile 42: it can be 50, 90, 95, 99, 99\.9"):
         Constraints(max_error_m=0.3, percentile=42.0)
 

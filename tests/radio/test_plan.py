@@ -162,7 +162,7 @@ def test_service_levels_need_time_as_well_as_accuracy() -> None:
     assert found is not None
     assert found[0].share == 1.0
     # Half a minute is too short for level 2, and nothing says that it is not reached.
-    assert [found[0].outcome, found[1].outcome] == ["too few drives"] * 2
+    assert [found[0].outcome, found[1].outcome] == ["too few runs"] * 2
 
 
 def test_an_integrity_campaign_goes_on_where_it_stopped(

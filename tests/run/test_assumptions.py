@@ -57,7 +57,7 @@ def test_the_paper_and_dead_reckoning_by_many_heads_are_named(
 ) -> None:
     done = access_av("run", "paper", "--set", "motion.start_at_m=290", "--out", tmp_path)
     assert done.code == 0, done.err
-    [line] = [line for line in done.out.splitlines() if line.startswith("Assumed")]
+    [line] = [line for line in done.out.splitlines() if line.startswith("Optimistic assumptions")]
     assumed = json.loads((tmp_path / "manifest.json").read_text())["assumed"]
     assert assumed
     assert all(what in line for what in assumed)

@@ -106,11 +106,11 @@ def test_run_tells_percentiles_and_integrity(
     )  # fmt: skip
     assert done.code == 0, done.err
     told = " ".join(done.out.split())
-    for text in ("50th percentile of the error", "protection level / error", "may rely on its position"):
+    for text in ("50th percentile of the error", "protection level / error", "The position is available"):
         assert text in told
     page = (tmp_path / "report.html").read_text()
     assert "stanford" in page
-    assert "may rely on its position" in page
+    assert "The position is available" in page
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert manifest["repeat"] == "access-av run scenario.toml --runs 1 --seed 1"
     again = access_av("run", tmp_path / "scenario.toml", "--seed", "1", "--out", tmp_path / "again")

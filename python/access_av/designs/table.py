@@ -148,20 +148,20 @@ class Constraints:
         --------
         >>> row = {"p99_error_m": 0.286, "p99_error_low_m": 0.21, "p99_error_high_m": 0.34}
         >>> Constraints(max_error_m=0.3).in_words(row)
-        ['99 % of errors within 0.286 m (95 %: 0.21 to 0.34), asked 0.3 m: too few drives to say']
+        ['99th percentile of the error 0.286 m (95 %: 0.21 to 0.34), limit 0.3 m: too few runs']
         """
         told = []
         for name, (value, bound) in self._judged(row).items():
             unit = "J" if name == ENERGY else "m"
-            had, verdict = "not known" if value is None else f"{value:.3g} {unit}", "missed"
+            had, verdict = "unknown" if value is None else f"{value:.3g} {unit}", "missed"
             if value is not None and value <= bound:
-                verdict = "kept"
+                verdict = "met"
             if name == self._percentile_name and value is not None:
                 low_m, high_m = _ends(row, self.percent)
-                if (high_m is None and verdict == "kept") or (high_m or 0.0) > bound >= value:
-                    verdict = "too few drives to say"
+                if (high_m is None and verdict == "met") or (high_m or 0.0) > bound >= value:
+                    verdict = "too few runs"
                 had += f" (95 %: {ends_text(low_m, high_m)})"
-            told.append(f"{name} {had}, asked {bound:g} {unit}: {verdict}")
+            told.append(f"{name} {had}, limit {bound:g} {unit}: {verdict}")
         return told
 
     def instead(self, name: str, factor: float) -> str:
@@ -202,7 +202,7 @@ class Constraints:
 
     @property
     def _percentile_name(self) -> str:
-        return f"{self.percent:g} % of errors within"
+        return f"{self.percent:g}th percentile of the error"
 
     def _judged(self, row: Mapping[str, Any]) -> dict[str, tuple[float | None, float]]:
         """Returns value and limit of each limited quantity of a row."""
@@ -210,7 +210,7 @@ class Constraints:
             ENERGY: (row.get("energy_j"), self.max_energy_j),
             "RMS error": (row.get("rms_error_m"), self.max_rms_m),
             self._percentile_name: (row.get(column(self.percent)), self.max_error_m),
-            "worst error": (row.get("p90_max_error_m"), self.max_worst_m),
+            "maximum error": (row.get("p90_max_error_m"), self.max_worst_m),
         }
         return {name: (value, bound) for name, (value, bound) in every.items() if bound is not None}
 
@@ -245,11 +245,11 @@ def what_to_change(constraints: Constraints, rows: pl.DataFrame) -> list[str]:
             factor, label = min(others)
             advice.append(f"{constraints.instead(name, factor)}: {label}")
         else:
-            advice.append(f"{name} alone, however much is allowed, does not help")
+            advice.append(f"{name}: no value of this limit alone is sufficient")
     nearest, row = min(zip(excesses, records, strict=True), key=lambda pair: max(pair[0].values()))
     factor = max(nearest.values())
     if np.isfinite(factor) and len(nearest) > 1:
         every = ", ".join(constraints.instead(name, factor) for name in nearest)
         advice.append(f"{every}: {row['choice']}")
-    advice.append("else what does not vary: more radio heads, a better odometer, a surveyed road")
+    advice.append("other changes: more radio heads, a better odometer, a surveyed road")
     return advice

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 BOUNDARIES = {
-    "marginal": "what is drawn above idle",
-    "soc-rails": "the rails of the system on chip",
-    "wall": "the wall socket",
-    "unstated": "unstated; the source does not say what it counts",
+    "marginal": "above idle",
+    "soc-rails": "rails of the system on chip",
+    "wall": "wall socket",
+    "unstated": "unknown, because the source does not define it",
 }
 
 

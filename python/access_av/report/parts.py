@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 # Kind of badge for each result of a service level.
-OUTCOMES = {"reached": "yes", "too few drives": "fit", "not reached": "no"}
+OUTCOMES = {"reached": "yes", "too few runs": "fit", "not reached": "no"}
 
 
 def badge(text: str, kind: str) -> str:

@@ -1,1 +1,1 @@
-"""Scenarios driven: simulated, bounded, with faults injected, held against service levels."""
+"""Evaluation of scenarios: simulation, error bound, fault injection, service levels."""

@@ -1,4 +1,4 @@
-"""What a scenario takes as exact or leaves out, so that its figures look better than a plant's."""
+"""Optimistic assumptions of a scenario: exact or omitted error sources."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def flattering(scenario: _core.Scenario) -> list[str]:
-    """What flatters the figures of a scenario, in words; each with the key that says otherwise.
+    """Returns the optimistic assumptions of a scenario as text, each with its key.
 
     Examples
     --------
@@ -28,12 +28,11 @@ def flattering(scenario: _core.Scenario) -> list[str]:
     tracks = vehicle["localizer"]["kind"] == "tracker"
     heads = site["radio_heads"]
     found = {
-        f"angles of {len(heads)} radio heads, each taken as exact by dead reckoning": (
+        f"angles of {len(heads)} radio heads, assumed exact by dead reckoning": (
             not tracks and len(heads) > 1
         ),
-        "dead reckoning, which knows no error of its own, so no protection level"
-        " (vehicle.localizer.kind)": not tracks,
-        "no integrity monitor, so no protection level (vehicle.integrity.enabled)": tracks
+        "dead reckoning without protection level (vehicle.localizer.kind)": not tracks,
+        "no integrity monitor and protection level (vehicle.integrity.enabled)": tracks
         and not vehicle.get("integrity", {"enabled": True})["enabled"],
         "exact start (vehicle.start)": start["known"]
         and not (start["position_std_m"] or start["heading_std_rad"]),
@@ -43,14 +42,14 @@ def flattering(scenario: _core.Scenario) -> list[str]:
         "exact array (vehicle.array.mounting_std_rad, phase_std_rad)": not (
             array.get("mounting_std_rad") or array.get("phase_std_rad")
         ),
-        "exact places of the radio heads (site.radio_heads.all.position_std_m)": not any(
+        "exact positions of the radio heads (site.radio_heads.all.position_std_m)": not any(
             head["position_std_m"] for head in heads
         ),
-        "nothing drawn from what is stated (truth.draw)": json.loads(scenario.to_json())
+        "truth equal to the nominal model (truth.draw)": json.loads(scenario.to_json())
         .get("truth", {})
         .get("draw")
         == "none",
-        "energy not counted, for which the platform has no figure (vehicle.platform.name)": (
+        "no energy, because the platform has no value for the method (vehicle.platform.name)": (
             energy_boundary(scenario) is None
         ),
     }
@@ -58,13 +57,13 @@ def flattering(scenario: _core.Scenario) -> list[str]:
 
 
 def energy_boundary(scenario: _core.Scenario) -> str | None:
-    """What the joules of a scenario count, in words; ``None`` where its platform has no figure.
+    """Returns the boundary of the energy as text; ``None`` if the platform has no energy.
 
     Examples
     --------
     >>> from access_av import _core
     >>> energy_boundary(_core.Scenario.load("yard"))
-    'what is drawn above idle'
+    'above idle'
     """
     settings = json.loads(scenario.vehicle.to_json())["platform"]
     platform = Platform.load(settings["name"]).core
@@ -73,11 +72,11 @@ def energy_boundary(scenario: _core.Scenario) -> str | None:
 
 
 def in_words(assumed: list[str]) -> str:
-    """One sentence of what flatters; empty where nothing does.
+    """Returns the optimistic assumptions as a sentence; empty without any.
 
     Examples
     --------
     >>> in_words(["exact start (vehicle.start)"])
-    'Assumed, and better than a plant is: exact start (vehicle.start).'
+    'Optimistic assumptions: exact start (vehicle.start).'
     """
-    return f"Assumed, and better than a plant is: {'; '.join(assumed)}." if assumed else ""
+    return f"Optimistic assumptions: {'; '.join(assumed)}." if assumed else ""

@@ -1,7 +1,7 @@
 """Campaigns: many tasks that do not depend on one another, with results in parts on disk.
 
-What a part holds does not depend on who computed it: threads, shards of an array job, or the
-workers of a Dask cluster give the same bytes. A campaign that was killed goes on where it was.
+The content of a part does not depend on the computing process: threads, shards of an array job and
+Dask workers give identical bytes. A repeated campaign continues after an interruption.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ if TYPE_CHECKING:
 
     from access_av.run.result_cache import Parts
 
-# Tasks handed out for each worker, so that none waits for the next.
+# Number of pending tasks per worker, so that no worker is idle.
 AHEAD = 4
 
 
 class CampaignError(InputError):
-    """Workers that are gone; what was finished is kept."""
+    """Lost workers; finished parts are kept."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """One part to compute.
+    """One part of a campaign.
 
     Attributes
     ----------
     depends_on
         Everything that its numbers depend on, as plain values.
     work, arguments
-        ``work(*arguments)`` makes it; both can be pickled.
+        ``work(*arguments)`` computes it; both can be pickled.
     """
 
     depends_on: Any
@@ -56,19 +56,19 @@ class Task:
 
 @dataclass(frozen=True)
 class Shard:
-    """The share of a campaign that one of several jobs computes; they count from 1."""
+    """Part of a campaign that one of several jobs computes, counted from 1."""
 
     number: int = 1
     of: int = 1
 
     @classmethod
     def parse(cls, text: str) -> Shard:
-        """Read ``2/8``.
+        """Reads a text such as ``2/8``.
 
         Raises
         ------
         InputError
-            When it is not that.
+            Invalid text.
 
         Examples
         --------
@@ -81,20 +81,20 @@ class Shard:
         raise InputError(f"--shard {text}: write I/N with I from 1 to N, for example 2/8")
 
     def holds(self, index: int) -> bool:
-        """Whether a task is this job's, by its place."""
+        """Returns whether a task belongs to this job, by its index."""
         return index % self.of == self.number - 1
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """Where parts are kept and who computes them.
+    """Storage and workers of a campaign.
 
     Attributes
     ----------
     executor
-        Anything like those of :mod:`concurrent.futures`; one after the other when ``None``.
+        Executor as in :mod:`concurrent.futures`; sequential if ``None``.
     workers
-        How many tasks it works on at once.
+        Number of parallel tasks.
     """
 
     parts: Parts
@@ -105,24 +105,24 @@ class Campaign:
     def run(
         self, tasks: Sequence[Task], progress: Callable[[int, int], None] | None = None
     ) -> list[dict[str, NDArray[Any]] | None]:
-        """Compute what is not there yet.
+        """Computes the missing parts.
 
         Parameters
         ----------
         tasks
-            What there is to do.
+            Tasks of the campaign.
         progress
             Called as ``progress(done, total)``.
 
         Returns
         -------
         list
-            Parts in the tasks' order; ``None`` where one is another shard's and not there yet.
+            Parts in the order of the tasks; ``None`` if a part of another shard is missing.
 
         Raises
         ------
         CampaignError
-            When the workers are gone.
+            Lost workers.
         """
         found = [self.parts.read(task.depends_on) for task in tasks]
         missing = [
@@ -167,19 +167,19 @@ class Campaign:
 
 
 def _is_of_workers(error: BaseException) -> bool:
-    """Whether it is the workers that failed, not the task."""
+    """Returns whether an error comes from the workers and not from the task."""
     by_dask = type(error).__module__.startswith(("distributed", "dask"))
     return by_dask or isinstance(error, (BrokenExecutor, CancelledError, ConnectionError))
 
 
 @contextmanager
 def executor(dask: str | None = None, threads: int | None = None) -> Iterator[tuple[Executor, int]]:
-    """Workers, and how many: a Dask cluster's by the scheduler's address, else threads.
+    """Yields workers and their number: of a Dask cluster by its address, otherwise threads.
 
     Raises
     ------
     InputError
-        When there is no scheduler there, or no Dask.
+        Scheduler not reachable, or Dask not installed.
     """
     if dask is None:
         cores = os.cpu_count() or 1

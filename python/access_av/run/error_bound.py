@@ -1,4 +1,4 @@
-"""How well any localizer can do in a scenario, before anything is built there."""
+"""Lower bound of the localization error of a scenario."""
 
 from __future__ import annotations
 
@@ -19,11 +19,10 @@ from access_av.tables.result import Origin, Result, origin
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# An SSB is to be detected down to this Es/Iot (TS 38.133, side condition of intra-frequency
+# Minimum Es/Iot of a detectable SSB in dB (TS 38.133, side condition of intra-frequency
 # measurements).
 VISIBLE_SNR_DB = -6.0
-# The map is of a vehicle that has listened over so long a way, an independent angle per half
-# wavelength.
+# Driven distance with reception for the map (m), with one independent angle per half wavelength.
 MAP_TRAVEL_M = 1.0
 ANGLES_PER_WAVELENGTH = 2.0
 MARGIN_M = 20.0
@@ -45,9 +44,9 @@ class ErrorBound(Result):
     heads
         One row per radio head; columns ``bound_heads``.
     site
-        The bound over the site, one row per square of ``map_step_m``; columns ``bound_map``. Of a
-        vehicle that has measured ``map_angles`` independent angles, knows its heading to
-        ``map_heading_std_rad`` and nothing of its place.
+        The bound over the site, one row per square of ``map_step_m``; columns ``bound_map``. It is
+        valid for a vehicle that has measured ``map_angles`` independent angles, with a heading σ of
+        ``map_heading_std_rad`` and an unknown position.
     """
 
     scenario: _core.Scenario
@@ -72,7 +71,7 @@ class ErrorBound(Result):
         return lines(self.route, "along_m", columns, titles=titles)
 
     def summary(self) -> dict[str, Any]:
-        """The numbers to judge a placement of radio heads by, without the tables."""
+        """Returns the main figures of a placement of radio heads."""
         bound_m = self.route["bound_m"]
         return {
             "scenario": self.scenario.name,
@@ -87,32 +86,32 @@ class ErrorBound(Result):
 
     @cached_property
     def verdicts(self) -> list[service_levels.Verdict]:
-        """The service levels that no localizer can better on this route."""
+        """Returns the service levels by the bound, which no localizer exceeds."""
         return service_levels.of_bound(self.route["along_std_m"], self.route["across_std_m"])
 
 
 def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) -> ErrorBound:
-    """The least error of any localizer along a scenario's route, and over its site.
+    """Computes the lower bound of the error along a scenario's route and over its site.
 
     Parameters
     ----------
     scenario
         A scenario, or the name or path of one.
     map_step_m
-        Side of the map's squares in metres; when ``None``, a round length that makes about
-        :data:`MAP_CELLS` of them.
+        Side of the map's squares in metres. Default: a round length with about :data:`MAP_CELLS`
+        squares.
 
     Returns
     -------
     ErrorBound
-        Tables.
+        Bound and tables.
 
     Raises
     ------
     SettingsError
-        When the scenario cannot be used.
+        Unusable scenario.
     InputError
-        When the map would have more than :data:`MOST_MAP_CELLS` squares.
+        Map with more than :data:`MOST_MAP_CELLS` squares.
 
     Examples
     --------
@@ -165,7 +164,7 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
 
 
 def along_route(scenario: _core.Scenario) -> pl.DataFrame:
-    """The bound at every SSB of the drive; columns ``bound_route`` of :mod:`access_av.columns`."""
+    """Returns the bound at every SSB of the drive; columns ``bound_route``."""
     return pl.DataFrame(_core.Bound(scenario).along_route())
 
 
@@ -200,7 +199,7 @@ def _extent(route: pl.DataFrame, heads: pl.DataFrame) -> tuple[NDArray[np.float6
 
 
 def _round_step(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
-    """The round step, 1, 2 or 5 times a power of ten, that makes no more than ``MAP_CELLS``."""
+    """Returns the smallest round step (1, 2, 5 times 10ⁿ) with at most ``MAP_CELLS`` squares."""
     least_m = math.sqrt(float(np.prod(high - low)) / MAP_CELLS)
     power = 10.0 ** math.floor(math.log10(least_m))
     return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= least_m)

@@ -1,4 +1,4 @@
-"""How the world may be otherwise than believed: overrides of a scenario, by name."""
+"""Differences between truth and nominal model: overrides of a scenario, by name."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 Overrides = dict[str, Any]
 
-# Multiples of what is stated.
+# Multiples of the specified standard deviations.
 SIZES = (1, 3, 10)
 
-# One deviation where none is stated: what a survey, a calibration and a data sheet usually leave.
+# Default standard deviations: typical survey, calibration and data sheet.
 PLACE_STD_M = 0.1
 ROAD_STD_M = 0.03
 MOUNTING_STD_RAD = 0.01
@@ -41,7 +41,7 @@ LONGEST_S = 600.0
 
 
 def mismatches(scenario: _core.Scenario) -> dict[str, Overrides]:
-    """What can be otherwise than believed, by name: overrides of the scenario.
+    """Returns the differences between truth and nominal model by name: overrides of the scenario.
 
     Every other quantity is drawn from its stated standard deviation.
 
@@ -91,9 +91,9 @@ def mismatches(scenario: _core.Scenario) -> dict[str, Overrides]:
 
 
 def hypotheses(scenario: _core.Scenario) -> dict[str, Overrides]:
-    """What may be wrong at a site, at three sizes each: 1, 3 and 10 times what is stated of it.
+    """Returns fault hypotheses of a site at 1, 3 and 10 times the specified standard deviation.
 
-    Where no deviation is stated, one is what surveys, calibration and data sheets usually leave.
+    The default standard deviation is that of a typical survey, calibration or data sheet.
     Every other quantity is drawn from its stated standard deviation.
 
     Examples
@@ -161,7 +161,7 @@ def _of_size(site: Overrides, vehicle: Overrides, size: float) -> dict[str, Over
 
 
 def _moved(heads: list[Overrides], by_m: Iterable[Any]) -> Overrides:
-    """Radio heads elsewhere; none where they have no names to tell them apart by."""
+    """Returns displaced radio heads; empty if they have no distinct names."""
     names = [head["name"] for head in heads]
     if not all(names) or len(set(names)) < len(names):
         return {}
@@ -174,7 +174,7 @@ def _moved(heads: list[Overrides], by_m: Iterable[Any]) -> Overrides:
 
 
 def _swapped(heads: list[Overrides]) -> Overrides:
-    """A wrong plan of cells: the first two radio heads send what the other should."""
+    """Exchanges the cells of the first two radio heads."""
     if len(heads) < 2 or not _moved(heads[:2], np.zeros((2, 3))):
         return {}
     first, second = heads[:2]
@@ -188,7 +188,7 @@ def _swapped(heads: list[Overrides]) -> Overrides:
 
 
 def _bent(site: Overrides, size: float) -> Overrides:
-    """A road whose corners lie to one side and the other of where the map has them."""
+    """Returns a road with corners displaced alternately to both sides."""
     road = site.get("road") or {}
     if not road.get("polyline_m"):
         return {}

@@ -1,4 +1,4 @@
-"""How integrity holds where the world is not as believed: mismatch by channel by radio heads."""
+"""Integrity under differences of truth and model, by channel and number of radio heads."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from access_av.run.campaign import Campaign
 
-# Drives of a part: what is lost when a campaign is stopped.
+# Runs per part, which are lost by an interruption.
 PART_RUNS = 5
 
 
@@ -38,14 +38,14 @@ class Case:
     Attributes
     ----------
     mismatch, channel, heads, asked_risk_per_hour
-        How the world departs from what is believed, the channel, how many radio heads are listened
-        to, and the risk that the level is to leave.
+        Difference of truth and model, channel, number of received radio heads, and target
+        integrity risk.
     scenario
-        All of it.
+        Scenario of the case.
     trajectories
         ``run, time_s, error_x_m, error_y_m, protection_level_m, integrity`` of every step.
     variant
-        What of several was driven.
+        Name of the variant.
     """
 
     mismatch: str
@@ -58,11 +58,11 @@ class Case:
 
     @property
     def alert_limit_m(self) -> float:
-        """The guard's alert limit."""
+        """Returns the alert limit of the integrity monitor."""
         return float(_settings(self.scenario)["alert_limit_m"])
 
     def as_record(self) -> dict[str, Any]:
-        """A row of the table; columns ``integrity_cases`` of :mod:`access_av.columns`."""
+        """Returns a row of the table; columns ``integrity_cases`` of :mod:`access_av.columns`."""
         found = Integrity.of(self.trajectories)
         alarms = Alarms.of(self.trajectories, self.alert_limit_m)
         if found is None or alarms is None:
@@ -93,7 +93,7 @@ class Case:
         }
 
     def errors(self, name: str) -> Errors:
-        """Its errors, drive by drive; infinite as long as the place is searched for."""
+        """Returns the errors of each run; infinite during the search for the first position."""
         by_run = [
             part["error_x_m"].to_numpy()
             for part in self.trajectories.partition_by("run", maintain_order=True)
@@ -106,13 +106,13 @@ class Case:
 
 
 def _settings(scenario: _core.Scenario) -> dict[str, Any]:
-    """``[integrity]`` of its vehicle, in which it is written out."""
+    """Returns the complete ``[integrity]`` settings of the vehicle."""
     found: dict[str, Any] = json.loads(scenario.vehicle.to_json())["integrity"]
     return found
 
 
 def channels(names: Sequence[str]) -> dict[str, Overrides]:
-    """Channels by name: ``as set``, ``K=dB`` for a true Rician K, or a model.
+    """Returns channels by name: ``as set``, ``K=dB`` for a true Rician K, or a model.
 
     Examples
     --------
@@ -146,38 +146,38 @@ def drive(
     risks_per_hour: Sequence[float] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Case] | None:
-    """Drive a guarded scenario under every mismatch, channel and number of radio heads.
+    """Simulates a scenario with every mismatch, channel and number of radio heads.
 
     Parameters
     ----------
     campaign
-        Who drives, and where drives are kept.
+        Workers and storage of the runs.
     scenario
-        A scenario, or the name or path of one. A monitor that is switched off is switched on.
+        A scenario, or the name or path of one. A disabled integrity monitor is enabled.
     runs, seed
-        Drives of each case, and their seed.
+        Number of runs per case, and seed.
     only
         Names out of :func:`~access_av.hypotheses.mismatches`, all of which are driven when
         ``None``, and :func:`~access_av.hypotheses.hypotheses`.
     channel_names
         See :func:`channels`.
     heads
-        Numbers of radio heads listened to, the first of the site; all of them when ``None``.
+        Numbers of received radio heads, the first ones of the site. Default: all.
     risks_per_hour
-        Target integrity risks; the vehicle's own when ``None``.
+        Target integrity risks. Default: that of the vehicle.
     progress
         Called as ``progress(done, total)``.
 
     Returns
     -------
     list of Case
-        In the order mismatch, channel, heads, risk; ``None`` where parts are missing that another
-        shard computes.
+        In the order mismatch, channel, heads, risk; ``None`` if parts of another shard are
+        missing.
 
     Raises
     ------
     InputError
-        For a name or number that there is not.
+        Unknown name or number.
 
     Examples
     --------
@@ -245,7 +245,7 @@ def drive(
 
 
 def driven(scenario: str, first_run: int, runs: int, seed: int) -> dict[str, NDArray[Any]]:
-    """A part: errors, levels and states of every step, on one thread."""
+    """Simulates one part: errors, levels and states of every step, in one thread."""
     found = Simulation.of(
         _core.simulate(
             _core.Scenario.from_toml(scenario),
@@ -256,7 +256,7 @@ def driven(scenario: str, first_run: int, runs: int, seed: int) -> dict[str, NDA
             keep_trajectories=True,
         )
     )
-    if found.trajectories is None:  # they were asked for
+    if found.trajectories is None:  # keep_trajectories is set
         raise RuntimeError("the simulation kept no trajectories")
     steps = found.trajectories.filter(pl.col("protection_level_m").is_not_null())
     state = steps["integrity"].cast(pl.Enum(STATES)).to_physical()

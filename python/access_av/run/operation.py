@@ -1,4 +1,4 @@
-"""What integrity means for operation: how often a vehicle may rely on its position, and why not."""
+"""Availability of the position, and the causes of unavailability."""
 
 from __future__ import annotations
 
@@ -12,39 +12,38 @@ if TYPE_CHECKING:
 
     from access_av._core import Vehicle
 
-# Why a position is not to be relied on, and what changes that, in the order in which they are
-# asked: the first that is so is the reason.
-SEARCHING = "the first position was not found yet"
-CONTRADICTED = "several radio heads contradict each other, or the array or the odometer all of them"
-TOO_WIDE = "the protection level was above the alert limit of {limit_m:g} m"
-SUSPECTED = "a radio head, the array or the odometer was suspected of a fault, or had just been"
+# Causes of unavailability and their remedies, in the order of their test; the first one counts.
+SEARCHING = "first position not found yet"
+CONTRADICTED = "contradictions between radio heads, array and odometer"
+TOO_WIDE = "protection level above the alert limit of {limit_m:g} m"
+SUSPECTED = "fault of a radio head, the array or the odometer suspected, now or recently"
 REMEDIES = {
-    SEARCHING: "an initial pose, or more radio heads in reach of it",
-    CONTRADICTED: "the places of the radio heads and the array's mounting, surveyed (access-av "
-    "survey finds them from drives)",
-    TOO_WIDE: "wake-ups more often, more radio heads in reach, smaller stated deviations, or a "
-    "higher integrity.alert_limit_m where the plant allows it",
-    SUSPECTED: "deviations that are stated as large as they are (array, odometer, radio heads): "
-    "what is within them is no fault",
+    SEARCHING: "a start pose, or more radio heads near the start",
+    CONTRADICTED: "a survey of radio heads and array mounting (access-av survey, from drives)",
+    TOO_WIDE: "more wake-ups, more radio heads, smaller standard deviations, or a higher "
+    "integrity.alert_limit_m if the plant permits it",
+    SUSPECTED: "realistic standard deviations of array, odometer and radio heads, because errors "
+    "within them are no faults",
 }
 
 
 @dataclass(frozen=True)
 class Operation:
-    """For how much of the time a vehicle may rely on its position.
+    """Availability of a vehicle's position.
 
     Attributes
     ----------
     reliable
         Share of the time in state ``ok``.
     reasons
-        Share of the time by the reason why it may not, the most frequent first.
+        Share of the time by cause of unavailability, the most frequent first.
     level_m
-        Median protection level while it may; ``None`` where it never may.
+        Median protection level in state ``ok``; ``None`` if the state is never ``ok``.
     alert_limit_m
         Alert limit of the vehicle.
     beyond, epochs
-        Errors beyond the protection level while it may, of so many; ``None`` without a truth.
+        Number of errors above the protection level in state ``ok``, and number of positions in
+        state ``ok``; ``None`` without truth.
     """
 
     reliable: float
@@ -56,12 +55,12 @@ class Operation:
 
     @classmethod
     def of(cls, steps: pl.DataFrame, alert_limit_m: float) -> Operation | None:
-        """Count in a table of poses or trajectories, evenly spaced in time.
+        """Evaluates a table of poses or trajectories with a constant time step.
 
         Parameters
         ----------
         steps
-            Columns ``integrity``, ``protection_level_m`` and ``searching``; ``error_m`` where the
+            Columns ``integrity``, ``protection_level_m`` and ``searching``; ``error_m`` if the
             truth is known.
         alert_limit_m
             ``integrity.alert_limit_m`` of the vehicle.
@@ -69,7 +68,7 @@ class Operation:
         Returns
         -------
         Operation or None
-            ``None`` where no state is told: nothing watches over the position.
+            ``None`` without an integrity monitor.
 
         Examples
         --------
@@ -119,45 +118,38 @@ has to slow down or stop: 30 % because the protection level was above the alert 
 
     @classmethod
     def under(cls, vehicle: Vehicle, steps: pl.DataFrame) -> Operation | None:
-        """The same, by the vehicle's own alert limit; ``None`` where it is not guarded."""
+        """Evaluates with the vehicle's alert limit; ``None`` without an integrity monitor."""
         limit_m = vehicle.alert_limit_m
         return None if limit_m is None else cls.of(steps, limit_m)
 
     def in_words(self) -> str:
-        """How often, how near, and why not else."""
-        text = (
-            f"The vehicle may rely on its position {_percent(self.reliable)} of the time (state ok)"
-        )
+        """Returns availability, protection level and causes as text."""
+        text = f"The position is available (state ok) {_percent(self.reliable)} of the time"
         if self.level_m is not None:
-            text += (
-                f"; half of that time it knows it to within {self.level_m:.2g} m (protection level)"
-            )
+            text += f", with a median protection level of {self.level_m:.2g} m"
         text += "."
         if self.beyond is not None and self.epochs:
             text += (
-                f" While it might, the error was beyond that level in {self.beyond:,} of "
-                f"{self.epochs:,} positions."
+                f" The error exceeded the level in {self.beyond:,} of {self.epochs:,} available "
+                "positions."
             )
         if self.reasons:
             whys = [
-                f"{_percent(share)} because {name.format(limit_m=self.alert_limit_m)}"
+                f"{_percent(share)} {name.format(limit_m=self.alert_limit_m)}"
                 for name, share in self.reasons.items()
             ]
-            text += (
-                " The rest of the time it knows that it may not, and has to slow down or stop: "
-                f"{', '.join(whys)}."
-            )
+            text += f" Otherwise the vehicle must slow down or stop. Causes: {', '.join(whys)}."
         return text
 
     def what_helps(self) -> str:
-        """What changes the most frequent reason; empty where it may nearly always."""
+        """Returns the remedy of the most frequent cause; empty above 99 % availability."""
         if not self.reasons or self.reliable > 0.99:
             return ""
-        return f"What helps most: {REMEDIES[next(iter(self.reasons))]}."
+        return f"Remedy: {REMEDIES[next(iter(self.reasons))]}."
 
 
 def _percent(share: float) -> str:
-    """A share, not rounded to all or none.
+    """Returns a share in percent, without rounding to 0 or 100 %.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Results in parts on disk, so that what was stopped goes on.
+"""Results in parts on disk, so that an interrupted campaign continues.
 
-A part is named after everything that it depends on, and put in place whole: a part that is there is
-right, whoever computed it and when. Several campaigns may share a directory.
+The name of a part is a hash of everything that it depends on, and parts are written atomically.
+An existing part is therefore valid. Several campaigns may share a directory.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ class Parts:
     def get(
         self, depends_on: Any, compute: Callable[[], Mapping[str, NDArray[Any]]]
     ) -> dict[str, NDArray[Any]]:
-        """A part from disk, or else computed and kept.
+        """Reads a part, or computes and stores it.
 
         Parameters
         ----------
         depends_on
             Everything that the part's numbers depend on, as plain values.
         compute
-            Makes it.
+            Computes the part.
 
         Examples
         --------
@@ -60,12 +60,12 @@ class Parts:
         return self.put(depends_on, compute()) if held is None else held
 
     def read(self, depends_on: Any) -> dict[str, NDArray[Any]] | None:
-        """A part from disk; ``None`` where there is none, or it is damaged, which is said."""
+        """Reads a part; ``None`` if it is missing or damaged (with a warning)."""
         file = self._file(depends_on)
         if not file.is_file():
             return None
         try:
-            # A file checks itself: its arrays carry their CRC-32.
+            # The arrays of a file contain a CRC-32.
             with file.open("rb") as opened, np.load(opened) as held:
                 return {name: held[name] for name in held.files}
         except (ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
@@ -73,12 +73,12 @@ class Parts:
             return None
 
     def put(self, depends_on: Any, made: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-        """Keep a part, whole or not at all.
+        """Stores a part atomically.
 
         Raises
         ------
         OSError
-            When it cannot be written; names the part, and leaves nothing of it.
+            Write error; the message names the part, and no file remains.
         """
         target = self._file(depends_on)
         held = io.BytesIO()

@@ -1,8 +1,8 @@
-"""Positioning service levels of 3GPP: which of them a site and a vehicle reach.
+"""Positioning service levels of 3GPP, and which of them a site and a vehicle reach.
 
 Horizontal accuracy and availability of TS 22.261, 7.3.2.2 (level 7, which is relative between
-vehicles, is judged as if it were absolute), and the industrial target of TR 38.857. Latency is not
-judged: it is the platform's.
+vehicles, is evaluated as absolute), and the industrial target of TR 38.857. Latency is not
+evaluated, because it depends on the platform.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 DIRECTIONS = 64
-# After so long a position's error is another's: the tracker's memory at usual speeds.
+# Time between independent errors (s): the memory of the tracker at typical speeds.
 INDEPENDENT_S = 10.0
 
 
 @dataclass(frozen=True)
 class Level:
-    """A service level: at least this share of positions is to be this near."""
+    """A service level: accuracy and required availability."""
 
     name: str
     accuracy_m: float
@@ -46,16 +46,16 @@ LEVELS = (
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a level is reached.
+    """Result for one service level.
 
     Attributes
     ----------
     level
         The level.
     share
-        Share of positions as near as it asks.
+        Share of positions within the accuracy.
     least_share
-        Low end of the share's 95 % interval; the share itself where there is no chance in it.
+        Lower end of the share's 95 % interval; the share itself for a bound.
     """
 
     level: Level
@@ -64,19 +64,19 @@ class Verdict:
 
     @property
     def reached(self) -> bool:
-        """Whether the level is reached, at 95 % confidence."""
+        """Returns whether the level is reached with 95 % confidence."""
         return self.least_share >= self.level.availability
 
     @property
     def outcome(self) -> str:
-        """Whether it is reached, or why that is not said."""
+        """Returns the result as text."""
         if self.reached:
             return "reached"
         enough = self.share >= self.level.availability
-        return "too few drives" if enough else "not reached"
+        return "too few runs" if enough else "not reached"
 
     def as_record(self) -> dict[str, Any]:
-        """Plain values for JSON."""
+        """Returns the values for JSON."""
         return {
             "level": self.level.name,
             "accuracy_m": self.level.accuracy_m,
@@ -88,17 +88,17 @@ class Verdict:
 
 
 def of_runs(errors_m: ArrayLike, step_s: float) -> list[Verdict]:
-    """The verdicts on horizontal errors of many drives.
+    """Evaluates horizontal errors of many runs.
 
-    The confidence is the lesser of two: the bootstrap over whole drives, which knows that drives
-    differ; and Clopper and Pearson's for as many independent positions as there are
-    :data:`INDEPENDENT_S`, which knows that what has not happened in an hour may happen in the next.
+    The lower end is the minimum of two: the bootstrap over whole runs, which covers differences
+    between runs, and the interval of Clopper and Pearson with one independent position every
+    :data:`INDEPENDENT_S`, which covers events that have not occurred yet.
 
     Parameters
     ----------
     errors_m
-        Horizontal errors, shape (runs, steps); NaN, where the vehicle does not know its place, is
-        not near.
+        Horizontal errors, shape (runs, steps); NaN (unknown position) counts as not within the
+        accuracy.
     step_s
         Time between two steps.
 
@@ -121,7 +121,7 @@ def of_runs(errors_m: ArrayLike, step_s: float) -> list[Verdict]:
     looks = max(1, int(runs * steps * step_s / INDEPENDENT_S))
     verdicts = []
     for level in LEVELS:
-        # Runs are of equal length: the share of all is the mean of theirs.
+        # The share of all is the mean of the runs, because they have equal lengths.
         shares = (errors_m <= level.accuracy_m).mean(axis=1)
         share = float(shares.mean())
         least, _ = clopper_pearson(int(share * looks), looks)
@@ -132,17 +132,17 @@ def of_runs(errors_m: ArrayLike, step_s: float) -> list[Verdict]:
 
 
 def of_bound(along_std_m: ArrayLike, across_std_m: ArrayLike) -> list[Verdict]:
-    """The verdicts on a route whose errors are Gaussian and as small as the bound allows.
+    """Evaluates a route with Gaussian errors as small as the bound.
 
     Parameters
     ----------
     along_std_m, across_std_m
-        Least standard deviations of the position in two directions at right angles, shape (steps,).
+        Bounds of the standard deviations in two perpendicular directions, shape (steps,).
 
     Returns
     -------
     list of Verdict
-        One for each of :data:`LEVELS`: what no localizer can better.
+        One for each of :data:`LEVELS`; no localizer exceeds them.
 
     Examples
     --------
@@ -157,7 +157,7 @@ def of_bound(along_std_m: ArrayLike, across_std_m: ArrayLike) -> list[Verdict]:
 
 
 def within(first_std_m: ArrayLike, second_std_m: ArrayLike, radius_m: float) -> NDArray[np.float64]:
-    """Probability that a Gaussian place lies within a circle about its mean.
+    """Returns the probability of a Gaussian position within a circle around its mean.
 
     In polar coordinates, ``1 - (1/2π) ∫ exp(-r²/2 q(θ)) / (σ₁ σ₂ q(θ)) dθ`` with
     ``q = cos²θ/σ₁² + sin²θ/σ₂²``; in the angle of the rounded Gaussian the weight is even.
@@ -167,7 +167,7 @@ def within(first_std_m: ArrayLike, second_std_m: ArrayLike, radius_m: float) -> 
     first_std_m, second_std_m
         Standard deviations along the axes.
     radius_m
-        The circle's radius.
+        Radius of the circle.
 
     Returns
     -------
@@ -183,14 +183,14 @@ def within(first_std_m: ArrayLike, second_std_m: ArrayLike, radius_m: float) -> 
         np.maximum(np.atleast_1d(np.asarray(std, dtype=np.float64)), 1e-9)
         for std in (first_std_m, second_std_m)
     )
-    # Half a step off the axes, so that a place on a line is integrated evenly too.
+    # Offset by half a step from the axes, so that a degenerate Gaussian is integrated evenly.
     angles = (np.arange(DIRECTIONS) + 0.5) * (2.0 * np.pi / DIRECTIONS)
     stretch = (first[:, None] * np.cos(angles)) ** 2 + (second[:, None] * np.sin(angles)) ** 2
     return np.asarray(1.0 - np.exp(-0.5 * radius_m**2 / stretch).mean(axis=1))
 
 
 def reached_in_words(verdicts: list[Verdict]) -> str:
-    """What is reached.
+    """Returns the reached levels as text.
 
     Examples
     --------
