@@ -21,6 +21,7 @@ from access_av.cli.options import (
 from access_av.cli.side_by_side import (
     PERCENTS,
     of_scenario,
+    plug_ins_of,
     show_compared,
     side_by_side,
     write_compared,
@@ -49,7 +50,8 @@ def run(
 
     Writes trajectories.parquet, executions.parquet, trajectory.tum and truth.tum (the first run),
     report.html, scenario.toml with all default values, and manifest.json. With --vary or --compare
-    also compared.parquet.
+    also compared.parquet. --compare estimator=FILE.py:NAME compares with a plug-in; policy and
+    localizer are possible, too.
     """
     import polars as pl
 
@@ -61,7 +63,11 @@ def run(
 
     given = overridden(overrides)
     chosen = load_scenario(scenario, allow_large=allow_large, overrides=given)
-    others = {name: load_scenario(name, allow_large=allow_large) for name in compare or ()}
+    plug_ins = plug_ins_of(compare)
+    others = {
+        name: chosen if name in plug_ins else load_scenario(name, allow_large=allow_large)
+        for name in compare or ()
+    }
     scenarios = of_scenario(chosen, vary, others)
     directory = ResultsDirectory.create(f"run-{chosen.name}", out)
     with progress("Driving") as tick:
@@ -78,7 +84,7 @@ def run(
         columns = ("time_s", f"{prefix}x_m", f"{prefix}y_m", f"{prefix}heading_rad")
         directory.write_text(name, tum_trajectory(*(poses[column] for column in columns)))
     asked = percentile or PERCENTS
-    beside = side_by_side(scenarios, asked, runs, seed, threads)
+    beside = side_by_side(scenarios, asked, runs, seed, threads, plug_ins)
     write_compared(beside, directory)
     page = render_drive(chosen, result, seed, compared_section(beside))
     directory.write_text("report.html", page)

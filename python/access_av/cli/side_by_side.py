@@ -41,12 +41,25 @@ def of_scenario(
     return variants(scenario, vary, others, lambda it, keys: it.with_overrides(keys))
 
 
+def plug_ins_of(compare: Sequence[str] | None) -> dict[str, dict[str, Any]]:
+    """Returns the plug-ins of ``--compare ROLE=FILE.py:NAME`` by role, by their labels."""
+    from access_av.run.plug_in_files import ROLES, load
+
+    found = {}
+    for text in compare or ():
+        role, equals, place = text.partition("=")
+        if equals and role in ROLES:
+            found[text] = {role: load(role, place)}
+    return found
+
+
 def side_by_side(
     scenarios: Mapping[str, _core.Scenario],
     percents: Sequence[float],
     runs: int,
     seed: int,
     threads: int | None,
+    plug_ins: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> list[Compared]:
     """Simulates the variants in equal environments; empty for a single variant."""
     from access_av.study.compare import compare
@@ -61,6 +74,7 @@ def side_by_side(
             seed=seed,
             threads=threads,
             progress=tick,
+            plug_ins=plug_ins,
         )
 
 

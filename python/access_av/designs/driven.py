@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,8 @@ from access_av.designs.space import shown
 from access_av.device.platform import Platform
 from access_av.errors import InputError
 from access_av.run.campaign import Task
+from access_av.run.plug_in_files import checksum, load, split
+from access_av.run.plug_ins import factory
 from access_av.run.service_levels import INDEPENDENT_S
 from access_av.statistics.percentiles import PERCENTS, Percentile, percentiles
 
@@ -48,6 +50,8 @@ class Design:
         Display name: values that differ between designs.
     world
         Name of the environment; empty if there is only one.
+    plug_ins
+        Plug-ins by role, as ``FILE.py:NAME``.
     """
 
     values: Mapping[str, Any]
@@ -55,10 +59,16 @@ class Design:
     scenario: Scenario
     platform: Platform
     world: str = ""
+    plug_ins: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def driven(self) -> str:
-        """Returns the scenario without its platform, which determines the runs."""
+        """Returns the scenario without its platform, which determines the runs.
+
+        A plug-in estimator has its own energy, which depends on the platform.
+        """
+        if "estimator" in self.plug_ins:
+            return self.scenario.to_toml()
         board = {"vehicle.platform.name": ANY_BOARD, "vehicle.platform.mode": 0}
         return self.scenario.with_overrides(board).to_toml()
 
@@ -162,7 +172,10 @@ def designs_of(
     for values in choices:
         try:
             # Tables first: `vehicle.wake_up` before `vehicle.wake_up.bound_m`.
-            ordered = dict(sorted({**values, **(given or {})}.items()))
+            settings, plug_ins = split(values)
+            for role, text in plug_ins.items():
+                load(role, text)
+            ordered = dict(sorted({**settings, **(given or {})}.items()))
             changed = scenario.with_overrides(ordered)
             name = _platform_name(changed)
             board = platforms.setdefault(name, Platform.load(name))
@@ -171,7 +184,7 @@ def designs_of(
         except SettingsError as error:
             raise InputError(f"design {ordered}: {error}") from error
         label = shown({key: values[key] for key in varying})
-        found.append(Design(values, label, resolved, board, world))
+        found.append(Design(values, label, resolved, board, world, plug_ins))
     return found
 
 
@@ -195,25 +208,33 @@ def drive(
     progress: Callable[[int, int], None] | None = None,
 ) -> list[dict[str, NDArray[Any]] | None]:
     """Simulates each design from run ``first_run``; designs with equal runs are simulated once."""
-    texts = [design.driven for design in designs]
+    texts = [(design.driven, tuple(design.plug_ins.items())) for design in designs]
     different = list(dict.fromkeys(texts))
     tasks = [
         Task(
             depends_on={
                 **{"drives": text, "seed": seed, "first_run": first_run, "runs": runs},
                 "error_every": ERROR_EVERY,
+                **({"plug_ins": [(*it, checksum(it[1])) for it in plug_ins]} if plug_ins else {}),
             },
             work=simulated,
-            arguments=(text, seed, first_run, runs),
+            arguments=(text, seed, first_run, runs, plug_ins),
         )
-        for text in different
+        for text, plug_ins in different
     ]
     parts = dict(zip(different, campaign.run(tasks, progress), strict=True))
     return [parts[text] for text in texts]
 
 
-def simulated(scenario: str, seed: int, first_run: int, runs: int) -> dict[str, NDArray[Any]]:
+def simulated(
+    scenario: str,
+    seed: int,
+    first_run: int,
+    runs: int,
+    plug_ins: Sequence[tuple[str, str]] = (),
+) -> dict[str, NDArray[Any]]:
     """Simulates one part: runs of a scenario, in one thread."""
+    factories: dict[str, Any] = {role: factory(load(role, text), role) for role, text in plug_ins}
     found = _core.simulate(
         Scenario.from_toml(scenario),
         runs,
@@ -221,11 +242,13 @@ def simulated(scenario: str, seed: int, first_run: int, runs: int) -> dict[str, 
         first_run=first_run,
         threads=1,
         errors_every=ERROR_EVERY,
+        **factories,
     )
     if found.errors_m is None:  # keep_trajectories is set
         raise RuntimeError("the simulation kept no errors")
     error_m = np.hypot(found.errors_m[..., 0], found.errors_m[..., 1])
-    columns = ("executions", "listened", "rms_error_m", "max_error_m")
+    columns = ["executions", "listened", "rms_error_m", "max_error_m"]
+    columns += ["energy_j"] if "estimator" in factories else []
     track = slice(None, None, TRACK_EVERY)
     return {
         **{name: np.asarray(found.runs[name], dtype=np.float64) for name in columns},
@@ -250,10 +273,14 @@ def joined(design: Design, parts: Sequence[Part]) -> Driven:
         core.energy_j(vehicle, int(estimated), int(heard), duration_s)
         for estimated, heard in zip(executions, listened, strict=True)
     ]
+    energy_j = np.array([np.inf if each is None else sum(each[:3]) for each in energies])
+    if "estimator" in design.plug_ins:
+        # The energy that the estimator states; infinite if it states none.
+        energy_j = np.nan_to_num(np.concatenate([part["energy_j"] for part in parts]), nan=np.inf)
     return Driven(
         design=design,
         square_m2=np.nan_to_num(rms_m**2, nan=np.inf),
-        energy_j=np.array([np.inf if each is None else sum(each[:3]) for each in energies]),
+        energy_j=energy_j,
         worst_m=np.nan_to_num(worst_m, nan=np.inf),
         error_m=np.concatenate([part["error_m"] for part in parts]),
         executions=executions,

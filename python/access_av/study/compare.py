@@ -134,6 +134,7 @@ def compare(
     seed: int,
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
+    plug_ins: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> list[Compared]:
     """Drives variants in the same environments; the first one is the baseline.
 
@@ -151,7 +152,7 @@ def compare(
             if progress is not None:
                 progress(before + done, total)
 
-        found.append(drive(label, scenario, runs, seed, threads, tell))
+        found.append(drive(label, scenario, runs, seed, threads, tell, (plug_ins or {}).get(label)))
     return beside_first(found, percents)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
@@ -73,6 +73,8 @@ class Driven(Errors):
     executions: NDArray[np.int64]
     listened: NDArray[np.int64]
     integrity: Integrity | None
+    has_own_estimator: bool = False
+    own_energy_j: float | None = None
 
     @property
     def state_shares(self) -> Mapping[str, float] | None:
@@ -92,6 +94,8 @@ class Driven(Errors):
     @property
     def energy_j(self) -> float | None:
         """Energy of a trip, on the mean; ``None`` where the platform has no figure."""
+        if self.has_own_estimator:
+            return self.own_energy_j
         energy = self.energy()
         return None if energy is None else energy["value"].total_j
 
@@ -123,6 +127,8 @@ class Driven(Errors):
 
     def energy(self, platform: Platform | None = None) -> dict[str, Energy] | None:
         """Energy of a trip by ``low``, ``value`` and ``high``; ``None`` without a figure."""
+        if self.has_own_estimator:
+            return None
         vehicle = self.scenario.vehicle
         core = (platform or Platform.load(platform_name(self.scenario))).core
         estimates, listened = (round(float(it.mean())) for it in (self.executions, self.listened))
@@ -167,12 +173,19 @@ def drive(
     seed: int,
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
+    plug_ins: Mapping[str, Any] | None = None,
 ) -> Driven:
     """Drive a scenario: the same seed gives each variant the same world, run by run."""
     period_s = json.loads(scenario.site.to_json())["ssb"]["period_ms"] * 1e-3
     every = max(1, round(KEPT_EVERY_S / period_s))
     found = simulate(
-        scenario, runs=runs, seed=seed, threads=threads, errors_every=every, progress=progress
+        scenario,
+        runs=runs,
+        seed=seed,
+        threads=threads,
+        errors_every=every,
+        progress=progress,
+        **(plug_ins or {}),
     )
     if found.errors_m is None or found.levels_m is None:  # they were asked for
         raise RuntimeError("the simulation kept no errors")
@@ -189,7 +202,14 @@ def drive(
         listened=found.runs["listened"].to_numpy().astype(np.int64),
         duration_s=float(time_s[-1]),
         integrity=found.integrity,
+        has_own_estimator="estimator" in (plug_ins or {}),
+        own_energy_j=_mean(found.runs["energy_j"]),
     )
+
+
+def _mean(values: pl.Series) -> float | None:
+    """Mean of values that are all known."""
+    return None if values.null_count() else float(values.to_numpy().mean())
 
 
 def platform_name(scenario: _core.Scenario) -> str:
