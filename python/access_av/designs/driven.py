@@ -218,7 +218,7 @@ def drive(
                 **({"plug_ins": [(*it, checksum(it[1])) for it in plug_ins]} if plug_ins else {}),
             },
             work=simulated,
-            arguments=(text, seed, first_run, runs, plug_ins),
+            arguments=(text, seed, first_run, runs, *([plug_ins] if plug_ins else [])),
         )
         for text, plug_ins in different
     ]
