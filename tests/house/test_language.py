@@ -46,6 +46,14 @@ PLAIN = [
     "crates/node/src/state.rs",
     "crates/node/src/statistics.rs",
     "crates/node/src/supervisor.rs",
+    "crates/node/src/source/connection.rs",
+    "crates/node/src/source/framing.rs",
+    "crates/node/src/source/lines.rs",
+    "crates/node/src/source/mod.rs",
+    "crates/node/src/source/r*.rs",
+    "crates/node/src/source/soapy.rs",
+    "crates/node/src/source/z*.rs",
+    "crates/node/src/web/site.rs",
     "crates/node/tests/**/*.rs",
     "crates/python/src/**/*.rs",
     "crates/recording/src/angle_file.rs",
@@ -192,7 +200,15 @@ def rust_texts(text: str) -> list[str]:
         elif block:
             blocks.append("\n".join(block))
             block = []
-    return [item for block in blocks for item in markdown_texts(block)]
+    return [item for block in blocks for item in markdown_texts(block)] + rust_literals(text)
+
+
+def rust_literals(text: str) -> list[str]:
+    """Messages of a Rust file: string literals of three words or more, without placeholders."""
+    code = re.sub(r"^\s*//.*$", "", text, flags=re.MULTILINE)
+    literals = re.findall(r'"((?:[^"\\\n]|\\.|\\\n)*)"', code)
+    messages = [re.sub(r"\{[^}]*\}", "", re.sub(r"\\\n\s*", "", item)) for item in literals]
+    return [item for item in messages if len(re.findall(r"[A-Za-z]{2,}", item)) > 2]
 
 
 READERS = {".md": markdown_texts, ".py": python_texts, ".rs": rust_texts}

@@ -416,11 +416,11 @@ fn diagnosis(status: &Status, heads: &[HeadStatus]) -> DiagnosticStatus {
         let name = format!("PCI {}, SSB {}", head.head.pci, head.head.ssb_index);
         let snr = head
             .snr_db
-            .map_or("not heard".to_owned(), |it| format!("{it:.1} dB"));
+            .map_or("not received".to_owned(), |it| format!("{it:.1} dB"));
         let (accepted, refused) = (head.accepted, head.refused);
         values.push((
             name,
-            format!("{snr}, {accepted} accepted, {refused} refused"),
+            format!("{snr}, {accepted} accepted, {refused} rejected"),
         ));
     }
     DiagnosticStatus {

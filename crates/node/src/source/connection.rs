@@ -1,4 +1,4 @@
-//! Streams of bytes from wherever they come, opened again when they end.
+//! Byte streams from any address, reopened when they end.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
@@ -10,22 +10,23 @@ use std::time::Duration;
 use crate::address::Address;
 use crate::inbox::{Inbox, Input, Level};
 
-/// A reader looks this often whether the node ends.
+/// Interval at which a reader checks whether the node is stopping.
 const LOOK: Duration = Duration::from_millis(200);
-/// Time between two attempts to connect.
+/// Interval between connection attempts.
 const RETRY: Duration = Duration::from_millis(300);
-/// Bytes read at once.
+/// Maximum number of bytes per read.
 const CHUNK: usize = 1 << 18;
 
-/// What happens to a stream.
+/// Event of a stream.
 pub enum Event<'a> {
-    /// It begins, or begins anew.
+    /// The stream begins or restarts.
     Begin,
-    /// It brings bytes.
+    /// Received bytes.
     Bytes(&'a [u8]),
 }
 
-/// Reads an address until the node ends, or a file or standard input does, and hands all to `take`.
+/// Reads an address until the node stops, or until a file or standard input ends, and calls `take`
+/// for each event.
 pub fn read(
     address: &Address,
     source: &'static str,
@@ -60,7 +61,7 @@ pub fn read(
                 remark(text.clone());
                 said = text;
             }
-            Ok(None) => {} // nobody has connected yet
+            Ok(None) => {} // no client has connected yet
             Err(error) => {
                 let text = format!("{address}: {error}");
                 if text != said {
@@ -89,7 +90,7 @@ fn drain(stream: &mut dyn Read, inbox: &Inbox, take: &mut impl FnMut(Event<'_>))
     Ok(())
 }
 
-/// Whether nothing is wrong but that nothing has come.
+/// Whether the error only means that no data arrived.
 pub fn is_idle(error: &io::Error) -> bool {
     matches!(
         error.kind(),
@@ -97,7 +98,7 @@ pub fn is_idle(error: &io::Error) -> bool {
     )
 }
 
-/// Connects, and keeps what it listens at.
+/// Opens connections and keeps listening sockets.
 #[derive(Default)]
 struct Opener {
     tcp: Option<TcpListener>,
@@ -105,7 +106,7 @@ struct Opener {
 }
 
 impl Opener {
-    /// The stream; `None` where nobody has connected yet.
+    /// Opens the stream; `None` if no client has connected yet.
     fn open(&mut self, address: &Address) -> io::Result<Option<Box<dyn Read>>> {
         Ok(Some(match address {
             Address::Standard => Box::new(io::stdin()),
@@ -146,7 +147,8 @@ impl Opener {
     }
 }
 
-/// Listens at a path; a socket that nobody listens at any more is left from a run before.
+/// Listens at a path. A socket file without a listener is removed because it is from an earlier
+/// run.
 fn listen_at(path: &Path) -> io::Result<UnixListener> {
     use std::os::unix::fs::FileTypeExt;
     let is_socket = path
@@ -158,7 +160,7 @@ fn listen_at(path: &Path) -> io::Result<UnixListener> {
     UnixListener::bind(path)
 }
 
-/// Connects within two seconds.
+/// Connects with a timeout of two seconds.
 pub fn connect(socket: &str) -> io::Result<TcpStream> {
     let mut last = io::Error::new(ErrorKind::NotFound, "no such host");
     for address in socket.to_socket_addrs()? {
@@ -184,7 +186,7 @@ fn timed_unix(stream: UnixStream) -> io::Result<UnixStream> {
     Ok(stream)
 }
 
-/// Each datagram is a line or several, whether or not a newline ends it.
+/// Stream of datagrams; each contains one or more lines, with or without a final newline.
 struct Datagrams(UdpSocket);
 
 impl Read for Datagrams {

@@ -1,4 +1,5 @@
-//! Bytes of samples to blocks of them: antennas in their order, timed, and only where they are wanted.
+//! Conversion of sample bytes to blocks: antennas in their order, with times, within the required
+//! windows only.
 
 use std::sync::Arc;
 
@@ -10,13 +11,14 @@ use crate::inbox::{Block, Inbox, Input};
 use crate::settings::{Clock, SampleFormat, Stream};
 use crate::statistics::SourceHealth;
 
-/// Most samples of a channel in one block.
+/// Maximum number of samples per channel in a block.
 const MOST_FRAMES: usize = 1 << 15;
-/// So often it is said that samples are dropped before a window, in seconds: the pipeline has nothing to do then.
+/// Interval in seconds at which dropped samples before a window are reported; the pipeline is idle
+/// then.
 const SAID_S: f64 = 0.02;
 
 impl SampleFormat {
-    /// Bytes of one complex sample.
+    /// Returns the number of bytes of one complex sample.
     pub const fn bytes(self) -> usize {
         match self {
             Self::Cf32 => 8,
@@ -25,7 +27,8 @@ impl SampleFormat {
         }
     }
 
-    /// The sample that `bytes` begin with; `None` for one that is no number, or where they are too few.
+    /// Decodes the first sample of `bytes`; `None` if it is not finite or if there are too few
+    /// bytes.
     fn decode(self, bytes: &[u8]) -> Option<Complex32> {
         let sample = match self {
             Self::Cf32 => {
@@ -48,20 +51,20 @@ impl SampleFormat {
     }
 }
 
-/// Samples of one channel among bytes.
+/// Samples of one channel within a byte slice.
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
-    /// From its first sample on.
+    /// Bytes from the first sample of the channel.
     pub bytes: &'a [u8],
-    /// Bytes from one of its samples to the next.
+    /// Number of bytes between consecutive samples of the channel.
     pub stride: usize,
 }
 
-/// Makes blocks of a stream.
+/// Converter of a stream to blocks.
 pub struct Framing {
     format: SampleFormat,
     rate_hz: f64,
-    /// Antenna of each channel.
+    /// Index of the antenna of each channel.
     antennas: Vec<u8>,
     clock: Times,
     counted: u64,
@@ -69,9 +72,9 @@ pub struct Framing {
     inbox: Arc<Inbox>,
     health: Arc<SourceHealth>,
     told_of_defects: bool,
-    /// Up to when it was last said that samples were dropped.
+    /// Time up to which dropped samples were reported last.
     said_s: f64,
-    /// Bytes of a sample, of all channels in turn, that is not yet complete.
+    /// Bytes of an incomplete frame (one sample of all channels).
     begun: Vec<u8>,
 }
 
@@ -81,7 +84,7 @@ enum Times {
 }
 
 impl Framing {
-    /// For a stream as the settings state it.
+    /// Creates a converter for a stream of the settings.
     pub fn new(
         stream: &Stream,
         format: SampleFormat,
@@ -108,17 +111,17 @@ impl Framing {
         }
     }
 
-    /// Bytes of one sample of one channel.
+    /// Returns the number of bytes of one sample of one channel.
     pub const fn sample_bytes(&self) -> usize {
         self.format.bytes()
     }
 
-    /// How long so many bytes of one channel last, in seconds.
+    /// Returns the duration of `bytes` bytes of one channel in seconds.
     pub fn duration_s(&self, bytes: usize) -> f64 {
         (bytes / self.format.bytes()) as f64 / self.rate_hz
     }
 
-    /// The stream begins anew: its counting does, and what of it is not complete is forgotten.
+    /// Restarts the sample count and removes incomplete data after the stream was reopened.
     pub fn restart(&mut self) {
         self.begun.clear();
         self.counted = 0;
@@ -128,7 +131,7 @@ impl Framing {
         }
     }
 
-    /// Takes in bytes of all channels in turn, cut anywhere.
+    /// Processes interleaved bytes of all channels, split at any position.
     pub fn interleaved(&mut self, mut bytes: &[u8]) {
         let (sample, channels) = (self.format.bytes(), self.antennas.len());
         let frame = sample * channels;
@@ -162,7 +165,7 @@ impl Framing {
         self.take(&views, frames);
     }
 
-    /// Takes in so many samples of each channel.
+    /// Processes `frames` samples of each channel.
     pub fn take(&mut self, channels: &[View<'_>], frames: usize) {
         if frames > 0 {
             let start_s = self.start_s(frames);
@@ -172,19 +175,19 @@ impl Framing {
         }
     }
 
-    /// Samples of each channel, from the next one on, that are not wanted as things stand.
+    /// Returns the number of next samples per channel that are currently not required.
     pub fn unwanted(&self) -> usize {
         self.up_to(|[from_s, _]| from_s)
     }
 
-    /// Samples of each channel, from the next one on, that nobody waits for as things stand: a window is handed to the
-    /// pipeline at its end.
+    /// Returns the number of next samples per channel that need not be processed immediately,
+    /// because a window is given to the pipeline at its end.
     pub fn unhurried(&self) -> usize {
         self.up_to(|[_, until_s]| until_s)
     }
 
-    /// Samples from the next one on up to a time of the window, all that is to come where the window is over and the
-    /// pipeline has not said yet what it wants next, none where everything is wanted.
+    /// Returns the number of next samples up to a time of the window: all if the window is over and
+    /// the next one is not yet set, and 0 if all samples are required.
     fn up_to(&self, time_s: impl Fn([f64; 2]) -> f64) -> usize {
         let next_s = match &self.clock {
             Times::Counted(zero_s) => Some(zero_s + self.counted as f64 / self.rate_hz),
@@ -199,14 +202,14 @@ impl Framing {
         }
     }
 
-    /// Counts samples of each channel that were not wanted and not read.
+    /// Counts samples of each channel that were not required and not read.
     pub fn pass_over(&mut self, frames: usize) {
         let start_s = self.start_s(frames);
         self.health.came(frames as u64);
         self.slept(start_s + frames as f64 / self.rate_hz);
     }
 
-    /// Takes in samples of each channel, equally many, the first of which was received at `time_s`.
+    /// Processes equal numbers of samples of each channel; the first was received at `time_s`.
     #[cfg(feature = "soapy")]
     pub fn take_samples(&mut self, channels: &[&[Complex32]], time_s: f64) {
         let frames = channels.first().map_or(0, |samples| samples.len());
@@ -226,14 +229,14 @@ impl Framing {
         });
     }
 
-    /// The radio is off for so long.
+    /// Reports that the radio is off for a duration.
     #[cfg(feature = "soapy")]
     pub fn rests(&self, off: std::time::Duration) {
         let missing = (off.as_secs_f64() * self.rate_hz) as u64;
         self.health.rests(missing, off);
     }
 
-    /// Hands what is wanted of so many samples to `take`, with its first, its number and its time.
+    /// Calls `take` for the required parts of the samples with index, count and time.
     fn cut(
         &mut self,
         frames: usize,
@@ -262,7 +265,7 @@ impl Framing {
         }
     }
 
-    /// Says that nothing was handed on up to this time: where a window is over, and now and then.
+    /// Reports the time up to which samples were dropped: when a window is over, and at intervals.
     fn slept(&mut self, until_s: f64) {
         let is_over = |[_, end_s]: [f64; 2]| until_s >= end_s;
         if until_s - self.said_s >= SAID_S || self.gate.wanted().is_none_or(is_over) {
@@ -321,7 +324,7 @@ impl Framing {
             self.health.defect();
             if !std::mem::replace(&mut self.told_of_defects, true) {
                 let text =
-                    "samples that are no numbers were set to 0; check samples.format".to_owned();
+                    "samples that are not finite were set to 0; check samples.format".to_owned();
                 let source = self.health.name;
                 self.inbox.put(Input::warning(source, text));
             }
@@ -365,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_come_to_their_antennas_wherever_the_bytes_are_cut() {
+    fn channels_are_assigned_to_antennas_for_any_split_of_the_bytes() {
         // Sample k of channel c is k + 100c + 0i.
         let bytes: Vec<u8> = (0..50_i16)
             .flat_map(|k| [k, 0, k + 100, 0, k + 200, 0])
@@ -390,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn formats_and_what_is_no_number() {
+    fn formats_are_decoded_and_non_finite_samples_are_zero() {
         let one = Complex32::new(0.5, -1.0);
         for (format, bytes) in [
             (
@@ -414,7 +417,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_is_wanted_is_handed_on() {
+    fn only_required_samples_are_delivered() {
         let mut framing = framing(SampleFormat::Ci8, &[0]);
         framing.gate.set([5.0 + 100e-6, 5.0 + 300e-6]);
         for _ in 0..10 {
@@ -427,7 +430,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_passed_over_is_counted_and_told_at_a_window_s_end() {
+    fn dropped_samples_are_counted_and_reported_at_the_end_of_a_window() {
         let mut framing = framing(SampleFormat::Ci8, &[0]);
         assert_eq!([framing.unwanted(), framing.unhurried()], [0, 0]);
         framing.gate.set([5.0 + 100.5e-6, 5.0 + 300.5e-6]);
@@ -439,7 +442,8 @@ mod tests {
         assert_eq!([framing.unwanted(), framing.unhurried()], [0, 0]);
         framing.pass_over(10);
         assert_eq!(framing.unwanted(), MOST_FRAMES);
-        // The first, that there is something to take, what was wanted, and that the window is over.
+        // Expected inputs: the first report, the report before the window, the required samples,
+        // and the end of the window.
         let told: Vec<f64> = std::iter::from_fn(|| framing.inbox.take(Duration::ZERO))
             .map(|(_, input)| match input {
                 Input::Slept(until_s) => until_s,

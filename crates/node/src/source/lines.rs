@@ -1,18 +1,18 @@
-//! Lines out of a stream of bytes, of bounded length.
+//! Lines of a byte stream with a maximum length.
 
-/// Bytes of the longest line that is taken.
+/// Maximum length of a line in bytes.
 pub const LONGEST: usize = 1 << 16;
 
-/// Cuts what comes in into lines.
+/// Splitter of a byte stream into lines.
 #[derive(Debug, Default)]
 pub struct Lines {
     begun: Vec<u8>,
-    /// Whether the line being read is too long, and is left out.
+    /// Whether the current line is too long and will be omitted.
     overlong: bool,
 }
 
 impl Lines {
-    /// Hands each line that `bytes` completes to `take`, `None` for one that was too long.
+    /// Calls `take` for each line that `bytes` completes, with `None` for a line that was too long.
     pub fn push(&mut self, bytes: &[u8], mut take: impl FnMut(Option<&[u8]>)) {
         let mut rest = bytes;
         while let Some(end) = rest.iter().position(|byte| *byte == b'\n') {
@@ -26,7 +26,7 @@ impl Lines {
         self.extend(rest);
     }
 
-    /// Hands over a last line that no newline ends, and begins anew.
+    /// Calls `take` for a last line without a newline, and resets the splitter.
     pub fn finish(&mut self, mut take: impl FnMut(Option<&[u8]>)) {
         if !self.begun.is_empty() || self.overlong {
             self.push(b"\n", &mut take);
@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_the_same_however_they_come() {
+    fn lines_do_not_depend_on_the_split_of_the_bytes() {
         let long = vec![b'x'; LONGEST + 1];
         let text = [b"one\n\ntwo\n".as_slice(), &long, b"\nthree"].concat();
         for piece in [1, 2, 7, 1000, text.len()] {

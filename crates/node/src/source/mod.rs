@@ -1,4 +1,4 @@
-//! What comes in, each source on a thread of its own.
+//! Inputs, each with its own thread.
 
 mod connection;
 mod framing;

@@ -1,4 +1,4 @@
-//! A recording in place of a radio: as fast as it was recorded.
+//! Recording in place of a radio, played in real time.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -10,23 +10,24 @@ use crate::gate::Gate;
 use crate::inbox::{Block, Inbox, Input};
 use crate::statistics::SourceHealth;
 
-/// Samples of a block in seconds where all are wanted.
+/// Duration of a block in seconds if all samples are required.
 const BLOCK_S: f64 = 1e-3;
-/// The same in a window, at most: that is read at its end, as a whole; a burst of SSBs is over in half a frame (5 ms).
+/// Maximum duration of a block in a window in seconds. A window is read as a whole at its end; a
+/// burst of SSBs is within half a frame (5 ms).
 const WINDOW_S: f64 = 10e-3;
 
-/// A recording block by block, in order of time; where samples are missing between its captures none come.
+/// Recording as blocks in order of time; gaps between captures give no blocks.
 pub struct Blocks {
     recording: Recording,
     rate_hz: f64,
     start_s: f64,
-    /// Seconds of a block at most.
+    /// Maximum duration of a block in seconds.
     pub block_s: f64,
     at: u64,
 }
 
 impl Blocks {
-    /// From the first sample on, which was received at `start_s`.
+    /// Creates the blocks from the first sample, which was received at `start_s`.
     pub fn new(recording: Recording, start_s: f64, block_s: f64) -> Self {
         let rate_hz = recording.sample_rate_hz();
         Self {
@@ -38,12 +39,12 @@ impl Blocks {
         }
     }
 
-    /// Time of the next block's first sample, as far as there is one.
+    /// Returns the time of the next block's first sample; `None` at the end.
     pub fn next_s(&self) -> Option<f64> {
         (self.at < self.recording.length()).then(|| self.time_s(self.at))
     }
 
-    /// Length of a block that was read, in seconds.
+    /// Returns the duration of a block in seconds.
     pub fn length_s(&self, samples: &[Vec<Complex32>]) -> f64 {
         samples.first().map_or(0, Vec::len) as f64 / self.rate_hz
     }
@@ -52,14 +53,14 @@ impl Blocks {
         self.start_s + self.index(sample) as f64 / self.rate_hz
     }
 
-    /// Number of a sample of the file among all there were, with those that are missing.
+    /// Returns the index of a sample of the file including missing samples.
     fn index(&self, sample: u64) -> u64 {
         let captures = &self.recording.metadata().captures;
         let capture = captures.iter().rfind(|it| it.sample_start <= sample);
         capture.map_or(sample, |it| global_index(it) + (sample - it.sample_start))
     }
 
-    /// End of the capture that the next sample is of.
+    /// Returns the end of the capture that contains the next sample.
     fn capture_end(&self) -> u64 {
         let captures = self.recording.metadata().captures.iter();
         let starts = captures.map(|it| it.sample_start);
@@ -67,7 +68,7 @@ impl Blocks {
         next.unwrap_or(u64::MAX).min(self.recording.length())
     }
 
-    /// Leaves unread what was received before `time_s`, and says how many samples.
+    /// Skips the samples that were received before `time_s` and returns their number.
     pub fn skip_to(&mut self, time_s: f64) -> u64 {
         let (first, wanted) = (self.at, (time_s - self.start_s) * self.rate_hz);
         while self.at < self.recording.length() {
@@ -80,10 +81,10 @@ impl Blocks {
         self.at - first
     }
 
-    /// Reads the next block and says its time; `None` at the end.
+    /// Reads the next block and returns its time; `None` at the end.
     ///
     /// # Errors
-    /// Those of the file.
+    /// Errors of the file.
     pub fn read(&mut self, into: &mut Vec<Vec<Complex32>>) -> Result<Option<f64>, RecordingError> {
         let Some(time_s) = self.next_s() else {
             return Ok(None);
@@ -102,8 +103,8 @@ fn global_index(capture: &Capture) -> u64 {
     stated.unwrap_or(capture.sample_start)
 }
 
-/// Plays a recording in real time until it or the node ends. What the gate does not want is not read, as if a
-/// radio were switched off meanwhile.
+/// Plays a recording in real time until it ends or the node stops. Samples that the gate does not require are
+/// not read, like with a radio that is switched off.
 pub fn run(
     recording: Recording,
     start_s: f64,
@@ -128,7 +129,7 @@ pub fn run(
         });
         let on_s = match wanted {
             Some([from_s, _]) if from_s > next_s => from_s,
-            // The window is over, and the pipeline has not said yet what it wants next.
+            // The window is over, and the next one is not set yet.
             Some([_, until_s]) if until_s <= next_s => next_s + BLOCK_S,
             _ => next_s,
         };

@@ -1,4 +1,4 @@
-//! A radio that SoapySDR drives, switched off between the bursts where it can tell the time.
+//! Radio with a SoapySDR driver, switched off between the bursts if it has a clock.
 
 use std::sync::Arc;
 use std::thread;
@@ -13,12 +13,12 @@ use crate::gate::Gate;
 use crate::inbox::{Inbox, Input};
 use crate::settings::Radio;
 
-/// Time that a radio takes to begin, in seconds: it is switched off only for longer.
+/// Time that a radio needs to start in seconds; it is switched off only for longer pauses.
 const BEGINS_S: f64 = 0.03;
 const TIMEOUT_US: i64 = 200_000;
 const RETRY: Duration = Duration::from_secs(1);
 
-/// Receives until the node ends; a radio that vanishes is opened again.
+/// Receives until the node stops; a radio that fails is opened again.
 pub fn run(radio: &Radio, mut framing: Framing, gate: &Arc<Gate>, inbox: &Inbox) {
     let mut said = String::new();
     while !inbox.is_closed() {
@@ -57,14 +57,14 @@ fn session(
     let length = stream.mtu()?.clamp(1, 1 << 15);
     let rate_hz = radio.stream.rate_msps * 1e6;
     let mut buffers = vec![vec![Complex32::ZERO; length]; radio.stream.antennas.len()];
-    // Time of the radio's clock at 0, and its time where it tells none.
+    // Offset of the radio's clock, and a sample counter for a radio without a clock.
     let (mut zero_s, mut counted) = (None, ArrivalClock::new(rate_hz));
     stream.activate(None)?;
     while !inbox.is_closed() {
         let mut into: Vec<&mut [Complex32]> = buffers.iter_mut().map(Vec::as_mut_slice).collect();
         let count = match stream.read(&mut into, TIMEOUT_US) {
             Ok(count) => count,
-            // Samples were lost, or none came: the next ones tell their time.
+            // After lost samples or a timeout, the next samples have a new time stamp.
             Err(error) if matches!(error.code, ErrorCode::Overflow | ErrorCode::Timeout) => {
                 continue;
             }
@@ -83,7 +83,7 @@ fn session(
             .collect();
         framing.take_samples(&samples, time_s);
         let end_s = time_s + count as f64 / rate_hz;
-        // Without the radio's own clock the count would be lost.
+        // Without the radio's clock, the sample count would be lost.
         if let (Some([from_s, _]), true) = (gate.wanted(), zero_s.is_some())
             && from_s - end_s > 2.0 * BEGINS_S
         {

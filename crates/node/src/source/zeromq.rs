@@ -1,4 +1,4 @@
-//! Samples by ZeroMQ, a socket for each channel, aligned by counting.
+//! Samples from ZeroMQ, with one socket per channel, aligned by counting.
 
 use std::io::{self, BufReader};
 use std::net::TcpStream;
@@ -11,29 +11,29 @@ use crate::address::Address;
 use crate::inbox::{Inbox, Input};
 
 const RETRY: Duration = Duration::from_millis(300);
-/// Bytes read at once: some answers of a millisecond.
+/// Maximum number of bytes per read: several answers of one millisecond.
 const CHUNK: usize = 1 << 18;
-/// Requests that a transmitter has not answered yet, at most: it goes on while nothing is read.
+/// Maximum number of unanswered requests; the transmitter continues while nothing is read.
 const AHEAD: usize = 16;
-/// So many are answered before as many are sent, all at once.
+/// Number of answers after which new requests are sent together.
 const AT_ONCE: usize = 4;
-/// Nothing is read for so long at most, for the node may end.
+/// Maximum time without reading, so that the node can stop.
 const LONGEST_REST: Duration = Duration::from_millis(50);
 
-/// One channel's transmitter.
+/// Transmitter of one channel.
 struct Channel {
     stream: BufReader<TcpStream>,
-    /// Answers since requests were last sent.
+    /// Number of answers since the last requests.
     answered: usize,
-    /// Bytes of the last answer.
+    /// Size of the last answer in bytes.
     last: usize,
-    /// Bytes of samples that were passed over, and what came after them, as far as the other channels have not
-    /// reached it yet.
+    /// Number of dropped sample bytes that the other channels have not reached yet.
     passed: usize,
+    /// Received bytes after the dropped ones that the other channels have not reached yet.
     pending: Vec<u8>,
 }
 
-/// Requests samples until the node ends; where one transmitter vanishes, all begin anew.
+/// Requests samples until the node stops; if one transmitter fails, all connections are reopened.
 pub fn run(endpoints: &[Address], mut framing: Framing, inbox: &Inbox) {
     let mut said = String::new();
     while !inbox.is_closed() {
@@ -48,7 +48,7 @@ pub fn run(endpoints: &[Address], mut framing: Framing, inbox: &Inbox) {
     }
 }
 
-/// From connecting to whatever ends it, and whether samples came.
+/// Runs the connections until an error. Returns the error and whether samples were received.
 fn session(endpoints: &[Address], framing: &mut Framing, inbox: &Inbox) -> (io::Error, bool) {
     let mut channels = Vec::with_capacity(endpoints.len());
     for endpoint in endpoints {
@@ -60,7 +60,7 @@ fn session(endpoints: &[Address], framing: &mut Framing, inbox: &Inbox) -> (io::
     let mut received = false;
     while !inbox.is_closed() {
         rest(&channels, framing);
-        // Transmitters send in order: when the last has come the others are there, and need no waiting.
+        // Transmitters send in order: after the answer of the last one, the others do not block.
         for (channel, endpoint) in channels.iter_mut().zip(endpoints).rev() {
             match channel.fill(framing, inbox) {
                 Ok(()) => received = true,
@@ -92,8 +92,9 @@ fn open(endpoint: &Address) -> io::Result<Channel> {
     })
 }
 
-/// Waits as long as nobody waits for what comes and there are requests to answer: reading each answer as it comes
-/// takes more than all else that is done with it. The answer that ends a window is waited for at its socket.
+/// Pauses while no sample is needed immediately and requests are pending, because reading each
+/// answer on arrival takes most of the computing time. The answer that ends a window is read
+/// without a pause.
 fn rest(channels: &[Channel], framing: &Framing) {
     let answer = channels.iter().map(|it| it.last).min().unwrap_or(0);
     let unhurried = framing.unhurried() * framing.sample_bytes();
@@ -103,7 +104,7 @@ fn rest(channels: &[Channel], framing: &Framing) {
 }
 
 impl Channel {
-    /// Waits for an answer, if this channel has no whole sample, and takes those that have come with it.
+    /// Waits for an answer if the channel has no complete sample, and reads all available answers.
     fn fill(&mut self, framing: &Framing, inbox: &Inbox) -> io::Result<()> {
         while self.length() < framing.sample_bytes() && !inbox.is_closed() {
             self.take(framing)?;
@@ -120,10 +121,10 @@ impl Channel {
         Ok(())
     }
 
-    /// Takes an answer; one of samples that are not wanted is passed over.
+    /// Reads an answer; an answer with samples that are not required is dropped.
     fn take(&mut self, framing: &Framing) -> io::Result<()> {
         let sample_bytes = framing.sample_bytes();
-        // What is passed over stands before all that is kept, in whole samples.
+        // Dropped samples precede all stored ones and are complete.
         let unwanted = match self.pending.len() {
             0 => (sample_bytes * framing.unwanted()).saturating_sub(self.passed),
             _ => 0,
@@ -142,12 +143,12 @@ impl Channel {
         }
     }
 
-    /// Bytes that the other channels have not reached yet.
+    /// Returns the number of bytes that the other channels have not reached yet.
     const fn length(&self) -> usize {
         self.passed + self.pending.len()
     }
 
-    /// Forgets bytes that all channels have reached.
+    /// Removes bytes that all channels have reached.
     fn forget(&mut self, count: usize) {
         let of_passed = count.min(self.passed);
         self.passed -= of_passed;
@@ -155,7 +156,8 @@ impl Channel {
     }
 }
 
-/// Hands on the samples that every channel has; those that one of them has passed over are of none.
+/// Delivers the samples that every channel has. Samples that one channel has dropped are dropped
+/// for all.
 fn hand_on(channels: &mut [Channel], framing: &mut Framing) {
     let stride = framing.sample_bytes();
     loop {
@@ -193,7 +195,7 @@ mod tests {
     use crate::statistics::SourceHealth;
 
     #[test]
-    fn what_one_channel_has_passed_over_is_of_none_and_the_channels_stay_aligned() {
+    fn samples_dropped_in_one_channel_are_dropped_in_all_and_channels_stay_aligned() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let channel = |passed: usize, pending: Vec<u8>| {
             let stream = TcpStream::connect(listener.local_addr().unwrap()).unwrap();

@@ -1,16 +1,16 @@
-//! The requesting end of ZMTP 3.0, ZeroMQ's protocol (rfc.zeromq.org/spec/23), without security.
+//! Requesting side of ZMTP 3.0, ZeroMQ's protocol (rfc.zeromq.org/spec/23), without security.
 //!
-//! By hand, for it is small: the Rust libraries take whatever length a frame says it has for the memory to set
-//! aside.
+//! This implementation limits memory: the existing Rust libraries allocate the length that a frame
+//! announces.
 
 use std::io::{self, BufRead, ErrorKind, Read, Write};
 
-/// Bytes of the longest frame that is taken: 4 million complex floats.
+/// Maximum length of a frame in bytes: 4 million complex floats.
 pub const LONGEST: usize = 32 << 20;
 
-/// What makes room for a frame as it comes.
+/// Number of bytes that are allocated at once for a frame.
 const CHUNK: usize = 1 << 16;
-/// Time limits of reads that may pass in the middle of a frame.
+/// Maximum number of read timeouts within a frame.
 const MOST_IDLE: u32 = 10;
 
 const MORE: u8 = 1;
@@ -18,10 +18,10 @@ const LONG: u8 = 2;
 const COMMAND: u8 = 4;
 const READY: &[u8] = b"\x05READY\x0bSocket-Type\0\0\0\x03REQ\x08Identity\0\0\0\0";
 
-/// Greets the peer; it must be one that answers requests.
+/// Exchanges greetings with the peer, which must be a REP socket.
 ///
 /// # Errors
-/// Those of the stream, [`ErrorKind::InvalidData`] for what is no such peer.
+/// Errors of the stream; [`ErrorKind::InvalidData`] for another kind of peer.
 pub fn greet(stream: &mut (impl Read + Write)) -> io::Result<()> {
     let mut greeting = [0_u8; 64];
     for (place, bytes) in [(0, &b"\xff"[..]), (9, b"\x7f\x03\0"), (12, b"NULL")] {
@@ -48,13 +48,13 @@ pub fn greet(stream: &mut (impl Read + Write)) -> io::Result<()> {
         mechanism @ ..,
     ] = &theirs
     else {
-        return Err(invalid("what answers is no ZeroMQ"));
+        return Err(invalid("the peer is not ZeroMQ"));
     };
     if *version < 3 {
-        return Err(invalid("what answers is ZeroMQ of a version before 3"));
+        return Err(invalid("the peer is ZeroMQ of a version before 3"));
     }
     if !mechanism.starts_with(b"NULL\0") {
-        return Err(invalid("the transmitter demands security"));
+        return Err(invalid("the transmitter requires a security mechanism"));
     }
     stream.write_all(&[COMMAND, READY.len() as u8])?;
     stream.write_all(READY)?;
@@ -71,20 +71,20 @@ pub fn greet(stream: &mut (impl Read + Write)) -> io::Result<()> {
     Ok(())
 }
 
-/// Asks for samples, so many times.
+/// Sends `times` requests for samples.
 ///
 /// # Errors
-/// Those of the stream.
+/// Errors of the stream.
 pub fn request(stream: &mut impl Write, times: usize) -> io::Result<()> {
-    // The empty frame before the request, and its one byte.
+    // The empty frame before the request, and the request of one byte.
     stream.write_all(&[MORE, 0, 0, 1, 0xff].repeat(times))
 }
 
-/// Appends what answers the request, or passes over it where `is_wanted`, told its length, says no; how many bytes
-/// were passed over.
+/// Appends the answer of a request. If `is_wanted` returns false for its length, the answer is
+/// dropped. Returns the number of dropped bytes.
 ///
 /// # Errors
-/// Those of the stream, [`ErrorKind::InvalidData`] for what is no answer.
+/// Errors of the stream; [`ErrorKind::InvalidData`] for an invalid answer.
 pub fn answer(
     peer: &mut impl BufRead,
     into: &mut Vec<u8>,
@@ -95,7 +95,7 @@ pub fn answer(
     loop {
         let Header { flags, length } = read_header(peer)?;
         if flags & COMMAND != 0 {
-            pass_over(peer, length)?; // nothing that concerns an answer
+            pass_over(peer, length)?; // commands do not concern the answer
             continue;
         }
         if !in_body && length != 0 {
@@ -110,30 +110,31 @@ pub fn answer(
         let is_body = std::mem::replace(&mut in_body, true);
         if is_last {
             if !is_body {
-                return Err(invalid("an answer without samples"));
+                return Err(invalid("the answer has no samples"));
             }
             return Ok(0);
         }
         if into.len() - before > LONGEST {
-            return Err(invalid("an answer that does not end"));
+            return Err(invalid("the answer does not end"));
         }
     }
 }
 
-/// What a frame begins with.
+/// Header of a frame.
 struct Header {
     flags: u8,
     length: usize,
 }
 
 /// # Errors
-/// Those of the stream, [`ErrorKind::InvalidData`] for a frame that is too long or of no known kind.
+/// Errors of the stream; [`ErrorKind::InvalidData`] for a frame that is too long or of an unknown
+/// kind.
 fn read_header(stream: &mut impl Read) -> io::Result<Header> {
     let mut flags = [0];
     read_exact(stream, &mut flags)?;
     let [flags] = flags;
     if flags & !(MORE | LONG | COMMAND) != 0 || flags & (MORE | COMMAND) == MORE | COMMAND {
-        return Err(invalid("no frame of ZeroMQ"));
+        return Err(invalid("not a frame of ZeroMQ"));
     }
     let length = if flags & LONG == 0 {
         let mut length = [0];
@@ -145,11 +146,11 @@ fn read_header(stream: &mut impl Read) -> io::Result<Header> {
         u64::from_be_bytes(length)
     };
     let length = usize::try_from(length).ok().filter(|it| *it <= LONGEST);
-    let length = length.ok_or_else(|| invalid("a frame of more than 32 MiB"))?;
+    let length = length.ok_or_else(|| invalid("the frame is longer than 32 MiB"))?;
     Ok(Header { flags, length })
 }
 
-/// Appends so many bytes. Room is made for what may come at once, not for all that is announced.
+/// Appends `length` bytes. Memory is allocated in steps as the bytes arrive.
 fn read_body(stream: &mut impl Read, length: usize, into: &mut Vec<u8>) -> io::Result<()> {
     piece_by_piece(length, |missing| {
         let start = into.len();
@@ -168,8 +169,8 @@ fn pass_over(peer: &mut impl BufRead, length: usize) -> io::Result<()> {
     })
 }
 
-/// Calls `next` with how much is missing, at most [`CHUNK`], until all has come; in the middle of a frame a peer
-/// that is silent is waited for.
+/// Calls `next` with the number of missing bytes, at most [`CHUNK`], until all bytes are read.
+/// Within a frame, read timeouts are tolerated.
 fn piece_by_piece(
     length: usize,
     mut next: impl FnMut(usize) -> io::Result<usize>,
@@ -188,8 +189,8 @@ fn piece_by_piece(
     Ok(())
 }
 
-/// Reads all of it. A peer that is silent for a read's time limit is waited for if nothing was read yet only by
-/// whoever asks again; in the middle of a frame, here.
+/// Fills the buffer. A timeout before the first byte is returned to the caller; a timeout within a
+/// frame is tolerated.
 fn read_exact(stream: &mut impl Read, mut into: &mut [u8]) -> io::Result<()> {
     let whole = into.len();
     let mut idle = 0;
@@ -217,7 +218,7 @@ fn invalid(why: &str) -> io::Error {
 mod tests {
     use super::*;
 
-    /// A peer that says this, whatever it is told.
+    /// Peer that sends these bytes and ignores its input.
     struct Peer<'a>(&'a [u8]);
 
     impl Read for Peer<'_> {
@@ -247,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn answers_of_one_frame_or_several() {
+    fn answers_of_one_frame_or_several_are_read() {
         let mut samples = Vec::new();
         let long = [&[LONG, 0, 0, 0, 0, 0, 0, 1, 0][..], &[7; 256]].concat();
         let told = [&[MORE, 0][..], &long, &[MORE, 0, MORE, 2, 1, 2, 0, 1, 3]].concat();
@@ -257,7 +258,7 @@ mod tests {
         assert_eq!(answer(&mut peer, &mut samples, |_| true).unwrap(), 0);
         assert_eq!(samples[256..], [1, 2, 3]);
         assert!(answer(&mut peer, &mut samples, |_| true).is_err());
-        // What is not wanted is passed over where it is one frame; of several the first are not the whole.
+        // A single frame can be dropped; of several frames, the first are not the whole answer.
         let mut peer = Peer(&told);
         samples.clear();
         assert_eq!(
@@ -270,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_answer_is_refused_before_room_is_made_for_it() {
+    fn invalid_answers_are_rejected_before_memory_is_allocated() {
         let endless = [&[MORE, 0, LONG][..], &u64::MAX.to_be_bytes()].concat();
         let cut = [
             &[MORE, 0, LONG][..],

@@ -1,14 +1,14 @@
-//! The map that the page draws.
+//! Map on the web page.
 
 use onboard::settings::{Check, Site};
 use serde_json::{Value, json};
 
 /// Distance between points of the road's centre line (m).
 const STEP_M: f64 = 1.0;
-/// Most points of it.
+/// Maximum number of points of the centre line.
 const MOST: usize = 4000;
 
-/// Road and radio heads as JSON.
+/// Returns the road and the radio heads as JSON.
 pub fn site_json(site: &Site, node: &str) -> Value {
     let road = site.road.as_ref();
     let road = road.and_then(|it| it.build("road", Check { file: &site.name }).ok());

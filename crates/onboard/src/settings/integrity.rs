@@ -117,7 +117,7 @@ impl IntegritySettings {
             "integrity.fault_probability.array",
             array,
             &format!(
-                "nobody watches it: it must be below integrity.risk_per_hour, {}",
+                "the fault is not monitored: it must be below integrity.risk_per_hour, {}",
                 self.risk_per_hour
             ),
         )

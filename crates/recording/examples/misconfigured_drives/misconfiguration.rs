@@ -34,7 +34,7 @@ fn move_head(drive: &mut Drive, rng: &mut ChaCha8Rng) -> Vec<String> {
     let head = &mut drive.site.radio_heads[head];
     head.position_m[0] += 10.0 * cos;
     head.position_m[1] += 10.0 * sin;
-    vec![format!("pci {} stands", head.pci)]
+    vec![format!("pci {} is near", head.pci)]
 }
 
 fn exchange_axes(drive: &mut Drive, rng: &mut ChaCha8Rng) -> Vec<String> {
