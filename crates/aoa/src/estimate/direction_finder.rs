@@ -153,6 +153,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
             noise.is_some(),
         );
         let tests = model.tests();
+        let needed = tests.needed_snr(bound::resolvable_snr::<N>(snapshots));
         let noise_covariance = bound::covariance_around(
             &best.around,
             best.direction,
@@ -160,7 +161,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
             snapshots,
             !self.is_level(),
         )
-        .map(|row| row.map(|it| it * tests.unknown_noise));
+        .map(|row| row.map(|it| it * tests.variance_factor(snr, needed)));
         let alike = other
             .filter(|other| best.is_far_from(&other.direction))
             .is_some_and(|other| {
@@ -174,11 +175,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         let left = best.residual(matrix, usize::from(model.parameters));
         let tested = tests.of(&left, noise_power, trace);
         let misfit = tests.misfit(tested.ratios());
-        let weak = threshold_doubt(
-            snr,
-            tests.unknown_noise * bound::resolvable_snr::<N>(snapshots),
-        )
-        .or(tests.noise_doubt());
+        let weak = threshold_doubt(snr, needed).or(tests.noise_doubt());
         let geometric = if alike {
             Some(Reason::Ambiguous)
         } else {

@@ -50,19 +50,17 @@ pub fn maximum_likelihood_pilots<const N: usize>(
     };
     let snr = maximum_likelihood::snr::<N>(beam, noise);
     let tests = Model::one::<N>(blocks.len(), noise_variance.is_some()).tests();
+    let needed = tests.needed_snr(bound::resolvable_snr::<N>(blocks.len()));
     let left = Residuals::of::<false, N>(&single, &place).item(0);
     Ok(describe(
         &Found {
             phase_rad: place.phase_rad[0],
-            noise_sigma_rad: bound::stochastic::<N>(snr, blocks.len()) * tests.unknown_noise.sqrt(),
+            noise_sigma_rad: bound::stochastic::<N>(snr, blocks.len())
+                * tests.variance_factor(snr, needed).sqrt(),
             snr,
             tests,
             tested: tests.of(&left, noise, power),
-            doubt: threshold_doubt(
-                snr,
-                tests.unknown_noise * bound::resolvable_snr::<N>(blocks.len()),
-            )
-            .or(tests.noise_doubt()),
+            doubt: threshold_doubt(snr, needed).or(tests.noise_doubt()),
         },
         array,
     ))

@@ -141,9 +141,8 @@ impl<const N: usize> SideBySide<'_, N> {
         };
         let values = spectra.values::<FUSED>(places);
         let tests = Model::one::<N>(self.snapshots, false).tests();
-        let threshold = tests.unknown_noise * bound::resolvable_snr::<N>(self.snapshots);
-        let per_snapshot =
-            tests.unknown_noise * excess * excess / (2.0 * self.snapshots as f64 * aperture::<N>());
+        let needed = tests.needed_snr(bound::resolvable_snr::<N>(self.snapshots));
+        let per_snapshot = excess * excess / (2.0 * self.snapshots as f64 * aperture::<N>());
         let (mut snrs, mut snr_db) = ([0.0; W], [0.0; W]);
         let (mut noise_sigma, mut phase_sigma) = ([0.0; W], [0.0; W]);
         let (mut coherent, mut noise, mut inflation) = ([0.0; W], [0.0; W], [0.0; W]);
@@ -155,7 +154,8 @@ impl<const N: usize> SideBySide<'_, N> {
             // Standard deviation according to the stochastic bound.
             let inverse = 1.0 / snr;
             let variance = times_plus::<FUSED>(inverse * (1.0 / N as f64), inverse, inverse);
-            noise_sigma[w] = no_more_than_ignorance((variance * per_snapshot).sqrt());
+            let variance = variance * (per_snapshot * tests.variance_factor(snr, needed));
+            noise_sigma[w] = no_more_than_ignorance(variance.sqrt());
             let tested = tests.of(&residuals.item(w), power, spectra.re[0][w]);
             (coherent[w], noise[w]) = (tested.coherent, tested.noise);
             inflation[w] = tested.inflation;
@@ -173,7 +173,7 @@ impl<const N: usize> SideBySide<'_, N> {
                 noise: noise[w],
                 inflation: inflation[w],
             };
-            let doubt = threshold_doubt(snrs[w], threshold).or(tests.noise_doubt());
+            let doubt = threshold_doubt(snrs[w], needed).or(tests.noise_doubt());
             let geometric = geometric_doubt(phases[w], noise_sigma[w], end_fire);
             *estimate = AngleEstimate {
                 phase_rad: phases[w],
