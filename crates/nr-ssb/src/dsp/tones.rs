@@ -484,23 +484,7 @@ fn blackman_harris(length: usize) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// White noise of unit power from a linear congruential generator.
-    fn noise(seed: u64, length: usize) -> Vec<Complex32> {
-        let mut state = seed;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (0..4)
-                .map(|i| (state >> (16 * i) & 0xFFFF) as f32 / 65536.0 - 0.5)
-                .sum::<f32>()
-                * 1.5_f32.sqrt()
-        };
-        (0..length)
-            .map(|_| Complex32::new(next(), next()))
-            .collect()
-    }
+    use crate::numeric::noise::noise;
 
     fn add_tone(samples: &mut [Complex32], cycles: f64, amplitude: f32) {
         let mut phasors = vec![Complex32::ZERO; samples.len()];

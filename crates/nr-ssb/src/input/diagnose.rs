@@ -144,23 +144,7 @@ fn power(x: Complex32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Uniform noise from a linear congruential generator.
-    fn noise(seed: u64, length: usize) -> Vec<Complex32> {
-        let mut state = seed;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            // The sum of four has a bell-shaped distribution, in which the maximum is rare.
-            (0..4)
-                .map(|i| (state >> (16 * i) & 0xFFFF) as f32 / 65536.0 - 0.5)
-                .sum::<f32>()
-        };
-        (0..length)
-            .map(|_| Complex32::new(next(), next()))
-            .collect()
-    }
+    use crate::numeric::noise::noise;
 
     #[test]
     fn every_fault_is_named_and_healthy_channels_have_none() {
@@ -169,7 +153,7 @@ mod tests {
         broken[7].re = f32::NAN;
         let silent = vec![Complex32::ZERO; 4000];
         let weak: Vec<_> = noise(3, 4000).iter().map(|x| x * 1e-3).collect();
-        let limit = |x: f32| x.clamp(-0.4, 0.4);
+        let limit = |x: f32| x.clamp(-0.5, 0.5);
         let clipped: Vec<_> = noise(4, 4000)
             .iter()
             .map(|x| Complex32::new(limit(x.re), limit(x.im)))

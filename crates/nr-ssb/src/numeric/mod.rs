@@ -3,5 +3,7 @@
 pub(crate) mod decibel;
 pub(crate) mod false_alarm;
 pub(crate) mod hermitian;
+#[cfg(test)]
+pub(crate) mod noise;
 pub(crate) mod phasors;
 pub(crate) mod sums;
