@@ -180,14 +180,9 @@ impl Model {
         self.residual_dimensions() / remaining.max(1.0)
     }
 
-    /// Whether the SNR is estimated from the residual of one source.
-    fn has_estimated_snr(self) -> bool {
-        !self.noise_is_known && self.sources == 1
-    }
-
     /// Factor on the SNR needed to exclude a wholly wrong direction, because the noise variance is estimated.
     fn needed(self) -> f64 {
-        if !self.has_estimated_snr() {
+        if self.has_known_noise() {
             return 1.0;
         }
         self.unknown_noise() * (1.0 + FREEDOMS_AT_TWICE_THE_SNR / self.noise_freedom().max(1.0))
@@ -218,10 +213,10 @@ impl Model {
             rest_freedom: self.rest_freedom().max(1.0),
             dimensions_left: m,
             unknown_noise: self.unknown_noise(),
-            increase_at_threshold: if self.has_estimated_snr() {
-                INCREASE_AT_THRESHOLD
-            } else {
+            increase_at_threshold: if self.has_known_noise() {
                 0.0
+            } else {
+                INCREASE_AT_THRESHOLD
             },
             needed: self.needed(),
             is_noise_determined: self.has_known_noise() || self.noise_freedom() >= FEWEST_FREEDOMS,
