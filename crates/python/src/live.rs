@@ -61,6 +61,8 @@ pub struct LiveStatus {
     samples_age_s: Option<f64>,
     /// Number of SSBs that the receiver tracks.
     tracked: usize,
+    /// Strongest tones that are subtracted from the samples: absolute frequency in Hz, power in dBFS.
+    tones: Vec<(f64, f64)>,
     /// Active faults: name, description, and time of detection in seconds.
     faults: Vec<(&'static str, String, f64)>,
 }
@@ -83,6 +85,9 @@ impl From<CoreStatus> for LiveStatus {
             odometry_age_s: status.odometry_age_s,
             samples_age_s: status.samples_age_s,
             tracked: status.tracked,
+            tones: (status.tones.iter().flatten())
+                .map(|it| (it.frequency_hz, it.power_dbfs))
+                .collect(),
             faults: (status.faults.iter())
                 .map(|it| (it.fault.name(), it.fault.to_string(), it.since_s))
                 .collect(),

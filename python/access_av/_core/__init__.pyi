@@ -99,6 +99,7 @@ class LiveStatus:
     odometry_age_s: Final[float | None]
     samples_age_s: Final[float | None]
     tracked: Final[int]
+    tones: Final[list[tuple[float, float]]]
     faults: Final[list[tuple[str, str, float]]]
 
 @final

@@ -48,8 +48,20 @@ pub struct PoseFields {
     pub last_angle_s: Option<f64>,
     /// Number of SSBs that the receiver tracks.
     pub tracked: usize,
+    /// Strongest tones that are subtracted from the samples.
+    pub tones: Vec<ToneMessage>,
     /// Active faults of odometry and receive channels.
     pub faults: Vec<FaultMessage>,
+}
+
+/// DC offset of the receiver, a spurious tone, or another carrier.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(extend("additionalProperties" = false))]
+pub struct ToneMessage {
+    /// Frequency in Hz.
+    pub frequency_hz: f64,
+    /// Power in dB relative to a tone of amplitude 1.
+    pub power_dbfs: f64,
 }
 
 /// An active fault.
@@ -93,6 +105,12 @@ impl From<&Status> for PoseFields {
             protection_level_m: status.protection_level_m.filter(|it| it.is_finite()),
             last_angle_s: status.last_angle_s,
             tracked: status.tracked,
+            tones: (status.tones.iter().flatten())
+                .map(|it| ToneMessage {
+                    frequency_hz: it.frequency_hz,
+                    power_dbfs: it.power_dbfs,
+                })
+                .collect(),
             faults: status.faults.iter().map(FaultMessage::from).collect(),
         }
     }

@@ -197,6 +197,7 @@ mod tests {
             odometry_age_s: None,
             samples_age_s: None,
             tracked: 0,
+            tones: [None; onboard::live::TONES],
             faults: onboard::monitor::ActiveFaults::default(),
         }
     }

@@ -51,7 +51,7 @@ pub use outcome::{HeadStatus, Outcome};
 pub use samples::{cf32, ci8, ci16};
 pub use saved::{MAX_GROWTH_M, Resumption, SavedState};
 pub use start::starting_at;
-pub use status::{Reason, State, Status};
+pub use status::{Reason, State, Status, TONES};
 pub use stream::{SampleStream, StreamConfig, StreamCounts};
 pub use stream_clock::Continuity;
 pub use time_base::ClockStep;

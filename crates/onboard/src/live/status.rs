@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use nr_ssb::Tone;
+
 use crate::geometry::Pose;
 use crate::monitor::{ActiveFaults, Fault};
 
@@ -203,6 +205,9 @@ impl fmt::Display for Reason {
     }
 }
 
+/// Number of tones in a status.
+pub const TONES: usize = 4;
+
 /// How the vehicle stands at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Status {
@@ -233,6 +238,9 @@ pub struct Status {
     pub samples_age_s: Option<f64>,
     /// SSBs that the receiver keeps to.
     pub tracked: usize,
+    /// Strongest tones that are subtracted from the samples, at absolute frequencies: DC offset of the receiver,
+    /// spurious tones, other carriers.
+    pub tones: [Option<Tone>; TONES],
     /// Active faults of odometry and receive channels.
     pub faults: ActiveFaults,
 }

@@ -1,5 +1,6 @@
 //! The samples of a stream as bursts of SSBs.
 
+use nr_ssb::Tone;
 use nr_ssb::front_end::FrontEndError;
 use nr_ssb::receiver::ReceiverError;
 use num_complex::Complex32;
@@ -110,6 +111,11 @@ impl SampleStream {
     /// SSBs that are tracked.
     pub fn tracked(&self) -> usize {
         self.receiver.tracked()
+    }
+
+    /// Returns tone number `index` of those that are subtracted, the strongest first, at its absolute frequency.
+    pub fn tone(&self, index: usize) -> Option<Tone> {
+        self.receiver.tone(index)
     }
 
     /// What has come.

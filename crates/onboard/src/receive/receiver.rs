@@ -8,7 +8,7 @@ use aoa::DirectionFinder;
 use nr_ssb::grid::{SUBCARRIERS, SYMBOLS};
 use nr_ssb::receiver::{self as ssb, ReceiverError, Seen, WindowReceiver};
 use nr_ssb::track::{Tracked, Tracker};
-use nr_ssb::{Complex32, SubcarrierSpacing};
+use nr_ssb::{Complex32, SubcarrierSpacing, Tone};
 use num_complex::Complex64;
 use thiserror::Error;
 
@@ -189,6 +189,11 @@ impl StreamReceiver {
         self.0.tracked()
     }
 
+    /// Returns tone number `index` of those that are subtracted, the strongest first, at its absolute frequency.
+    pub fn tone(&self, index: usize) -> Option<Tone> {
+        self.0.tone(index)
+    }
+
     /// Returns the input sample before which all SSBs have been passed on.
     pub fn heard_until(&self) -> f64 {
         self.0.heard_until()
@@ -277,6 +282,7 @@ impl<const A: usize> OfWindows for (WindowReceiver<A>, Observer<A>) {
 /// Receiver of a stream for any number of antennas.
 trait OfStream: Send {
     fn tracked(&self) -> usize;
+    fn tone(&self, index: usize) -> Option<Tone>;
     fn heard_until(&self) -> f64;
     fn found(&self) -> u64;
     fn push(
@@ -297,6 +303,12 @@ trait OfStream: Send {
 impl<const A: usize> OfStream for (ssb::StreamReceiver<A>, Observer<A>) {
     fn tracked(&self) -> usize {
         self.0.receiver().tracked()
+    }
+
+    fn tone(&self, index: usize) -> Option<Tone> {
+        let mut tone = self.0.receiver().tones().nth(index)?;
+        tone.frequency_hz += self.1.config.ssb_freq_hz;
+        Some(tone)
     }
 
     fn heard_until(&self) -> f64 {

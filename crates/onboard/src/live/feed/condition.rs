@@ -46,6 +46,7 @@ impl Live {
             odometry_age_s: age_s,
             samples_age_s: end_s.map(|end_s| now_s - self.clocks.angles.inside(end_s)),
             tracked: self.stream.as_ref().map_or(0, SampleStream::tracked),
+            tones: std::array::from_fn(|index| self.stream.as_ref()?.tone(index)),
             faults: *self.onboard.faults(),
         };
         let (Some(newest), Some(age_s)) = (newest, age_s) else {
