@@ -92,6 +92,22 @@ def test_one_cell_is_found_at_either_centre(tmp_path: Path) -> None:
     assert found(file) == [(3, SSB_HZ / 1e6), (4, SSB_HZ / 1e6)]
 
 
+def test_samples_before_and_after_a_gap_make_no_ssb(tmp_path: Path) -> None:
+    half = burst(3)
+    [first] = [it for it in cells_of(write(tmp_path / "one", half, [(0, SSB_HZ)])) if it.sfn]
+    # A gap in the middle of the first of three SSBs: only the others are whole.
+    cut = round(first.sample_start) + 548
+    samples = np.concatenate([half, half, half])
+    assert len(found(write(tmp_path / "whole", samples, [(0, SSB_HZ), (cut, SSB_HZ)]))) == 3
+    file = write(tmp_path / "gap", samples, [(0, SSB_HZ), (cut, SSB_HZ)])
+    meta = json.loads(file.read_text())
+    meta["captures"][1]["core:global_index"] = cut + 1_000_000
+    file.write_text(json.dumps(meta))
+    decoded = [it.sample_start for it in cells_of(file) if it.sfn is not None]
+    expected = [first.sample_start + half.size * number for number in (1, 2)]
+    assert decoded == pytest.approx(expected, abs=1)
+
+
 def test_a_drive_has_one_centre_frequency(access_av: Cli, tmp_path: Path) -> None:
     samples = np.concatenate([burst(3), burst(3)])
     file = write(tmp_path / "retuned", samples, [(0, SSB_HZ), (samples.size // 2, OTHER_HZ)])

@@ -8,7 +8,7 @@ use onboard::observation::SsbObservation;
 use onboard::receive::{ReceiveError, ReceiverConfig};
 
 use super::error::ReplayError;
-use crate::sigmf::{Capture, Recording};
+use crate::sigmf::Recording;
 
 /// Duration of samples that are read at once in seconds.
 const BLOCK_S: f64 = 0.02;
@@ -108,15 +108,9 @@ pub fn receive_recording(
 }
 fn stretches(recording: &Recording) -> Vec<Stretch> {
     let captures = &recording.metadata().captures;
-    let global_index = |capture: &Capture| {
-        let stated = capture.other.get("core:global_index");
-        stated
-            .and_then(serde_json::Value::as_u64)
-            .unwrap_or(capture.sample_start)
-    };
     let mut stretches: Vec<Stretch> = Vec::new();
     for capture in captures {
-        let global_index = global_index(capture);
+        let global_index = capture.global_index().unwrap_or(capture.sample_start);
         if let Some(last) = stretches.last_mut() {
             last.to = capture.sample_start;
             // A capture that continues the previous one is not a gap.

@@ -38,6 +38,16 @@ pub enum Places {
     },
 }
 
+impl SearchScope {
+    /// Whether another search was made at the same frequencies, for the same spacing, on as many channels.
+    pub(super) fn is_where(&self, other: &Self) -> bool {
+        let has_frequencies = !matches!(self.places, Places::Raster(_));
+        has_frequencies
+            && (self.spacing, self.channels) == (other.spacing, other.channels)
+            && self.places == other.places
+    }
+}
+
 impl fmt::Display for SearchScope {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} kHz spacing, ", self.spacing.khz())?;

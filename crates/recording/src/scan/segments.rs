@@ -1,8 +1,9 @@
-//! Scan of a recording by segments, each with its own centre frequency.
+//! Scan of a recording by segments, each with one centre frequency and without a gap.
 
+use nr_ssb::SubcarrierSpacing;
 use num_complex::Complex32;
 
-use super::diagnosis::ChannelFault;
+use super::diagnosis::{ChannelFault, add_tone};
 use super::error::ScanError;
 use super::iq_source::IqSource;
 use super::scanner::{Scan, ScanSettings, scan};
@@ -15,8 +16,9 @@ const SHORTEST_S: f64 = 17e-6;
 /// than one SSB of any spacing.
 const EXTENDED_S: f64 = 1e-3;
 
-/// Finds every SSB of a recording in order of time, at the centre frequency of its capture. If no
-/// PBCH is decoded, the search is repeated with I and Q exchanged.
+/// Finds every SSB of a recording in order of time, at the centre frequency of its capture. After a gap, SSBs are
+/// searched for at the frequencies where they were found before the gap. If no PBCH is decoded, the search is repeated
+/// with I and Q exchanged.
 ///
 /// # Errors
 /// Errors of [`scan`]; [`ScanError::Recording`] for a centre frequency outside 5G NR, or for one
@@ -31,42 +33,126 @@ pub fn scan_recording(
             RecordingError::value(recording.data_file(), "centre frequency", hz, allowed)
         };
         check_centre_hz(hz).map_err(wrong)?;
-        if segments.len() > 1 {
-            let allowed = format!(
-                "it cannot replace the {} different core:frequency of the captures",
-                segments.len()
-            );
+        let first = segments.first();
+        if first.is_some_and(|first| segments.iter().any(|it| !it.has_frequency_of(first))) {
+            let allowed =
+                "it cannot replace the different core:frequency of the captures".to_owned();
             return Err(wrong(allowed).into());
         }
     }
     let mut found = Scan::default();
-    for segment in segments {
+    let mut known: Vec<KnownPlaces> = Vec::new();
+    let is_only = segments.len() == 1;
+    // No SSB is in a segment that is shorter than one.
+    let least = SHORTEST_S * recording.sample_rate_hz();
+    let searched = |it: &Segment| is_only || it.length as f64 >= least;
+    for segment in segments.into_iter().filter(searched) {
         let mut source = SegmentSource {
             recording: &mut *recording,
             segment,
             exchanged: false,
         };
-        let mut part = scan(&mut source, settings)?;
-        if !has_message(&part) {
-            source.exchanged = true;
-            let exchanged = scan(&mut source, settings)?;
-            if has_message(&exchanged) {
-                part.ssbs = exchanged.ssbs;
-                part.faults.push(ChannelFault::IqExchanged);
-            }
+        let before = known
+            .iter()
+            .find(|it| it.segment.has_frequency_of(&segment));
+        let mut part = match before {
+            Some(before) => before.scan(&mut source, settings)?,
+            None => scan_either_way(&mut source, settings)?,
+        };
+        if before.is_none() {
+            known.extend(KnownPlaces::of(&part, segment, source.exchanged, settings));
         }
         for ssb in &mut part.ssbs {
             ssb.sample_start += segment.start as f64;
         }
         found.ssbs.append(&mut part.ssbs);
-        found.searched.append(&mut part.searched);
+        for scope in part.searched {
+            match found.searched.iter_mut().find(|it| it.is_where(&scope)) {
+                Some(known) => known.duration_s += scope.duration_s,
+                None => found.searched.push(scope),
+            }
+        }
         for fault in part.faults {
-            if !found.faults.contains(&fault) {
-                found.faults.push(fault);
+            match fault {
+                ChannelFault::Tone(tone) => add_tone(&mut found.faults, tone),
+                fault if found.faults.contains(&fault) => {}
+                fault => found.faults.push(fault),
             }
         }
     }
     Ok(found)
+}
+
+/// Scans a segment and, if no PBCH is decoded, scans it with I and Q exchanged.
+fn scan_either_way(
+    source: &mut SegmentSource<'_>,
+    settings: &ScanSettings,
+) -> Result<Scan, ScanError> {
+    let mut part = scan(source, settings)?;
+    if !has_message(&part) {
+        source.exchanged = true;
+        let exchanged = scan(source, settings)?;
+        source.exchanged = has_message(&exchanged);
+        if source.exchanged {
+            part.ssbs = exchanged.ssbs;
+            part.faults.push(ChannelFault::IqExchanged);
+        }
+    }
+    Ok(part)
+}
+
+/// Frequencies of the SSBs in an earlier segment of the same centre frequency.
+struct KnownPlaces {
+    segment: Segment,
+    exchanged: bool,
+    /// Frequency of the SSB's centre (Hz), and its subcarrier spacing.
+    places: Vec<(f64, SubcarrierSpacing)>,
+}
+
+impl KnownPlaces {
+    /// Returns the frequencies of a scan; `None` without SSBs, or if the centre frequency is unknown.
+    fn of(scan: &Scan, segment: Segment, exchanged: bool, settings: &ScanSettings) -> Option<Self> {
+        let mut places: Vec<(f64, SubcarrierSpacing)> = Vec::new();
+        for ssb in &scan.ssbs {
+            let place = (ssb.ssb_freq_hz, ssb.spacing);
+            if !places.contains(&place) {
+                places.push(place);
+            }
+        }
+        let centre_hz = settings.centre_frequency_hz.or(segment.centre_frequency_hz);
+        let is_absolute = centre_hz.is_some_and(|it| it > 0.0) || settings.ssb_freq_hz.is_some();
+        (is_absolute && !places.is_empty()).then_some(Self {
+            segment,
+            exchanged,
+            places,
+        })
+    }
+
+    /// Searches another segment at these frequencies.
+    fn scan(
+        &self,
+        source: &mut SegmentSource<'_>,
+        settings: &ScanSettings,
+    ) -> Result<Scan, ScanError> {
+        source.exchanged = self.exchanged;
+        let mut found = Scan::default();
+        for (ssb_freq_hz, spacing) in &self.places {
+            let settings = ScanSettings {
+                ssb_freq_hz: Some(*ssb_freq_hz),
+                spacing: Some(*spacing),
+                cfo_ppm: settings.cfo_ppm.filter(|_| settings.ssb_freq_hz.is_some()),
+                ..settings.clone()
+            };
+            let mut part = scan(source, &settings)?;
+            found.ssbs.append(&mut part.ssbs);
+            found.searched.append(&mut part.searched);
+            found.faults.append(&mut part.faults);
+        }
+        found
+            .ssbs
+            .sort_by(|a, b| a.sample_start.total_cmp(&b.sample_start));
+        Ok(found)
+    }
 }
 
 /// Whether the PBCH of any SSB was decoded.

@@ -90,6 +90,14 @@ pub struct Capture {
     pub other: Map<String, Value>,
 }
 
+impl Capture {
+    /// Index of the first sample since the start of the receiver (`core:global_index`). `None`: no gap precedes the
+    /// capture.
+    pub fn global_index(&self) -> Option<u64> {
+        self.other.get("core:global_index").and_then(Value::as_u64)
+    }
+}
+
 /// Element of `annotations`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Annotation {

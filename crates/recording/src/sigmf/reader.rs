@@ -248,7 +248,7 @@ impl Recording {
         Ok(None)
     }
 
-    /// Returns the segments of the recording with one centre frequency, in order.
+    /// Returns the segments of the recording in order, each with one centre frequency and without a gap.
     pub fn segments(&self) -> Vec<Segment> {
         segment::segments(&self.metadata.captures, self.length)
     }
@@ -259,7 +259,10 @@ impl Recording {
     /// [`RecordingError::Value`] with the first capture of another frequency.
     pub fn check_one_frequency(&self) -> Result<(), RecordingError> {
         let segments = self.segments();
-        let [first, second, ..] = segments.as_slice() else {
+        let Some(first) = segments.first() else {
+            return Ok(());
+        };
+        let Some(second) = segments.iter().find(|it| !it.has_frequency_of(first)) else {
             return Ok(());
         };
         let hz = |it: &Segment| it.centre_frequency_hz.unwrap_or(f64::NAN);

@@ -1,4 +1,4 @@
-//! Segments of a recording with one centre frequency.
+//! Segments of a recording with one centre frequency and without a gap.
 
 use super::metadata::Capture;
 
@@ -18,8 +18,18 @@ pub struct Segment {
     pub capture: usize,
 }
 
-/// Returns the segments of a recording of `length` samples in order. A capture without a frequency
-/// continues the previous segment.
+impl Segment {
+    /// Whether another segment has the same centre frequency.
+    pub fn has_frequency_of(&self, other: &Self) -> bool {
+        match (self.centre_frequency_hz, other.centre_frequency_hz) {
+            (Some(a), Some(b)) => (a - b).abs() < SAME_HZ,
+            (a, b) => a == b,
+        }
+    }
+}
+
+/// Returns the segments of a recording of `length` samples in order. A capture without a frequency continues the
+/// previous segment. A `core:global_index` that differs from the number of samples since the previous one is a gap.
 pub fn segments(captures: &[Capture], length: u64) -> Vec<Segment> {
     let first_hz = captures.iter().find_map(|it| it.frequency_hz);
     let mut segments = vec![Segment {
@@ -28,24 +38,28 @@ pub fn segments(captures: &[Capture], length: u64) -> Vec<Segment> {
         centre_frequency_hz: first_hz,
         capture: 0,
     }];
+    // Sample of the last capture, and its global index.
+    let mut counted = (0, 0);
     for (index, capture) in captures.iter().enumerate() {
-        let (Some(hz), Some(last)) = (capture.frequency_hz, segments.last_mut()) else {
+        let start = capture.sample_start.min(length);
+        let expected = u64::saturating_add(counted.1, start.saturating_sub(counted.0));
+        let global_index = capture.global_index().unwrap_or(expected);
+        let is_gap = index > 0 && global_index != expected;
+        counted = (start, global_index);
+        let Some(last) = segments.last_mut() else {
             continue;
         };
-        let is_same = last
-            .centre_frequency_hz
-            .is_some_and(|it| (it - hz).abs() < SAME_HZ);
-        if is_same {
-            continue;
-        }
-        let start = capture.sample_start.min(length);
-        last.length = start - last.start;
-        segments.push(Segment {
+        let next = Segment {
             start,
             length: length - start,
-            centre_frequency_hz: Some(hz),
+            centre_frequency_hz: capture.frequency_hz.or(last.centre_frequency_hz),
             capture: index,
-        });
+        };
+        if !is_gap && next.has_frequency_of(last) {
+            continue;
+        }
+        last.length = start - last.start;
+        segments.push(next);
     }
     segments.retain(|it| it.length > 0);
     segments
@@ -86,5 +100,37 @@ mod tests {
         ];
         assert_eq!(found(&hops), [(0, 40, a), (40, 40, b), (80, 20, a)]);
         assert_eq!(found(&[capture(0, None), capture(10, b)]), [(0, 100, b)]);
+    }
+
+    #[test]
+    fn segments_begin_after_gaps() {
+        let capture = |sample_start: u64, global_index: Option<u64>| {
+            let index = global_index.map(|it| ("core:global_index".to_owned(), it.into()));
+            Capture {
+                sample_start,
+                frequency_hz: Some(3.5e9),
+                other: index.into_iter().collect(),
+            }
+        };
+        let found = |captures: &[Capture]| -> Vec<(u64, u64, usize)> {
+            let segments = segments(captures, 100).into_iter();
+            segments
+                .map(|it| (it.start, it.length, it.capture))
+                .collect()
+        };
+        // A count that begins at any number, and goes on.
+        let contiguous = [
+            capture(0, Some(7000)),
+            capture(40, None),
+            capture(60, Some(7060)),
+        ];
+        assert_eq!(found(&contiguous), [(0, 100, 0)]);
+        let gaps = [
+            capture(0, Some(7000)),
+            capture(40, Some(7041)),
+            capture(60, Some(7061)),
+            capture(80, Some(9000)),
+        ];
+        assert_eq!(found(&gaps), [(0, 40, 0), (40, 40, 1), (80, 20, 3)]);
     }
 }
