@@ -1,0 +1,157 @@
+//! The search, the scan and the receivers, as one kind of function.
+
+use nr_ssb::Complex32;
+use nr_ssb::receiver::{Receiver, ReceiverConfig, Window, WindowReceiver};
+use nr_ssb::search::{SearchConfig, Searcher};
+use recording::scan::{
+    ChannelFault, SampleBlock, Scan, ScanSettings, SsbSearch, SsbSearchConfig, scan,
+};
+
+use crate::air::slices;
+use crate::{SPACING, Scene};
+
+/// SSBs of the cell that were detected, and reported tones.
+pub struct Detected {
+    /// Number of SSBs that there are.
+    pub bursts: usize,
+    pub ssbs: usize,
+    /// Frequencies from the samples' centre.
+    pub tones_hz: Vec<f64>,
+}
+
+type Detector = fn(&Scene, &[Vec<Complex32>]) -> Detected;
+
+/// Name, whether for samples at twice the base rate, number of bursts.
+pub const DETECTORS: [(&str, bool, usize, Detector); 4] = [
+    ("search", false, 1, search),
+    ("scan", true, 1, scan_band),
+    ("stream", true, 3, stream),
+    ("window", false, 3, window),
+];
+
+impl Scene {
+    /// Number of bursts of the cell among these SSBs, given by PCI and first sample at the base rate.
+    fn detected(&self, ssbs: &[(u16, f64)], tones_hz: Vec<f64>) -> Detected {
+        let first = self.cell.ssb_start(self.cell.ssb_indices[0]);
+        let is_there = |number: &usize| {
+            let start = first + (number * 153_600) as f64;
+            ssbs.iter()
+                .any(|(pci, at)| *pci == self.cell.pci && (at - start).abs() < 1.5)
+        };
+        Detected {
+            bursts: self.bursts,
+            ssbs: (0..self.bursts).filter(is_there).count(),
+            tones_hz,
+        }
+    }
+
+    fn centre_hz(&self) -> f64 {
+        self.cell.ssb_freq_hz - self.offset_hz
+    }
+}
+
+fn search(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
+    let config = SearchConfig {
+        ssb_freq_hz: Some(scene.cell.ssb_freq_hz),
+        ..SearchConfig::new(SPACING, samples.len())
+    };
+    let mut searcher = Searcher::new(config).unwrap();
+    let found = searcher.search(&slices(samples)).unwrap();
+    let found: Vec<_> = found
+        .iter()
+        .map(|ssb| (ssb.pci.get(), ssb.sample_start))
+        .collect();
+    let tones = searcher.tones().map(|it| it.frequency_hz).collect();
+    scene.detected(&found, tones)
+}
+
+fn scan_band(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
+    let mut source = SampleBlock {
+        antennas: slices(samples),
+        sample_rate_hz: scene.rate_hz(),
+        centre_frequency_hz: Some(scene.centre_hz()),
+    };
+    let Scan { ssbs, faults, .. } = scan(&mut source, &ScanSettings::default()).unwrap();
+    let found: Vec<_> = ssbs
+        .iter()
+        .map(|it| (it.ssb.pci.get(), it.sample_start / scene.factor as f64))
+        .collect();
+    let tones = faults.iter().filter_map(|fault| match fault {
+        ChannelFault::Tone(tone) => Some(tone.frequency_hz),
+        _ => None,
+    });
+    scene.detected(&found, tones.collect())
+}
+
+fn stream(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
+    let config = ReceiverConfig::new(scene.cell.ssb_freq_hz, SPACING, samples.len());
+    let mut receiver = Receiver::new(config, scene.rate_hz(), scene.centre_hz()).unwrap();
+    let mut found = Vec::new();
+    let mut tones = Vec::new();
+    for from in (0..samples[0].len()).step_by(10_000) {
+        let to = samples[0].len().min(from + 10_000);
+        let block: Vec<&[Complex32]> = samples.iter().map(|it| &it[from..to]).collect();
+        receiver
+            .push(&block, &mut |ssb| {
+                found.push((ssb.pci.get(), ssb.sample_start / scene.factor as f64));
+            })
+            .unwrap();
+        if !receiver.tones().is_empty() {
+            tones = receiver.tones();
+        }
+    }
+    receiver
+        .finish(&mut |ssb| found.push((ssb.pci.get(), ssb.sample_start / scene.factor as f64)))
+        .unwrap();
+    let tones = tones.iter().map(|it| it.frequency_hz + scene.offset_hz);
+    scene.detected(&found, tones.collect())
+}
+
+/// Windows of 5 ms around each burst.
+fn window(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
+    match samples.len() {
+        1 => window_of::<1>(scene, samples),
+        2 => window_of::<2>(scene, samples),
+        _ => window_of::<4>(scene, samples),
+    }
+}
+
+fn window_of<const A: usize>(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
+    let config = ReceiverConfig::new(scene.cell.ssb_freq_hz, SPACING, A);
+    let mut receiver = WindowReceiver::<A>::new(config).unwrap();
+    let mut found = Vec::new();
+    for number in 0..scene.bursts {
+        let start = (scene.cell.delay as usize).saturating_sub(300) + number * 153_600;
+        let antennas: Vec<&[Complex32]> = samples
+            .iter()
+            .map(|it| &it[start..start + 40_000])
+            .collect();
+        let window = Window {
+            start: start as i64,
+            antennas: &antennas,
+        };
+        receiver
+            .receive(&window, &mut |seen| {
+                found.push((seen.ssb.pci.get(), seen.ssb.sample_start));
+            })
+            .unwrap();
+    }
+    let tones = receiver.tones().map(|it| it.frequency_hz).collect();
+    scene.detected(&found, tones)
+}
+
+/// Angle of the only SSB.
+pub fn angle_rad(scene: &Scene, samples: &[Vec<Complex32>]) -> Option<f64> {
+    let frequency_hz = scene.cell.ssb_freq_hz;
+    let config = SsbSearchConfig::new(
+        scene.rate_hz(),
+        frequency_hz,
+        frequency_hz,
+        SPACING,
+        samples.len(),
+    );
+    let mut search = SsbSearch::new(config).unwrap();
+    let found = search.search(&slices(samples)).unwrap();
+    let angle = found.first()?.angle?.from_row()?;
+    Some(angle.angle_rad)
+}
