@@ -101,7 +101,7 @@ def run(
     directory.link_latest()
 
     show_compared(beside)
-    title = f"{chosen.name}: {runs} runs, seed {seed}"
+    title = f"{chosen.name}: {runs} run{'s' * (runs > 1)}, seed {seed}"
     show_simulation(result, title, energy_boundary(chosen))
     if assumed:
         console.print(in_words(assumed), soft_wrap=True)

@@ -184,6 +184,8 @@ def show_points(points: pl.DataFrame, title: str = "") -> None:
 
 def show_simulation(result: Simulation, title: str, energy_boundary: str | None) -> None:
     """Prints errors, executions and energy of a simulation as a table."""
+    from access_av.run.service_levels import reached_in_words
+
     steps, runs = result.steps, result.runs
     made = table(["", "value", "95 % interval"], title=title)
     rows: dict[str, tuple[Any, str]] = {
@@ -193,8 +195,8 @@ def show_simulation(result: Simulation, title: str, energy_boundary: str | None)
     for each in result.percentiles or ():
         rows[f"{each.percent:g}th percentile of the error / m"] = each.value, each.interval
     rows |= {
-        "worst mean error along the track, X / m": (steps["mean_abs_error_x_m"].max(), ""),
-        "worst mean error along the track, Y / m": (steps["mean_abs_error_y_m"].max(), ""),
+        "maximum mean error along the track, X / m": (steps["mean_abs_error_x_m"].max(), ""),
+        "maximum mean error along the track, Y / m": (steps["mean_abs_error_y_m"].max(), ""),
         "duration / s": (steps["time_s"].max(), ""),
         "executions (angles estimated)": (runs["executions"].mean(), ""),
         f"energy / J, {energy_boundary or 'not counted'}": (runs["energy_j"].mean(), ""),
@@ -220,7 +222,7 @@ def show_simulation(result: Simulation, title: str, energy_boundary: str | None)
     if (operation := result.operation) is not None:
         console.print(f"{operation.in_words()} {operation.what_helps()}".strip())
     if levels := result.service_levels:
-        show_service_levels(levels)
+        console.print(f"3GPP positioning service: {reached_in_words(levels)} reached (see report).")
 
 
 def show_service_levels(verdicts: Sequence[Verdict], title: str = "") -> None:

@@ -56,10 +56,10 @@ def ends_text(low: float | None, high: float | None) -> str:
     Examples
     --------
     >>> ends_text(0.21, 0.34), ends_text(0.21, math.inf), ends_text(None, None)
-    ('0.21 to 0.34', 'above 0.21', 'not known of one drive')
+    ('0.21 to 0.34', 'above 0.21', 'unknown for one run')
     """
     if low is None:
-        return "not known of one drive"
+        return "unknown for one run"
     return f"above {low:.3g}" if high is None or math.isinf(high) else f"{low:.3g} to {high:.3g}"
 
 
