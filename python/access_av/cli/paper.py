@@ -1,4 +1,4 @@
-"""The commands ``evaluate``, ``readings``, ``chosen``, ``search``, ``explore`` and ``fit``."""
+"""Commands ``evaluate``, ``readings``, ``chosen``, ``search``, ``explore`` and ``fit``."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ from access_av.cli.terminal import console, progress, show_points, table
 
 app = typer.Typer()
 
-ReadingOption = Annotated[str, typer.Option(help="Name of a reading, or path of a scenario file.")]
+ReadingOption = Annotated[
+    str, typer.Option(help="Interpretation: name, or path of a scenario file.")
+]
 
 
 @app.command(
@@ -35,34 +37,35 @@ ReadingOption = Annotated[str, typer.Option(help="Name of a reading, or path of 
 def evaluate(
     reading: Annotated[
         list[str] | None,
-        typer.Option(help="Only these readings: names, or paths of scenario files."),
+        typer.Option(help="Interpretation: name, or path of a scenario file; repeatable."),
     ] = None,
     scenario: Annotated[
-        str | None, typer.Option(help="Instead of readings: a scenario of the paper's trip.")
+        str | None, typer.Option(help="Scenario of the paper's trip, in place of interpretations.")
     ] = None,
     platform: PlatformOption = "jetson-agx-xavier",
     runs: Runs = 100,
     seed: Seed = 1,
     seeds: Annotated[
-        int, typer.Option(min=1, help="Judge the claims with so many seeds, from --seed on.")
+        int, typer.Option(min=1, help="Number of seeds for the claims, starting at --seed.")
     ] = 1,
     unknowns: Annotated[
         bool,
         typer.Option(
-            "--unknowns", help="Also: on what the claims hang, thing by thing (takes minutes)."
+            "--unknowns", help="Also a sensitivity analysis of the claims (takes minutes)."
         ),
     ] = False,
     claims: Annotated[
-        Path | None, typer.Option(help="Claims to judge, as in paper.toml; else the paper's.")
+        Path | None, typer.Option(help="Claims file, in the format of paper.toml.")
     ] = None,
     threads: Threads = None,
     dask: DaskOption = None,
     out: Out = None,
 ) -> None:
-    """Read the paper in every way it can be, judge its claims, write the report.
+    """Evaluate the paper's claims under its interpretations, and write the report.
 
-    Three campaigns for each reading: every method at every SSB, every method at what the computer
-    manages, and adaptive MUSIC, each over all power modes. results/latest points to the files.
+    Three campaigns for each interpretation: every method at every SSB, every method at the minimum
+    interval of the computer, and adaptive MUSIC, each over all power modes. results/latest points
+    to the files.
     """
     from access_av.cli.paper_tables import show_study
     from access_av.report.paper import results
@@ -101,12 +104,12 @@ def _claims(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: no table [claims]")
     for name, entry in found.items():
         if not isinstance(entry, dict):
-            raise InputError(f"{path}: claims.{name}: it must be a table")
+            raise InputError(f"{path}: claims.{name}: must be a table")
         needed = {"says", "where", "unit", "rule", "stated"}
         if missing := sorted(needed - entry.keys()):
             raise InputError(f"{path}: claims.{name}: {', '.join(missing)} missing")
         if not {"rests_on", "evidence"} & entry.keys():
-            raise InputError(f"{path}: claims.{name}: it needs `rests_on` or `evidence`")
+            raise InputError(f"{path}: claims.{name}: add `rests_on` or `evidence`")
     return dict(found)
 
 
@@ -114,15 +117,17 @@ def _claims(path: Path) -> dict[str, Any]:
     epilog="Example: [bold]access-av readings gate-t-max[/]",
 )
 def readings(
-    name: Annotated[str | None, typer.Argument(help="Print this one as a scenario.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="Interpretation to print as a scenario.")
+    ] = None,
 ) -> None:
-    """List the readings of the paper, or print one with every default written out."""
+    """List the interpretations of the paper, or print one with all default values."""
     from access_av.paper import readings as known
 
     if name is not None:
         print(known.load(name).scenario.to_toml(), end="")
         return
-    made = table(["reading", "what it is", "calibrated to the claims"], text=3)
+    made = table(["interpretation", "description", "calibrated to the claims"], text=3)
     for one in known.load_all():
         made.add_row(one.name, one.scenario.description, ", ".join(one.chosen) or "nothing")
     console.print(made)
@@ -138,10 +143,10 @@ def chosen(
     threads: Threads = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print what the paper leaves open, what was chosen and why, and what another value does.
+    """Print the open choices of the paper: chosen value, reason, and effect of alternatives.
 
-    One thing is changed at a time, from the shipped reading in mode 0. What they do together:
-    access-av evaluate --unknowns.
+    One choice is changed at a time, in the shipped interpretation and mode 0. The command access-av
+    evaluate --unknowns evaluates joint changes.
     """
     from dataclasses import asdict
 
@@ -168,24 +173,25 @@ def chosen(
 )
 def search(
     platform: PlatformOption = "jetson-agx-xavier",
-    worlds: Annotated[int, typer.Option(min=1, help="Worlds to draw.")] = 64,
-    controllers: Annotated[int, typer.Option(min=1, help="Controllers in each.")] = 32,
+    worlds: Annotated[int, typer.Option(min=1, help="Number of environments.")] = 64,
+    controllers: Annotated[int, typer.Option(min=1, help="Controllers per environment.")] = 32,
     runs: Runs = 20,
     confirm: Annotated[
-        int, typer.Option(min=0, help="Drives per setting of the best and its neighbours.")
+        int, typer.Option(min=0, help="Runs of the best interpretation and its neighbours.")
     ] = 200,
     seed: Seed = 1,
     threads: Threads = None,
     shard: ShardOption = "1/1",
     dask: DaskOption = None,
     out: Annotated[
-        Path | None, typer.Option(help="Write the best reading as a scenario file.")
+        Path | None, typer.Option(help="Scenario file to write for the best interpretation.")
     ] = None,
 ) -> None:
-    """Search for the reading of Algorithm 1 without a gate that meets most claims.
+    """Search for the interpretation of Algorithm 1 without a gate that meets most claims.
 
-    Draws from what the paper leaves open; no gate, t_max kept. A search that was stopped goes on
-    where it was (results/parts). The best one and its neighbours are driven again, more often.
+    Draws the open choices of the paper; without a gate, with t_max. results/parts keeps the runs,
+    so that a repeated command continues. The best interpretation and its neighbours are simulated
+    again with more runs.
     """
     from access_av.cli.paper_tables import show_search
     from access_av.device.platform import Platform
@@ -232,24 +238,28 @@ def _bound(text: str) -> Any:
     epilog="Example: [bold]access-av explore --max-energy-j 260 --max-rms-m 0.15[/]",
 )
 def explore(
-    max_energy_j: Annotated[float | None, _bound("Energy of a trip.")] = None,
+    max_energy_j: Annotated[float | None, _bound("Maximum energy of a trip, in J.")] = None,
     max_error_m: MaxError = None,
     percentile: PercentileOption = None,
-    max_rms_m: Annotated[float | None, _bound("RMS error over track and runs.")] = None,
-    max_worst_m: Annotated[float | None, _bound("Worst mean error, X and Y.")] = None,
-    max_executions: Annotated[float | None, _bound("Angle estimates in a trip.")] = None,
-    mode: Annotated[list[int] | None, typer.Option(help="Only these power modes.")] = None,
-    fixed: Annotated[bool, typer.Option("--fixed", help="Also the fixed wake-up times.")] = False,
+    max_rms_m: Annotated[
+        float | None, _bound("Maximum RMS error over track and runs, in m.")
+    ] = None,
+    max_worst_m: Annotated[float | None, _bound("Maximum mean error in X and Y, in m.")] = None,
+    max_executions: Annotated[
+        float | None, _bound("Maximum number of angle estimates per trip.")
+    ] = None,
+    mode: Annotated[list[int] | None, typer.Option(help="Power mode; repeatable.")] = None,
+    fixed: Annotated[bool, typer.Option("--fixed", help="Also fixed wake-up times.")] = False,
     reading: ReadingOption = "gate",
     results: Annotated[
-        Path | None, typer.Option(help="Results of an evaluation; else results/latest.")
+        Path | None, typer.Option(help="Results folder of evaluate.", show_default="results/latest")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Find operating points of the paper's trip within an energy budget and an error bound.
 
-    Asks the last evaluation; where there is none, runs it first. For a trip of your own: access-av
-    designs. Exit code 3 where no operating point qualifies.
+    Uses the last evaluation, or runs it first. The command access-av designs does this for other
+    trips. Exit code 3 if no operating point qualifies.
     """
     from access_av.designs.operating_points import Query
     from access_av.designs.operating_points import explore as answer
@@ -269,7 +279,7 @@ def explore(
     elif found.is_empty():
         console.print(f"No operating point has {query}.")
         nearest = points.sort("energy_j").head(1)
-        show_points(nearest, title="The one with the least energy")
+        show_points(nearest, title="Operating point with the minimum energy")
     if found.is_empty():
         raise typer.Exit(MISSED)
     if as_json:
@@ -295,13 +305,13 @@ def fit(
     seed: Seed = 1,
     threads: Threads = None,
     out: Annotated[
-        Path | None, typer.Option(help="Write the platform file with the fitted values.")
+        Path | None, typer.Option(help="Platform file to write with the fitted values.")
     ] = None,
 ) -> None:
     """Fit the energy per execution of each mode and method to the paper's figures.
 
-    Simulates how often each setting executes, then solves for the energies that agree with the
-    sums the paper states. This is where the shipped platform's "fitted" values come from.
+    Simulates the number of executions of each setting, then solves for the energies that agree with
+    the sums in the paper. The "fitted" values of the shipped platform come from this command.
     """
     from access_av.paper import study
     from access_av.paper.energy_fit import numbers
@@ -319,7 +329,7 @@ def fit(
         made.add_row(str(mode.number), *(f"{energy.value:.4f}" for energy in energies))
     console.print(made)
     free, solved = numbers()
-    console.print(f"{free} numbers were free, {solved} of them solved for from stated figures.")
+    console.print(f"{free} free parameters, {solved} of them solved from figures of the paper.")
     if out is not None:
         write_whole(out, fitted.to_toml())
         console.print(f"Platform file: {out}", soft_wrap=True)

@@ -1,4 +1,4 @@
-"""The evaluation and the paper's claims on the command line."""
+"""Terminal output of the evaluation and of the paper's claims."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def mark(claim: Claim) -> str:
 
 
 def show_study(study: Study) -> None:
-    """Claims by readings, the shown reading's modes, what it comes to."""
+    """Prints claims by interpretation, the modes of the shown one, and the summary."""
     show_evaluation(study.shown)
     _show_claims(study)
     _show_freedoms(study)
@@ -54,9 +54,9 @@ def show_study(study: Study) -> None:
 
 
 def show_evaluation(evaluation: Evaluation) -> None:
-    """Accuracy and energy per mode, fixed methods beside the adaptive one."""
+    """Prints accuracy and energy per mode for fixed and adaptive methods."""
     energy = table(["mode", *map(label, METHODS), "adaptive"], title="Energy of a trip in J")
-    error = table(["mode", *map(label, METHODS), "adaptive"], title="Worst error in Y in m")
+    error = table(["mode", *map(label, METHODS), "adaptive"], title="Maximum mean error in Y in m")
     for mode in evaluation.platform.modes:
         rows = [
             *evaluation.campaign("Q").filter(mode=mode.number).iter_rows(named=True),
@@ -87,7 +87,7 @@ def _show_claims(study: Study) -> None:
     columns = [each.reading.name for each in study.evaluations]
     matrix = table(
         ["claim", *(map(str, range(1, len(columns) + 1)))],
-        title="Claims by readings (✓ reproduced, ✗ not; = agrees, ≠ differs by arithmetic or "
+        title="Claims by interpretation (✓ reproduced, ✗ not; = agrees, ≠ differs by arithmetic or "
         "construction; ? or 3/5: changes with the seed)",
     )
     by_reading = [study.of(name) for name in columns]
@@ -99,7 +99,7 @@ def _show_claims(study: Study) -> None:
 
 
 def _show_freedoms(study: Study) -> None:
-    """What each freedom of the energy fit buys."""
+    """Prints the effect of each free parameter of the energy fit."""
     if not study.bought:
         return
     made = table(
@@ -108,9 +108,9 @@ def _show_freedoms(study: Study) -> None:
             "numbers / solved",
             "reproduced / by construction / by arithmetic",
             "saving %",
-            "both halves",
+            "both claim groups",
         ],
-        title=f"What each freedom buys, claims under {study.shown.reading.name}",
+        title=f"Effect of each free parameter, claims under {study.shown.reading.name}",
         text=1,
     )
     for index, each in enumerate(study.bought):
@@ -123,14 +123,14 @@ def _show_freedoms(study: Study) -> None:
             ", ".join(each.both) or "none",
         )
     console.print(made)
-    console.print("* claims are judged by this one")
+    console.print("* fit that judges the claims")
 
 
 def show_chosen(effects: Sequence[Effect], runs: int) -> None:
-    """What the paper leaves open, what was chosen, and what another value does."""
+    """Prints the open choices of the paper, the chosen values, and the effect of alternatives."""
     made = table(
-        ["open", "chosen", "executions", "worst m", "RMS m", "80 ms: RMS", "every SSB: RMS"],
-        title=f"One thing at a time, mode 0 of the shipped reading, {runs} runs",
+        ["choice", "value", "executions", "maximum m", "RMS m", "80 ms: RMS", "every SSB: RMS"],
+        title=f"Single changes, mode 0 of the shipped interpretation, {runs} runs",
         text=2,
     )
     for each in effects:
@@ -147,15 +147,15 @@ def show_chosen(effects: Sequence[Effect], runs: int) -> None:
 
 
 def _show_unknowns(found: Unknowns) -> None:
-    """On what each claim hangs that is neither arithmetic nor solved for."""
+    """Prints the sensitivity of each claim to the open choices."""
     made = table(
         [
             "claim",
             "holds in",
-            "total Sobol index of what matters, ± half its 95 % interval",
+            "significant total Sobol indices, ± half of the 95 % interval",
             "rest",
         ],
-        title=f"On what the claims hang: {found.readings} readings of {found.runs} runs",
+        title=f"Sensitivity of the claims: {found.readings} interpretations with {found.runs} runs",
         text=3,
     )
     matter = found.matter
@@ -177,11 +177,11 @@ def _show_unknowns(found: Unknowns) -> None:
 
 
 def show_search(found: Sample, checked: Sequence[Confirmed]) -> None:
-    """The best readings that a search found, and what more runs make of the best."""
+    """Prints the best interpretations of a search, and their confirmation by more runs."""
     held = found.held()
     made = table(
-        ["held", "executions", "worst m", "what was drawn"],
-        title=f"Of {len(held)} readings, those that meet most of {len(found.margins)} claims",
+        ["claims met", "executions", "maximum m", "drawn values"],
+        title=f"Best of {len(held)} interpretations ({len(found.margins)} claims)",
     )
     for index in found.best()[:8]:
         drawn = ", ".join(f"{name} {value_text(it)}" for name, it in found.values(index).items())
@@ -193,7 +193,7 @@ def show_search(found: Sample, checked: Sequence[Confirmed]) -> None:
         )
     console.print(made)
     if checked:
-        again = table(["reading", "held", "not met"], title="Driven again", text=1)
+        again = table(["interpretation", "claims met", "not met"], title="Confirmation", text=1)
         for each in checked:
             again.add_row(each.label, str(each.held), ", ".join(each.missed))
         console.print(again)
