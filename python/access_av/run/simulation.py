@@ -1,4 +1,4 @@
-"""One scenario, many drives: the simulator, with tables instead of raw columns."""
+"""Simulation of a scenario in many runs, with results as tables."""
 
 from __future__ import annotations
 
@@ -29,35 +29,35 @@ if TYPE_CHECKING:
 
 Scenario = _core.Scenario
 
-# The first ten seconds of SSBs every 20 ms.
+# Number of SSBs in the first ten seconds, at a period of 20 ms.
 SETTLED_STEPS = 500
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Simulation(Result):
-    """What many drives found. :mod:`access_av.columns` says what each table's columns are.
+    """Results of a simulation. :mod:`access_av.columns` describes the columns of the tables.
 
     Attributes
     ----------
     steps
-        Statistics over all runs, one row per SSB. Errors are of the runs that know their pose by
-        then.
+        Statistics over all runs, one row per SSB. Errors are those of runs with a known
+        pose.
     runs
         One row per run.
     trajectories
         Truth and estimate, one row per run and SSB. ``None`` unless kept.
     executions
-        The angle estimates, one row each. ``None`` unless trajectories were kept.
+        One row per angle estimate. ``None`` unless trajectories were kept.
     integrity
-        How protection levels and errors went together; ``None`` where none were stated.
+        Comparison of protection levels and errors; ``None`` without protection levels.
     error_quantiles_m
-        Quantiles of the horizontal error over all runs and SSBs, by probability; out of a histogram
-        whose bins are 5.9 % wide. Exact ones, with intervals: :attr:`percentiles`.
+        Quantiles of the horizontal error over all runs and SSBs, by probability, from a histogram
+        with bins of 5.9 %. Exact values with intervals: :attr:`percentiles`.
     errors_m
-        Estimate minus truth in x and y, of shape (runs, SSBs, 2); NaN as long as the first pose is
-        not known. ``None`` unless kept.
+        Estimate minus truth in x and y, of shape (runs, SSBs, 2); NaN before the first known
+        pose. ``None`` unless kept.
     scenario, seed
-        What was driven, and by which seed: the same two give the same again.
+        Simulated scenario and seed, which reproduce the result.
     origin
         Version and commit that simulated it. Not compared.
     """
@@ -92,7 +92,7 @@ class Simulation(Result):
         scenario: Scenario | None = None,
         seed: int | None = None,
     ) -> Simulation:
-        """What the core found, as tables."""
+        """Converts the results of the Rust core to tables."""
         return cls(
             steps=_table(found.steps),
             runs=_table(found.runs),
@@ -107,7 +107,7 @@ class Simulation(Result):
         )
 
     def summary(self) -> dict[str, float | None]:
-        """The drives in a few numbers; executions and energy are those of a run, on the mean.
+        """Returns the main figures; executions and energy are means over the runs.
 
         Examples
         --------
@@ -133,7 +133,7 @@ class Simulation(Result):
     def percentiles(self) -> list[Percentile] | None:
         """Percentiles of the horizontal error with intervals; ``None`` without single runs.
 
-        Over all positions that are told, by :func:`access_av.statistics.percentiles`.
+        Computed over all known positions by :func:`access_av.statistics.percentiles`.
         """
         errors_m = self.horizontal_errors_m
         if errors_m is None or np.isnan(errors_m).all():
@@ -181,7 +181,7 @@ class Simulation(Result):
 
     @property
     def operation(self) -> Operation | None:
-        """For how much of the time the vehicle may rely on its position, and why not else."""
+        """Availability of the position, and causes of unavailability."""
         if self.trajectories is None or self.scenario is None:
             return None
         steps = self.trajectories.with_columns(error_m=horizontal_error_m())
@@ -189,7 +189,7 @@ class Simulation(Result):
 
     @property
     def consistency(self) -> Consistency | None:
-        """Errors against what the localizer says of them; ``None`` without trajectories.
+        """Comparison of errors with the localizer's covariance; ``None`` without trajectories.
 
         The first :data:`SETTLED_STEPS` are left out of the NEES: an exact start has no covariance.
         """
@@ -199,7 +199,7 @@ class Simulation(Result):
 
     @property
     def service_levels(self) -> list[service_levels.Verdict] | None:
-        """The 3GPP service levels that the drives reach; ``None`` without trajectories."""
+        """Results for the 3GPP service levels; ``None`` without trajectories."""
         errors_m = self._at_every_ssb()
         if errors_m is None:
             return None
@@ -227,24 +227,24 @@ def simulate(
     localizer: Callable[..., Any] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Simulation:
-    """Drive a scenario many times.
+    """Simulates a scenario in many runs.
 
     Parameters
     ----------
     scenario
         A scenario, or the name or path of one.
     runs
-        Number of drives.
+        Number of runs.
     seed
-        Seed of all random streams: the same seed gives the same bytes.
+        Seed of all random streams; equal seeds give bit-identical results.
     platform
-        The onboard computer; the one the scenario names when ``None``.
+        Onboard computer. Default: that of the scenario.
     threads
-        Worker threads, one per core at most and when ``None``. Results do not depend on it.
+        Number of worker threads. Default and maximum: one per core. Results do not depend on it.
     keep_trajectories
-        Whether to keep every drive's trajectory and executions, not only their statistics.
+        Whether to keep the trajectory and executions of every run.
     errors_every
-        Keep every drive's errors in x and y, and its protection levels, at each so many SSBs, for
+        Interval, in SSBs, of stored errors in x and y and protection levels of every run, for
         statistics over whole runs.
     estimator
         Replaces the vehicle's angle estimator: a class, or a function that makes an estimator. It
@@ -255,8 +255,8 @@ def simulate(
         of the likelihood over the electrical angle, at equally spaced values from −π on; or
         ``None`` where there is no angle. An angle without standard deviation gets the Cramér–Rao
         bound at its SSB's SNR, and one warning. The attribute ``energy_per_execution_j`` or
-        ``time_per_execution_s`` states what an estimate takes; without one the runs have no
-        energy.
+        ``time_per_execution_s`` specifies the cost of an estimate; without it the runs have
+        no energy.
     policy
         Replaces the vehicle's wake-up policy: a class, or a function that makes a policy, as of
         ``estimator``; a function of the situation that keeps no state may be given itself. The
@@ -274,7 +274,7 @@ def simulate(
         used, and ``pose(time_s)``, which returns x, y, heading and, if known, the 3 by 3 covariance
         of the three. Late angles go to copies of it (:func:`copy.deepcopy`).
     progress
-        Called as ``progress(done, total)`` with numbers of drives.
+        Called as ``progress(done, total)`` with numbers of runs.
 
     Returns
     -------
@@ -284,14 +284,14 @@ def simulate(
     Raises
     ------
     SettingsError
-        When the scenario cannot be used; names the key and what is allowed.
+        Unusable scenario; the message names the key and the allowed values.
     TypeError
         When an estimator, policy or localizer is an object that all runs would share, or a
         function that keeps state.
     ValueError
         When an estimator, policy or localizer returns what it must not; names the call.
     OSError
-        When the system does not give so many threads.
+        Too many threads for the system.
 
     Examples
     --------
@@ -318,6 +318,6 @@ def simulate(
 
 
 def _table(columns: Mapping[str, Any]) -> pl.DataFrame:
-    """A table with null for what is not known."""
+    """Returns a table with null for unknown values."""
     words = {name: pl.String for name in ("integrity", "reason") if name in columns}
     return pl.DataFrame(columns, schema_overrides=words).fill_nan(None)

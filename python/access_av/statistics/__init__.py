@@ -1,4 +1,4 @@
-"""Statistics of simulated drives: consistency, integrity, and how far they are known.
+"""Statistics of simulated runs: consistency, integrity, percentiles, confidence intervals.
 
 Examples
 --------

@@ -1,4 +1,4 @@
-"""How far a statistic over runs is known."""
+"""Bootstrap intervals of statistics over runs."""
 
 from __future__ import annotations
 
@@ -20,35 +20,35 @@ def bootstrap_interval(
     resamples: int = 2000,
     seed: int = 0,
 ) -> tuple[float, float]:
-    """Percentile interval of a statistic over independent runs, by the bootstrap.
+    """Returns the bootstrap percentile interval of a statistic over independent runs.
 
-    Runs are drawn with replacement, whole, so that whatever hangs together within one stays
-    together: an odometer's scale error stays with a drive, and its epochs are not independent. The
-    ends are the empirical quantiles ``(1 ∓ probability) / 2`` of the statistic over the resamples
-    (Efron, Annals of Statistics 7, 1979).
+    Whole runs are drawn with replacement, because the epochs of a run are correlated: for example,
+    an odometer's scale error is constant during a run. The ends are the empirical quantiles
+    ``(1 ∓ probability) / 2`` of the statistic over the resamples (Efron, Annals of Statistics 7,
+    1979).
 
     Parameters
     ----------
     runs
-        One row per run, of whatever the statistic needs of it: a mean, or sums and counts.
+        One row per run with the inputs of the statistic: a mean, or sums and counts.
     statistic
-        Takes as many rows, drawn; returns the statistic.
+        Function of the drawn rows that returns the statistic.
     probability
         Coverage, above 0 and below 1.
     resamples
         Number of draws.
     seed
-        Same seed, same interval.
+        Seed of the resamples.
 
     Returns
     -------
     tuple of float
-        Low and high end.
+        Lower and upper end.
 
     Raises
     ------
     ValueError
-        Without runs or resamples, or with another probability.
+        No runs or resamples, or an invalid probability.
 
     Examples
     --------

@@ -1,9 +1,9 @@
-"""Whether a localizer is as wrong as it says.
+"""Consistency of a localizer: comparison of its errors with its covariance.
 
-All of it works on a table of trajectories, as ``access_av.simulate(…, keep_trajectories=True)``
-returns and ``trajectories.parquet`` holds. Steps at which the first pose is not known yet count
-nowhere. The same table gives the same bytes: sums are taken of lists, because those that
-``group_by`` takes depend on its threads in the last digit.
+The functions use a table of trajectories from ``access_av.simulate(…, keep_trajectories=True)`` or
+``trajectories.parquet``. Steps before the first known pose are ignored. Equal tables give
+bit-identical results: sums are computed over lists, because the last digit of a ``group_by`` sum
+depends on its threads.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-# The position: x and y.
+# Dimensions of the position: x and y.
 DIMENSIONS = 2
 
 
 def horizontal_error_m() -> pl.Expr:
-    """Distance between truth and estimate, in a table of trajectories.
+    """Returns the distance between truth and estimate in a table of trajectories.
 
     Examples
     --------
@@ -38,7 +38,7 @@ def horizontal_error_m() -> pl.Expr:
 
 
 def nees(trajectories: pl.DataFrame) -> pl.DataFrame:
-    """Normalised estimation error squared (NEES) of the position, at each step of each run.
+    """Returns the normalised estimation error squared (NEES) of the position for each step and run.
 
     ``e' P⁻¹ e`` with the error e in x and y and the localizer's covariance P of it; chi-squared
     with two degrees of freedom where error and covariance agree, 2 on average (Bar-Shalom, Li and
@@ -52,8 +52,8 @@ def nees(trajectories: pl.DataFrame) -> pl.DataFrame:
     Returns
     -------
     polars.DataFrame
-        Columns ``nees``; null where the localizer has no covariance or one without area, and as
-        long as the first pose is not known.
+        Columns ``nees``; null without a covariance, with a singular one, and before the first
+        known pose.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def nees(trajectories: pl.DataFrame) -> pl.DataFrame:
 def nees_band(
     runs: int, *, probability: float = 0.95, dimensions: int = DIMENSIONS
 ) -> tuple[float, float]:
-    """Band that the mean NEES over ``runs`` runs of a consistent localizer keeps.
+    """Returns the band of the mean NEES over ``runs`` runs of a consistent localizer.
 
     The sum over the runs is chi-squared with ``runs · dimensions`` degrees of freedom, so the ends
     are its quantiles ``(1 ∓ probability) / 2``, divided by the runs (Bar-Shalom, Li and
@@ -86,14 +86,14 @@ def nees_band(
     runs
         Independent runs, at least 1.
     probability
-        Share of the steps within.
+        Share of the steps within the band.
     dimensions
-        Of the state whose NEES it is.
+        Dimension of the state of the NEES.
 
     Returns
     -------
     tuple of float
-        Low and high end.
+        Lower and upper end.
 
     Examples
     --------
@@ -112,19 +112,19 @@ def nees_band(
 
 
 def mean_nees(trajectories: pl.DataFrame, *, probability: float = 0.95) -> pl.DataFrame:
-    """Mean NEES of the position over the runs, at each step, beside its band.
+    """Returns the mean NEES of the position over the runs and its band for each step.
 
     Parameters
     ----------
     trajectories
         Columns ``trajectories`` of :mod:`access_av.columns`.
     probability
-        Of the band, see :func:`nees_band`.
+        Probability of the band, see :func:`nees_band`.
 
     Returns
     -------
     polars.DataFrame
-        Columns ``mean_nees``, by time; steps at which no run has a NEES are left out.
+        Columns ``mean_nees``, by time; without steps for which no run has a NEES.
 
     Examples
     --------
@@ -156,25 +156,25 @@ def mean_nees(trajectories: pl.DataFrame, *, probability: float = 0.95) -> pl.Da
 
 @dataclass(frozen=True)
 class Consistency:
-    """Errors beside what the localizer said of them.
+    """Comparison of errors with the localizer's covariance.
 
     Attributes
     ----------
     runs
         Number of runs.
     rms_error_m
-        Root mean square of the horizontal error over track and runs; ``None`` where no run ever
-        knows its pose.
+        Root mean square of the horizontal error over track and runs; ``None`` if no run has a
+        known pose.
     predicted_rms_error_m
-        What the localizer's covariances make of it; ``None`` where it has none.
+        Value predicted by the localizer's covariances; ``None`` without covariances.
     p90_error_m
         90th percentile of the horizontal error.
     anees
         Average NEES: its mean over steps and runs, divided by the two dimensions. 1 for a
-        consistent localizer, more for one that is too sure of itself; ``None`` without covariances
+        consistent localizer, more for an optimistic covariance; ``None`` without covariances
         (Li, Zhao and Jilkov, Practical measures and test for credibility of an estimator, 2001).
     anees_interval
-        Its 95 % interval by the bootstrap over whole runs.
+        95 % interval of ``anees`` by the bootstrap over whole runs.
     in_band
         Share of the steps whose mean NEES over the runs is within its 95 % band.
 
@@ -198,15 +198,15 @@ class Consistency:
 
     @classmethod
     def of(cls, trajectories: pl.DataFrame, *, skip: int = 0) -> Consistency:
-        """Judge a table of trajectories.
+        """Evaluates a table of trajectories.
 
         Parameters
         ----------
         trajectories
             Columns ``trajectories`` of :mod:`access_av.columns`.
         skip
-            Steps at the start whose NEES is left out: a start that is known exactly has an error
-            ellipse without area, and one that is known almost exactly one that says nothing.
+            Number of steps at the start without a NEES, because an exact start has a singular
+            covariance.
         """
         times_s = trajectories["time_s"].unique().sort()
         known = trajectories.filter(~pl.col("searching")).with_columns(
@@ -236,7 +236,7 @@ class Consistency:
 
 
 def _root_mean(steps: pl.DataFrame, squared: pl.Expr) -> float | None:
-    """Root of the mean over the steps, each being the mean over its runs."""
+    """Returns the root of the mean over the steps of the means over the runs."""
     by_step = steps.group_by("time_s").agg(squared.alias("squared")).sort("time_s")
     mean = by_step["squared"].list.mean().mean()
     return None if mean is None else math.sqrt(mean)  # type: ignore[arg-type]

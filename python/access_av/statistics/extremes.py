@@ -1,4 +1,4 @@
-"""How often an hour brings an error beyond the protection level, where counting cannot reach."""
+"""Integrity risk per hour by extreme-value theory, for events that are too rare to count."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from access_av.statistics.consistency import horizontal_error_m
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-# Share of the maxima that counts as their tail, and the fewest of them that a tail is fitted to.
+# Share of the maxima in the tail, and minimum number of maxima for a fit.
 TAIL = 0.1
 LEAST_PEAKS = 20
 
-# No level is held to less: a vehicle that was told its exact start begins with one of micrometres.
+# Minimum protection level in the ratio (m), because an exact start has a level of micrometres.
 LEAST_LEVEL_M = 0.01
 
 RESAMPLES = 500
 
 
 def exceedance(values: ArrayLike, level: float) -> float:
-    """Probability that a value lies above ``level``, by peaks over a threshold.
+    """Returns the probability of a value above ``level``, by peaks over a threshold.
 
-    What the largest tenth of the values has above its least, u, follows a generalised Pareto
+    The excesses of the largest tenth of the values above its minimum u follow a generalised Pareto
     distribution: ``P(x > level) = share · (1 + ξ (level − u) / σ)^(−1/ξ)`` (Pickands, Annals of
     Statistics 3, 1975), with ξ and σ by probability-weighted moments (Hosking and Wallis,
-    Technometrics 29, 1987). A shape below 0, a tail that ends, is not believed: then ξ = 0, the
-    exponential tail that a squared Gaussian has. Where ``level`` is not above u, values are
+    Technometrics 29, 1987). A shape below 0 (a bounded tail) is replaced by ξ = 0, the
+    exponential tail of a squared Gaussian. If ``level`` is not above u, the values are
     counted.
 
     Parameters
@@ -39,7 +39,7 @@ def exceedance(values: ArrayLike, level: float) -> float:
     values
         Independent values, (count,).
     level
-        What they are to exceed.
+        Threshold of the probability.
 
     Examples
     --------
@@ -56,7 +56,7 @@ def exceedance(values: ArrayLike, level: float) -> float:
         return float((ordered > level).mean()) if len(ordered) else 0.0
     peaks = ordered[-tail:] - ordered[-tail - 1]
     mean = peaks.mean()
-    # The mean of x (1 − F(x)), F by plotting positions.
+    # Mean of x (1 − F(x)), with F by plotting positions.
     lower = (peaks * (1.0 - (np.arange(tail) + 0.65) / tail)).mean()
     shape = max(0.0, 2.0 - mean / (mean - 2.0 * lower)) if mean > 2.0 * lower else 0.0
     scale = mean * (1.0 - shape)
@@ -69,14 +69,14 @@ def exceedance(values: ArrayLike, level: float) -> float:
 
 @dataclass(frozen=True)
 class ObtainedRisk:
-    """How often an hour in state ``ok`` brings an error beyond the protection level.
+    """Rate of errors above the protection level in state ``ok``.
 
     Attributes
     ----------
     per_hour
-        Times in an hour.
+        Errors per hour.
     interval
-        Its 95 % interval by the bootstrap over runs.
+        95 % interval of the rate by the bootstrap over runs.
 
     Examples
     --------
@@ -105,10 +105,10 @@ class ObtainedRisk:
 
     @classmethod
     def of(cls, trajectories: pl.DataFrame, correlation_s: float) -> ObtainedRisk | None:
-        """Of a table of trajectories; ``None`` where it is too short for a tail.
+        """Evaluates a table of trajectories; ``None`` if it is too short for a tail.
 
-        The largest ratio of error to level while ``ok``, squared, of every ``correlation_s``
-        seconds is one value: an error that lasts longer counts more than once.
+        One value is the maximum squared ratio of error and level in state ``ok`` within
+        ``correlation_s`` seconds. A longer error therefore counts more than once.
         """
         block = (pl.col("time_s") / correlation_s).floor().alias("block")
         ratio = (horizontal_error_m() / pl.col("protection_level_m").clip(LEAST_LEVEL_M)) ** 2

@@ -1,4 +1,4 @@
-"""What a percentile of two variants differs by, where both drove the same drives."""
+"""Paired difference of a percentile between two variants with equal runs."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ RESAMPLES = 400
 def paired_difference(
     errors: ArrayLike, others: ArrayLike, percent: float, *, seed: int = 0
 ) -> tuple[float, float, float]:
-    """Percentile of one minus that of the other, and its 95 % interval over pairs of drives.
+    """Returns the difference of a percentile, and its 95 % interval over pairs of runs.
 
-    Drives are drawn with replacement, whole, and for both alike: what makes a drive hard for one
-    makes it hard for the other, so that the difference is known better than either. The interval is
-    the bootstrap's standard error times Student's t of as many drives less one, about the
-    difference (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, 12.5).
+    Whole runs are drawn with replacement, in pairs. The errors of a pair are correlated; therefore
+    the difference is more accurate than either percentile. The interval is the difference ± the
+    bootstrap's standard error times Student's t with (number of runs − 1) degrees of freedom (Efron
+    and Tibshirani, An Introduction to the Bootstrap, 1993, 12.5).
 
     Parameters
     ----------
     errors, others
-        Errors of the same drives, each of shape (runs, epochs); infinity is beyond any bound.
+        Errors of equal runs, each of shape (runs, epochs); infinity is above any bound.
     percent
         The percentile, above 0 and at most 100.
     seed
-        Same seed, same interval.
+        Seed of the resamples.
 
     Returns
     -------
     tuple of float
-        Difference and the ends of its interval; infinite ends with a single drive.
+        Difference (first minus second) and the ends of its interval; infinite ends with one run.
 
     Raises
     ------
     ValueError
-        Where they are not of as many drives.
+        Different numbers of runs.
 
     Examples
     --------
@@ -76,6 +76,6 @@ def _less(first: float, second: float) -> float:
 
 
 def _resampled(errors: NDArray[Any], drawn: NDArray[Any], percent: float) -> NDArray[np.float64]:
-    """The percentile in each resample, whose drives count as often as they were drawn."""
+    """Returns the percentile of each resample, with runs weighted by their number of draws."""
     order = np.argsort(errors, axis=None, kind="stable")
     return resampled(errors.ravel()[order], order // errors.shape[1], drawn, percent)

@@ -1,4 +1,4 @@
-"""Percentiles of errors over many drives, and how far they are known."""
+"""Percentiles of errors over many runs, with confidence intervals."""
 
 from __future__ import annotations
 
@@ -17,26 +17,25 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-# What is told of every distribution of errors, in percent: the median, and what 3GPP's service
-# levels ask for.
+# Reported percentiles: the median, and the availabilities of 3GPP's service levels.
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.9)
 
-# Errors that are counted together before they are counted one by one.
+# Block size of the counting.
 BLOCK = 256
 
 
 @dataclass(frozen=True)
 class Percentile:
-    """A percentile of the errors of many drives.
+    """A percentile of the errors of many runs.
 
     Attributes
     ----------
     percent
-        Share of the errors that is no larger, in percent.
+        Share of the errors up to the value, in percent.
     value
-        The percentile, in the errors' unit; infinite where so many have no error.
+        Percentile in the unit of the errors; infinite if too many errors are infinite.
     low, high
-        Ends of its 95 % interval; ``None`` with a single run.
+        Ends of the 95 % interval; ``None`` with a single run.
     """
 
     percent: float
@@ -46,12 +45,12 @@ class Percentile:
 
     @property
     def interval(self) -> str:
-        """The interval in words."""
+        """Returns the interval as text."""
         return ends_text(self.low, self.high)
 
 
 def ends_text(low: float | None, high: float | None) -> str:
-    """An interval in words; without a high end where more may be than was seen.
+    """Returns an interval as text; an infinite upper end means too few runs.
 
     Examples
     --------
@@ -64,7 +63,7 @@ def ends_text(low: float | None, high: float | None) -> str:
 
 
 def column(percent: float) -> str:
-    """Name of the column that holds a percentile of the horizontal error.
+    """Returns the column name of a percentile of the horizontal error.
 
     Examples
     --------
@@ -75,7 +74,7 @@ def column(percent: float) -> str:
 
 
 def as_columns(percentiles: Sequence[Percentile]) -> dict[str, float | None]:
-    """Percentiles of the horizontal error and their intervals, by the names of columns."""
+    """Returns percentiles of the horizontal error and their intervals, by column name."""
     found: dict[str, float | None] = {}
     for each in percentiles:
         name = column(each.percent)
@@ -86,7 +85,7 @@ def as_columns(percentiles: Sequence[Percentile]) -> dict[str, float | None]:
 
 
 def names() -> list[str]:
-    """Names of all columns that :func:`as_columns` may give."""
+    """Returns the names of all columns of :func:`as_columns`."""
     every = [Percentile(percent, 0.0, 0.0, 0.0) for percent in PERCENTS]
     return list(as_columns(every))
 
@@ -103,35 +102,34 @@ def percentiles(
     resamples: int = 1000,
     seed: int = 0,
 ) -> list[Percentile]:
-    """Percentiles over all drives and epochs, with 95 % intervals by bootstrap over whole drives.
+    """Returns percentiles over all runs and epochs, with 95 % bootstrap intervals.
 
-    A percentile is the least error that so many are no larger than (the inverse of the empirical
-    distribution). Epochs of a drive hang together, drives do not: drives are drawn with
-    replacement, whole, and the interval's ends are quantiles of what the percentile is over the
-    resamples (Efron, Annals of Statistics 7, 1979). They are those beyond which a Gaussian has as
-    much as Student's t of so few drives has beyond its 95 % interval (Hesterberg, The American
+    A percentile is the inverse of the empirical distribution. Epochs of a run are correlated, runs
+    are independent: whole runs are drawn with replacement, and the ends of the interval are
+    quantiles of the percentile over the resamples (Efron, Annals of Statistics 7, 1979). The
+    quantiles are expanded according to Student's t for the number of runs (Hesterberg, The American
     Statistician 69, 2015, 4.3.2: the expanded percentile interval).
 
-    What has not happened may yet happen: given ``independent``, the high end is no lower than the
-    error below which, by Clopper and Pearson's 95 % interval of a share, at least so many are;
-    infinite where too few were seen to say that of any error.
+    With ``independent``, the interval also covers events that have not occurred: the upper end is
+    at least the error whose share, by Clopper and Pearson's 95 % interval, reaches the percentage.
+    It is infinite if there are too few independent errors.
 
-    A tail is known no better than its worst drives are. Where drives differ by a factor of 1.6
-    (one standard deviation), intervals of 20 drives hold the median in 95 % of the cases, the 90th
-    percentile in 93 %, the 99th in 75 %; those of 40 drives in 96, 95 and 83 %.
+    Few runs determine the tail poorly. If the errors of runs differ by a factor of 1.6 (one
+    standard deviation), intervals of 20 runs cover the median in 95 % of the cases, the 90th
+    percentile in 93 %, the 99th in 75 %; those of 40 runs in 96, 95 and 83 %.
 
     Parameters
     ----------
     errors
-        Absolute errors, shape (runs, epochs); NaN is left out, infinity is beyond any bound.
+        Absolute errors, shape (runs, epochs); NaN is ignored, infinity is above any bound.
     percents
-        Which, each above 0 and at most 100.
+        Percentages, each above 0 and at most 100.
     independent
-        How many of the errors are as good as independent; the bootstrap alone where ``None``.
+        Number of independent errors. Default: only the bootstrap.
     resamples
         Number of draws.
     seed
-        Same seed, same intervals.
+        Seed of the resamples.
 
     Returns
     -------
@@ -141,7 +139,7 @@ def percentiles(
     Raises
     ------
     ValueError
-        Without a single error, or with a percentage that there is not.
+        No errors, or an invalid percentage.
 
     Examples
     --------
@@ -182,14 +180,14 @@ def percentiles(
 def resampled(
     pooled: NDArray[Any], run: NDArray[Any], drawn: NDArray[Any], percent: float
 ) -> NDArray[Any]:
-    """A percentile in each resample.
+    """Returns a percentile of each resample.
 
     Parameters
     ----------
     pooled, run
         All errors in ascending order, and the run of each.
     drawn
-        How often each resample has each run, shape (resamples, runs).
+        Number of draws of each run in each resample, shape (resamples, runs).
     percent
         The percentile, above 0 and at most 100.
     """
@@ -199,7 +197,7 @@ def resampled(
 
 
 def _beyond(runs: int) -> float:
-    """Share of the resamples beyond each end of a 95 % interval."""
+    """Returns the share of the resamples outside each end of a 95 % interval."""
     freedom = runs - 1
     # Student's t squared, by the beta distribution of t² / (t² + freedom).
     share = beta_quantile(0.95, 0.5, 0.5 * freedom)
@@ -208,7 +206,7 @@ def _beyond(runs: int) -> float:
 
 
 def _seldom_seen(pooled: NDArray[Any], percent: float, independent: int) -> float:
-    """The least error below which, with 95 % confidence, is the percentage of all."""
+    """Returns the minimum error below which the percentage lies with 95 % confidence."""
     within = _within(percent, independent)
     if within is None:
         return math.inf
@@ -217,7 +215,7 @@ def _seldom_seen(pooled: NDArray[Any], percent: float, independent: int) -> floa
 
 @lru_cache(maxsize=256)
 def _within(percent: float, independent: int) -> int | None:
-    """How many of the independent ones have to be within an error; ``None`` if all are too few."""
+    """Returns the required number of independent errors within a bound; ``None`` if impossible."""
     for within in range(int(percent / 100.0 * independent), independent + 1):
         if clopper_pearson(within, independent)[0] >= percent / 100.0:
             return within
@@ -225,15 +223,15 @@ def _within(percent: float, independent: int) -> int | None:
 
 
 def _ranks(percent: float, sizes: NDArray[Any]) -> NDArray[Any]:
-    """Which of so many errors in order is the percentile, from 1 on."""
+    """Returns the rank of the percentile among ordered errors, from 1."""
     return np.maximum(np.ceil(np.round(percent / 100.0 * sizes, 6)).astype(np.int64), 1)
 
 
 def _places(run: NDArray[Any], drawn: NDArray[Any], ranks: NDArray[Any]) -> NDArray[Any]:
-    """Where in the order of all errors each resample has as many as its rank.
+    """Returns the index at which each resample reaches its rank among all ordered errors.
 
-    Counted by blocks first, and then within the few blocks in which that happens. ``run`` is the
-    run of each error, in their order; ``drawn`` how often a resample has a run.
+    Counts blocks first, then single errors within the found blocks. ``run`` is the run of each
+    ordered error, ``drawn`` the number of draws of each run in each resample.
     """
     runs, blocks = drawn.shape[1], -(-len(run) // BLOCK)
     in_block = np.bincount(run * blocks + np.arange(len(run)) // BLOCK, minlength=runs * blocks)

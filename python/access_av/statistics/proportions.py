@@ -11,7 +11,7 @@ from access_av.statistics.distributions import beta_quantile
 def clopper_pearson(
     successes: int, trials: int, *, probability: float = 0.95
 ) -> tuple[float, float]:
-    """Exact interval of a proportion: it holds the true one at least with ``probability``.
+    """Returns the exact interval of a proportion, with a coverage of at least ``probability``.
 
     With ``alpha = 1 - probability``, the ends are the quantile ``alpha / 2`` of
     ``Beta(successes, trials - successes + 1)`` and the quantile ``1 - alpha / 2`` of
@@ -49,7 +49,7 @@ def clopper_pearson(
 
 
 def wilson(successes: int, trials: int, *, probability: float = 0.95) -> tuple[float, float]:
-    """Score interval of a proportion: shorter than the exact one, right on average.
+    """Returns the score interval of a proportion: shorter, with correct mean coverage.
 
     ``(p + z²/2n ± z·sqrt(p(1 − p)/n + z²/4n²)) / (1 + z²/n)`` with the normal quantile z of
     ``(1 + probability) / 2`` (Wilson, Journal of the American Statistical Association 22, 1927).
