@@ -31,7 +31,8 @@ SLOW = {
     *("test_node", "test_radio", "test_aarch64", "test_live", "test_off_the_road"),
     *("test_fault_campaign", "test_manifold"),
     *("test_study", "test_plant_guide"),
-    *("test_notebook", "test_recomputed", "test_results", "test_rerun"),
+    *("test_labels", "test_notebook", "test_plug_in_files", "test_recomputed"),
+    *("test_results", "test_rerun"),
 }
 
 

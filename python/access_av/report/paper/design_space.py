@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import math
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import altair as alt
 import polars as pl
 
 from access_av.designs.operating_points import Query, explore
 from access_av.paper.statements import ADAPTIVE_LABEL, of_claim
-from access_av.report.chart import finish, with_labels
+from access_av.report.chart import finish
+from access_av.report.labels import domain, layers, placed
 from access_av.report.paper.lines import COLOURS, NAMES, by_mode, scale
 from access_av.report.parts import figure, table
 
 if TYPE_CHECKING:
     from access_av.paper.evaluation import Evaluation
     from access_av.report.chart import Spec
+
+# Heights of the plots (px).
+PROJECTION_PX, SPACE_PX = 260, 420
 
 
 def design(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
@@ -38,16 +42,13 @@ def _projection(evaluation: Evaluation, axis: str) -> Spec:
     """The adaptive points of all modes, seen along one of the paper's two error axes."""
     points = evaluation.campaign("R").filter(pl.col("energy_j").is_not_null())
     columns = ("mode", "energy_j", "worst_error_x_m", "worst_error_y_m")
-    named = with_labels(
-        points.select(columns).with_columns(pl.col(pl.Float64).round(4)),
-        "mode",
-        pl.col("energy_j"),
-        pl.col(f"worst_error_{axis}_m"),
-        [(energy_j, 0.0) for energy_j in points["energy_j"].head(1)],
-    )
-    base = alt.Chart(named).encode(
-        x=alt.X("energy_j:Q", title="energy of a trip / J", scale=alt.Scale(zero=False)),
-        y=alt.Y(f"worst_error_{axis}_m:Q", title=f"worst error in {axis.upper()} / m"),
+    rows = points.select(columns).with_columns(pl.col(pl.Float64).round(4))
+    error = f"worst_error_{axis}_m"
+    x_domain, y_domain = domain([*rows["energy_j"]] or [0.0]), domain([0.0, *rows[error]])
+    axes = ("energy_j", x_domain, False), (error, y_domain, False)
+    base = alt.Chart(placed(rows, "mode", *axes, PROJECTION_PX)).encode(
+        x=_axis(alt.X, "energy_j", "energy of a trip / J", x_domain),
+        y=_axis(alt.Y, error, f"worst error in {axis.upper()} / m", y_domain),
         tooltip=[
             alt.Tooltip("mode:O", title="power mode"),
             alt.Tooltip("energy_j:Q", title="energy / J", format=".1f"),
@@ -55,13 +56,18 @@ def _projection(evaluation: Evaluation, axis: str) -> Spec:
             alt.Tooltip("worst_error_y_m:Q", title="worst Y / m", format=".3f"),
         ],
     )
-    dots = base.mark_circle(size=110, color=COLOURS[ADAPTIVE_LABEL])
-    numbers = base.mark_text(dy=-11, fontSize=11).encode(text="label:N")
+    dots = base.mark_circle(size=90, color=COLOURS[ADAPTIVE_LABEL])
+    lines, numbers = layers(base)
     return finish(
-        dots + numbers,
-        height=240,
+        lines + dots + numbers,
+        height=PROJECTION_PX,
         description=f"Worst error in {axis.upper()} against energy of the adaptive points by mode",
     )
+
+
+def _axis(channel: Any, column: str, title: str, ends: list[float]) -> Any:
+    """An axis of points with labels: its domain is that of the labels' positions."""
+    return channel(f"{column}:Q", title=title, scale=alt.Scale(domain=ends, nice=False))
 
 
 def queries(evaluation: Evaluation) -> str:
@@ -116,15 +122,16 @@ def _chart(evaluation: Evaluation) -> Spec:
         bind=alt.binding_range(min=0.05, max=round(most_m, 2), step=0.01, name="RMS at most / m "),
     )
     meets = f"datum.energy_j <= {budget.name} && datum.rms_error_m <= {bound.name}"
-    corner = [(energy_j, 0.0) for energy_j in table["energy_j"].head(1)]
-    table = with_labels(table, "mode", pl.col("energy_j"), pl.col("rms_error_m"), corner)
-    base = alt.Chart(table).encode(
-        x=alt.X("energy_j:Q", title="energy of a trip / J", scale=alt.Scale(zero=False)),
-        y=alt.Y("rms_error_m:Q", title="RMS error / m", scale=alt.Scale(zero=True)),
+    x_domain = domain([*table["energy_j"]] or [0.0])
+    y_domain = domain([0.0, most_m, *table["rms_error_m"]])
+    axes = ("energy_j", x_domain, False), ("rms_error_m", y_domain, False)
+    base = alt.Chart(placed(table, "mode", *axes, SPACE_PX, group="line")).encode(
+        x=_axis(alt.X, "energy_j", "energy of a trip / J", x_domain),
+        y=_axis(alt.Y, "rms_error_m", "RMS error / m", y_domain),
         opacity=alt.condition(meets, alt.value(1.0), alt.value(0.18)),
     )
     dots = (
-        base.mark_circle(size=110)
+        base.mark_circle(size=70)
         .encode(
             color=alt.Color("line:N", scale=scale(NAMES), legend=alt.Legend(title=None)),
             tooltip=[
@@ -140,12 +147,16 @@ def _chart(evaluation: Evaluation) -> Spec:
         )
         .add_params(budget, bound)
     )
-    numbers = base.mark_text(dy=-11, fontSize=11).encode(text="label:N")
+    lines, numbers = layers(base)
     limits = alt.Chart(pl.DataFrame({"any": [0]})).mark_rule(strokeDash=[4, 3])
-    vertical = limits.transform_calculate(limit=budget.name).encode(x="limit:Q")
-    horizontal = limits.transform_calculate(limit=bound.name).encode(y="limit:Q")
+    vertical = limits.transform_calculate(limit=budget.name).encode(
+        x=_axis(alt.X, "limit", "energy of a trip / J", x_domain)
+    )
+    horizontal = limits.transform_calculate(limit=bound.name).encode(
+        y=_axis(alt.Y, "limit", "RMS error / m", y_domain)
+    )
     return finish(
-        vertical + horizontal + dots + numbers,
-        height=320,
+        vertical + horizontal + lines + dots + numbers,
+        height=SPACE_PX,
         description="RMS error against energy of each operating point; the number is the mode",
     )

@@ -15,7 +15,8 @@ from access_av.paper.claims import NO_EVIDENCE, NOT_REPRODUCED, REPRODUCED
 from access_av.paper.margins import ROUNDED
 from access_av.paper.statements import METHODS, of_claim, paper_numbers
 from access_av.paper.statements import half as half_of
-from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, finish, with_labels
+from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, finish
+from access_av.report.labels import domain, layers, placed
 from access_av.report.parts import badge, figure, table
 from access_av.signal.methods import label
 from access_av.tables.numbers import value_text
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from access_av.report.chart import Spec
 
 # The worst error and the average saving: the first claim of one half, the last of the other.
+# Height of the plot of the overview (px).
+OVERVIEW_PX = 300
 PROMISED = (("accuracy", 0), ("energy", -1))
 
 
@@ -88,43 +91,45 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
     bound_m, stated = (of_claim(half_of(name)[at]) for name, at in PROMISED)
     tolerance = of_claim(half_of("energy")[-1], "tolerance")
     y = {"low": stated * (1 - tolerance), "high": stated * (1 + tolerance)}
-    least_m = min(0.1, *(row["worst"] for row in rows))
+    table = pl.DataFrame(rows)
+    least_m = min(0.1, *table["worst"])
+    x_domain = domain([least_m, bound_m, *table["worst"]], log=True)
+    y_domain = domain([*y.values(), *table["saving"]])
+    x_axis = alt.X(
+        "worst:Q",
+        title="worst error of adaptive MUSIC, any mode / m",
+        scale=alt.Scale(type="log", nice=False, domain=x_domain),
+    )
+    y_axis = alt.Y(
+        "saving:Q",
+        title="energy saved, average / %",
+        scale=alt.Scale(zero=False, nice=False, domain=y_domain),
+    )
     promised = (
-        alt.Chart(pl.DataFrame([{"left": 0.9 * least_m, "right": bound_m, **y}]))
+        alt.Chart(pl.DataFrame([{"worst": x_domain[0], "right": bound_m,
+                                 "saving": y["low"], "high": y["high"]}]))
         .mark_rect(opacity=0.18, color=GREEN)
-        .encode(
-            x=alt.X(
-                "left:Q",
-                title="worst error of adaptive MUSIC, any mode / m",
-                scale=alt.Scale(type="log", nice=False),
-            ),
-            x2="right:Q",
-            y=alt.Y("low:Q", title="energy saved, average / %", scale=alt.Scale(zero=False)),
-            y2="high:Q",
-        )
-    )
-    corners = [(math.log(0.9 * least_m), y["low"]), (math.log(bound_m), y["high"])]
-    named = with_labels(
-        pl.DataFrame(rows), "number", pl.col("worst").log(), pl.col("saving"), corners
-    )
-    base = alt.Chart(named).encode(
-        x="worst:Q",
-        y="saving:Q",
+        .encode(x=x_axis, x2="right:Q", y=y_axis, y2="high:Q")
+    )  # fmt: skip
+    axes = ("worst", x_domain, True), ("saving", y_domain, False)
+    base = alt.Chart(placed(table, "number", *axes, OVERVIEW_PX)).encode(
+        x=x_axis,
+        y=y_axis,
         tooltip=["reading:N", alt.Tooltip("worst:Q", format=".3f"),
                  alt.Tooltip("saving:Q", format=".1f"), "keeps:N"],
     )  # fmt: skip
     kinds = ["neither", "accuracy", "saving", "both"]
-    dots = base.mark_circle(size=130, opacity=1.0).encode(
+    dots = base.mark_circle(size=90, opacity=1.0).encode(
         color=alt.Color(
             "keeps:N",
             scale=alt.Scale(domain=kinds, range=[GREY, BLUE, ORANGE, GREEN]),
             legend=alt.Legend(title="keeps", orient="top"),
         )
     )
-    numbers = base.mark_text(dx=11, dy=-9, fontSize=11).encode(text="label:N")
+    lines, numbers = layers(base)
     specs["overview"] = finish(
-        promised + dots + numbers,
-        height=300,
+        promised + lines + dots + numbers,
+        height=OVERVIEW_PX,
         description="Worst error and average saving of each reading, and what the paper promises",
     )
     return figure(

@@ -1,0 +1,175 @@
+"""Positions of the labels of points, so that no label covers another one or a point."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import altair as alt
+import numpy as np
+import polars as pl
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+# Widths of a chart's plot for which positions are computed, from a telephone to a wide page (px).
+WIDTHS_PX = (280.0, 310.0, 420.0, 540.0, 640.0, 1000.0)
+# Points that are closer at every width cover each other and have one label (px).
+COINCIDENT_PX = 3.0
+# Size of a label, and radius of a point with its margin (px).
+CHARACTER_PX, HEIGHT_PX, POINT_PX = 6.6, 13.0, 7.0
+# Distances and directions of a label from its point, in the order in which they are tried.
+RADII_PX = (14.0, 19.0, 26.0, 34.0, 44.0, 56.0, 70.0, 86.0)
+DIRECTIONS = 16
+# Distance from which on a line connects label and point (px).
+LEADER_PX = 18.0
+# Share of an axis that stays free at each end.
+MARGIN = 0.09
+
+
+def domain(values: Sequence[float], *, log: bool = False) -> list[float]:
+    """Returns the domain of an axis that contains values, with a margin at both ends.
+
+    Examples
+    --------
+    >>> domain([0.0, 100.0])
+    [-9.0, 109.0]
+    """
+    low, high = min(values), max(values)
+    if log:
+        low, high = math.log(low), math.log(high)
+    margin = MARGIN * ((high - low) or abs(high) or 1.0)
+    ends = (low - margin, high + margin)
+    return [math.exp(it) if log else it for it in ends]
+
+
+def placed(
+    points: pl.DataFrame,
+    name: str,
+    x: tuple[str, Sequence[float], bool],
+    y: tuple[str, Sequence[float], bool],
+    height_px: float,
+    *,
+    group: str | None = None,
+) -> pl.DataFrame:
+    """Adds the columns ``label``, ``dx`` and ``dy``: text, and its offset from the point in pixels.
+
+    Parameters
+    ----------
+    points
+        The points.
+    name
+        Column of the names.
+    x, y
+        Column, domain, and whether the scale is logarithmic.
+    height_px
+        Height of the plot.
+    group
+        Column within which coincident points have one label.
+
+    Examples
+    --------
+    >>> rows = pl.DataFrame({"mode": [1, 2, 3], "x": [0.0, 0.0, 1.0], "y": [0.0, 0.0, 1.0]})
+    >>> axes = ("x", (-1.0, 2.0), False), ("y", (-1.0, 2.0), False)
+    >>> placed(rows, "mode", *axes, 200.0)["label"].to_list()
+    ['1, 2', '', '3']
+    """
+    across, upward = _share(points, *x), _share(points, *y)
+    # Shape (widths, points, 2), y downwards.
+    at = np.stack([np.stack([w * across, height_px * (1.0 - upward)], 1) for w in WIDTHS_PX])
+    groups = [""] * points.height if group is None else points[group].to_list()
+    names: dict[int, list[str]] = {}
+    for number, text in enumerate(points[name].cast(pl.String)):
+        close = (
+            it
+            for it in names
+            if groups[it] == groups[number]
+            and np.hypot(*(at[:, it] - at[:, number]).T).max() < COINCIDENT_PX
+        )
+        names.setdefault(next(close, number), []).append(text)
+    labels = {it: ", ".join(texts) for it, texts in names.items()}
+    offsets = _offsets(at, labels, height_px)
+    return points.with_columns(
+        label=pl.Series([labels.get(it, "") for it in range(points.height)], dtype=pl.String),
+        dx=pl.Series([offsets.get(it, (0.0, 0.0))[0] for it in range(points.height)]),
+        dy=pl.Series([offsets.get(it, (0.0, 0.0))[1] for it in range(points.height)]),
+    )
+
+
+def layers(base: alt.Chart) -> tuple[alt.Chart, alt.Chart]:
+    """Returns the lines to distant labels, and the labels, of a chart of placed points."""
+    dx, dy = alt.ExprRef("datum.dx"), alt.ExprRef("datum.dy")
+    far = f"datum.label != '' && sqrt(datum.dx * datum.dx + datum.dy * datum.dy) > {LEADER_PX}"
+    # A rule between the point and 0.7 of the way to its label.
+    ends = alt.ExprRef("0.7 * datum.dx"), alt.ExprRef("0.7 * datum.dy")
+    x, y = (base.encoding[it] for it in ("x", "y"))
+    ends_at = {"x2": str(x.shorthand).split(":")[0], "y2": str(y.shorthand).split(":")[0]}
+    lines = (
+        base.transform_filter(far)
+        .mark_rule(strokeWidth=0.8, opacity=0.7, x2Offset=ends[0], y2Offset=ends[1])
+        .encode(**ends_at)
+    )
+    texts = base.mark_text(fontSize=11, dx=dx, dy=dy, baseline="middle").encode(text="label:N")
+    return lines, texts
+
+
+def _share(
+    points: pl.DataFrame, column: str, ends: Sequence[float], log: bool
+) -> NDArray[np.float64]:
+    """Positions between the ends of an axis, from 0 to 1."""
+    values = points[column].cast(pl.Float64).to_numpy()
+    low, high = ends
+    if log:
+        values, low, high = np.log(values), math.log(low), math.log(high)
+    return np.asarray((values - low) / (high - low), dtype=np.float64)
+
+
+def _offsets(
+    at: NDArray[np.float64], labels: dict[int, str], height_px: float
+) -> dict[int, tuple[float, float]]:
+    """Offsets of labels, the most crowded point first; of several the one with least overlap."""
+    angles = np.pi / 4.0 + 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    tried = [
+        (radius * math.cos(angle), -radius * math.sin(angle))
+        for radius in RADII_PX
+        for angle in angles
+    ]
+    narrow = at[0]
+    crowd = {it: np.hypot(*(narrow - narrow[it]).T).__lt__(40.0).sum() for it in labels}
+    found: dict[int, tuple[float, float]] = {}
+    boxes: list[NDArray[np.float64]] = []
+    for number in sorted(labels, key=lambda it: (-crowd[it], it)):
+        half = np.array([0.5 * CHARACTER_PX * len(labels[number]) + 2.0, 0.5 * HEIGHT_PX])
+        costs = []
+        for offset in tried:
+            centre = at[:, number] + np.array(offset)
+            box = np.concatenate([centre - half, centre + half], axis=1)
+            costs.append(_cost(box, boxes, at, height_px))
+            if costs[-1] == 0.0:
+                break
+        best = int(np.argmin(costs))
+        found[number] = tried[best]
+        centre = at[:, number] + np.array(tried[best])
+        boxes.append(np.concatenate([centre - half, centre + half], axis=1))
+    return found
+
+
+def _cost(
+    box: NDArray[np.float64],
+    others: Sequence[NDArray[np.float64]],
+    at: NDArray[np.float64],
+    height_px: float,
+) -> float:
+    """Overlap of a label with labels, points and the margin, in pixels, over all widths."""
+    total = 0.0
+    for other in others:
+        depth = np.minimum(box[:, 2:], other[:, 2:]) - np.maximum(box[:, :2], other[:, :2])
+        total += float(np.clip(depth.min(axis=1), 0.0, None).sum())
+    nearest = np.clip(at, box[:, None, :2], box[:, None, 2:])
+    gap_px = np.hypot(*np.moveaxis(nearest - at, -1, 0))
+    total += float(np.clip(POINT_PX - gap_px, 0.0, None).sum())
+    limits = np.stack([np.array(WIDTHS_PX), np.full(len(WIDTHS_PX), height_px)], axis=1)
+    outside = np.clip(-box[:, :2], 0.0, None) + np.clip(box[:, 2:] - limits, 0.0, None)
+    return total + float(outside.sum())
