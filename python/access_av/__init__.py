@@ -1,37 +1,37 @@
 """Localization of factory vehicles from 5G synchronization signal blocks (SSBs).
 
-What is done is a function here, what there is to know about is a module; both come in when they
-are first used, so that importing the package takes no time.
+The functions and modules of the table are imported at their first use, so that the import of the
+package is fast.
 
 =====================  ============================================================================
-``study_plant``        is a plant's localization good enough, what mends it, what does it cost
-``simulate``           drive a scenario many times
+``study_plant``        localization of a plant: accuracy, weak positions, remedies, cost
+``simulate``           simulates a scenario in many runs
 ``sweep``              every combination of some values, in the same environments
 ``difference``         paired comparison of two results
-``bound``              how well any localizer can do in it
-``plan``               where to put further radio heads
-``synthesize``         record a scenario's drive as somebody on the vehicle would have
-``estimate_angles``    a recording's angles, for ``locate``
-``locate``             where the vehicle was in a recorded drive
-``Live``               the pipeline on a vehicle, fed as samples, angles and odometry come
-``survey``             where radio heads stand, as ordinary drives show it
+``bound``              lower bound of the localization error of a scenario
+``plan``               placement of additional radio heads
+``synthesize``         synthetic recording of a scenario's drive
+``estimate_angles``    angles of a recording, as input of ``locate``
+``locate``             trajectory of a recorded drive
+``Live``               the pipeline on a vehicle: samples, angles and odometry as inputs
+``survey``             positions of radio heads, estimated from ordinary drives
 ``evaluate``           the paper's evaluation
-``explore``            operating points that meet an energy budget and an error
-``Site``               the plant as the vehicles believe it to be: load, change, write out
-``Vehicle``            a vehicle as it believes to be built, and how it is set
-``Scenario``           a site, a vehicle, and the world around them, otherwise or not
+``explore``            operating points that meet an energy and an error limit
+``Site``               nominal model of the plant: load, change, write
+``Vehicle``            nominal model and settings of a vehicle
+``Scenario``           site, vehicle, environment, and differences of the truth
 ``Platform``           the onboard computer: power modes, energy per execution
-``Plant``              a site, a vehicle, a fleet of it, and the accuracy that is needed
+``Plant``              site, vehicle, fleet, and required accuracy
 ``Recording``          samples on disk (SigMF, raw)
-``channel``            channels by themselves: drops of 3GPP TR 38.901
+``channel``            drops of the channels of 3GPP TR 38.901
 ``ray_paths``          paths of a ray tracer, for the simulator
 ``aoa``                angle of arrival with linear arrays
-``nr``                 SSBs: find them in samples and recordings, build them
+``nr``                 SSBs: search in samples and recordings, generation
 ``recorded_angles``    angles from the annotated recording of a linear array
-``service_levels``     which of 3GPP's a site and a vehicle reach
-``statistics``         consistency and integrity of simulated drives, intervals over runs
+``service_levels``     3GPP positioning service levels
+``statistics``         consistency and integrity of simulated runs, intervals
 ``drives``             recorded drives: errors against a truth, summary
-``columns``            what the columns of every table are
+``columns``            description of the columns of all tables
 ``cost``, ``carbon``   money and greenhouse gas of equipment and energy, with sources
 ``paper``              the paper's numbers, evaluation and claims
 =====================  ============================================================================

@@ -1,8 +1,8 @@
-"""Ctrl-C ends the program within a second, whatever it is doing, and leaves nothing half written.
+"""Ctrl-C ends the program within a second, without partially written files.
 
-Python raises ``KeyboardInterrupt`` between two of its own instructions only; a long computation or
-a chart that is being drawn lets it wait. So a thread of the core, which needs no interpreter, waits
-too, and ends the program where nothing else has by then.
+Python raises ``KeyboardInterrupt`` only between two of its instructions; a long computation or the
+drawing of a chart delays it. Therefore a thread of the Rust core, which needs no interpreter, ends
+the program after the timeout.
 """
 
 from __future__ import annotations

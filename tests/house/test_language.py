@@ -109,6 +109,8 @@ PLAIN = [
     "docs/designs.md",
     "docs/energy.md",
     "docs/estimator.md",
+    "docs/install-jetson.md",
+    "docs/install-usrp.md",
     "docs/integrity.md",
     "docs/live.md",
     "docs/locate.md",
