@@ -480,3 +480,26 @@ def test_a_warning_tells_its_parts() -> None:
     assert (warning.key, warning.value) == ("vehicle.odometer.scale_std", "0.5")
     assert warning.why in str(warning)
     assert warning.write in str(warning)
+
+
+def test_dead_reckoning_with_two_radio_heads_is_reported_by_varied_commands(
+    access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
+    off = ("--set", "vehicle.integrity.enabled=false", "--set", "motion.start_at_m=292.0")
+    vary = ("--vary", "vehicle.localizer.kind=dead-reckoning")
+    said = "dead reckoning supports one radio head"
+    done = access_av("run", "paper-real-odometry-2", *off, *vary, "--out", tmp_path / "r")
+    assert done.code == 0, done.err
+    assert " ".join(done.err.split()).count(said) == 1
+    (tmp_path / "short.toml").write_text(
+        'like = "paper-real-odometry-2"\n[motion]\nstart_at_m = 292.0\n'
+    )
+    (tmp_path / "space.toml").write_text(
+        '[vehicle.localizer]\nkind = ["tracker", "dead-reckoning"]\n'
+        "[vehicle.integrity]\nenabled = [false]\n"
+        "[vehicle.platform]\nmode = [0, 1]\n"
+    )
+    space = ("--space", tmp_path / "space.toml", "--runs", "1")
+    done = access_av("designs", tmp_path / "short.toml", *space, "--out", tmp_path / "d")
+    assert done.code == 0, done.err
+    assert " ".join(done.err.split()).count(said) == 1

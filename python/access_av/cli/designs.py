@@ -21,6 +21,7 @@ from access_av.cli.options import (
     Seed,
     ShardOption,
     Threads,
+    announce,
     load_scenario,
 )
 from access_av.cli.terminal import console, progress, table, width
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 TABLE = "designs.parquet"
+# Maximum number of designs whose settings are checked for implausible values.
+MOST_CHECKED = 1000
 # Maximum number of rows in the terminal.
 SHOWN = 20
 # Minimum columns: design, energy, percentile and its interval.
@@ -100,6 +103,11 @@ def designs(
     if optuna is None:
         choices = read.grid() if sobol is None else read.sobol(sobol)
         every = in_worlds(chosen, choices, read.worlds)
+        said = {str(it) for it in chosen.warnings()}
+        for worlds in every[:MOST_CHECKED]:
+            new = [it for it in worlds[0].scenario.warnings() if str(it) not in said]
+            said |= {str(it) for it in new}
+            announce(f"{space}: {worlds[0].label}", new)
     with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
         campaign = Campaign(Parts(RESULTS / "parts"), pool, workers, share)
         found = (

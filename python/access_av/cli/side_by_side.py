@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar
 
+from access_av.cli.options import announce
 from access_av.cli.terminal import console, progress, table
 
 if TYPE_CHECKING:
@@ -38,7 +39,19 @@ def of_scenario(
     others: Mapping[str, _core.Scenario],
 ) -> dict[str, _core.Scenario]:
     """Returns the variants of a scenario."""
-    return variants(scenario, vary, others, lambda it, keys: it.with_overrides(keys))
+
+    def changed(it: _core.Scenario, keys: dict[str, Any]) -> _core.Scenario:
+        made = it.with_overrides(keys)
+        announce_new(", ".join(f"{key} = {value}" for key, value in keys.items()), made, it)
+        return made
+
+    return variants(scenario, vary, others, changed)
+
+
+def announce_new(name: str, changed: _core.Scenario, baseline: _core.Scenario) -> None:
+    """Shows the warnings of a changed scenario that its baseline does not have."""
+    known = {str(warning) for warning in baseline.warnings()}
+    announce(name, [it for it in changed.warnings() if str(it) not in known])
 
 
 def plug_ins_of(compare: Sequence[str] | None) -> dict[str, dict[str, Any]]:
