@@ -20,6 +20,32 @@ name = "short"
 start_at_m = 285.0
 """
 SPACE = "[vehicle.platform]\nmode = [0, 2]\n"
+PLANT = """
+name = "short"
+target = "0.2 m 90 %"
+vehicle = "tugger"
+[site]
+name = "short"
+[site.road]
+polyline_m = [[0.0, 0.0], [30.0, 0.0]]
+[[site.radio_heads]]
+name = "mast"
+position_m = [10.0, 20.0, 8.0]
+pci = 1
+eirp_dbm = 10.0
+[[site.radio_heads]]
+name = "other"
+position_m = [60.0, 10.0, 8.0]
+pci = 2
+eirp_dbm = 10.0
+[fleet]
+vehicles = 6
+hours_per_day = 16.0
+trips_per_day = 40
+years = 4.0
+[prices]
+currency = "EUR"
+"""
 DRIVE = ("--site", "drive/site.toml", "--vehicle", "drive/vehicle.toml")
 RECORDED = ("--recording", "drive/iq.sigmf-meta", "--odometry", "drive/odometry.csv")
 COMMANDS = {
@@ -37,7 +63,7 @@ COMMANDS = {
     "tune": ("tune", "short.toml", "--runs", "2", "--designs", "2", "--max-error-m", "3"),
     "integrity": ("integrity", "short.toml", "--runs", "2", "--mismatch", "none"),
     "evaluate": ("evaluate", "--reading", "gate", "--runs", "1"),
-    "study": ("study", "paper", "--runs", "2"),
+    "study": ("study", "plant.toml", "--runs", "2"),
 }
 
 
@@ -57,6 +83,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     where = tmp_path_factory.mktemp("rerun")
     (where / "short.toml").write_text(SCENARIO)
     (where / "space.toml").write_text(SPACE)
+    (where / "plant.toml").write_text(PLANT)
     drives = (
         ("drive", ()),
         ("log1", ("--angles",)),

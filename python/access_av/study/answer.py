@@ -20,6 +20,7 @@ from access_av.study.remedies import Remedy, remedies
 from access_av.study.trips import Driven, drive
 from access_av.study.unstated import Unstated, unstated
 from access_av.study.verdicts import Effect, Judgement
+from access_av.tables.result import Result
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,7 +71,7 @@ class Mended:
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Study(Result):
     """What a study found.
 
     Attributes
