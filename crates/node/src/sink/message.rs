@@ -382,7 +382,7 @@ impl From<&Record> for Message {
 #[serde(untagged)]
 #[allow(dead_code, reason = "only its schema is used")]
 enum Output {
-    Line(Message),
+    Line(Box<Message>),
     Position(VdaPosition),
 }
 
@@ -397,12 +397,13 @@ pub fn schema() -> Value {
 }
 
 /// Types on the reference page, in this order.
-const PAGE: [(&str, &str); 9] = [
+const PAGE: [(&str, &str); 10] = [
     ("PoseMessage", "`pose`"),
     ("VerdictMessage", "`verdict`"),
     ("StatusMessage", "`status`"),
     ("EventMessage", "`event`"),
     ("FaultMessage", "Items of `faults`"),
+    ("ToneMessage", "Items of `tones`"),
     ("HeadMessage", "Items of `heads`"),
     ("EnergyMessage", "`energy`"),
     ("OutputStatus", "Items of `outputs`"),
