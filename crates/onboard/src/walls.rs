@@ -95,6 +95,7 @@ mod tests {
         site.rician_k_db = 10.0;
         let points_m = vec![[-5.0, 0.0], [5.0, 0.0], [5.0, -20.0]];
         let wall = |loss_db| WallSettings {
+            name: String::new(),
             points_m: points_m.clone(),
             loss_db,
         };

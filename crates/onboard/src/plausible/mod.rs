@@ -15,6 +15,9 @@ mod warning;
 
 pub use platform::of_platform;
 pub use together::{of_both, of_both_along, of_site};
-pub use usual::{Usual, as_degrees, as_millimetres, as_milliseconds, as_percent, rounded, unusual};
+pub use usual::{
+    Usual, as_centimetres, as_degrees, as_millimetres, as_milliseconds, as_percent, rounded,
+    unusual,
+};
 pub use vehicle::{of_vehicle, speed_in_mps};
 pub use warning::Warning;

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::hearing::steps_along;
-use super::usual::{Usual, as_degrees, as_millimetres, rounded, unusual};
+use super::usual::{Usual, as_centimetres, as_degrees, as_millimetres, rounded, unusual};
 use super::warning::Warning;
 use crate::geometry::{Point, cross};
 use crate::road::Road;
@@ -28,9 +28,9 @@ const ROWS: &[Usual] = &[
     },
     Usual {
         key: "radio_heads[].position_std_m",
-        within: [0.0, 20.0],
-        why: "larger than the error of a phone's GNSS",
-        write: as_millimetres,
+        within: [0.0, 3.0],
+        why: "larger than the error of a map or of a phone's GNSS",
+        write: as_centimetres,
     },
     Usual {
         // The maximum licensed EIRP at 28 GHz is 75 dBm per 100 MHz (47 CFR 30.202).
@@ -44,9 +44,14 @@ const ROWS: &[Usual] = &[
     },
     Usual {
         key: "radio_heads[].eirp_std_db",
-        within: [0.0, 15.0],
+        within: [0.0, 12.0],
         why: "larger than the uncertainty of any transmitter",
-        write: |_| "write dB, 1 to 6".to_owned(),
+        write: |it| {
+            format!(
+                "write dB, 1 to 6: a standard deviation of {it} % is {:.1} dB",
+                10.0 * (1.0 + it / 100.0).log10()
+            )
+        },
     },
     Usual {
         key: "road.width_m",
@@ -58,7 +63,7 @@ const ROWS: &[Usual] = &[
         key: "road.position_std_m",
         within: [0.0, 5.0],
         why: "larger than the error of a road in an aerial photograph",
-        write: as_millimetres,
+        write: as_centimetres,
     },
     Usual {
         key: "road.start.heading_rad",
@@ -100,6 +105,7 @@ pub(super) fn written(site: &Site, road: Option<&Road>) -> Vec<Warning> {
     found.extend(twins(site));
     found.extend(bends(site));
     found.extend(road.into_iter().flat_map(|road| across(site, road)));
+    found.extend(road.into_iter().flat_map(|road| other_side(site, road)));
     found
 }
 
@@ -253,6 +259,45 @@ fn bends(site: &Site) -> Vec<Warning> {
                 it.length_m / it.turn_rad.abs()
             ),
             write: as_degrees(it.turn_rad),
+        })
+        .collect()
+}
+
+/// Returns warnings for radio heads that a wall hides from the nearest point of the road and that would be in
+/// sight on the other side of the road.
+fn other_side(site: &Site, road: &Road) -> Vec<Warning> {
+    let hidden = |from: Point, to: Point| {
+        let mut walls = site.walls.iter().flat_map(|wall| wall.points_m.windows(2));
+        walls.any(|ends| cross([from, to], [ends[0].into(), ends[1].into()]))
+    };
+    let heads = site.radio_heads.iter().enumerate();
+    heads
+        .filter_map(|(index, head)| {
+            let [x_m, y_m, z_m] = head.position_m;
+            let place = Point::new(x_m, y_m);
+            let projection = road.project(place);
+            let nearest = road
+                .pose(projection.along_m.clamp(0.0, road.length_m()))
+                .point();
+            let mirrored = Point::new(2.0 * nearest.x_m - x_m, 2.0 * nearest.y_m - y_m);
+            let is_doubtful = hidden(place, nearest) && !hidden(mirrored, nearest);
+            is_doubtful.then(|| Warning {
+                key: format!("radio_heads[{index}].position_m"),
+                value: format!("{:?}", head.position_m),
+                why: format!(
+                    "it stands behind a wall, {:.0} m to the {} of the road",
+                    projection.lateral_m.abs(),
+                    if projection.lateral_m > 0.0 {
+                        "left"
+                    } else {
+                        "right"
+                    }
+                ),
+                write: format!(
+                    "write [{:.1}, {:.1}, {z_m}] if it stands on the other side of the road",
+                    mirrored.x_m, mirrored.y_m
+                ),
+            })
         })
         .collect()
 }

@@ -91,6 +91,15 @@ pub fn as_millimetres(value: f64) -> String {
     format!("write metres: {value} mm are {}", rounded(value / 1000.0))
 }
 
+/// Returns the suggestion for a standard deviation that is probably in centimetres or millimetres.
+pub fn as_centimetres(value: f64) -> String {
+    format!(
+        "write metres: {value} cm are {}, {value} mm are {}",
+        rounded(value / 100.0),
+        rounded(value / 1000.0)
+    )
+}
+
 /// Returns the suggestion for milliseconds that are probably in seconds.
 pub fn as_milliseconds(value: f64) -> String {
     format!(

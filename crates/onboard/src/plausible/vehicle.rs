@@ -3,7 +3,8 @@
 use std::f64::consts::TAU;
 
 use super::usual::{
-    Usual, as_degrees, as_millimetres, as_milliseconds, as_percent, rounded, unusual,
+    Usual, as_centimetres, as_degrees, as_millimetres, as_milliseconds, as_percent, rounded,
+    unusual,
 };
 use super::warning::Warning;
 use crate::settings::Vehicle;
@@ -76,9 +77,9 @@ const ROWS: &[Usual] = &[
     },
     Usual {
         key: "array.position_std_m",
-        within: [0.0, 1.0],
+        within: [0.0, 0.5],
         why: "larger than the error of a tape measure",
-        write: as_millimetres,
+        write: as_centimetres,
     },
     Usual {
         key: "array.mounting_std_rad",

@@ -132,6 +132,19 @@ pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
         Ok(settings)
     }
 
+    /// Returns the keys that a file contains, with those of the files that it is like, without defaults.
+    ///
+    /// # Errors
+    /// [`SettingsError`] where a file that it is like cannot be read.
+    fn stated_keys(
+        mut table: Table,
+        origin: &str,
+        library: &dyn Library,
+    ) -> Result<Table, SettingsError> {
+        take_after_likes::<Self>(&mut table, origin, library)?;
+        Ok(table)
+    }
+
     /// Returns a copy with modified keys, such as `("array.elements", 5)` or
     /// `("radio_heads[0].eirp_dbm", 0.0)`. A table is replaced as a whole. If a tag
     /// (`wake_up.policy`, `localizer.kind`) changes, the keys of the previous variant are removed.

@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WallSettings {
+    /// Name for people: that of the hall.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub name: String,
     /// Corners in plan `[x, y]`, in metres. Straight walls connect consecutive corners, and are
     /// higher than any line of sight.
     #[schemars(length(min = 2, max = 100), inner(inner(range(min = -1e7, max = 1e7))))]
