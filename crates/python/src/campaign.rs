@@ -393,20 +393,21 @@ fn run_table(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
     Ok(table.unbind())
 }
 
-/// Creates the integrity table: epochs by state and exceeded protection levels per run. The median
-/// is from the histogram.
+/// Creates the integrity table per run: epochs by state, degraded ones with a protection level above
+/// the alert limit, and exceeded protection levels while ok. The median is from the histogram.
 fn integrity(py: Python<'_>, campaign: &Campaign) -> PyResult<Option<(Py<PyDict>, f64)>> {
     let runs = &campaign.integrity;
     if runs.is_empty() {
         return Ok(None);
     }
     let table = PyDict::new(py);
-    let columns: [Column<IntegritySummary>; 4] = [
+    let columns: [Column<IntegritySummary>; 5] = [
         ("ok", |run| run.ok as f64),
         ("degraded", |run| {
             (run.epochs - run.ok - run.unavailable) as f64
         }),
         ("unavailable", |run| run.unavailable as f64),
+        ("too_wide", |run| run.too_wide as f64),
         ("beyond", |run| run.beyond as f64),
     ];
     for (name, value) in columns {

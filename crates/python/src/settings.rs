@@ -275,6 +275,19 @@ toml_file! {
         (self.0.target.error_m(), self.0.target.percent())
     }
 
+    /// Return the targets of positions and stretches: name, both ends as distances along the road in metres, horizontal error
+    /// in metres, and share of the time in percent.
+    #[getter]
+    fn targets(&self) -> PyResult<Vec<(String, f64, f64, f64, f64)>> {
+        let check = Check { file: &self.0.name };
+        let path = self.0.scenario(&self.0.channel).path(check);
+        let road_m = path.map_err(settings_error)?.length_m();
+        Ok(self.0.targets.iter().map(|it| {
+            let [from_m, to_m] = it.ends_m(road_m);
+            (it.name.clone(), from_m, to_m, it.target.error_m(), it.target.percent())
+        }).collect())
+    }
+
     /// Return the scenario of a trip with the nominal channel.
     fn scenario(&self) -> Scenario {
         Scenario(self.0.scenario(&self.0.channel))
@@ -285,10 +298,14 @@ toml_file! {
         Scenario(self.0.scenario(&self.0.poor_channel))
     }
 
-    /// Return warnings about implausible values of site, vehicle and trip. Raises `SettingsError`
-    /// if the vehicle's platform lacks a required capability.
+    /// Return warnings about implausible values of site, vehicle, trip and prices. Raises
+    /// `SettingsError` if the vehicle's platform lacks a required capability.
     fn warnings(&self) -> PyResult<Vec<SettingsWarning>> {
-        self.scenario().warnings()
+        let of_platform = platform_warnings(&self.0.vehicle)
+            .map_err(|error| settings_error(error.beneath(&self.0.name, "vehicle")))?;
+        let mut found = self.0.warnings().map_err(settings_error)?;
+        found.extend(of_platform);
+        Ok(told(found))
     }
 }
 

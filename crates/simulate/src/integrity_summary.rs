@@ -19,6 +19,8 @@ pub struct IntegritySummary {
     pub ok: usize,
     /// Number of steps in state `unavailable`.
     pub unavailable: usize,
+    /// Number of steps in state `degraded` whose protection level exceeds the alert limit.
+    pub too_wide: usize,
     /// Number of steps in state `ok` whose error exceeds the protection level.
     pub beyond: usize,
     /// Number of alarms: transitions from `ok` to another state.
@@ -60,6 +62,8 @@ impl IntegritySummary {
             summary.alarms += usize::from(was_ok && !ok);
             let early = was_ok && !ok && !exceeds;
             summary.early_alarms += usize::from(early);
+            let too_wide = integrity.protection_level_m > alert_limit_m;
+            summary.too_wide += usize::from(!ok && !unavailable && too_wide);
             let vouched = integrity.protection_level_m <= alert_limit_m;
             summary.suspicions += usize::from(early && vouched);
             summary.worst_m = summary.worst_m.max(error_m);
@@ -88,6 +92,7 @@ impl IntegritySummary {
             total.epochs += run.epochs;
             total.ok += run.ok;
             total.unavailable += run.unavailable;
+            total.too_wide += run.too_wide;
             total.beyond += run.beyond;
             total.alarms += run.alarms;
             total.early_alarms += run.early_alarms;

@@ -4,6 +4,7 @@ mod channel;
 mod faults;
 mod iq;
 mod motion;
+mod place_target;
 mod plant;
 mod plausible;
 mod price;
@@ -11,6 +12,7 @@ mod scenario_file;
 mod size;
 mod target;
 mod truth;
+mod unusual_prices;
 
 pub use channel::{BlockageSettings, ChannelModel, ChannelSettings, HallSettings, ScatterModel};
 pub use faults::{FaultKind, FaultSettings};

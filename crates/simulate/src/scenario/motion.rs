@@ -28,9 +28,12 @@ pub struct MotionSettings {
 }
 
 /// Stop along the path.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StopSettings {
+    /// Name for people.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub name: String,
     /// Position along the path in metres.
     #[schemars(range(min = 0.0, max = 1e5))]
     pub at_m: f64,

@@ -1,5 +1,6 @@
 //! Plant: the task of a fleet on a site, the required accuracy and the prices.
 
+use onboard::plausible::Warning;
 use onboard::settings::{Check, Library, SettingsError, Site, TomlFile, Vehicle};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,10 +9,12 @@ use toml::{Table, Value};
 use super::channel::{ChannelModel, ChannelSettings};
 use super::iq::IqSettings;
 use super::motion::MotionSettings;
+use super::place_target::PlaceTarget;
 use super::price::Price;
 use super::scenario_file::{Fidelity, Scenario, hold, named_or_held};
 use super::target::Target;
 use super::truth::TruthSettings;
+use super::unusual_prices;
 
 /// Plant file: a site, a vehicle, the fleet and the required accuracy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -24,6 +27,10 @@ pub struct Plant {
     pub description: String,
     /// Maximum horizontal error and the fraction of time for which it is required: `"0.3 m 99 %"`.
     pub target: Target,
+    /// Targets of single positions or stretches, in addition to `target`, which applies to the whole trip.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 50))]
+    pub targets: Vec<PlaceTarget>,
     /// Site: a name or a table.
     #[schemars(schema_with = "named_or_held::<Site>")]
     pub site: Site,
@@ -73,9 +80,12 @@ pub struct Fleet {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Prices {
-    /// Currency [default: US dollars]. Published prices are in US dollars and are not converted.
+    /// Currency of all prices [default: US dollars].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub currency: Option<String>,
+    /// Price of one US dollar in `currency`. Published prices are in US dollars and are converted by it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub currency_per_usd: Option<Price>,
     /// Price of electricity per kWh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub electricity_per_kwh: Option<Price>,
@@ -85,15 +95,39 @@ pub struct Prices {
     /// Price of the receiver and the antennas of a vehicle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub receiver: Option<Price>,
+    /// Price of the onboard computer of a vehicle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub computer: Option<Price>,
     /// Price of the LiDAR of a vehicle, for comparison.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lidar: Option<Price>,
+    /// Electrical power of a LiDAR in watts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lidar_power_w: Option<Price>,
     /// Price of a roadside unit, for comparison.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roadside_unit: Option<Price>,
     /// Maintenance cost of a roadside unit per year.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roadside_unit_yearly: Option<Price>,
+    /// Electrical power of a roadside unit in watts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roadside_unit_power_w: Option<Price>,
+    /// Price of an ultra-wideband (UWB) anchor with its installation, for comparison.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uwb_anchor: Option<Price>,
+    /// Length of road for each UWB anchor in metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uwb_anchor_spacing_m: Option<Price>,
+    /// Electrical power of a UWB anchor in watts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uwb_anchor_power_w: Option<Price>,
+    /// Price of the UWB tag of a vehicle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uwb_tag: Option<Price>,
+    /// Electrical power of a UWB tag in watts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uwb_tag_power_w: Option<Price>,
     /// Price of an additional radio head with its mast.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radio_head: Option<Price>,
@@ -153,8 +187,16 @@ impl TomlFile for Plant {
         origin: &str,
         library: &dyn Library,
     ) -> Result<(), SettingsError> {
+        let site = stated::<Site>(table, origin, library)?;
+        needs_cells(&site, Check { file: origin })?;
+        let vehicle = stated::<Vehicle>(table, origin, library)?;
         hold::<Site>(table, origin, library)?;
-        hold::<Vehicle>(table, origin, library)
+        hold::<Vehicle>(table, origin, library)?;
+        let integrity = vehicle.get("integrity").and_then(Value::as_table);
+        if !integrity.is_some_and(|it| it.contains_key("alert_limit_m")) {
+            limit_by_target(table, origin, library);
+        }
+        Ok(())
     }
 
     fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
@@ -170,6 +212,8 @@ impl TomlFile for Plant {
             let allowed = "`low`, `value` and `high` must not fall";
             check.that(rise, &key, format!("{ends:?}"), allowed)?;
         }
+        self.check_targets(check)?;
+        self.check_currency(check)?;
         let (fleet, trip_s) = (&self.fleet, scenario.size(check)?.duration_s);
         let most = fleet.hours_per_day * 3600.0 / trip_s;
         check.that(
@@ -185,7 +229,121 @@ impl TomlFile for Plant {
     }
 }
 
+/// Alert limit over the error of the target: the containment limit of required navigation performance is twice
+/// its accuracy (ICAO Doc 9613, 1.2).
+const ALERT_LIMIT_PER_TARGET: f64 = 2.0;
+/// Currencies with a published rate (`economics/prices.toml`).
+const CONVERTED: [&str; 2] = ["USD", "EUR"];
+
+/// Returns the keys of a site or vehicle that a plant's file, and the files that it names, contain.
+fn stated<T: TomlFile>(
+    table: &Table,
+    origin: &str,
+    library: &dyn Library,
+) -> Result<Table, SettingsError> {
+    match table.get(T::WHAT) {
+        Some(Value::String(name)) => {
+            let named = library.text(T::WHAT, T::SHIPPED, name, origin);
+            let named = named.map_err(|error| error.beneath(origin, T::WHAT))?;
+            // A text that is no TOML is rejected by its reader, with its place.
+            let keys = named.text.parse().unwrap_or_default();
+            T::stated_keys(keys, &named.origin, library)
+        }
+        Some(Value::Table(held)) => T::stated_keys(held.clone(), origin, library)
+            .map_err(|error| error.beneath(origin, T::WHAT)),
+        _ => Ok(Table::new()),
+    }
+}
+
+/// Rejects radio heads without a cell identity or a radiated power: no default fits any plant.
+fn needs_cells(site: &Table, check: Check<'_>) -> Result<(), SettingsError> {
+    let heads = site.get("radio_heads").and_then(Value::as_array);
+    for (index, head) in heads.into_iter().flatten().enumerate() {
+        let needed = [
+            (
+                "pci",
+                "write the physical cell identity, 0 to 1007, by which vehicles recognize the radio head",
+            ),
+            (
+                "eirp_dbm",
+                "write the radiated power with the antenna's gain in dBm: 10 mW are 10, 1 W is 30",
+            ),
+        ];
+        for (key, allowed) in needed {
+            let is_there = head.as_table().is_none_or(|it| it.contains_key(key));
+            let key = format!("site.radio_heads[{index}].{key}");
+            check.that(is_there, &key, "missing", allowed)?;
+        }
+    }
+    Ok(())
+}
+
+/// Derives the alert limit of a plant's vehicle from the plant's target.
+fn limit_by_target(table: &mut Table, origin: &str, library: &dyn Library) {
+    let target = table.get("target").and_then(Value::as_str);
+    let Some(Ok(target)) = target.map(|it| Target::try_from(it.to_owned())) else {
+        return; // the reader rejects it
+    };
+    let Some(Value::Table(vehicle)) = table.get_mut("vehicle") else {
+        return;
+    };
+    let read = Vehicle::from_table(vehicle.clone(), origin, library);
+    if read.is_ok_and(|it| it.integrity_monitor().is_some()) {
+        let integrity = vehicle
+            .entry("integrity")
+            .or_insert_with(|| Value::Table(Table::new()));
+        if let Value::Table(integrity) = integrity {
+            let limit_m = ALERT_LIMIT_PER_TARGET * target.error_m();
+            integrity.insert("alert_limit_m".to_owned(), Value::Float(limit_m));
+        }
+    }
+}
+
 impl Plant {
+    /// Returns warnings about implausible values of site, vehicle, trip and prices.
+    ///
+    /// # Errors
+    /// [`SettingsError`] only where the plant has been changed by hand into an impossible one.
+    pub fn warnings(&self) -> Result<Vec<Warning>, SettingsError> {
+        let mut found = self.scenario(&self.channel).warnings()?;
+        found.extend(unusual_prices::of_plant(self));
+        Ok(found)
+    }
+
+    /// Returns the currency of all prices.
+    pub fn currency(&self) -> &str {
+        self.prices.currency.as_deref().unwrap_or("USD")
+    }
+
+    /// Rejects a currency without a rate: published prices are US dollars.
+    fn check_currency(&self, check: Check<'_>) -> Result<(), SettingsError> {
+        let is_known = CONVERTED.contains(&self.currency());
+        check.that(
+            is_known || self.prices.currency_per_usd.is_some(),
+            "prices.currency_per_usd",
+            "missing",
+            &format!(
+                "prices that are not stated are published in US dollars; write the price of one US \
+                 dollar in {}",
+                self.currency()
+            ),
+        )
+    }
+
+    /// Rejects targets without a position on the driven road.
+    fn check_targets(&self, check: Check<'_>) -> Result<(), SettingsError> {
+        let road_m = self.scenario(&self.channel).path(check)?.length_m();
+        for (index, target) in self.targets.iter().enumerate() {
+            target.check(
+                check,
+                &format!("targets[{index}]"),
+                self.motion.start_at_m,
+                road_m,
+            )?;
+        }
+        Ok(())
+    }
+
     /// Returns the scenario of a trip with the given channel.
     pub fn scenario(&self, channel: &ChannelSettings) -> Scenario {
         Scenario {
@@ -227,6 +385,80 @@ mod tests {
             let plant = Plant::from_library(name, &Shipped).unwrap();
             let again = Plant::from_toml(&plant.to_toml(), "again", &Shipped).unwrap();
             assert_eq!(again, plant);
+        }
+    }
+
+    #[test]
+    fn the_alert_limit_follows_from_the_target_unless_it_is_set() {
+        let limit_m = |text: &str| {
+            let plant = Plant::from_toml(text, "mine.toml", &Shipped).unwrap();
+            plant.vehicle.integrity_monitor().unwrap().alert_limit_m
+        };
+        assert!((limit_m(BENDS) - 0.6).abs() < 1e-12);
+        let own = "vehicle = { like = \"tugger\", integrity.alert_limit_m = 1.5 }";
+        let text = BENDS.replace("vehicle = \"tugger\"", own);
+        assert!((limit_m(&text) - 1.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn targets_of_places_lie_on_the_road() {
+        let with = |target: &str| {
+            let text = BENDS.replace("[motion]", &format!("[[targets]]\n{target}\n[motion]"));
+            Plant::from_toml(&text, "mine.toml", &Shipped).map_err(|it| it.to_string())
+        };
+        let plant = with("name = \"gate\"\nat_m = 2.0\ntarget = \"0.1 m 95 %\"").unwrap();
+        assert_eq!(plant.targets[0].ends_m(600.0), [0.0, 7.0]);
+        let plant = with("from_m = 100.0\nto_m = 150.0\ntarget = \"0.1 m 95 %\"").unwrap();
+        assert_eq!(plant.targets[0].ends_m(600.0), [100.0, 150.0]);
+        for (target, key) in [
+            ("target = \"0.1 m 95 %\"", "targets[0].at_m"),
+            ("at_m = 6000.0\ntarget = \"0.1 m 95 %\"", "targets[0].at_m"),
+            ("from_m = 10.0\ntarget = \"0.1 m 95 %\"", "targets[0].to_m"),
+            (
+                "from_m = 20.0\nto_m = 10.0\ntarget = \"0.1 m 95 %\"",
+                "targets[0].to_m",
+            ),
+            (
+                "at_m = 5.0\nto_m = 10.0\ntarget = \"0.1 m 95 %\"",
+                "targets[0].at_m",
+            ),
+        ] {
+            let message = with(target).unwrap_err();
+            assert!(message.contains(key), "{target}: {message}");
+        }
+    }
+
+    #[test]
+    fn cells_are_identified_and_published_prices_converted() {
+        let message = refused(("pci = 22\n", ""));
+        assert!(message.contains("radio_heads[1].pci"), "{message}");
+        let message = refused(("eirp_dbm = 10.0\n", ""));
+        assert!(message.contains("radio_heads[0].eirp_dbm"), "{message}");
+        let message = refused(("[fleet]", "[prices]\ncurrency = \"SEK\"\n[fleet]"));
+        assert!(message.contains("prices.currency_per_usd"), "{message}");
+    }
+
+    #[test]
+    fn prices_in_another_unit_are_doubted() {
+        for (price, hint) in [
+            ("electricity_per_kwh = 25.0", "25 cents are 0.25"),
+            ("grid_g_per_kwh = 0.381", "0.381 kg are 381"),
+            ("lidar = 4.0", "4 thousand are 4000"),
+            ("uwb_tag_power_w = 300.0", "300 mW are 0.3"),
+        ] {
+            let text = BENDS.replace("[fleet]", &format!("[prices]\n{price}\n[fleet]"));
+            let plant = Plant::from_toml(&text, "mine.toml", &Shipped).unwrap();
+            let told = plant.warnings().unwrap();
+            let written: Vec<_> = told.iter().map(ToString::to_string).collect();
+            assert!(
+                written.iter().any(|it| it.contains(hint)),
+                "{price}: {written:?}"
+            );
+        }
+        for name in Plant::names() {
+            let plant = Plant::from_library(name, &Shipped).unwrap();
+            let prices = |it: &Warning| it.key.starts_with("prices");
+            assert!(!plant.warnings().unwrap().iter().any(prices), "{name}");
         }
     }
 

@@ -170,6 +170,7 @@ mod tests {
         let stops = vec![StopSettings {
             at_m: 100.0,
             dwell_s: 7.0,
+            ..StopSettings::default()
         }];
         let profile = profile(
             &MotionSettings {
@@ -186,7 +187,11 @@ mod tests {
 
     #[test]
     fn stops_before_the_start_position_are_ignored() {
-        let stop = |at_m| StopSettings { at_m, dwell_s: 5.0 };
+        let stop = |at_m| StopSettings {
+            at_m,
+            dwell_s: 5.0,
+            ..StopSettings::default()
+        };
         let begin = |start_at_m, stops| {
             let settings = MotionSettings {
                 start_at_m,
@@ -213,6 +218,7 @@ mod tests {
         let stops = vec![StopSettings {
             at_m: 120.0,
             dwell_s: 2.0,
+            ..StopSettings::default()
         }];
         let profile = profile(
             &MotionSettings {
