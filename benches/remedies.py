@@ -33,8 +33,9 @@ def main() -> None:
     scenario, (_, percent) = plant.scenario(), plant.target
     began_s = time.monotonic()
     studied = access_av.study_plant(plant, seed=STUDY_SEED, always_mend=True)
-    place = {it.remedy.name: number for number, it in enumerate(studied.mended, start=1)}
-    runs = studied.mended[0].driven.runs
+    single = studied.measured.single
+    place = {it.name: number for number, it in enumerate(single, start=1)}
+    runs = studied.measured.before.runs
     print(f"{plant.name}: study of {runs} pairs, {time.monotonic() - began_s:.0f} s")
 
     began_s = time.monotonic()
@@ -46,7 +47,7 @@ def main() -> None:
     }
     print(f"{asked.drives} drives each, {time.monotonic() - began_s:.0f} s")
     print(f"as it is: {percent:g} % within {base.percentile(percent).value:.3f} m")
-    less = {name: it.less_than(base, percent) for name, it in driven.items()}
+    less = {name: it.delta_m(base, percent) for name, it in driven.items()}
     for number, name in enumerate(sorted(less, key=lambda it: less[it][0]), start=1):
         found, low, high = less[name]
         print(
@@ -55,7 +56,7 @@ def main() -> None:
 
     agree = sure = 0
     for one, other in itertools.combinations(driven, 2):
-        _, low, high = driven[one].less_than(driven[other], percent)
+        _, low, high = driven[one].delta_m(driven[other], percent)
         if low <= 0.0 <= high:
             continue
         sure += 1

@@ -80,7 +80,8 @@ if TYPE_CHECKING:
     from access_av.run.simulation import Simulation, simulate
     from access_av.run.sweep import Sweep, sweep
     from access_av.signal import aoa, nr, recorded_angles
-    from access_av.study.answer import Study, study_plant
+    from access_av.study.answer import study_plant
+    from access_av.study.study_result import Study
     from access_av.tables import columns
 
 __all__ = [
@@ -149,7 +150,8 @@ if not TYPE_CHECKING:
             "access_av.drives.self_survey": ["Survey", "survey"],
             "access_av.run.simulation": ["Simulation", "simulate"],
             "access_av.run.sweep": ["Sweep", "sweep"],
-            "access_av.study.answer": ["Study", "study_plant"],
+            "access_av.study.answer": ["study_plant"],
+            "access_av.study.study_result": ["Study"],
         },
         modules={
             "aoa": "access_av.signal.aoa",

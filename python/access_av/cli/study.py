@@ -57,13 +57,16 @@ def study(
 ) -> None:
     """Evaluate the localization of a plant: accuracy, weak positions, remedies and cost.
 
-    Writes report.html, study.json, errors.parquet, drives.parquet, places.parquet, places.csv,
-    points.parquet, trajectories.parquet (the run that the report plays), plant.toml with all
-    default values, and manifest.json. With --vary or --compare also compared.parquet.
+    Writes report.html, study.json, recommended.toml (for access-av run), errors.parquet,
+    drives.parquet, targets.parquet, places.parquet, places.csv, points.parquet,
+    trajectories.parquet (the run that the report plays), plant.toml with all default values, and
+    manifest.json. With --vary or --compare also compared.parquet.
     """
     from access_av.report.compared import compared_section
     from access_av.report.study import render_study
     from access_av.study.answer import study_plant
+    from access_av.study.compare import combinations
+    from access_av.study.study_result import recommended_toml
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
     chosen = Plant.load(plant)
@@ -74,7 +77,7 @@ def study(
     directory = ResultsDirectory.create(f"study-{chosen.name}", out)
     with progress("Driving") as tick:
         found = study_plant(
-            plant, runs=runs, seed=seed, threads=threads, always_mend=always_mend, progress=tick
+            chosen, runs=runs, seed=seed, threads=threads, always_mend=always_mend, progress=tick
         )
     for name, rows in found.tables().items():
         directory.write_table(f"{name}.parquet", rows)
@@ -83,7 +86,10 @@ def study(
     asked = percentile or [50.0, found.percent]
     beside = side_by_side(scenarios, asked, found.believed.runs, seed, threads)
     write_compared(beside, directory)
-    directory.write_text("report.html", render_study(found, compared_section(beside)))
+    combined = combinations(vary or ())
+    directory.write_text("report.html", render_study(found, compared_section(beside, combined)))
+    if (point := recommended_toml(found)) is not None:
+        directory.write_text("recommended.toml", point)
     directory.write_text("plant.toml", chosen.to_toml())
     directory.write_manifest(
         repeat=("study", "plant.toml", "--seed", seed, "--runs", found.believed.runs),
@@ -104,19 +110,31 @@ def study(
         )
     if found.mended:
         made = table(
-            ["remedy", f"{found.percent:g} % within / m", "difference / m", "interval", ""], text=1
-        )
+            [
+                "measure", "lost drives", f"{found.percent:g} % within / m", "difference / m",
+                "interval", "", "targets",
+            ],
+            text=1,
+        )  # fmt: skip
         for it in found.mended:
             delta, low, high = it.delta_m
             made.add_row(
-                it.remedy.name,
+                it.name,
+                f"{it.driven.lost_runs} of {it.driven.runs}",
                 f"{it.error.value:.3f}",
                 f"{delta:+.3f}",
                 f"{low:+.3f} to {high:+.3f}",
                 it.effect.words,
+                it.judgement.words,
             )
         console.print(made)
+    if combined and len(vary or ()) > 1:
+        console.print(f"Combinations: {combined}.")
     show_compared(beside)
     if found.point is not None:
-        console.print(f"Recommended: {found.point.name}.")
+        agreement = found.recommendation.agreement.value
+        console.print(f"Recommended: {found.point.name}; two seeds: {agreement}.")
+        console.print(
+            f"Simulate it: access-av run {directory.path / 'recommended.toml'}", soft_wrap=True
+        )
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 FLEET = ("vehicles", "hours_per_day", "days_per_year", "years")
 # One of these says how often a vehicle drives.
 TRIPS = ("trips_per_day", "trip_s")
+# Operating times of the infrastructure: all day and every day without.
+INFRASTRUCTURE = {"infrastructure_hours_per_day": 24.0, "infrastructure_days_per_year": 365.0}
 ITEM = ("units", "price", "yearly", "power_w", "embodied_kg")
-DAY_S = 86_400.0
 
 
 @dataclass(frozen=True)
@@ -109,8 +110,10 @@ def balance(figures: Mapping[str, Any]) -> Balance:
         {"currency", "grid", "grid_g_per_kwh", "electricity_per_kwh", "fleet", "before", "after"},
     )
     fleet = figures.get("fleet", {})
-    _only(fleet, "fleet.", {*FLEET, *TRIPS})
+    _only(fleet, "fleet.", {*FLEET, *TRIPS, *INFRASTRUCTURE})
     use = {name: _range(fleet, f"fleet.{name}").central for name in FLEET}
+    for name, usual in INFRASTRUCTURE.items():
+        use[name] = _range(fleet, f"fleet.{name}").central if name in fleet else usual
     if not 0.0 <= use["hours_per_day"] <= 24.0:
         raise InputError("fleet.hours_per_day: it must be from 0 to 24")
     use["trips"] = _trips(fleet, use["hours_per_day"])
@@ -198,10 +201,11 @@ def _way(
     vehicle_j = onboard_w.scaled(hours * 3600.0).plus(
         _range(way, f"{name}.energy_j_per_trip").scaled(use["trips"])
     )
-    # Infrastructure is on all day and every day, vehicles while they work.
-    fixed_j = fixed_w.scaled(DAY_S)
+    fixed_j = fixed_w.scaled(use["infrastructure_hours_per_day"] * 3600.0)
     kwh_per_year = (
-        vehicle_j.scaled(vehicles * days).plus(fixed_j.scaled(365.0)).scaled(1.0 / KWH_IN_J)
+        vehicle_j.scaled(vehicles * days)
+        .plus(fixed_j.scaled(use["infrastructure_days_per_year"]))
+        .scaled(1.0 / KWH_IN_J)
     )
     return Way(
         capital=capital,

@@ -14,8 +14,11 @@ if TYPE_CHECKING:
     from access_av.study.compare import Compared
 
 
-def compared_section(found: Sequence[Compared]) -> str:
-    """Returns a section of the report; empty without variants."""
+def compared_section(found: Sequence[Compared], combined: str = "") -> str:
+    """Returns a section of the report; empty without variants.
+
+    ``combined`` states the combinations of the variants.
+    """
     if not found:
         return ""
     percents = found[0].percents
@@ -35,7 +38,8 @@ def compared_section(found: Sequence[Compared]) -> str:
     )  # fmt: skip
     return section(
         "Comparison of variants",
-        f"Horizontal error, {found[0].driven.runs} {found[0].driven.rows} each, in equal "
+        (f"{combined}. " if combined else "")
+        + f"Horizontal error, {found[0].driven.runs} {found[0].driven.rows} each, in equal "
         "environments. Differences are paired, with 95 % intervals.",
         table(head, rows, numbers=range(1, len(percents) + 1)),
     )

@@ -16,7 +16,7 @@ from access_av.study.economy import trip_j
 
 if TYPE_CHECKING:
     from access_av.report.chart import Spec
-    from access_av.study.answer import Study
+    from access_av.study.study_result import Study
 
 TALLEST_MAP_PX = 640.0
 MARGIN_M = 25.0
@@ -64,11 +64,29 @@ def road_map(study: Study) -> Spec:
         ],
     )
     layers = [*frame.beneath(site), drawn, *frame.masts(heads)]
-    stops = _at(study, [stop["at_m"] for stop in _stops(study)])
-    if not stops.is_empty():
-        square = alt.Chart(stops).mark_point(shape="square", size=120, color=GREY, strokeWidth=2)
-        said = [alt.Tooltip("along_m:Q", title="stop, along the road / m")]
-        layers.append(frame.put(square, tooltip=said))
+    targets = _at(
+        study,
+        {it.name: 0.5 * (it.from_m + it.to_m) for it in study.targets.each[1:]},
+    )
+    stops = _at(
+        study,
+        {
+            stop.get("name") or f"stop at {stop['at_m']:.0f} m": stop["at_m"]
+            for stop in _stops(study)
+        },
+    )
+    named = {stop["name"] for stop in _stops(study) if stop.get("name")}
+    named |= {name for name, *_ in study.plant.targets if name}
+    for rows, shape, colour in ((stops, "square", GREY), (targets, "diamond", PURPLE)):
+        if rows.is_empty():
+            continue
+        symbol = alt.Chart(rows).mark_point(shape=shape, size=120, color=colour, strokeWidth=2)
+        said = [alt.Tooltip("name:N"), alt.Tooltip("along_m:Q", title="along the road / m")]
+        layers.append(frame.put(symbol, tooltip=said))
+        shown = rows.filter(pl.col("name").is_in(list(named)))
+        if not shown.is_empty():
+            text = alt.Chart(shown).mark_text(fontSize=11, dy=16 if rows is stops else -14)
+            layers.append(frame.put(text, text="name:N"))
     worst = pl.DataFrame(
         [
             {"number": str(number), "x_m": place.x_m, "y_m": place.y_m}
@@ -108,15 +126,21 @@ def _classes(target_m: float) -> list[str]:
     ]
 
 
-def _stops(study: Study) -> list[dict[str, float]]:
-    stops: list[dict[str, float]] = json.loads(study.plant.to_json())["motion"]["stops"]
+def _stops(study: Study) -> list[dict[str, Any]]:
+    stops: list[dict[str, Any]] = json.loads(study.plant.to_json())["motion"]["stops"]
     return stops
 
 
-def _at(study: Study, along_m: list[float]) -> pl.DataFrame:
-    rows = [study.places.row(min(study.places.height - 1, int(at)), named=True) for at in along_m]
+def _at(study: Study, along_m: dict[str, float]) -> pl.DataFrame:
+    """Positions on the road by name, from their distances along it."""
+    last = study.places.height - 1
+    rows = [
+        (name, study.places.row(min(last, int(at)), named=True)) for name, at in along_m.items()
+    ]
     columns = ("along_m", "x_m", "y_m")
-    return pl.DataFrame([{name: row[name] for name in columns} for row in rows])
+    return pl.DataFrame(
+        [{"name": label, **{name: row[name] for name in columns}} for label, row in rows]
+    )
 
 
 def along_road(study: Study) -> Spec:
@@ -192,7 +216,7 @@ def ways_to_operate(study: Study) -> Spec:
     rows = pl.DataFrame(
         [
             {
-                "way": f"{point.method}, {point.wake_up}",
+                "way": f"{point.operation.method}, {point.operation.wake_up}",
                 "mode": f"mode {point.mode} ({point.mode_name})",
                 "energy_j": round(trip_j(point).central, 4),
                 "error_m": round(point.error_m, 4),

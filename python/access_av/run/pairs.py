@@ -71,6 +71,15 @@ class Errors:
         return found
 
     @property
+    def lost(self) -> NDArray[np.bool_]:
+        """Whether the vehicle is lost, for each row; see :attr:`lost_runs`."""
+        known = np.logical_or.accumulate(np.isfinite(self.errors_m), axis=1)
+        beyond = known & ~(self.errors_m <= LOST_M)
+        never = ~known[:, -1] if known.shape[1] else np.zeros(self.runs, dtype=bool)
+        lost_s = beyond.mean(axis=1) * self.duration_s
+        return np.asarray((lost_s > LOST_S) | never)
+
+    @property
     def lost_runs(self) -> int:
         """Number of rows with a lost vehicle.
 
@@ -85,11 +94,7 @@ class Errors:
         >>> Errors(name="a", errors_m=errors_m, duration_s=100.0).lost_runs
         1
         """
-        known = np.logical_or.accumulate(np.isfinite(self.errors_m), axis=1)
-        beyond = known & ~(self.errors_m <= LOST_M)
-        never = ~known[:, -1] if known.shape[1] else np.zeros(self.runs, dtype=bool)
-        lost_s = beyond.mean(axis=1) * self.duration_s
-        return int(((lost_s > LOST_S) | never).sum())
+        return int(self.lost.sum())
 
     @property
     def state_shares(self) -> Mapping[str, float] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,6 +46,9 @@ class Integrity:
     run_interval
         95 % interval of the share of runs with an exceedance, by Clopper and Pearson. Epochs of a
         run hang together; runs do not.
+    by_run
+        Number of steps of each run by state, ``beyond`` the level while ``ok``, and, from a
+        campaign, ``too_wide``: degraded with a protection level above the alert limit.
 
     Examples
     --------
@@ -72,6 +75,9 @@ class Integrity:
     exceedance_share: float
     exceedance_interval: tuple[float, float]
     run_interval: tuple[float, float]
+    by_run: Mapping[str, NDArray[np.float64]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
 
     @property
     def availability(self) -> float:
@@ -120,6 +126,7 @@ class Integrity:
             exceedance_share=_share(by_run),
             exceedance_interval=bootstrap_interval(by_run, _share),
             run_interval=clopper_pearson(affected, runs),
+            by_run=counts,
         )
 
 

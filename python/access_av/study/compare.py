@@ -12,7 +12,7 @@ import polars as pl
 
 from access_av.errors import InputError
 from access_av.run.pairs import Errors
-from access_av.study.trips import drive
+from access_av.study.trips import Driven, drive
 from access_av.tables.toml import tomllib
 
 if TYPE_CHECKING:
@@ -57,8 +57,13 @@ class Compared:
         shares = self.driven.state_shares
         if shares is None:
             return "no monitor"
-        others = (f"{share:.1%} {state}" for state, share in shares.items() if state != "ok")
-        text = f"{shares['ok']:.1%} ok, {', '.join(others)}"
+        reasons = self.driven.not_ok_shares if isinstance(self.driven, Driven) else None
+        others = (
+            [f"{share:.1%} {state}" for state, share in shares.items() if state != "ok"]
+            if reasons is None
+            else [f"{share:.1%} {reason.words}" for reason, share in reasons.items() if share > 0.0]
+        )
+        text = ", ".join([f"{shares['ok']:.1%} ok", *others])
         beyond = self.driven.exceedances
         return f"{text}; {beyond} errors beyond the level while ok" if beyond else text
 
@@ -124,6 +129,26 @@ def varied(vary: Sequence[str]) -> list[tuple[str, dict[str, Any]]]:
             "access-av designs searches more"
         )
     return found if vary else []
+
+
+def combinations(vary: Sequence[str]) -> str:
+    """The combinations that ``--vary`` options make, in words; empty without any.
+
+    Examples
+    --------
+    >>> combinations(["site.rician_k_db=5,10", "vehicle.array.elements=4,8"])
+    '2 values of site.rician_k_db × 2 values of vehicle.array.elements = 4 variants'
+    """
+    keys = [values(text) for text in vary]
+    if not keys:
+        return ""
+
+    def count(number: int, what: str) -> str:
+        return f"{number} {what}{'' if number == 1 else 's'}"
+
+    parts = " × ".join(f"{count(len(its), 'value')} of {key}" for key, its in keys)
+    total = count(math.prod(len(its) for _, its in keys), "variant")
+    return f"{parts} = {total}" if len(keys) > 1 else parts
 
 
 def compare(

@@ -1,13 +1,15 @@
-"""What a plant's way of localizing draws, costs and emits, beside a LiDAR and roadside units."""
+"""Energy, money and carbon of a plant's localization, and of its alternatives."""
 
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from access_av.economics.balance import balance
 from access_av.economics.carbon import Range
+from access_av.run.error_bound import along_route
 from access_av.tables.toml import shipped
 
 if TYPE_CHECKING:
@@ -17,12 +19,15 @@ if TYPE_CHECKING:
     from access_av.economics.balance import Way
     from access_av.study.points import Point
 
-OURS, WITH_IDLE, LIDAR, ROADSIDE = (
-    "5G receivers",
-    "5G receivers, each with a computer for this alone",
-    "a LiDAR on each vehicle",
+OURS, WITH_COMPUTER, LIDAR, ROADSIDE, UWB = (
+    "5G receivers, computers are there anyway",
+    "5G receivers, each with a computer",
+    "LiDARs, each with a computer",
     "roadside units",
+    "UWB anchors and tags",
 )
+# Figures of prices.toml that are no money.
+NO_MONEY = ("_g_per_kwh", "_power_w", "_embodied_kg", "_spacing_m")
 
 
 @dataclass(frozen=True)
@@ -34,27 +39,33 @@ class Prices:
     currency
         What money is counted in.
     ranges, sources
-        By the keys of ``[prices]`` and of ``economics/prices.toml``.
+        By the keys of ``[prices]`` and of ``economics/prices.toml``; money in ``currency``.
+    published
+        Keys whose figures are published ones, because the plant does not state them.
     """
 
     currency: str
     ranges: Mapping[str, Range]
     sources: Mapping[str, str]
+    published: frozenset[str]
 
     @classmethod
     def of(cls, plant: _core.Plant) -> Prices:
         """The plant's, completed."""
         own: dict[str, Any] = json.loads(plant.to_json()).get("prices", {})
         facts = shipped("economics", "prices.toml")
-        taken = {name: own.get(name, fact) for name, fact in facts.items() if name != "currency"}
-        return cls(
-            currency=str(own.get("currency", facts["currency"]["name"])),
-            ranges={
-                name: Range(float(it["low"]), float(it["value"]), float(it["high"]))
-                for name, it in taken.items()
-            },
-            sources={name: str(it["source"]) for name, it in taken.items()},
-        )
+        of_currencies = facts.pop("currency")
+        currency = str(own.get("currency", of_currencies["name"]))
+        rate = own.get("currency_per_usd") or of_currencies["per_usd"][currency]
+        per_usd, converted = _range(rate), f"{rate['value']:g} {currency} per USD: {rate['source']}"
+        ranges, sources = {}, {}
+        for name, fact in facts.items():
+            figure = own.get(name, fact)
+            ranges[name], sources[name] = _range(figure), str(figure["source"])
+            if name not in own and not name.endswith(NO_MONEY) and currency != "USD":
+                ranges[name] = ranges[name].times(per_usd)
+                sources[name] += f"; {converted}"
+        return cls(currency, ranges, sources, frozenset(facts.keys() - own.keys()))
 
 
 @dataclass(frozen=True)
@@ -99,23 +110,53 @@ def trip_j(point: Point) -> Range:
     )
 
 
+def composition(point: Point, day_of: Day, fleet: Mapping[str, Any]) -> dict[str, float]:
+    """Energy of the fleet's day by its parts, in Wh at the central values.
+
+    Keys: ``estimates``, ``receiver``, and ``idle`` if the platform has a figure.
+    """
+    trips = fleet["vehicles"] * fleet["trips_per_day"]
+    energy = point.energy["value"]
+    parts = {
+        "estimates": energy.estimates_j * trips / 3600.0,
+        "receiver": energy.listening_j * trips / 3600.0,
+    }
+    return parts if day_of.idle_wh is None else {**parts, "idle": day_of.idle_wh.central}
+
+
 def _range(ends: Mapping[str, float]) -> Range:
-    return Range(ends["low"], ends["value"], ends["high"])
+    return Range(float(ends["low"]), float(ends["value"]), float(ends["high"]))
+
+
+def anchors(prices: Prices, road_m: float) -> Range:
+    """Number of UWB anchors along a road, low to high."""
+    spacing = prices.ranges["uwb_anchor_spacing_m"]
+    ends = (spacing.high, spacing.central, spacing.low)
+    return Range(*(float(math.ceil(road_m / it)) for it in ends))
 
 
 def ways(plant: _core.Plant, point: Point, prices: Prices) -> dict[str, Way]:
     """Money, energy and carbon of each way to localize the fleet, by its name.
 
-    The cells are there anyway, and so is what any of them costs; a remedy's price is its own.
+    The cells are there anyway and are not counted. Vehicles and infrastructure are on for the same
+    hours: those of the fleet. Every computer is counted with its price, production and idle power.
     """
     written = json.loads(plant.to_json())
+    road_m = along_route(plant.scenario())["along_m"].to_list()
     fleet, heads = written["fleet"], len(written["site"]["radio_heads"])
     common = {
         "currency": prices.currency,
         "grid_g_per_kwh": _ends(prices.ranges["grid_g_per_kwh"]),
         "electricity_per_kwh": _ends(prices.ranges["electricity_per_kwh"]),
-        "fleet": dict(fleet),
+        "fleet": {
+            **fleet,
+            "infrastructure_hours_per_day": fleet["hours_per_day"],
+            "infrastructure_days_per_year": fleet["days_per_year"],
+        },
     }
+    computer = _item(prices, "computer", embodied="computer_embodied_kg")
+    if point.idle_w is not None:
+        computer["power_w"] = _ends(_range(point.idle_w))
     receiver = _item(prices, "receiver", embodied="receiver_embodied_kg")
     ours = {"onboard": [receiver], "energy_j_per_trip": _ends(trip_j(point))}
     lidar = _item(prices, "lidar", power="lidar_power_w", embodied="lidar_embodied_kg")
@@ -129,17 +170,25 @@ def ways(plant: _core.Plant, point: Point, prices: Prices) -> dict[str, Way]:
     )
     found = {
         OURS: ours,
-        LIDAR: {"onboard": [lidar], "energy_j_per_trip": 0.0},
+        WITH_COMPUTER: {**ours, "onboard": [receiver, computer]},
+        LIDAR: {"onboard": [lidar, computer], "energy_j_per_trip": 0.0},
         ROADSIDE: {"infrastructure": [roadside], "energy_j_per_trip": 0.0},
+        UWB: {
+            "infrastructure": [
+                _item(
+                    prices,
+                    "uwb_anchor",
+                    units=_ends(anchors(prices, road_m[-1] - road_m[0])),
+                    power="uwb_anchor_power_w",
+                    embodied="uwb_anchor_embodied_kg",
+                )
+            ],
+            "onboard": [
+                _item(prices, "uwb_tag", power="uwb_tag_power_w", embodied="uwb_tag_embodied_kg")
+            ],
+            "energy_j_per_trip": 0.0,
+        },
     }
-    if point.idle_w is not None:
-        board = {
-            **_item(prices, "receiver"),
-            "name": "computer, idle",
-            "price": 0.0,
-            "power_w": _ends(_range(point.idle_w)),
-        }
-        found[WITH_IDLE] = {**ours, "onboard": [receiver, board]}
     return {
         name: balance({**common, "before": way, "after": way}).before for name, way in found.items()
     }
@@ -163,7 +212,7 @@ def _item(
     prices: Prices,
     name: str,
     *,
-    units: int = 1,
+    units: int | dict[str, float] = 1,
     yearly: str = "",
     power: str = "",
     embodied: str = "",

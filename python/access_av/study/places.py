@@ -14,7 +14,7 @@ from access_av import _core
 from access_av.run.error_bound import VISIBLE_SNR_DB, along_route
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -143,8 +143,9 @@ def radio_heads(scenario: _core.Scenario) -> list[Mapping[str, Any]]:
     return heads
 
 
-def worst_places(places: pl.DataFrame, stops_m: list[float]) -> list[WorstPlace]:
-    """The places of the largest errors, so far apart that they are not one place."""
+def worst_places(places: pl.DataFrame, plant: _core.Plant) -> list[WorstPlace]:
+    """The positions with the largest errors, at least :data:`APART_M` apart."""
+    written = json.loads(plant.to_json())
     left = places.sort("target_error_m", descending=True, maintain_order=True)
     found: list[WorstPlace] = []
     for row in left.iter_rows(named=True):
@@ -155,7 +156,7 @@ def worst_places(places: pl.DataFrame, stops_m: list[float]) -> list[WorstPlace]
                     x_m=row["x_m"],
                     y_m=row["y_m"],
                     error_m=row["target_error_m"],
-                    why=_why(row, places, stops_m),
+                    why=_why(row, places, written),
                 )
             )
         if len(found) == MOST_PLACES:
@@ -163,39 +164,102 @@ def worst_places(places: pl.DataFrame, stops_m: list[float]) -> list[WorstPlace]
     return found
 
 
-def _why(row: Mapping[str, Any], places: pl.DataFrame, stops_m: list[float]) -> str:
-    """What is particular about a place: of several reasons the weightiest."""
+def _why(row: Mapping[str, Any], places: pl.DataFrame, plant: Mapping[str, Any]) -> str:
+    """The most important particularity of a position."""
+    along_m = row["along_m"]
+    if along_m < places["along_m"][0] + STARTING_M:
+        return "the vehicle has just started, and its position is mostly the configured start"
     if not row["heads_visible"]:
-        return "no radio head is in reach and in sight: the odometer is alone"
-    if row["along_m"] < STARTING_M:
-        return "just set off: the vehicle knows its place mostly from what it is told at the start"
+        return f"no radio head is in reach and in sight{hiding(row, plant)}: only the odometer"
     if row["dilution_of_degree_m"] is None:
         return "every radio head in reach lies straight ahead or behind"
-    # The odometer carries the error of the way that was just driven.
-    here, usual = _carried(places, row["along_m"]), _usual(places)
+    if carried := _carried_over(row, places, plant):
+        return carried
+    here, usual = _carried(places, along_m), _usual(places)
     if here > MORE_THAN_USUAL * usual:
         return (
-            f"on the {CARRIED_M:g} m before, radio heads lie ahead, behind or far away: a degree "
-            f"of their angles is {here:.1f} m along the road, against {usual:.1f} m at the median "
-            "of the road"
+            f"on the last {CARRIED_M:g} m, radio heads lie ahead, behind or far away"
+            f"{hiding(row, plant)}: an angle error of one degree is {here:.1f} m along the road, "
+            f"{usual:.1f} m at the median of the road"
         )
     if row["heads_visible"] == 1:
-        return "one radio head alone is in reach"
+        return f"only one radio head is in reach and in sight{hiding(row, plant)}"
     if row["best_snr_db"] < WEAK_SNR_DB:
         return f"the strongest radio head is weak here ({row['best_snr_db']:.0f} dB)"
-    if any(0.0 <= row["along_m"] - stop_m < 2.0 * WINDOW_M for stop_m in stops_m):
-        return "at a stop: the error it arrives with stays as long as it stands"
+    for stop in plant["motion"]["stops"]:
+        if 0.0 <= along_m - stop["at_m"] < 2.0 * WINDOW_M:
+            name = f" “{stop['name']}”" if stop.get("name") else ""
+            return f"at the stop{name}: the error on arrival remains while the vehicle stands"
     bound = places["bound_m"].median()
     if isinstance(bound, float) and row["bound_m"] <= bound:
-        return "drives that happened to be bad here: what could be reached here is as elsewhere"
+        return "by chance in these drives: the Cramér–Rao bound is not larger than elsewhere"
     return (
-        "nothing particular in the geometry: errors of odometer, array and radio heads’ places, "
-        "as large as they are stated"
+        "no particular geometry: the specified errors of odometer, array and radio-head positions"
     )
 
 
+def _is_poor(row: Mapping[str, Any], usual_m: float) -> bool:
+    dilution_m = row["dilution_of_degree_m"]
+    return dilution_m is None or dilution_m > MORE_THAN_USUAL * usual_m
+
+
+def _carried_over(
+    row: Mapping[str, Any], places: pl.DataFrame, plant: Mapping[str, Any]
+) -> str | None:
+    """The explanation of an error that arose earlier; ``None`` where it arose here."""
+    usual_m = _usual(places)
+    if _is_poor(row, usual_m):
+        return None
+    before = pl.col("along_m").is_between(row["along_m"] - CARRIED_M, row["along_m"])
+    poor = [it for it in places.filter(before).iter_rows(named=True) if _is_poor(it, usual_m)]
+    if not poor:
+        return None
+    first, last = poor[0], poor[-1]
+    middle = poor[len(poor) // 2]
+    cause = (
+        "no radio head is in sight"
+        if not middle["heads_visible"]
+        else "radio heads lie ahead, behind or far away"
+    )
+    return (
+        f"carried over from the stretch {first['along_m']:.0f} to {last['along_m']:.0f} m, where "
+        f"{cause}{hiding(middle, plant)}; the geometry is good here, and the odometer retains the "
+        "error"
+    )
+
+
+def hiding(row: Mapping[str, Any], plant: Mapping[str, Any]) -> str:
+    """The named walls between a position and radio heads, in parentheses; empty without any."""
+    found = []
+    for number, head in enumerate(plant["site"]["radio_heads"], start=1):
+        ends = (row["x_m"], row["y_m"]), tuple(head["position_m"][:2])
+        walls = dict.fromkeys(
+            wall.get("name") or f"wall {index}"
+            for index, wall in enumerate(plant["site"].get("walls", []), start=1)
+            if any(
+                _cross(ends, corners)
+                for corners in zip(wall["points_m"][:-1], wall["points_m"][1:], strict=True)
+            )
+        )
+        if walls:
+            names = " and ".join(f"“{wall}”" for wall in walls)
+            found.append(f"{names} hides “{head['name'] or f'head {number}'}”")
+    return f" ({', '.join(found)})" if found else ""
+
+
+def _cross(one: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> bool:
+    """Whether two line segments cross."""
+
+    def side(ends: Sequence[Sequence[float]], point: Sequence[float]) -> float:
+        (ax, ay), (bx, by) = ends
+        return (bx - ax) * (point[1] - ay) - (by - ay) * (point[0] - ax)
+
+    parted = side(one, other[0]) * side(one, other[1]) < 0.0
+    return parted and side(other, one[0]) * side(other, one[1]) < 0.0
+
+
 def _carried(places: pl.DataFrame, along_m: float) -> float:
-    """Root mean square of the dilution on the way to a place."""
+    """Root mean square of the dilution on the stretch before a position."""
     before = pl.col("along_m").is_between(along_m - CARRIED_M, along_m)
     square = (pl.col("dilution_of_degree_m").filter(before) ** 2).mean().sqrt()
     found = places.select(square).item()
@@ -206,3 +270,33 @@ def _usual(places: pl.DataFrame) -> float:
     """The median of that over the road."""
     every = range(0, places.height, 10)
     return float(np.median([_carried(places, places["along_m"][place]) for place in every]))
+
+
+def radio_head_sides(scenario: _core.Scenario) -> pl.DataFrame:
+    """Side and distance of each radio head from the road, at the nearest point of the trip.
+
+    Returns
+    -------
+    polars.DataFrame
+        Columns ``name, along_m, side, distance_m``; ``side`` is ``left`` or ``right`` in the
+        direction of driving.
+    """
+    route = along_route(scenario)
+    x_m, y_m, along_m = (route[name].to_numpy() for name in ("x_m", "y_m", "along_m"))
+    _, x_m = _rising(along_m, x_m)
+    along_m, y_m = _rising(along_m, y_m)
+    rows = []
+    for number, head in enumerate(radio_heads(scenario), start=1):
+        dx, dy = head["position_m"][0] - x_m, head["position_m"][1] - y_m
+        nearest = int(np.hypot(dx, dy).argmin())
+        before, after = max(0, nearest - 1), min(len(x_m) - 1, nearest + 1)
+        turn = (x_m[after] - x_m[before]) * dy[nearest] - (y_m[after] - y_m[before]) * dx[nearest]
+        rows.append(
+            {
+                "name": head["name"] or f"head {number}",
+                "along_m": float(along_m[nearest]),
+                "side": "left" if turn > 0.0 else "right",
+                "distance_m": float(np.hypot(dx[nearest], dy[nearest])),
+            }
+        )
+    return pl.DataFrame(rows)

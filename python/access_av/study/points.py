@@ -1,9 +1,9 @@
-"""Operating points: estimator, wake-up and power mode, what no other beats, and which to take."""
+"""Operating points: estimator, wake-up and power mode, and the front of energy and error."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,84 +11,124 @@ import numpy as np
 from access_av.designs.front import not_beaten
 from access_av.device.platform import Platform
 from access_av.study.trips import EXTENTS, Driven, Energy, platform_name
+from access_av.study.verdicts import Judgement
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from access_av import _core
+    from access_av.device.platform import PowerMode
+    from access_av.study.targets import Targets
 
-# Wake-ups that are tried beside the vehicle's own, by what a table calls them.
+# Intervals of the fixed wake-ups that are simulated next to the vehicle's own wake-up, in ms.
 FIXED_MS = (200.0, 500.0, 1000.0)
-# An estimator that takes raw snapshots is tried where the vehicle knows the pilots.
+# Estimators that process raw snapshots are simulated without known pilots.
 METHODS = ("root-music", "esprit", "music")
+MODE_KEY = "vehicle.platform.mode"
+
+
+@dataclass(frozen=True)
+class Operation:
+    """Estimator and wake-up of a vehicle.
+
+    Attributes
+    ----------
+    name
+        Name in tables; ``as it is`` for the vehicle's own.
+    method, wake_up
+        In words.
+    settings
+        Keys of the scenario that differ from the vehicle's own, and their values.
+    """
+
+    name: str
+    method: str
+    wake_up: str
+    settings: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Point:
-    """One way to operate the vehicle.
+    """An operation in a power mode.
 
     Attributes
     ----------
     driven
-        Its drives; any power mode makes the same ones.
-    method, wake_up
-        In words.
+        Its drives; in this mode if ``simulated``, else in the vehicle's own mode.
+    operation
+        Estimator and wake-up.
     mode, mode_name
         The power mode.
+    simulated
+        Whether the drives are of this mode.
     energy
-        Of a trip by ``low``, ``value`` and ``high``.
+        Energy of a trip by ``low``, ``value`` and ``high``.
     idle_w
-        What the board draws in the mode whether or not it estimates; ``None`` without a figure.
+        Power of the idle board in this mode; ``None`` without a figure.
     error_m
-        The target's percentile of the horizontal error.
+        Percentile of the horizontal error that the target of the whole trip names.
+    judgement
+        Whether the drives meet all targets.
     """
 
     driven: Driven
-    method: str
-    wake_up: str
+    operation: Operation
     mode: int
     mode_name: str
+    simulated: bool
     energy: Mapping[str, Energy]
     idle_w: Mapping[str, float] | None
     error_m: float
+    judgement: Judgement
 
     @property
     def name(self) -> str:
         """Method, wake-up and mode."""
-        return f"{self.method}, {self.wake_up}, mode {self.mode} ({self.mode_name})"
+        return (
+            f"{self.operation.method}, {self.operation.wake_up}, mode {self.mode} "
+            f"({self.mode_name})"
+        )
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Keys of the scenario that select this point, and their values."""
+        return {**self.operation.settings, MODE_KEY: self.mode}
+
+    @property
+    def energy_j(self) -> float:
+        """Energy of a trip in joules, at the central values."""
+        return self.energy["value"].total_j
 
 
-def tried(scenario: _core.Scenario) -> dict[str, tuple[str, str, dict[str, Any]]]:
-    """Ways to operate, without power modes: by name, method and wake-up, and their settings.
-
-    The vehicle's own comes first, under the name ``as it is``.
-    """
+def operations(scenario: _core.Scenario) -> list[Operation]:
+    """Operations that a study simulates; the vehicle's own comes first."""
     vehicle = json.loads(scenario.resolved().vehicle.to_json())
     method, own = vehicle["estimator"]["method"], in_words(vehicle["wake_up"])
-    found: dict[str, tuple[str, str, dict[str, Any]]] = {"as it is": (method, own, {})}
+    found = [Operation("as it is", method, own, {})]
     period_ms = json.loads(scenario.site.to_json())["ssb"]["period_ms"]
     for interval_ms in FIXED_MS:
-        wake_up = {"policy": "fixed", "interval_ms": interval_ms}
-        if interval_ms >= period_ms and in_words(wake_up) != own:
-            name = in_words(wake_up)
-            found[name] = (method, name, {"vehicle.wake_up": wake_up})
-    if own != in_words({"policy": "uncertainty"}):
-        name = in_words({"policy": "uncertainty"})
-        found[name] = (method, name, {"vehicle.wake_up": {"policy": "uncertainty"}})
+        wake_up: dict[str, Any] = {"policy": "fixed", "interval_ms": interval_ms}
+        name = in_words(wake_up)
+        if interval_ms >= period_ms and name != own:
+            found.append(Operation(name, method, name, {"vehicle.wake_up": wake_up}))
+    wake_up = {"policy": "uncertainty"}
+    name = in_words(wake_up)
+    if own != name:
+        found.append(Operation(name, method, name, {"vehicle.wake_up": wake_up}))
     for other in METHODS:
         if other != method:
             settings = {"vehicle.estimator.method": other, "vehicle.receiver.pilots": "blind"}
-            found[other] = (other, own, settings)
+            found.append(Operation(other, other, own, settings))
     return found
 
 
 def in_words(wake_up: Mapping[str, Any]) -> str:
-    """When a vehicle wakes up, in words."""
+    """A wake-up policy in words."""
     if wake_up["policy"] == "fixed":
         interval_ms = wake_up.get("interval_ms")
-        return "as fast as it can" if interval_ms is None else f"every {interval_ms:g} ms"
+        return "as often as possible" if interval_ms is None else f"every {interval_ms:g} ms"
     named = {
-        "uncertainty": "when its own error asks for it",
+        "uncertainty": "by the vehicle's own error",
         "pid": "by Algorithm 1",
         "gated": "gated by SNR",
     }
@@ -96,51 +136,64 @@ def in_words(wake_up: Mapping[str, Any]) -> str:
     return named.get(policy, policy)
 
 
-def points(drives: Sequence[tuple[str, str, Driven]], percent: float) -> list[Point]:
-    """Every driven way in every power mode that has a figure for it.
+def mode_groups(scenario: _core.Scenario) -> list[list[PowerMode]]:
+    """Power modes of the vehicle's platform, together where the vehicle drives identically.
 
-    A mode in which an estimate takes longer than from one SSB to the next would drive otherwise,
-    and is left out.
-
-    Parameters
-    ----------
-    drives
-        Method, wake-up and drives of each.
-    percent
-        The target's percentile.
+    A mode changes a drive by the wake-up times that the vehicle leaves to the platform, and by the
+    energy of a wake-up relative to an estimate. Modes without a figure for the method are left
+    out, and modes in which an estimate takes longer than the period of the SSBs.
     """
-    found = []
-    for method, wake_up, driven in drives:
-        error_m = driven.percentile(percent).value
-        scenario = driven.scenario
-        platform = Platform.load(platform_name(scenario))
-        period_s = json.loads(scenario.site.to_json())["ssb"]["period_ms"] * 1e-3
-        for mode in platform.modes:
-            in_mode = scenario.with_overrides({"vehicle.platform.mode": mode.number})
-            energy = _with(driven, in_mode).energy(platform)
-            if energy is None or platform.core.base_wake_up_s(in_mode.vehicle) > period_s:
-                continue
-            found.append(
-                Point(
-                    driven=driven,
-                    method=method,
-                    wake_up=wake_up,
-                    mode=mode.number,
-                    mode_name=mode.name,
-                    energy=energy,
-                    idle_w=idle_w(platform, mode.number),
-                    error_m=error_m,
-                )
-            )
-    return found
+    platform = Platform.load(platform_name(scenario))
+    period_s = json.loads(scenario.site.to_json())["ssb"]["period_ms"] * 1e-3
+    found: dict[str, list[PowerMode]] = {}
+    for mode in platform.modes:
+        vehicle = scenario.with_overrides({MODE_KEY: mode.number}).vehicle
+        parts = platform.core.energy_j(vehicle, 1, 1, 1.0)
+        if parts is None or platform.core.base_wake_up_s(vehicle) > period_s:
+            continue
+        resolved = json.loads(vehicle.resolved(platform.core).to_json())
+        del resolved["platform"]["mode"]
+        wake_up = resolved["wake_up"]
+        asks = wake_up["policy"] == "uncertainty" and wake_up.get("wake_up_cost") is None
+        cost = round(parts[1] / parts[0], 9) if asks and parts[0] > 0.0 else None
+        found.setdefault(json.dumps([resolved, cost], sort_keys=True), []).append(mode)
+    return list(found.values())
 
 
-def _with(driven: Driven, scenario: _core.Scenario) -> Driven:
-    return replace(driven, scenario=scenario)
+def own_mode(scenario: _core.Scenario) -> int:
+    """The power mode of a scenario's vehicle."""
+    return int(json.loads(scenario.vehicle.to_json())["platform"]["mode"])
+
+
+def point(
+    driven: Driven,
+    operation: Operation,
+    mode: PowerMode,
+    targets: Targets,
+    *,
+    simulated: bool,
+) -> Point:
+    """Drives of an operation in a power mode, with their energy there."""
+    in_mode = driven.scenario.with_overrides({MODE_KEY: mode.number})
+    platform = Platform.load(platform_name(in_mode))
+    energy = driven.in_scenario(in_mode).energy(platform)
+    if energy is None:  # such modes are in no group
+        raise RuntimeError(f"mode {mode.number} has no figure of energy")
+    return Point(
+        driven=driven,
+        operation=operation,
+        mode=mode.number,
+        mode_name=mode.name,
+        simulated=simulated,
+        energy=energy,
+        idle_w=idle_w(platform, mode.number),
+        error_m=driven.percentile(targets.each[0].percent).value,
+        judgement=targets.judgement(driven),
+    )
 
 
 def idle_w(platform: Platform, number: int) -> dict[str, float] | None:
-    """What a board draws in a mode whether or not anything is estimated, low to high, in watts."""
+    """Power of an idle board in a mode in watts, low to high; ``None`` without a figure."""
     written = json.loads(platform.core.to_json())
     [mode] = [mode for mode in written["modes"] if mode["mode"] == number]
     figure = mode.get("idle_power_w") or written.get("idle", {}).get("power_w")
@@ -152,18 +205,25 @@ def idle_w(platform: Platform, number: int) -> dict[str, float] | None:
 
 
 def front(found: Sequence[Point]) -> list[int]:
-    """Places of the points that no other beats in energy and error, by energy."""
+    """Indices of the points that no other exceeds in both energy and error, by energy."""
     if not found:
         return []
-    energy_j = np.array([point.energy["value"].total_j for point in found])
+    energy_j = np.array([point.energy_j for point in found])
     error_m = np.array([point.error_m for point in found])
     return [int(place) for place in not_beaten(energy_j, error_m) if np.isfinite(error_m[place])]
 
 
-def recommended(found: Sequence[Point], error_m: float) -> int | None:
-    """Of the front the one of least energy that keeps the target; where none does, the best one."""
+def recommended(found: Sequence[Point]) -> int | None:
+    """Index of the point of the front with the least energy that meets all targets.
+
+    Points that meet them with 95 % confidence come before those that probably meet them. Where
+    none does: the most accurate point of the front.
+    """
     on_front = front(found)
     if not on_front:
         return None
-    keeping = [place for place in on_front if found[place].error_m <= error_m]
-    return keeping[0] if keeping else min(on_front, key=lambda place: found[place].error_m)
+    for judgements in ((Judgement.MET,), (Judgement.MET, Judgement.PROBABLY_MET)):
+        holding = [place for place in on_front if found[place].judgement in judgements]
+        if holding:
+            return holding[0]
+    return min(on_front, key=lambda place: found[place].error_m)

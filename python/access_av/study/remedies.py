@@ -1,4 +1,4 @@
-"""What could mend a plant's error: each a change of site or vehicle, with what it costs."""
+"""Measures that could reduce a plant's error: changes of site or vehicle, and their prices."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class Remedy:
     settings
         The keys of the scenario that it changes, and their values.
     price
-        Which of the plant's prices it is.
+        Key of the plant's price of one unit.
     units
-        How often that is paid.
+        Number of units.
     """
 
     name: str
@@ -45,6 +45,10 @@ class Remedy:
     settings: Mapping[str, Any]
     price: str
     units: int
+
+    def applied(self, scenario: _core.Scenario) -> _core.Scenario:
+        """A scenario with this change."""
+        return scenario.with_overrides(dict(self.settings))
 
 
 def remedies(scenario: _core.Scenario, vehicles: int) -> list[Remedy]:

@@ -12,15 +12,16 @@ import polars as pl
 from access_av.device.platform import Platform
 from access_av.run.pairs import Errors
 from access_av.run.simulation import simulate
+from access_av.statistics.integrity import Integrity
 from access_av.statistics.proportions import clopper_pearson
+from access_av.study.verdicts import NotOk
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from access_av import _core
-    from access_av.statistics.integrity import Integrity
 
 # Errors are kept this often: a vehicle moves less than its own width meanwhile.
 KEPT_EVERY_S = 0.1
@@ -65,6 +66,8 @@ class Driven(Errors):
         Angle estimates, and SSB bursts listened to, of each run.
     integrity
         Counts of states and of errors beyond the protection level; ``None`` without a monitor.
+    seeds
+        Seed of each run.
     """
 
     scenario: _core.Scenario
@@ -73,6 +76,7 @@ class Driven(Errors):
     executions: NDArray[np.int64]
     listened: NDArray[np.int64]
     integrity: Integrity | None
+    seeds: NDArray[np.int64]
     has_own_estimator: bool = False
     own_energy_j: float | None = None
 
@@ -85,6 +89,19 @@ class Driven(Errors):
     def ok_share(self) -> float | None:
         """Share of the time in state ``ok``; ``None`` without an integrity monitor."""
         return None if self.state_shares is None else float(self.state_shares["ok"])
+
+    @property
+    def not_ok_shares(self) -> Mapping[NotOk, float] | None:
+        """Share of the time by reason why the state is not ``ok``; ``None`` without a monitor."""
+        if self.integrity is None:
+            return None
+        counts = {name: float(it.sum()) for name, it in self.integrity.by_run.items()}
+        epochs = counts["ok"] + counts["degraded"] + counts["unavailable"]
+        return {
+            NotOk.LEVEL: counts["too_wide"] / epochs,
+            NotOk.SUSPECTED: (counts["degraded"] - counts["too_wide"]) / epochs,
+            NotOk.CONTRADICTED: counts["unavailable"] / epochs,
+        }
 
     @property
     def exceedances(self) -> int | None:
@@ -107,23 +124,44 @@ class Driven(Errors):
             levels_m=self.levels_m[:runs],
             executions=self.executions[:runs],
             listened=self.listened[:runs],
+            seeds=self.seeds[:runs],
+            integrity=_of_runs(self.integrity, slice(runs)),
+        )
+
+    def in_scenario(self, scenario: _core.Scenario) -> Driven:
+        """These drives under another scenario that drives identically."""
+        return replace(self, scenario=scenario)
+
+    def named(self, name: str) -> Driven:
+        """These drives under another name."""
+        return replace(self, name=name)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Driven]) -> Driven:
+        """The drives of several seeds of one scenario together."""
+        of_parts = [it.integrity for it in parts if it.integrity is not None]
+        return replace(
+            parts[0],
+            errors_m=np.concatenate([it.errors_m for it in parts]),
+            levels_m=np.concatenate([it.levels_m for it in parts]),
+            executions=np.concatenate([it.executions for it in parts]),
+            listened=np.concatenate([it.listened for it in parts]),
+            seeds=np.concatenate([it.seeds for it in parts]),
+            integrity=_together(of_parts) if len(of_parts) == len(parts) else None,
+        )
+
+    def between(self, first: int, last: int) -> Errors:
+        """Errors of the epochs from ``first`` to before ``last``: a part of each drive."""
+        share = (last - first) / self.errors_m.shape[1]
+        return Errors(
+            name=self.name,
+            errors_m=self.errors_m[:, first:last],
+            duration_s=share * self.duration_s,
         )
 
     def within(self, error_m: float) -> tuple[float, float, float]:
-        """Share of the time within an error, and the ends of its 95 % interval.
-
-        The wider, at each end, of the bootstrap over whole drives, and of Clopper and Pearson's for
-        as many independent positions as there are.
-        """
-        shares = (self.errors_m <= error_m).mean(axis=1)
-        share = float(shares.mean())
-        low, high = clopper_pearson(int(share * self.independent), self.independent)
-        if self.runs > 1:
-            rng = np.random.default_rng(0)
-            drawn = rng.integers(0, self.runs, (2000, self.runs))
-            least, most = np.quantile(shares[drawn].mean(axis=1), [0.025, 0.975])
-            low, high = min(low, float(least)), max(high, float(most))
-        return share, low, max(high, share)
+        """Share of the time within an error, and the ends of its 95 % interval."""
+        return share_within(self, error_m)
 
     def energy(self, platform: Platform | None = None) -> dict[str, Energy] | None:
         """Energy of a trip by ``low``, ``value`` and ``high``; ``None`` without a figure."""
@@ -154,16 +192,64 @@ class Driven(Errors):
         ).with_columns(pl.col("protection_level_m").fill_nan(None))
 
     def drives(self) -> pl.DataFrame:
-        """One row per drive: columns ``variant, run, executions, listened, duration_s``."""
+        """One row per drive: columns ``study_drives`` of :mod:`access_av.columns`."""
+        counts = {} if self.integrity is None else self.integrity.by_run
+
+        def column(name: str, minus: str = "") -> pl.Series:
+            if name not in counts:
+                return pl.Series([None] * self.runs, dtype=pl.Int64)
+            found = counts[name] - counts[minus] if minus else counts[name]
+            return pl.Series(np.asarray(found), dtype=pl.Float64).cast(pl.Int64)
+
         return pl.DataFrame(
             {
                 "variant": [self.name] * self.runs,
                 "run": np.arange(self.runs, dtype=np.uint32),
+                "seed": self.seeds,
                 "executions": self.executions,
                 "listened": self.listened,
                 "duration_s": [self.duration_s] * self.runs,
+                "is_lost": self.lost,
+                "ok_steps": column("ok"),
+                "level_steps": column("too_wide"),
+                "suspected_steps": column("degraded", "too_wide"),
+                "unavailable_steps": column("unavailable"),
+                "exceedances": column("beyond"),
             }
         )
+
+
+def share_within(driven: Errors, error_m: float) -> tuple[float, float, float]:
+    """Share of the time within an error, and the ends of its 95 % interval.
+
+    The wider, at each end, of the bootstrap over whole drives, and of Clopper and Pearson's for
+    the number of independent positions.
+    """
+    shares = (driven.errors_m <= error_m).mean(axis=1)
+    share = float(shares.mean())
+    low, high = clopper_pearson(int(share * driven.independent), driven.independent)
+    if driven.runs > 1:
+        rng = np.random.default_rng(0)
+        drawn = rng.integers(0, driven.runs, (2000, driven.runs))
+        least, most = np.quantile(shares[drawn].mean(axis=1), [0.025, 0.975])
+        low, high = min(low, float(least)), max(high, float(most))
+    return share, low, max(high, share)
+
+
+def _of_runs(found: Integrity | None, runs: slice) -> Integrity | None:
+    if found is None:
+        return None
+    counts = {name: it[runs] for name, it in found.by_run.items()}
+    return Integrity.of_runs(counts, found.median_level_over_error)
+
+
+def _together(parts: Sequence[Integrity]) -> Integrity:
+    counts = {
+        name: np.concatenate([np.asarray(it.by_run[name]) for it in parts])
+        for name in parts[0].by_run
+    }
+    ratio = float(np.average([it.median_level_over_error for it in parts]))
+    return Integrity.of_runs(counts, ratio)
 
 
 def drive(
@@ -202,6 +288,7 @@ def drive(
         listened=found.runs["listened"].to_numpy().astype(np.int64),
         duration_s=float(time_s[-1]),
         integrity=found.integrity,
+        seeds=np.full(runs, seed, dtype=np.int64),
         has_own_estimator="estimator" in (plug_ins or {}),
         own_energy_j=_mean(found.runs["energy_j"]),
     )

@@ -1,72 +1,116 @@
-"""What a study's figures hang on that nobody at the plant has stated, ranked by its effect."""
+"""Values that a plant shares with the template, and their effect on the reachable error."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from pathlib import Path
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from access_av import _core
 from access_av.run.error_bound import along_route
-from access_av.tables import toml
+from access_av.site_files.templates import new
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from access_av import _core
+ODOMETER = ("scale_std", "noise_m_per_sqrt_m")
+ARRAY = ("mounting_std_rad", "phase_std_rad")
+# Keys without an effect on the error that a new plant shares with the template, and their units.
+OTHERS = {
+    "target": "",
+    "site.road.segments": "",
+    "site.carrier_mhz": "MHz",
+    "fleet.vehicles": "",
+    "fleet.hours_per_day": "h",
+    "fleet.trips_per_day": "",
+    "fleet.days_per_year": "",
+    "fleet.years": "",
+}
 
 
 @dataclass(frozen=True)
-class Unstated:
-    """A value that the plant's own files do not state.
+class Unverified:
+    """A value that is equal to the template's or the default.
 
     Attributes
     ----------
     key
-        Where to state it.
+        Key in the plant's file.
     what
-        What is taken instead, in words.
+        The value in words.
     otherwise
-        What it could be as well, in words.
+        A plausible alternative in words; empty without an effect on the error.
     effect
-        By what factor the bound of the error (90th percentile along the road) is then larger.
+        Bound of the error (90th percentile along the road) with the alternative over that with the
+        value; ``None`` where the key has no effect on it.
     """
 
     key: str
     what: str
     otherwise: str
-    effect: float
+    effect: float | None
 
 
-def unstated(scenario: _core.Scenario, plant: str) -> list[Unstated]:
-    """Every value taken from a shipped file or by default, the weightiest first.
+def unverified(plant: _core.Plant) -> list[Unverified]:
+    """Values that are equal to the template's or the default, the most influential first.
 
-    By the posterior Cramér-Rao bound, in which each is worse by itself: what is stated there has to
-    be looked up first.
-
-    Parameters
-    ----------
-    scenario
-        A trip of the plant.
-    plant
-        Path of the plant's file; of a shipped one nothing is stated.
+    The effect is that on the posterior Cramér–Rao bound, each value changed alone. Whether a value
+    was written to the file or left out does not matter: a plant that was loaded from a path and the
+    same plant as an object have the same values.
     """
-    stated = _stated(Path(plant))
+    mine, template = json.loads(plant.to_json()), _template()
+    scenario = plant.scenario()
     before_m = _p90_m(scenario)
     found = []
-    for key, what, otherwise, settings in _candidates(scenario):
-        if not _has(stated, key):
-            after_m = _p90_m(scenario.with_overrides(settings))
-            found.append(Unstated(key, what, otherwise, after_m / before_m))
-    return sorted(found, key=lambda one: -one.effect)
+    for key, what, otherwise, settings in _candidates(mine["site"], mine["vehicle"]):
+        if not _is_shared(mine, template, key):
+            continue
+        after_m = _p90_m(scenario.with_overrides(settings))
+        found.append(Unverified(key, what, otherwise, after_m / before_m))
+    found.sort(key=lambda one: -(one.effect or 0.0))
+    for key, unit in OTHERS.items():
+        if _is_shared(mine, template, key):
+            value = _at(mine, key)
+            what = "as in the template" if isinstance(value, list) else f"{value} {unit}".strip()
+            found.append(Unverified(key, what, "", None))
+    return found
+
+
+@cache
+def _template() -> Mapping[str, Any]:
+    plant = _core.Plant.from_toml(new("plant", "template", "template"), "template")
+    written: Mapping[str, Any] = json.loads(plant.to_json())
+    return written
+
+
+def _at(held: Any, key: str) -> Any:
+    for name in key.split("."):
+        held = held.get(name) if isinstance(held, dict) else None
+    return held
+
+
+def _is_shared(mine: Mapping[str, Any], template: Mapping[str, Any], key: str) -> bool:
+    """Whether a plant has the template's value; of radio heads, whether one of them has it."""
+    place, _, name = key.rpartition(".")
+    if place == "site.radio_heads":
+        values = {head[name] for head in template["site"]["radio_heads"]}
+        return any(head[name] in values for head in mine["site"]["radio_heads"])
+    if place == "vehicle":
+        shared = {"odometer": ODOMETER, "array": ARRAY}[name]
+        return all(_at(mine, f"{key}.{one}") == _at(template, f"{key}.{one}") for one in shared)
+    value = _at(mine, key)
+    return value is not None and value == _at(template, key)
 
 
 def _p90_m(scenario: _core.Scenario) -> float:
     return float(along_route(scenario)["bound_m"].quantile(0.9, "linear") or 0.0)
 
 
-def _candidates(scenario: _core.Scenario) -> list[tuple[str, str, str, dict[str, Any]]]:
-    site, vehicle = (json.loads(part.to_json()) for part in (scenario.site, scenario.vehicle))
+def _candidates(
+    site: Mapping[str, Any], vehicle: Mapping[str, Any]
+) -> list[tuple[str, str, str, dict[str, Any]]]:
+    """Values with an effect on the error: key, value in words, alternative, and its settings."""
     heads, odometer, array = site["radio_heads"], vehicle["odometer"], vehicle["array"]
     found = [
         (
@@ -77,7 +121,7 @@ def _candidates(scenario: _core.Scenario) -> list[tuple[str, str, str, dict[str,
         ),
         (
             "site.radio_heads.eirp_dbm",
-            f"radio heads radiate {_span(heads, 'eirp_dbm')} dBm",
+            f"radio heads radiate {_span(heads, 'eirp_dbm')} dBm (EIRP)",
             "6 dB less",
             {
                 f"site.radio_heads[{index}].eirp_dbm": head["eirp_dbm"] - 6.0
@@ -86,8 +130,8 @@ def _candidates(scenario: _core.Scenario) -> list[tuple[str, str, str, dict[str,
         ),
         (
             "site.radio_heads.position_std_m",
-            f"radio heads’ places known to {_span(heads, 'position_std_m')} m",
-            "three times worse, 0.3 m at least",
+            f"positions of the radio heads known to {_span(heads, 'position_std_m')} m (σ)",
+            "three times this value, at least 0.3 m",
             {
                 f"site.radio_heads[{index}].position_std_m": max(0.3, 3.0 * head["position_std_m"])
                 for index, head in enumerate(heads)
@@ -95,24 +139,17 @@ def _candidates(scenario: _core.Scenario) -> list[tuple[str, str, str, dict[str,
         ),
         (
             "vehicle.odometer",
-            f"odometer’s scale known to {100.0 * odometer['scale_std']:g} %, noise of "
-            f"{odometer['noise_m_per_sqrt_m']:g} m per root of a metre",
-            "twice as large",
-            {
-                f"vehicle.odometer.{key}": 2.0 * odometer[key]
-                for key in ("scale_std", "noise_m_per_sqrt_m")
-            },
+            f"scale of the odometer known to {100.0 * odometer['scale_std']:g} % (σ), noise of "
+            f"{odometer['noise_m_per_sqrt_m']:g} m per √m",
+            "twice this value",
+            {f"vehicle.odometer.{key}": 2.0 * odometer[key] for key in ODOMETER},
         ),
         (
             "vehicle.array",
-            f"antennas’ mounting known to {array.get('mounting_std_rad', 0.0):g} rad, phases to "
-            f"{array.get('phase_std_rad', 0.0):g} rad",
-            "twice as large",
-            {
-                f"vehicle.array.{key}": 2.0 * array[key]
-                for key in ("mounting_std_rad", "phase_std_rad")
-                if array.get(key)
-            },
+            f"mounting of the antennas known to {array.get('mounting_std_rad', 0.0):g} rad (σ), "
+            f"phases to {array.get('phase_std_rad', 0.0):g} rad",
+            "twice this value",
+            {f"vehicle.array.{key}": 2.0 * array[key] for key in ARRAY if array.get(key)},
         ),
         (
             "site.ssb.period_ms",
@@ -127,25 +164,3 @@ def _candidates(scenario: _core.Scenario) -> list[tuple[str, str, str, dict[str,
 def _span(heads: list[dict[str, Any]], key: str) -> str:
     values = sorted({head[key] for head in heads})
     return f"{values[0]:g}" if len(values) == 1 else f"{values[0]:g} to {values[-1]:g}"
-
-
-def _stated(plant: Path) -> Mapping[str, Any]:
-    """What the plant's own files state: the plant's, and those of its own that it names."""
-    if not plant.is_file():
-        return {}
-    found = dict(toml.read(plant))
-    for kind in ("site", "vehicle"):
-        named = found.get(kind)
-        if isinstance(named, str):
-            beside = plant.parent / named
-            found[kind] = toml.read(beside) if beside.is_file() else {}
-    return found
-
-
-def _has(stated: Any, key: str) -> bool:
-    head, _, rest = key.partition(".")
-    if isinstance(stated, list):
-        return bool(stated) and all(_has(item, key) for item in stated)
-    if not isinstance(stated, dict) or head not in stated:
-        return False
-    return _has(stated[head], rest) if rest else True

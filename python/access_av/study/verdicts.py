@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from enum import Enum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 
 class Judgement(Enum):
@@ -12,6 +16,40 @@ class Judgement(Enum):
     PROBABLY_MET = "probably_met"
     PROBABLY_MISSED = "probably_missed"
     MISSED = "missed"
+
+    @classmethod
+    def of(cls, share: tuple[float, float, float], percent: float) -> Judgement:
+        """Judgement by a share of the time, the ends of its 95 % interval, and the target's share.
+
+        Examples
+        --------
+        >>> Judgement.of((0.97, 0.94, 0.99), 95.0), Judgement.of((0.97, 0.96, 0.99), 95.0)
+        (<Judgement.PROBABLY_MET: 'probably_met'>, <Judgement.MET: 'met'>)
+        """
+        value, low, high = share
+        required = 0.01 * percent
+        if low >= required:
+            return cls.MET
+        if high < required:
+            return cls.MISSED
+        return cls.PROBABLY_MET if value >= required else cls.PROBABLY_MISSED
+
+    @classmethod
+    def of_all(cls, each: Iterable[Judgement]) -> Judgement:
+        """Judgement of several targets together: that of the least fulfilled one.
+
+        Examples
+        --------
+        >>> Judgement.of_all([Judgement.MET, Judgement.PROBABLY_MISSED])
+        <Judgement.PROBABLY_MISSED: 'probably_missed'>
+        """
+        order = list(cls)
+        return max(each, key=order.index)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the estimated share meets the target, with or without 95 % confidence."""
+        return self in (Judgement.MET, Judgement.PROBABLY_MET)
 
     @property
     def words(self) -> str:
@@ -68,6 +106,33 @@ class Effect(Enum):
         return cls.HARMS if low > 0.0 else cls.UNCERTAIN
 
 
+class NotOk(Enum):
+    """Reason why a state is not ``ok``; the value stands in `study.json`."""
+
+    LEVEL = "level"
+    SUSPECTED = "suspected"
+    CONTRADICTED = "contradicted"
+
+    @property
+    def words(self) -> str:
+        """The wording for reports.
+
+        Examples
+        --------
+        >>> NotOk.LEVEL.words
+        'level above the alert limit'
+        """
+        return _REASONS[self]
+
+
+class Agreement(Enum):
+    """Whether two seeds recommend one operating point; the value stands in `study.json`."""
+
+    AGREED = "agreed"
+    EQUIVALENT = "equivalent"
+    UNDECIDED = "undecided"
+
+
 _JUDGEMENTS = {
     Judgement.MET: ("good enough", "yes"),
     Judgement.PROBABLY_MET: ("probably good enough", "fit"),
@@ -78,4 +143,9 @@ _EFFECTS = {
     Effect.HELPS: ("helps", "yes"),
     Effect.UNCERTAIN: ("not sure", "fit"),
     Effect.HARMS: ("makes it worse", "no"),
+}
+_REASONS = {
+    NotOk.LEVEL: "level above the alert limit",
+    NotOk.SUSPECTED: "suspected fault",
+    NotOk.CONTRADICTED: "position lost",
 }

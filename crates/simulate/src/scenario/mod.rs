@@ -18,6 +18,7 @@ pub use channel::{BlockageSettings, ChannelModel, ChannelSettings, HallSettings,
 pub use faults::{FaultKind, FaultSettings};
 pub use iq::IqSettings;
 pub use motion::{MotionSettings, StopSettings};
+pub use place_target::PlaceTarget;
 pub use plant::{Fleet, Plant, Prices};
 pub use price::Price;
 pub use scenario_file::{Fidelity, Scenario};

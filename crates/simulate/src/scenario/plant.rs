@@ -306,7 +306,7 @@ impl Plant {
     /// [`SettingsError`] only where the plant has been changed by hand into an impossible one.
     pub fn warnings(&self) -> Result<Vec<Warning>, SettingsError> {
         let mut found = self.scenario(&self.channel).warnings()?;
-        found.extend(unusual_prices::of_plant(self));
+        found.extend(unusual_prices::of_plant(self, self.currency()));
         Ok(found)
     }
 

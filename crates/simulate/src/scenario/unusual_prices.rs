@@ -1,13 +1,13 @@
 //! Implausible prices, emission factors and powers of a plant.
 
+use serde::Serialize;
+
 use onboard::plausible::{Usual, Warning, as_millimetres, rounded, unusual};
 
-use super::plant::Plant;
-
 /// Returns warnings about implausible figures of `[prices]`.
-pub(super) fn of_plant(plant: &Plant) -> Vec<Warning> {
+pub(super) fn of_plant(plant: &impl Serialize, currency: &str) -> Vec<Warning> {
     let mut found = unusual(plant, FACTORS);
-    if LIKE_DOLLARS.contains(&plant.currency()) {
+    if LIKE_DOLLARS.contains(&currency) {
         found.extend(unusual(plant, PRICES));
     }
     found

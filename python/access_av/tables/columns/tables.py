@@ -324,7 +324,27 @@ TABLES: Mapping[str, Table] = {
             "study_drives",
             "A run of a study",
             "`drives.parquet` of `access-av study`",
-            ("variant", "run", "executions", "listened", "duration_s"),
+            (
+                "variant", "run", "seed", "executions", "listened", "duration_s", "is_lost",
+                "ok_steps", "level_steps", "suspected_steps", "unavailable_steps", "exceedances",
+            ),
+            dict.fromkeys(
+                (
+                    "ok_steps", "level_steps", "suspected_steps", "unavailable_steps",
+                    "exceedances",
+                ),
+                "no integrity monitor",
+            ),
+        ),
+        Table(
+            "study_targets",
+            "A target of a plant, on its stretch of the road",
+            "`targets.parquet` of `access-av study`",
+            (
+                "variant", "target", "from_m", "to_m", "required_error_m", "percent",
+                "target_error_m", "target_error_low_m", "target_error_high_m", "within_share",
+                "within_low_share", "within_high_share", "judgement",
+            ),
         ),
         Table(
             "places",
@@ -347,7 +367,8 @@ TABLES: Mapping[str, Table] = {
             "A configuration of the vehicle in a power mode",
             "`points.parquet` of `access-av study`",
             (
-                "variant", "method", "wake_up", "mode", "mode_name", "target_error_m",
+                "variant", "runs", "method", "wake_up", "mode", "mode_name", "is_simulated",
+                "target_error_m", "judgement",
                 *(
                     f"{part}_{extent}_j"
                     for part in ("estimates", "listening", "idle")

@@ -1,0 +1,228 @@
+"""Sections of the page of a study on the operating point and the costs."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from typing import TYPE_CHECKING
+
+from access_av.report.parts import badge, figure, section, table
+from access_av.report.study_parts import (
+    digits,
+    ends,
+    joules_range,
+    lost,
+    ok,
+    sources,
+    watts,
+)
+from access_av.run.assumptions import energy_boundary
+from access_av.study import economy
+from access_av.study.operate import MATTERS_SHARE
+from access_av.study.verdicts import Agreement
+
+if TYPE_CHECKING:
+    from access_av.study.points import Point
+    from access_av.study.study_result import Study
+
+
+def operation_section(study: Study) -> str:
+    """The recommended operating point, its rivals, and its energy."""
+    point, day = study.point, study.day
+    if point is None or day is None:
+        return section("How to operate it", "The vehicle’s platform has no figure of energy.", "")
+    boundary = energy_boundary(point.driven.scenario) or "unstated"
+    found = point.driven.percentile(study.percent)
+    text = (
+        f"Recommended: {point.name}. {study.percent:g} % of the errors are within "
+        f"{found.value:.3f} m ({found.interval} m, {point.driven.runs} drives with two seeds); a "
+        f"trip takes {joules_range(economy.trip_j(point))}, the fleet’s day "
+        f"{ends(day.trips_wh)} Wh. Boundary: {boundary}; low to high. {_agreement(study)}"
+    )
+    keys = [(f"<code>{escape(key)}</code>", escape(json.dumps(value))) for key, value in
+            point.settings.items()]  # fmt: skip
+    return section(
+        "How to operate it",
+        text,
+        "<p>recommended.toml next to this page contains this operating point: "
+        "<code>access-av run recommended.toml</code> simulates it. Its keys:</p>"
+        + table(("Key", "Value"), keys)
+        + _rivals(study)
+        + _composition(study, point, day)
+        + figure("ways", "Each power mode of each operation; dashed: the target.")
+        + _points(study),
+    )
+
+
+def _agreement(study: Study) -> str:
+    """Whether the seeds agree, in words."""
+    named = " and ".join(f"“{it}”" for it in dict.fromkeys(study.recommendation.by_seed))
+    match study.recommendation.agreement:
+        case Agreement.AGREED:
+            return "Two seeds recommend the same point."
+        case Agreement.EQUIVALENT:
+            return (
+                f"Two seeds recommend {named}; the difference does not matter: the errors are "
+                f"equal with 95 % confidence, and the energy of the fleet’s day differs by less "
+                f"than {MATTERS_SHARE:.0%}."
+            )
+        case Agreement.UNDECIDED:
+            return f"Two seeds recommend {named}: these drives do not decide; --runs adds drives."
+
+
+def _rivals(study: Study) -> str:
+    rows = []
+    for it in study.recommendation.rivals:
+        delta, low, high = it.delta_m
+        rows.append(
+            (
+                escape(it.point.name),
+                lost(it.point.driven),
+                f"{it.point.error_m:.3f} m",
+                f"{delta:+.3f} m",
+                f"{low:+.3f} to {high:+.3f} m",
+                f"{it.delta_j:+.3g} J",
+                "–" if it.day_share is None else f"{100.0 * it.day_share:+.2g} %",
+                badge("equivalent", "fit")
+                if it.is_equivalent
+                else badge(it.point.judgement.words, it.point.judgement.badge),
+            )
+        )
+    if not rows:
+        return ""
+    head = (
+        "Rival", "Lost drives", f"{study.percent:g} % within", "error difference", "interval",
+        "energy difference, a trip", "of the fleet’s day", "",
+    )  # fmt: skip
+    return (
+        "<h3>Rivals of the recommended point</h3><p>Differences: rival − recommended, in pairs of "
+        "drives. Equivalent: the errors are equal with 95 % confidence, and the energy of the "
+        f"fleet’s day, idle included, differs by less than {MATTERS_SHARE:.0%}.</p>"
+        + table(head, rows, numbers=range(2, 7))
+    )
+
+
+def _composition(study: Study, point: Point, day: economy.Day) -> str:
+    fleet = json.loads(study.plant.to_json())["fleet"]
+    parts = economy.composition(point, day, fleet)
+    whole, added = sum(parts.values()), parts["estimates"] + parts["receiver"]
+    named = {
+        "estimates": "angle estimates",
+        "receiver": "receiver",
+        "idle": "computers, idle while switched on",
+    }
+    rows = [
+        (
+            named[name],
+            f"{digits(wh)} Wh",
+            "–" if name == "idle" or not added else f"{100.0 * wh / added:.4g} %",
+            f"{100.0 * wh / whole:.4g} %" if whole else "–",
+        )
+        for name, wh in parts.items()
+    ]
+    head = ("Part", "Fleet’s day", "share above idle", "share of all")
+    text = ""
+    if day.idle_share is not None:
+        text = (
+            f"<p>Idle computers take {100.0 * day.idle_share:.4g} % of the fleet’s day. A computer "
+            "with less idle power, or one that serves other purposes too, reduces it; estimator and wake-up "
+            "hardly do.</p>"
+        )
+    return f"<h3>Composition of the energy</h3>{text}" + table(head, rows, numbers=range(1, 4))
+
+
+def _points(study: Study) -> str:
+    """Every operation in its mode of least energy, then the power modes of the recommended one."""
+    point = study.point
+    least: dict[str, Point] = {}
+    for it in study.points:
+        if it.operation.name not in least or it.energy_j < least[it.operation.name].energy_j:
+            least[it.operation.name] = it
+    if point is not None:
+        least[point.operation.name] = point
+    rows = [_way(study, it) for it in sorted(least.values(), key=lambda it: it.error_m)]
+    head = (
+        "Operation", "Lost drives", f"{study.percent:g} % within", "interval", "estimates a trip",
+        "J a trip, above idle", "state ok", "",
+    )  # fmt: skip
+    modes = [
+        (
+            f"{it.mode} {escape(it.mode_name)}",
+            f"{it.error_m:.3f} m",
+            joules_range(economy.trip_j(it)),
+            "–" if it.idle_w is None else watts(it.idle_w),
+            "–" if it.idle_w is None else _fleet_day(study, it),
+        )
+        for it in study.points
+        if point is not None and it.operation.name == point.operation.name
+    ]
+    mode_head = (
+        "Power mode", f"{study.percent:g} % within", "a trip, above idle", "idle / W",
+        "Wh a fleet’s day, with idle",
+    )  # fmt: skip
+    return (
+        table(head, rows, numbers=range(2, 7))
+        + "<h3>Recommended operation in every power mode</h3>"
+        + table(mode_head, modes, numbers=range(1, 5))
+    )
+
+
+def _way(study: Study, it: Point) -> tuple[str, ...]:
+    found = it.driven.percentile(study.percent)
+    label = (
+        badge("recommended", "yes")
+        if it is study.point
+        else badge(it.judgement.words, it.judgement.badge)
+    )
+    sample = "two seeds" if it.simulated and it.driven.name != it.operation.name else "screened"
+    return (
+        f"{escape(it.operation.method)}, {escape(it.operation.wake_up)}<small>mode {it.mode} "
+        f"({escape(it.mode_name)}); {it.driven.runs} drives, {sample}</small>",
+        lost(it.driven),
+        f"{found.value:.3f} m",
+        f"{escape(found.interval)} m",
+        f"{it.driven.executions.mean():,.0f}",
+        joules_range(economy.trip_j(it)),
+        ok(it.driven),
+        label,
+    )
+
+
+def _fleet_day(study: Study, it: Point) -> str:
+    day = economy.day(study.plant, it)
+    return "–" if day.idle_wh is None else ends(day.trips_wh.plus(day.idle_wh))
+
+
+def money_section(study: Study) -> str:
+    """Money and carbon of each kind of localization; empty without a recommendation."""
+    if not study.ways:
+        return ""
+    fleet = json.loads(study.plant.to_json())["fleet"]
+    years, currency = fleet["years"], escape(study.prices.currency)
+    ways = study.ways.values()
+    rows = [
+        (f"to buy / {currency}", *(ends(way.capital) for way in ways)),
+        (f"a year / {currency}", *(ends(way.yearly) for way in ways)),
+        (f"{years:g} years / {currency}", *(ends(economy.total(way, years)) for way in ways)),
+        ("production / kgCO2e", *(ends(way.embodied_kg) for way in ways)),
+        ("use a year / kgCO2e", *(ends(way.use_kg_per_year) for way in ways)),
+        (f"{years:g} years / kgCO2e", *(ends(economy.total_kg(way, years)) for way in ways)),
+    ]
+    head = (f"{fleet['vehicles']} vehicles by", *study.ways)
+    used = [
+        "receiver", "computer", "lidar", "roadside_unit", "roadside_unit_yearly", "uwb_anchor",
+        "uwb_anchor_spacing_m", "uwb_tag", "electricity_per_kwh", "grid_g_per_kwh",
+        "lidar_power_w", "roadside_unit_power_w", "uwb_anchor_power_w", "uwb_tag_power_w",
+        "receiver_embodied_kg", "computer_embodied_kg", "lidar_embodied_kg",
+        "roadside_unit_embodied_kg", "uwb_anchor_embodied_kg", "uwb_tag_embodied_kg",
+    ]  # fmt: skip
+    published = sum(key in study.prices.published for key in used)
+    return section(
+        "What does it cost?",
+        f"Low … central … high, in {study.prices.currency}, without discounting. Vehicles and "
+        f"infrastructure are on {fleet['hours_per_day']:g} h on {fleet['days_per_year']:g} days a "
+        "year. The cells are there anyway and are not counted; a computer counts with its price, "
+        f"production and idle power. {published} of {len(used)} figures are published ones and "
+        "unverified for this plant.",
+        table(head, rows, numbers=range(1, 1 + len(study.ways))) + sources(study, used),
+    )

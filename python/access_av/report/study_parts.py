@@ -1,0 +1,94 @@
+"""Parts of the page of a study that several of its sections use."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+from access_av.report.parts import badge, table
+from access_av.study.verdicts import NotOk
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from access_av.economics.carbon import Range
+    from access_av.study.study_result import Study
+    from access_av.study.trips import Driven
+
+
+def lost(driven: Driven) -> str:
+    """Number of lost drives."""
+    runs = driven.lost_runs
+    return badge(f"LOST in {runs} of {driven.runs}", "no") if runs else f"0 of {driven.runs}"
+
+
+def reliability_rows(drives: Iterable[Driven]) -> list[tuple[str, ...]]:
+    """Lost drives, state ``ok``, reasons otherwise and errors while ``ok``, one row per variant."""
+    rows = []
+    for driven in drives:
+        reasons, beyond = driven.not_ok_shares, driven.exceedances
+        shares = [None] * len(NotOk) if reasons is None else [reasons[it] for it in NotOk]
+        rows.append(
+            (
+                escape(driven.name),
+                lost(driven),
+                ok(driven),
+                *("–" if it is None else f"{it:.1%}" for it in shares),
+                "–" if beyond is None else f"{beyond:,}",
+            )
+        )
+    return rows
+
+
+def ok(driven: Driven) -> str:
+    """Share of the time in state ``ok``."""
+    return "–" if driven.ok_share is None else f"{driven.ok_share:.1%}"
+
+
+def count(number: int, what: str) -> str:
+    """A number of things."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def sources(study: Study, keys: list[str]) -> str:
+    """A table of figures and their sources, to unfold."""
+    rows = [
+        (
+            escape(key.replace("_", " ")),
+            ends(study.prices.ranges[key]),
+            badge("unverified", "fit") if key in study.prices.published else "",
+            escape(study.prices.sources[key]),
+        )
+        for key in dict.fromkeys(keys)
+    ]
+    return (
+        "<details><summary>Sources of these figures</summary>"
+        f"{table(('Figure', 'low … central … high', '', 'Source'), rows, numbers=(1,))}</details>"
+    )
+
+
+def digits(value: float) -> str:
+    """A number with three digits at least."""
+    return f"{value:,.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
+
+
+def ends(values: Range) -> str:
+    """A range, low to high."""
+    texts = dict.fromkeys(map(digits, (values.low, values.central, values.high)))
+    return " … ".join(texts)
+
+
+def joules(value: float) -> str:
+    """An energy."""
+    return f"{digits(value)} J"
+
+
+def joules_range(values: Range) -> str:
+    """A range of an energy."""
+    return f"{ends(values)} J"
+
+
+def watts(power_w: Mapping[str, float]) -> str:
+    """A range of a power."""
+    texts = dict.fromkeys(f"{power_w[extent]:.3g}" for extent in ("low", "value", "high"))
+    return " … ".join(texts)

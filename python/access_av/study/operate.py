@@ -1,0 +1,272 @@
+"""Recommended operating point: screening, finalists with two seeds, and rivals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from access_av.study import economy
+from access_av.study.points import (
+    Operation,
+    Point,
+    front,
+    mode_groups,
+    operations,
+    own_mode,
+    point,
+    recommended,
+)
+from access_av.study.trips import Driven
+from access_av.study.verdicts import Agreement, Judgement
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from access_av import _core
+    from access_av.device.platform import PowerMode
+    from access_av.study.targets import Targets
+
+    # Name, scenario, number of runs and seed of drives.
+    Simulate = Callable[[str, _core.Scenario, int, int], Driven]
+
+# Operations that are simulated in every power mode with two seeds: the one that screening
+# recommends, the vehicle's own, and their rivals.
+MOST_FINALISTS = 3
+# Blocks of runs that each of the two seeds gets until both recommend the same point.
+MOST_BLOCKS = 2
+# Offset of the seed of each further block of runs.
+SEED_STEP = 1000
+# Share of a fleet's energy of a day, idle computers included, below which a difference does not
+# matter: energy meters for billing have this accuracy (IEC 62053-21, class 1).
+MATTERS_SHARE = 0.01
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A point next to the recommended one.
+
+    Attributes
+    ----------
+    point
+        The rival.
+    delta_m
+        Its error minus that of the recommended point, in pairs of drives, and the ends of the
+        95 % interval; percentile of the target of the whole trip.
+    delta_j
+        Its energy of a trip minus that of the recommended point, at the central values.
+    day_share
+        The difference in energy as a share of the fleet's energy of a day at the recommended
+        point, idle computers included; ``None`` without a figure of idle power.
+    """
+
+    point: Point
+    delta_m: tuple[float, float, float]
+    delta_j: float
+    day_share: float | None
+
+    @property
+    def is_equivalent(self) -> bool:
+        """Whether neither the difference in error nor that in energy matters.
+
+        The error is equal with 95 % confidence, and the energy differs by less than
+        :data:`MATTERS_SHARE` of the fleet's day.
+        """
+        _, low, high = self.delta_m
+        same_energy = self.delta_j == 0.0 or (
+            self.day_share is not None and abs(self.day_share) < MATTERS_SHARE
+        )
+        return low <= 0.0 <= high and same_energy
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """Operating points of a study and the recommended one.
+
+    Attributes
+    ----------
+    points
+        All points; the finalists, which are simulated in every power mode, come first.
+    front
+        Indices of the finalists that no other one exceeds in energy and error.
+    chosen
+        Index of the recommended point; ``None`` without a figure of energy.
+    rivals
+        The other finalists, in the mode of least energy, and the recommended operation in the
+        other power modes.
+    by_seed
+        The points that the two seeds recommend by themselves.
+    """
+
+    points: list[Point]
+    front: list[int]
+    chosen: int | None
+    rivals: list[Rival]
+    by_seed: tuple[str, ...]
+
+    @property
+    def point(self) -> Point | None:
+        """The recommended point."""
+        return None if self.chosen is None else self.points[self.chosen]
+
+    @property
+    def agreement(self) -> Agreement:
+        """Whether both seeds recommend this point, or another one that is equivalent."""
+        if self.point is None or set(self.by_seed) <= {self.point.name}:
+            return Agreement.AGREED
+        equivalent = {it.point.name for it in self.rivals if it.is_equivalent}
+        others = set(self.by_seed) - {self.point.name}
+        return Agreement.EQUIVALENT if others <= equivalent else Agreement.UNDECIDED
+
+
+@dataclass(frozen=True)
+class _Finalist:
+    """Drives of an operation in a group of power modes, by block."""
+
+    operation: Operation
+    modes: list[PowerMode]
+    scenario: _core.Scenario
+    blocks: list[Driven]
+
+    def points(self, blocks: list[Driven], targets: Targets) -> list[Point]:
+        driven = Driven.joined(blocks)
+        return [point(driven, self.operation, it, targets, simulated=True) for it in self.modes]
+
+
+def operate(
+    plant: _core.Plant,
+    targets: Targets,
+    believed: Driven,
+    runs: int,
+    seed: int,
+    simulate: Simulate,
+    plan: Callable[[int], None],
+) -> Recommendation:
+    """Finds the operating point with the least energy that meets the targets.
+
+    Every operation is screened in the vehicle's own power mode. The recommended one and its rivals
+    are then simulated in every power mode, with two seeds, until both recommend the same point or
+    :data:`MOST_BLOCKS` blocks of runs are simulated.
+
+    Parameters
+    ----------
+    plant, targets
+        The plant and its targets.
+    believed
+        Drives of the plant as it is.
+    runs
+        Runs of each operation, power mode and block.
+    seed
+        Seed of the drives.
+    simulate
+        Drives a scenario.
+    plan
+        Called with the number of drives that are still to be simulated.
+    """
+    scenario = plant.scenario()
+    screened = _screened(scenario, targets, believed, runs, seed, simulate, plan)
+    finalists = [
+        _Finalist(it, modes, changed, [])
+        for it in _finalists(screened)
+        for changed in [scenario.with_overrides(dict(it.settings))]
+        for modes in mode_groups(changed)
+    ]
+    by_seed: list[list[Point]] = [[], []]
+    for block in range(MOST_BLOCKS):
+        plan(2 * runs * len(finalists))
+        for number, it in enumerate(finalists):
+            label = f"{it.operation.name}, mode {it.modes[0].number}"
+            in_mode = it.scenario.with_overrides({"vehicle.platform.mode": it.modes[0].number})
+            for which in range(2):
+                seed_of_block = seed + (2 * block + which) * SEED_STEP
+                it.blocks.append(simulate(label, in_mode, runs, seed_of_block))
+            plan(2 * runs * (len(finalists) - number - 1))
+        by_seed = [
+            [one for it in finalists for one in it.points(it.blocks[which::2], targets)]
+            for which in range(2)
+        ]
+        if len({_name(it) for it in by_seed}) == 1:
+            break
+    pooled = [one for it in finalists for one in it.points(it.blocks, targets)]
+    known = {one.operation.name for one in pooled}
+    every = [*pooled, *(it for it in screened if it.operation.name not in known)]
+    chosen = recommended(pooled)
+    named = tuple(name for it in by_seed if (name := _name(it)) is not None)
+    rivals = [] if chosen is None else _rivals(plant, targets, pooled, pooled[chosen], named)
+    return Recommendation(every, front(pooled), chosen, rivals, named)
+
+
+def _name(found: list[Point]) -> str | None:
+    chosen = recommended(found)
+    return None if chosen is None else found[chosen].name
+
+
+def _screened(
+    scenario: _core.Scenario,
+    targets: Targets,
+    believed: Driven,
+    runs: int,
+    seed: int,
+    simulate: Simulate,
+    plan: Callable[[int], None],
+) -> list[Point]:
+    """Every operation, driven in the vehicle's own power mode, with its energy in all modes."""
+    found = []
+    every = operations(scenario)
+    for number, it in enumerate(every):
+        plan(runs * (len(every) - number))
+        changed = scenario.with_overrides(dict(it.settings)) if it.settings else scenario
+        driven = simulate(it.name, changed, runs, seed) if it.settings else believed.first(runs)
+        for modes in mode_groups(changed):
+            own = own_mode(changed) in [mode.number for mode in modes]
+            found += [point(driven, it, mode, targets, simulated=own) for mode in modes]
+    return found
+
+
+def _finalists(screened: list[Point]) -> list[Operation]:
+    """What screening recommends, the vehicle's own, and those that more drives could prefer."""
+    chosen = recommended(screened)
+    if chosen is None:
+        return []
+    best = screened[chosen]
+    cheapest: dict[str, Point] = {}
+    for it in sorted(screened, key=lambda one: one.energy_j):
+        cheapest.setdefault(it.operation.name, it)
+    others = [it for it in cheapest.values() if it.operation.name != best.operation.name]
+    possible = [it for it in others if it.judgement is not Judgement.MISSED]
+    if best.judgement.holds:
+        # Cheaper ones might meet the targets; if this one does not, the next ones are needed.
+        rivals = [it for it in possible if it.energy_j <= best.energy_j][::-1]
+        rivals += [it for it in possible if it.energy_j > best.energy_j]
+    else:
+        rivals = sorted(others, key=lambda it: it.error_m)
+    own = screened[0].operation
+    named = [best.operation, *([] if own == best.operation else [own])]
+    named += [it.operation for it in rivals if it.operation not in named]
+    return named[:MOST_FINALISTS]
+
+
+def _rivals(
+    plant: _core.Plant, targets: Targets, pooled: list[Point], best: Point, named: tuple[str, ...]
+) -> list[Rival]:
+    """Every finalist in its mode of least energy, the other modes, and what the seeds recommend."""
+    percent = targets.each[0].percent
+    best_wh = _day_wh(plant, best)
+    seen = {best.name}
+    found: list[Rival] = []
+    for it in sorted(pooled, key=lambda one: one.energy_j):
+        is_first = all(one.point.operation.name != it.operation.name for one in found)
+        is_other_mode = it.operation.name == best.operation.name
+        if it.name in seen or not (is_first or is_other_mode or it.name in named):
+            continue
+        seen.add(it.name)
+        day_wh = _day_wh(plant, it)
+        share = None if best_wh is None or day_wh is None else (day_wh - best_wh) / best_wh
+        delta_m = it.driven.delta_m(best.driven, percent)
+        found.append(Rival(it, delta_m, it.energy_j - best.energy_j, share))
+    return found
+
+
+def _day_wh(plant: _core.Plant, it: Point) -> float | None:
+    """Energy of the fleet's day with idle computers; ``None`` without a figure of idle power."""
+    day = economy.day(plant, it)
+    return None if day.idle_wh is None else day.idle_wh.central + day.trips_wh.central

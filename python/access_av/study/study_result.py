@@ -1,0 +1,360 @@
+"""Results of a study: drives, verdicts, figures and tables."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import polars as pl
+
+from access_av.study import economy
+from access_av.study.targets import table as targets_table
+from access_av.tables.result import Result
+
+if TYPE_CHECKING:
+    from access_av import _core
+    from access_av.economics.balance import Way
+    from access_av.run.simulation import Simulation
+    from access_av.statistics.percentiles import Percentile
+    from access_av.study.measures import Measure, Measures
+    from access_av.study.operate import Recommendation, Rival
+    from access_av.study.places import WorstPlace
+    from access_av.study.points import Point
+    from access_av.study.targets import TargetResult, Targets
+    from access_av.study.trips import Driven
+    from access_av.study.unverified import Unverified
+    from access_av.study.verdicts import Judgement
+
+
+@dataclass(frozen=True, eq=False)
+class Study(Result):
+    """Results of a study.
+
+    Attributes
+    ----------
+    plant, seed
+        The plant, and the seed of the drives.
+    targets
+        The targets; that of the whole trip is the first one.
+    believed, poor
+        Drives with the nominal channel, and with poor line of sight.
+    places, worst
+        The error along the road, and the positions with the largest errors.
+    heads
+        Side and distance of each radio head from the road.
+    measured
+        Measures that reduce the error; ``None`` where the drives meet all targets.
+    recommendation
+        Operating points, and the recommended one.
+    prices, day, ways
+        Prices, energy of a fleet's day, and money and carbon of each kind of localization.
+    unverified
+        Values that are equal to the template's or the default.
+    played
+        The first drive with the nominal channel, step by step.
+    """
+
+    plant: _core.Plant
+    seed: int
+    targets: Targets
+    believed: Driven
+    poor: Driven
+    places: pl.DataFrame
+    worst: list[WorstPlace]
+    heads: pl.DataFrame
+    measured: Measures | None
+    recommendation: Recommendation
+    prices: economy.Prices
+    day: economy.Day | None
+    ways: dict[str, Way]
+    unverified: list[Unverified]
+    played: Simulation
+
+    def __repr__(self) -> str:
+        return f"Study({self.plant.name}: {self.verdict})"
+
+    @property
+    def error_m(self) -> float:
+        """Error of the target of the whole trip, in metres."""
+        return self.targets.each[0].error_m
+
+    @property
+    def percent(self) -> float:
+        """Share of the time of the target of the whole trip, in percent."""
+        return self.targets.each[0].percent
+
+    @property
+    def mended(self) -> list[Measure]:
+        """All measures; the single ones first, the most effective one at the top."""
+        return [] if self.measured is None else self.measured.every
+
+    @property
+    def points(self) -> list[Point]:
+        """All operating points."""
+        return self.recommendation.points
+
+    @property
+    def front(self) -> list[int]:
+        """Indices of the points that no other finalist exceeds in energy and error."""
+        return self.recommendation.front
+
+    @property
+    def recommended(self) -> int | None:
+        """Index of the recommended point."""
+        return self.recommendation.chosen
+
+    @property
+    def point(self) -> Point | None:
+        """The recommended point; ``None`` without a figure of energy."""
+        return self.recommendation.point
+
+    @property
+    def alert_limit_m(self) -> float:
+        """Alert limit of the vehicle in metres; twice the target's error unless set."""
+        limit_m = self.believed.scenario.vehicle.alert_limit_m
+        if limit_m is None:  # such plants are not studied
+            raise RuntimeError("the vehicle has no integrity monitor")
+        return limit_m
+
+    def results(self, driven: Driven) -> list[TargetResult]:
+        """Drives under each target."""
+        return self.targets.results(driven)
+
+    def judged(self, driven: Driven) -> Judgement:
+        """Whether drives meet all targets."""
+        return self.targets.judgement(driven)
+
+    def in_words(self, driven: Driven) -> str:
+        """Lost drives first, then the target's percentile with its interval, in words."""
+        found = driven.percentile(self.percent)
+        lost = f"LOST in {driven.lost_runs} of {driven.runs} drives, " if driven.lost_runs else ""
+        return f"{lost}within {found.value:.2f} m ({found.interval} m, {driven.runs} drives)"
+
+    @property
+    def verdict(self) -> str:
+        """The verdict on all targets with the nominal channel, and with poor line of sight."""
+        believed = self.judged(self.believed).words
+        text = (
+            f"{believed[0].upper()}{believed[1:]}: for {self.percent:g} % of the time the vehicle "
+            f"knows its position {self.in_words(self.believed)}; {self.error_m:g} m is required."
+        )
+        if missed := [it for it in self.results(self.believed)[1:] if not it.judgement.holds]:
+            named = ", ".join(
+                f"{it.target.name} ({it.error.value:.2f} m, required {it.target.words})"
+                for it in missed
+            )
+            text += f" Stretches that miss their targets: {named}."
+        return (
+            f"{text} With poor line of sight: {self.judged(self.poor).words}, "
+            f"{self.in_words(self.poor)}."
+        )
+
+    @property
+    def trajectory(self) -> pl.DataFrame:
+        """Truth and estimate of the drive that is played, step by step."""
+        if self.played.trajectories is None:  # they were asked for
+            raise RuntimeError("the simulation kept no trajectories")
+        return self.played.trajectories
+
+    def summary(self) -> dict[str, Any]:
+        """Every figure of the page, as plain values for JSON."""
+        return _summary(self)
+
+    def tables(self) -> dict[str, pl.DataFrame]:
+        """Everything the figures are computed from, by the file's name."""
+        return _tables(self)
+
+
+def recommended_toml(study: Study) -> str | None:
+    """The recommended operating point as a scenario for ``access-av run``.
+
+    ``None`` without a recommendation. The scenario is a trip of the plant with the keys of the
+    point; they are named at its top.
+    """
+    point = study.point
+    if point is None:
+        return None
+    scenario = study.plant.scenario().with_overrides(point.settings)
+    keys = "".join(f"#   {key} = {_as_toml(value)}\n" for key, value in point.settings.items())
+    return (
+        f"# Recommended operating point of plant {study.plant.name}: {point.name}.\n"
+        f"# Keys that select it:\n{keys}"
+        f"# Simulate it: access-av run recommended.toml\n\n{scenario.to_toml()}"
+    )
+
+
+def _as_toml(value: object) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_as_toml(it)}" for key, it in value.items()) + " }"
+    return json.dumps(value)
+
+
+def _summary(study: Study) -> dict[str, Any]:
+    """Every figure of the page, as plain values for JSON."""
+    written = json.loads(study.plant.to_json())
+    fleet = written["fleet"]
+    cheapest = None if study.measured is None else study.measured.cheapest
+    return {
+        "plant": study.plant.name,
+        "seed": study.seed,
+        "target": {"error_m": study.error_m, "percent": study.percent},
+        "targets": [vars(it) for it in study.targets.each],
+        "alert_limit_m": study.alert_limit_m,
+        "verdict": study.verdict,
+        "believed": _figures(study, study.believed),
+        "poor": _figures(study, study.poor),
+        "worst": [vars(place) for place in study.worst],
+        "radio_heads": study.heads.to_dicts(),
+        "before_measures": None
+        if study.measured is None
+        else _figures(study, study.measured.before),
+        "remedies": [_measure(study, it) for it in study.mended],
+        "cheapest_measure": cheapest and cheapest.name,
+        **_recommendation(study),
+        "currency": study.prices.currency,
+        "years": fleet["years"],
+        "ways": {
+            name: {key: vars(value) for key, value in vars(way).items()}
+            for name, way in study.ways.items()
+        },
+        "prices": {
+            key: {
+                **vars(value),
+                "source": study.prices.sources[key],
+                "is_published": key in study.prices.published,
+            }
+            for key, value in study.prices.ranges.items()
+        },
+        "unverified": [vars(it) for it in study.unverified],
+    }
+
+
+def _measure(study: Study, it: Measure) -> dict[str, Any]:
+    delta_m, low_m, high_m = it.delta_m
+    return {
+        "name": it.name,
+        "what": it.what,
+        "settings": [dict(one.settings) for one in it.remedies],
+        **_figures(study, it.driven),
+        "delta_m": delta_m,
+        "delta_low_m": low_m,
+        "delta_high_m": high_m,
+        "effect": it.effect.value,
+        "cost": vars(it.cost),
+        "cm_per_price": it.cm_per_price,
+    }
+
+
+def _recommendation(study: Study) -> dict[str, Any]:
+    point, day = study.point, study.day
+    if point is None or day is None:
+        return {"recommended": None, "rivals": [], "day": None}
+    fleet = json.loads(study.plant.to_json())["fleet"]
+    return {
+        "recommended": {
+            "name": point.name,
+            "method": point.operation.method,
+            "wake_up": point.operation.wake_up,
+            "mode": point.mode,
+            "settings": point.settings,
+            "runs": point.driven.runs,
+            "error_m": point.error_m,
+            **_percentile(point.driven.percentile(study.percent)),
+            "judged": point.judgement.value,
+            "trip_j": vars(economy.trip_j(point)),
+            "idle_w": point.idle_w and dict(point.idle_w),
+            "agreement": study.recommendation.agreement.value,
+            "by_seed": list(study.recommendation.by_seed),
+        },
+        "rivals": [_rival(it) for it in study.recommendation.rivals],
+        "day": {
+            "trips_wh": vars(day.trips_wh),
+            "idle_wh": day.idle_wh and vars(day.idle_wh),
+            "idle_share": day.idle_share,
+            "composition_wh": economy.composition(point, day, fleet),
+        },
+    }
+
+
+def _rival(it: Rival) -> dict[str, Any]:
+    delta_m, low_m, high_m = it.delta_m
+    return {
+        "name": it.point.name,
+        "error_m": it.point.error_m,
+        "delta_m": delta_m,
+        "delta_low_m": low_m,
+        "delta_high_m": high_m,
+        "delta_j": it.delta_j,
+        "day_share": it.day_share,
+        "is_equivalent": it.is_equivalent,
+        "judged": it.point.judgement.value,
+    }
+
+
+def _figures(study: Study, driven: Driven) -> dict[str, Any]:
+    share, low, high = driven.within(study.error_m)
+    reasons = driven.not_ok_shares
+    return {
+        "runs": driven.runs,
+        **_percentile(driven.percentile(study.percent)),
+        "within_share": share,
+        "within_low_share": low,
+        "within_high_share": high,
+        "judged": study.judged(driven).value,
+        "lost_runs": driven.lost_runs,
+        "ok_share": driven.ok_share,
+        "state_shares": driven.state_shares and dict(driven.state_shares),
+        "not_ok_shares": reasons and {it.value: share for it, share in reasons.items()},
+        "beyond_level_while_ok": driven.exceedances,
+    }
+
+
+def _percentile(found: Percentile) -> dict[str, Any]:
+    return {
+        "target_error_m": found.value,
+        "target_error_low_m": found.low,
+        "target_error_high_m": found.high,
+    }
+
+
+def _tables(study: Study) -> dict[str, pl.DataFrame]:
+    """Everything the figures are computed from, by the file's name."""
+    drives = [study.believed, study.poor, *(it.driven for it in study.mended)]
+    of_points = {point.driven.name: point.driven for point in study.points}
+    drives += [it for name, it in of_points.items() if name != study.believed.name]
+    rows = [
+        {
+            "variant": point.driven.name,
+            "runs": point.driven.runs,
+            "method": point.operation.method,
+            "wake_up": point.operation.wake_up,
+            "mode": point.mode,
+            "mode_name": point.mode_name,
+            "is_simulated": point.simulated,
+            "target_error_m": point.error_m,
+            "judgement": point.judgement.value,
+            **{
+                f"{part}_{extent}_j": getattr(point.energy[extent], f"{part}_j")
+                for part in ("estimates", "listening", "idle")
+                for extent in ("low", "value", "high")
+            },
+            **{
+                f"idle_{extent}_w": None if point.idle_w is None else point.idle_w[extent]
+                for extent in ("low", "value", "high")
+            },
+            "on_front": index in study.front,
+            "recommended": index == study.recommended,
+        }
+        for index, point in enumerate(study.points)
+    ]
+    return {
+        "errors": pl.concat(driven.table() for driven in drives),
+        "drives": pl.concat(driven.drives() for driven in drives),
+        "targets": targets_table(
+            {it.name: study.results(it) for it in (study.believed, study.poor)}
+        ),
+        "places": study.places,
+        "points": pl.DataFrame(rows, infer_schema_length=None),
+        "trajectories": study.trajectory,
+    }

@@ -1,0 +1,156 @@
+"""Sets of measures, and operating points next to each other, on made drives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from access_av import Plant
+from access_av.economics.carbon import Range
+from access_av.study.economy import Prices
+from access_av.study.measures import measures
+from access_av.study.operate import operate
+from access_av.study.remedies import Remedy
+from access_av.study.targets import Targets
+from access_av.study.trips import Driven, drive
+from access_av.study.verdicts import Agreement, Judgement
+
+if TYPE_CHECKING:
+    from access_av import _core
+
+RUNS = 4
+# The end of the road, so that a drive takes a moment.
+PLANT = Plant.load("bends").with_overrides({"motion.start_at_m": 585.0, "motion.stops": []})
+FREE = {"site.rician_k_db": 11.0}
+
+
+@pytest.fixture(scope="module")
+def real() -> Driven:
+    return drive("as it is", PLANT.scenario(), 2, 1)
+
+
+def made(real: Driven, name: str, scenario: _core.Scenario, level_m: float, seed: int) -> Driven:
+    """Drives of 600 s with errors about a level: 99 % of them are within three times it."""
+    random = np.random.default_rng(seed)
+    errors_m = level_m * np.abs(random.standard_normal((RUNS, len(real.time_s))))
+    return replace(
+        real,
+        name=name,
+        scenario=scenario,
+        errors_m=errors_m,
+        levels_m=np.full(errors_m.shape, np.nan, dtype=np.float32),
+        executions=np.full(RUNS, 100),
+        listened=np.full(RUNS, 50),
+        seeds=np.full(RUNS, seed),
+        duration_s=600.0,
+        integrity=None,
+    )
+
+
+def prices(each: dict[str, float]) -> Prices:
+    ranges = {name: Range(value, value, value) for name, value in each.items()}
+    return Prices("EUR", ranges, dict.fromkeys(each, "test"), frozenset())
+
+
+@pytest.mark.parametrize(
+    ("ratios", "costs", "cheapest"),
+    [
+        # A single measure that suffices and is dearer than two that suffice together.
+        ({"a": 0.2, "b": 0.5, "c": 0.5}, {"a": 900.0, "b": 10.0, "c": 20.0}, "b + c"),
+        # The single one is the cheapest.
+        ({"a": 0.2, "b": 0.5, "c": 0.5}, {"a": 9.0, "b": 10.0, "c": 20.0}, "a"),
+        # All three are needed, and none of the pairs is simulated before.
+        ({"a": 0.6, "b": 0.6, "c": 0.7}, {"a": 9.0, "b": 10.0, "c": 20.0}, "a + b + c"),
+        # Nothing suffices: the most effective set shows what is possible.
+        ({"a": 0.9, "b": 0.9, "c": 0.9}, {"a": 9.0, "b": 10.0, "c": 20.0}, None),
+    ],
+)
+def test_the_cheapest_set_that_meets_the_target_is_found(
+    real: Driven, ratios: dict[str, float], costs: dict[str, float], cheapest: str | None
+) -> None:
+    level_m = 0.33  # 99 % within 0.85 m; 0.3 m are required
+    simulated = []
+
+    def simulate(name: str, scenario: _core.Scenario, runs: int, seed: int) -> Driven:
+        simulated.append(name)
+        assert runs == RUNS
+        ratio = float(np.prod([ratios[it] for it in name.split(" + ")]))
+        return made(real, name, scenario, level_m * ratio, seed)
+
+    before = made(real, "as it is", PLANT.scenario(), level_m, 1)
+    changes = [Remedy(name, name, FREE, name, 1) for name in ratios]
+    planned: list[int] = []
+    found = measures(
+        PLANT.scenario(), changes, before, Targets.of(PLANT), prices(costs), 1, simulate,
+        planned.append,
+    )  # fmt: skip
+    assert (found.cheapest and found.cheapest.name) == cheapest
+    assert planned[-1] == 0
+    assert simulated[:3] == list(ratios)
+    if cheapest is None:
+        assert simulated[3:] == ["a + b + c"]
+    for it in found.single:
+        gained_cm = 100.0 * (before.percentile(99.0).value - it.error.value)
+        assert it.cm_per_price == pytest.approx(gained_cm / costs[it.name])
+
+
+@pytest.mark.parametrize(
+    ("levels", "agreement", "chosen"),
+    [
+        # Half a second is accurate enough with either seed.
+        ({200: [0.05] * 4, 500: [0.06] * 4, 1000: [0.4] * 4}, Agreement.AGREED, "every 500 ms"),
+        # Two seeds find half a second accurate enough, or not at all.
+        (
+            {200: [0.05] * 4, 500: [0.06, 0.4, 0.06, 0.4], 1000: [0.4] * 4},
+            Agreement.UNDECIDED,
+            "every 200 ms",
+        ),
+        # None is accurate enough, and all have the same error: the seeds recommend by chance.
+        ({200: [0.2] * 4, 500: [0.2] * 4, 1000: [0.2] * 4}, Agreement.EQUIVALENT, None),
+    ],
+)
+def test_seeds_agree_or_the_difference_is_judged(
+    real: Driven, levels: dict[int, list[float]], agreement: Agreement, chosen: str | None
+) -> None:
+    bursts = {200: 30, 500: 12, 1000: 6}
+
+    def simulate(name: str, scenario: _core.Scenario, runs: int, seed: int) -> Driven:
+        assert runs == RUNS
+        interval_ms = next((it for it in levels if name.startswith(f"every {it} ms")), None)
+        level_m = 0.2 if interval_ms is None else levels[interval_ms][seed // 1000]
+        count = 150 if interval_ms is None else bursts[interval_ms]
+        # Drives of different operations do not resemble each other.
+        found = made(real, name, scenario, level_m, seed + count)
+        return replace(found, listened=np.full(RUNS, count), executions=np.full(RUNS, 3 * count))
+
+    believed = made(real, "as it is", PLANT.scenario(), 0.2, 1)
+    found = operate(PLANT, Targets.of(PLANT), believed, RUNS, 1, simulate, lambda _: None)
+    assert found.point is not None
+    assert found.chosen in found.front
+    assert found.agreement is agreement
+    if chosen is not None:
+        assert found.point.operation.name == chosen
+        assert found.point.judgement is Judgement.MET
+    assert {it.point.mode for it in found.rivals} >= set(range(8)) - {found.point.mode}
+
+
+def test_a_target_of_a_stretch_is_judged_there_only(real: Driven) -> None:
+    plant = PLANT.with_overrides(
+        {
+            "targets": [
+                {"name": "gate", "at_m": 595.0, "target": "0.1 m 95 %"},
+                {"from_m": 586.0, "to_m": 588.0, "target": "0.1 m 95 %"},
+            ]
+        }
+    )
+    targets = Targets.of(plant)
+    assert [it.name for it in targets.each] == ["whole trip", "gate", "586 to 588 m"]
+    driven = made(real, "as it is", plant.scenario(), 0.01, 1)
+    along_m = np.interp(driven.time_s, targets.time_s, targets.along_m)
+    driven.errors_m[:, along_m > 589.0] = 0.2
+    judgements = [it.judgement.holds for it in targets.results(driven)]
+    assert judgements == [True, False, True]
+    assert not targets.judgement(driven).holds
