@@ -124,7 +124,8 @@ class Integrity:
             exceedances=int(by_run[:, 0].sum()),
             runs_with_exceedances=affected,
             exceedance_share=_share(by_run),
-            exceedance_interval=bootstrap_interval(by_run, _share),
+            # Resamples of runs without any are without any.
+            exceedance_interval=bootstrap_interval(by_run, _share) if affected else (0.0, 0.0),
             run_interval=clopper_pearson(affected, runs),
             by_run=counts,
         )

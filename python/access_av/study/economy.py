@@ -53,7 +53,7 @@ class Prices:
     def of(cls, plant: _core.Plant) -> Prices:
         """The plant's, completed."""
         own: dict[str, Any] = json.loads(plant.to_json()).get("prices", {})
-        facts = shipped("economics", "prices.toml")
+        facts = dict(shipped("economics", "prices.toml"))
         of_currencies = facts.pop("currency")
         currency = str(own.get("currency", of_currencies["name"]))
         rate = own.get("currency_per_usd") or of_currencies["per_usd"][currency]
