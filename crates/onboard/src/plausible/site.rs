@@ -263,12 +263,32 @@ fn bends(site: &Site) -> Vec<Warning> {
         .collect()
 }
 
-/// Returns warnings for radio heads that a wall hides from the nearest point of the road and that would be in
+/// Distance along the road before and behind a radio head that it is to serve (m).
+const NEXT_TO_M: f64 = 60.0;
+
+/// Returns warnings for radio heads that walls hide from the road next to them, and that would be in
 /// sight on the other side of the road.
 fn other_side(site: &Site, road: &Road) -> Vec<Warning> {
-    let hidden = |from: Point, to: Point| {
+    if site.walls.is_empty() {
+        return Vec::new();
+    }
+    let way: Vec<(f64, Point)> = steps_along(road, STEP_M, MOST_STEPS).collect();
+    let is_hidden = |from: Point, to: Point| {
         let mut walls = site.walls.iter().flat_map(|wall| wall.points_m.windows(2));
         walls.any(|ends| cross([from, to], [ends[0].into(), ends[1].into()]))
+    };
+    // Share of the road about a distance along it that walls hide from a position.
+    let hidden_share = |from: Point, about_m: f64| {
+        let near = way
+            .iter()
+            .filter(|(along_m, _)| (along_m - about_m).abs() <= NEXT_TO_M);
+        let (count, hidden) = near.fold((0.0, 0.0), |(count, hidden), (_, point)| {
+            (
+                count + 1.0,
+                hidden + f64::from(u8::from(is_hidden(from, *point))),
+            )
+        });
+        if count > 0.0 { hidden / count } else { 0.0 }
     };
     let heads = site.radio_heads.iter().enumerate();
     heads
@@ -280,12 +300,13 @@ fn other_side(site: &Site, road: &Road) -> Vec<Warning> {
                 .pose(projection.along_m.clamp(0.0, road.length_m()))
                 .point();
             let mirrored = Point::new(2.0 * nearest.x_m - x_m, 2.0 * nearest.y_m - y_m);
-            let is_doubtful = hidden(place, nearest) && !hidden(mirrored, nearest);
+            let is_doubtful = hidden_share(place, projection.along_m) > 0.9
+                && hidden_share(mirrored, projection.along_m) < 0.1;
             is_doubtful.then(|| Warning {
                 key: format!("radio_heads[{index}].position_m"),
                 value: format!("{:?}", head.position_m),
                 why: format!(
-                    "it stands behind a wall, {:.0} m to the {} of the road",
+                    "walls hide the road from it: it is {:.0} m to the {} of the road",
                     projection.lateral_m.abs(),
                     if projection.lateral_m > 0.0 {
                         "left"
@@ -294,7 +315,7 @@ fn other_side(site: &Site, road: &Road) -> Vec<Warning> {
                     }
                 ),
                 write: format!(
-                    "write [{:.1}, {:.1}, {z_m}] if it stands on the other side of the road",
+                    "write [{:.1}, {:.1}, {z_m}] if it is on the other side of the road",
                     mirrored.x_m, mirrored.y_m
                 ),
             })
