@@ -125,8 +125,8 @@ def _composition(study: Study, point: Point, day: economy.Day) -> str:
     if day.idle_share is not None:
         text = (
             f"<p>Idle computers take {100.0 * day.idle_share:.4g} % of the fleet’s day. A computer "
-            "with less idle power, or one that serves other purposes too, reduces it; estimator and "
-            "wake-up hardly do.</p>"
+            "with less idle power, or one that serves other purposes too, reduces it. Estimator "
+            "and wake-up hardly do.</p>"
         )
     return f"<h3>Composition of the energy</h3>{text}" + table(head, rows, numbers=range(1, 4))
 
