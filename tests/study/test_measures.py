@@ -52,7 +52,7 @@ def made(real: Driven, name: str, scenario: _core.Scenario, level_m: float, seed
 
 def prices(each: dict[str, float]) -> Prices:
     ranges = {name: Range(value, value, value) for name, value in each.items()}
-    return Prices("EUR", ranges, dict.fromkeys(each, "test"), frozenset())
+    return Prices("EUR", ranges, dict.fromkeys(each, "test"), ())
 
 
 @pytest.mark.parametrize(

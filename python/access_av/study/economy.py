@@ -47,7 +47,7 @@ class Prices:
     currency: str
     ranges: Mapping[str, Range]
     sources: Mapping[str, str]
-    published: frozenset[str]
+    published: tuple[str, ...]
 
     @classmethod
     def of(cls, plant: _core.Plant) -> Prices:
@@ -65,7 +65,7 @@ class Prices:
             if name not in own and not name.endswith(NO_MONEY) and currency != "USD":
                 ranges[name] = ranges[name].times(per_usd)
                 sources[name] += f"; {converted}"
-        return cls(currency, ranges, sources, frozenset(facts.keys() - own.keys()))
+        return cls(currency, ranges, sources, tuple(sorted(facts.keys() - own.keys())))
 
 
 @dataclass(frozen=True)
