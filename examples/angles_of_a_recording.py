@@ -1,7 +1,7 @@
-"""From a recording to angles of arrival: samples, SSBs, angles, and what each is worth.
+"""Angles of arrival of a recording: samples, SSBs, angles and their standard deviations.
 
-The same as `crates/recording/examples/angles_of_a_recording.rs`, where nothing but the recording is
-known::
+The Python form of `crates/recording/examples/angles_of_a_recording.rs`. Only the recording is
+needed::
 
     access-av synth yard --duration-s 2 --out drive
     python examples/angles_of_a_recording.py drive/iq.sigmf-meta
@@ -13,7 +13,7 @@ from access_av import Recording, nr
 
 
 def main() -> None:
-    """Print one line for each SSB."""
+    """Prints one line for each SSB."""
     if len(sys.argv) != 2:
         sys.exit("give a recording")
     print("sample_start,pci,ssb_index,phase_rad,phase_sigma_rad,snr_db,doubt")

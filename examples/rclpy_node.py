@@ -2,8 +2,9 @@
 
     python examples/rclpy_node.py site.toml vehicle.toml
 
-`/odom` (nav_msgs/Odometry) moves the vehicle, `/angles` (std_msgs/String, JSON with the arguments
-of `access_av.Live.angle`) locates it, `/initialpose` (PoseWithCovarianceStamped) gives a pose.
+`/odom` (nav_msgs/Odometry) gives the motion of the vehicle. `/angles` (std_msgs/String, JSON with
+the arguments of `access_av.Live.angle`) gives the measurements. `/initialpose`
+(PoseWithCovarianceStamped) sets the pose.
 """
 
 from __future__ import annotations
@@ -18,16 +19,16 @@ import access_av
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-AXES = (0, 1, 5)  # x, y and the turn about z of a covariance of six axes
+AXES = (0, 1, 5)  # x, y and yaw of a covariance of six axes
 
 
 def seconds(stamp: Any) -> float:
-    """A ROS time stamp as one number."""
+    """Converts a ROS time stamp to seconds."""
     return stamp.sec + 1e-9 * stamp.nanosec
 
 
 def main(arguments: list[str]) -> None:
-    """Spin the node of the site and vehicle that the arguments name."""
+    """Runs the node of the given site and vehicle."""
     import rclpy
     from diagnostic_msgs.msg import DiagnosticStatus
     from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -44,7 +45,7 @@ def main(arguments: list[str]) -> None:
     def taken(take: Callable[..., Any], *given: Any, **named: Any) -> None:
         try:
             take(*given, **named)
-        except (TypeError, ValueError) as refused:  # live goes on as before
+        except (TypeError, ValueError) as refused:  # the state of `live` is unchanged
             node.get_logger().warning(str(refused))
 
     def odometry(message: Any) -> None:

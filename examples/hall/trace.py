@@ -1,7 +1,7 @@
-"""The paths of a small hall by the image method: how ``paths.npz`` beside this was made.
+"""Propagation paths of a small hall by the image method: writes the file ``paths.npz``.
 
-Four walls, floor and ceiling of a hall of 60 by 24 by 8 m, each reflecting once; three radio heads;
-a lane of 40 m through the middle::
+The hall measures 60 m × 24 m × 8 m. Each of the four walls, the floor and the ceiling reflects
+once. Three radio heads serve a lane of 40 m through the middle::
 
     python examples/hall/trace.py
 """
@@ -19,13 +19,13 @@ HERE = Path(__file__).parent
 HALL_M = np.array([60.0, 24.0, 8.0])
 ARRAY_HEIGHT_M = 1.2
 STEP_M = 0.5
-# Concrete, at all angles: half the power.
+# Power reflection coefficient of concrete, at all angles.
 REFLECTION = -np.sqrt(0.5)
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
 
 def images(head_m: np.ndarray) -> np.ndarray:
-    """The head, and its mirror images in the six surfaces, shape (7, 3)."""
+    """Positions (m) of the head and of its mirror images in the six surfaces, shape (7, 3)."""
     mirrored = np.repeat(head_m[None], 7, axis=0)
     for axis in range(3):
         mirrored[1 + axis, axis] = -head_m[axis]
@@ -34,7 +34,7 @@ def images(head_m: np.ndarray) -> np.ndarray:
 
 
 def main() -> None:
-    """Trace and write."""
+    """Computes the paths and writes them."""
     site = Site.load(str(HERE / "site.toml"))
     settings = json.loads(site.to_json())
     heads, carrier_hz = settings["radio_heads"], 1e6 * settings["carrier_mhz"]

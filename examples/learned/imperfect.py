@@ -1,20 +1,22 @@
-"""An array that is not what it is taken for: learning beside calibration.
+"""Learned estimators compared with calibration, for an array that differs from its model.
 
     .venv/bin/python examples/learned/imperfect.py        # half a minute
 
-DeepMUSIC's case is an array with coupling and with errors of its channels: maximum likelihood with
-the ideal manifold a(ω) is then off, and a network that has learnt the array as it is may not be.
-Here neighbours couple by 15 % and channels are off by 0.2 rad (σ): the antennas give B a(ω), B a
-matrix. The same looks with a known angle, as a drive along a known road gives them, serve
+DeepMUSIC considers an array with coupling and with channel errors. Maximum likelihood with the
+ideal manifold a(ω) is then biased; a network that was trained on the actual array need not be.
+Here neighbouring antennas couple by 15 %, and the channel phases have errors of 0.2 rad (σ). The
+antennas give B a(ω), where B is a matrix. A drive along a known road gives snapshots with a known
+angle. They are used to estimate
 
 - two numbers, the direction of the axis and one phase from antenna to antenna, as
-  `access-av survey` finds them;
-- a whole matrix B, by alternating least squares over B and each look's complex amplitude;
+  `access-av survey` does;
+- the whole matrix B, by alternating least squares over B and the complex amplitude of each
+  snapshot;
 - a network of two layers.
 
-Beside them stand maximum likelihood with the ideal and with the true manifold, and a network with
-as many looks as it likes. Angles are evenly distributed from 20 to 160 degrees; one despread block
-of 127 pilots a look.
+The references are maximum likelihood with the ideal and with the true manifold, and a network with
+unlimited training snapshots. Angles are uniformly distributed from 20 to 160 degrees. Each snapshot
+is one despread block of 127 pilots.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ EDGE_RAD = np.radians(20.0)
 
 
 def imperfect_array(random):
-    """B: neighbours couple, and every channel has a phase and a gain of its own."""
+    """Returns B: neighbours couple, and each channel has a phase and a gain error."""
     near = np.abs(np.subtract.outer(np.arange(ELEMENTS), np.arange(ELEMENTS)))
     turned = np.exp(2j * np.pi * random.random((ELEMENTS, ELEMENTS)))
     coupling = np.where(near == 1, COUPLING * np.triu(turned) + COUPLING * np.triu(turned).T, 0.0)
@@ -42,7 +44,7 @@ def imperfect_array(random):
 
 
 def looks(random, array, snr_db):
-    """Electrical angles and channel vectors at these SNRs."""
+    """Returns electrical angles (rad) and channel vectors at the given SNRs."""
     phase_rad = np.pi * np.cos(random.uniform(EDGE_RAD, np.pi - EDGE_RAD, snr_db.size))
     noise = random.normal(size=(2, snr_db.size, ELEMENTS)) * np.sqrt(0.5 / PILOTS)
     amplitude = (10.0 ** (snr_db / 20.0) * np.exp(2j * np.pi * random.random(snr_db.size)))[:, None]
@@ -50,7 +52,7 @@ def looks(random, array, snr_db):
 
 
 def maximum_likelihood(channels, array):
-    """ω at the largest |(B a(ω))ᴴ ĥ| / |B a(ω)|, on a grid and by a parabola through its peak."""
+    """Returns ω at the maximum of |(B a(ω))ᴴ ĥ| / |B a(ω)|: grid search, parabolic refinement."""
     manifold = steering(GRID_RAD) @ array.T
     matched = np.abs(channels @ manifold.conj().T) / np.linalg.norm(manifold, axis=1)
     best = matched.argmax(axis=1)
@@ -62,7 +64,7 @@ def maximum_likelihood(channels, array):
 
 
 def survey(phase_rad, channels):
-    """A correction by two numbers: the axis is turned, and each antenna runs ahead of the last."""
+    """Estimates axis rotation and phase from antenna to antenna (rad)."""
     cosine = phase_rad / np.pi
     off_rad = np.angle(np.exp(1j * (maximum_likelihood(channels, np.eye(ELEMENTS)) - phase_rad)))
     columns = np.stack([-np.pi * np.sqrt(1.0 - cosine**2), np.ones_like(cosine)], axis=1)
@@ -76,12 +78,12 @@ def survey(phase_rad, channels):
 
 
 def calibrate(phase_rad, channels, rounds=30):
-    """B by alternating least squares over it and the looks' amplitudes."""
+    """Estimates B by alternating least squares over B and the amplitudes of the snapshots."""
     ideal, array = steering(phase_rad), np.eye(ELEMENTS, dtype=complex)
     for _ in range(rounds):
         given = ideal @ array.T
         amplitude = np.sum(given.conj() * channels, axis=1) / np.sum(np.abs(given) ** 2, axis=1)
-        # Each look counts by its noise, which is the same for all; its amplitude is its weight.
+        # All snapshots have the same noise, so that the weight of each is its amplitude.
         array = np.linalg.lstsq(amplitude[:, None] * ideal, channels, rcond=None)[0].T
     return array
 
@@ -92,7 +94,7 @@ def rms(found_rad, phase_rad):
 
 
 def compare(random, count, known, steps):
-    """RMS errors by estimator and SNR, of one imperfect array."""
+    """Returns the RMS errors of each estimator at each SNR, for one imperfect array."""
     array = imperfect_array(random)
     snr_db = random.uniform(*TRAINED_AT_DB, known)
     labelled = looks(random, array, snr_db)
@@ -126,7 +128,7 @@ def compare(random, count, known, steps):
 
 
 def main():
-    """Several arrays, and the root mean square over them."""
+    """Prints the RMS over several arrays."""
     options = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     options.add_argument("--arrays", type=int, default=5)
     options.add_argument("--known", type=int, default=500, help="looks with a known angle")

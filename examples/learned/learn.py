@@ -1,13 +1,13 @@
-"""A learned angle estimator, beside maximum likelihood and beside what no estimator can beat.
+"""A learned angle estimator, compared with maximum likelihood and with the Bayesian bound.
 
     .venv/bin/python examples/learned/learn.py            # half a minute
-    .venv/bin/python examples/learned/learn.py --drive    # and a drive with each
+    .venv/bin/python examples/learned/learn.py --drive    # and a drive with each estimator
 
-The paper's outlook names learning. Here a network of two layers learns the electrical angle ω of
-one source from four antennas, despread by known pilots: ĥ = √κ e^{jφ} a(ω) + √v n, with n white and
-normal, κ = K/(K+1), v = 1/(K+1) + 1/(M SNR), any phase φ, θ evenly distributed. The ceiling is
-exact: p(ω | ĥ) ∝ p(ω) I₀(2 √κ |a(ω)ᴴ ĥ| / v), and the direction of the mean of e^{jω} under it has
-the least mean of 1 − cos(error) that there is (Van Trees, Optimum Array Processing, 8).
+The paper's outlook proposes learning. Here a network of two layers learns the electrical angle ω of
+one source from four antennas, despread by known pilots: ĥ = √κ e^{jφ} a(ω) + √v n. The noise n is
+white and normal, κ = K/(K+1), v = 1/(K+1) + 1/(M SNR), φ is uniform, and θ is uniform. The bound is
+exact: p(ω | ĥ) ∝ p(ω) I₀(2 √κ |a(ω)ᴴ ĥ| / v). The direction of the mean of e^{jω} under this
+posterior minimizes the mean of 1 − cos(error) (Van Trees, Optimum Array Processing, 8).
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ def steering(phase_rad):
 
 
 def variance(snr_db):
-    """Variance of each element of ĥ: scatter, and noise after despreading."""
+    """Variance of each element of ĥ: scattering, and noise after despreading."""
     return 1.0 / (K + 1.0) + 10.0 ** (-0.1 * snr_db) / PILOTS
 
 
 def draw(random, snr_db):
-    """Angles ω and channels ĥ of shape (n, ELEMENTS), one for each SNR."""
+    """Draws angles ω (rad) and channels ĥ of shape (n, ELEMENTS), one for each SNR."""
     phase_rad = np.pi * np.cos(random.uniform(0.0, np.pi, snr_db.size))
     parts = (
         random.normal(size=(2, snr_db.size, ELEMENTS)) * np.sqrt(0.5 * variance(snr_db))[:, None]
@@ -46,7 +46,7 @@ def draw(random, snr_db):
 
 
 def features(covariance):
-    """What the network sees of covariances (n, ELEMENTS, ELEMENTS): all but their scale."""
+    """Network inputs from covariances (n, ELEMENTS, ELEMENTS), normalized to remove their scale."""
     scale = np.trace(covariance, axis1=1, axis2=2).real[:, None]
     upper = covariance[:, UPPER[0], UPPER[1]] / scale * ELEMENTS
     return np.hstack([upper.real, upper.imag])
@@ -58,7 +58,7 @@ def outer(channels):
 
 
 class Network:
-    """Features to the direction (cos ω, sin ω): two hidden layers, trained by Adam."""
+    """Network from features to (cos ω, sin ω): two hidden layers, trained by Adam."""
 
     def __init__(self, random, widths=(12, 64, 64, 2)):
         self.layers = [
@@ -67,7 +67,7 @@ class Network:
         ]
 
     def __call__(self, inputs):
-        """Electrical angles in radians."""
+        """Returns electrical angles in radians."""
         out = self._forward(inputs)[-1]
         return np.arctan2(out[:, 1], out[:, 0])
 
@@ -79,7 +79,7 @@ class Network:
         return kept
 
     def train(self, random, steps, batch=512, rate=2e-3, sample=None):
-        """Fresh samples at every step, so that nothing is learnt by heart, or ``sample``'s."""
+        """Trains on new samples in every step (no overfitting), or on those of ``sample``."""
         sample = sample or (lambda: draw(random, random.uniform(-25.0, 15.0, batch)))
         moments = [
             [[np.zeros_like(part), np.zeros_like(part)] for part in it] for it in self.layers
@@ -107,19 +107,19 @@ class Network:
 
 
 def maximum_likelihood(channels):
-    """ω at the largest |a(ω)ᴴ ĥ|, on the grid."""
+    """Returns ω at the maximum of |a(ω)ᴴ ĥ| on the grid."""
     return GRID_RAD[np.abs(channels @ steering(GRID_RAD).conj().T).argmax(axis=1)]
 
 
 def bayes(channels, snr_db):
-    """The estimate of least mean 1 − cos(error): the ceiling."""
+    """Returns the estimate with the minimum mean of 1 − cos(error), which is the bound."""
     matched = np.abs(channels @ steering(GRID_RAD).conj().T)
     argument = 2.0 * np.sqrt(K / (K + 1.0)) * matched / variance(snr_db)
-    # ln I₀(x) = x + ln(e^{−x} I₀(x)), which neither overflows nor vanishes.
+    # ln I₀(x) = x + ln(e^{−x} I₀(x)) neither overflows nor underflows.
     log_likelihood = (
         argument + np.log(np.i0(np.minimum(argument, 500.0))) - np.minimum(argument, 500.0)
     )
-    # θ evenly distributed: p(ω) = 1/(π √(π² − ω²)).
+    # θ is uniform: p(ω) = 1/(π √(π² − ω²)).
     log_prior = -0.5 * np.log(np.pi**2 - np.minimum(np.abs(GRID_RAD), np.pi - 1e-3) ** 2)
     log_posterior = log_likelihood + log_prior
     weight = np.exp(log_posterior - log_posterior.max(axis=1, keepdims=True))
@@ -127,14 +127,14 @@ def bayes(channels, snr_db):
 
 
 def cost(found_rad, phase_rad):
-    """Mean of 2 (1 − cos(error)) as an RMS error in radians, and its standard error."""
+    """Returns the mean of 2 (1 − cos(error)) as an RMS error (rad), and its standard error."""
     each = 2.0 * (1.0 - np.cos(found_rad - phase_rad))
     mean = each.mean()
     return np.sqrt(mean), 0.5 * each.std() / np.sqrt(each.size * mean)
 
 
 def compare(network, random, count):
-    """Rows of SNR and (cost, standard error) by estimator, over the same draws."""
+    """Returns rows of SNR and (cost, standard error) of each estimator, with the same samples."""
     for snr_db in SNRS_DB:
         phase_rad, channels = draw(random, np.full(count, snr_db))
         yield (
@@ -146,7 +146,7 @@ def compare(network, random, count):
 
 
 def drive(network):
-    """The same drive with each estimator."""
+    """Runs the same drive with each estimator."""
     import access_av
 
     def learned(snapshots):
@@ -161,7 +161,7 @@ def drive(network):
 
 
 def main():
-    """Train, compare, drive."""
+    """Trains the network, compares the estimators and runs the drives."""
     options = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     options.add_argument("--steps", type=int, default=4000, help="of the training")
     options.add_argument("--count", type=int, default=2000, help="draws an SNR")

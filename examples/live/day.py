@@ -1,10 +1,11 @@
-"""A day of driving as fast as the computer can: it must not leak, and its counters must add up.
+"""A day of driving at maximum speed: tests for memory leaks and consistent counters.
 
     python examples/live/day.py [--node PROGRAM] [--hours 24]
 
-A drive of the scenario `yard` comes again and again as newline JSON on standard input, angles and
-odometry; each time the vehicle is found anew. Prints the memory over the hours, what came, what was
-dropped, and the size of the MCAP files; each is read, and must be whole.
+A drive of the scenario `yard` is repeated as newline JSON on standard input, with angles and
+odometry. Each repetition starts without a pose. The program prints the memory over the hours, the
+numbers of received and dropped messages, and the size of the MCAP files. Each MCAP file is read and
+must be complete.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def messages_of(folder: Path) -> list[tuple[float, str]]:
-    """Angles and odometry in order of time: the time, and what follows it in the line."""
+    """Angles and odometry in order of time: the time, and the rest of the line."""
     told: list[tuple[float, dict[str, Any]]] = []
     for odometry in odometry_of(folder):
         told.append((odometry.pop("time_s"), {"type": "odometry", **odometry}))
@@ -48,18 +49,18 @@ def messages_of(folder: Path) -> list[tuple[float, str]]:
 
 
 def hours_of(lap: list[tuple[float, str]], hours: float) -> Iterator[tuple[str, int]]:
-    """Text of one drive after the other and its number of messages, until they fill the hours."""
+    """Yields the text and the number of messages of each repetition, for the given hours."""
     begins_s = 0.0
     while begins_s < 3600.0 * hours:
         lines = [f'{{"time_s":{begins_s + time_s:.9f},{rest}\n' for time_s, rest in lap]
-        # Only what has driven can be searched for again.
+        # The search for a pose requires odometry of a driven distance.
         lines.insert(0, '{"type":"reset"}\n')
         yield "".join(lines), len(lines)
         begins_s += lap[-1][0] + 0.02
 
 
 def main() -> int:
-    """Drives for a day."""
+    """Runs the day of driving."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--node", default=str(ROOT / "target/release/access-av-node"))
     parser.add_argument("--hours", type=float, default=24.0)
@@ -109,7 +110,7 @@ def main() -> int:
     print(f"MCAP: {number} files, {size / 1e6:.1f} MB, {size / drive_s * 0.0864:.0f} MB a day")
     print(f"read of them: {read}")
     lost = sum(told["dropped"].values()) + sent - told["sources"][0]["items"]
-    # A status a second of the drive.
+    # One status message per second of the drive.
     whole = abs(read["/diagnostics"] - drive_s) <= 2 + 2 * len(memory_mib)
     return 0 if lost == 0 and whole else 1
 

@@ -1,8 +1,9 @@
-"""A simulated yard drives in real time, through ZeroMQ, into `access-av-node`; its page opens.
+"""Live demonstration: a simulated yard drives in real time into `access-av-node` by ZeroMQ.
 
     python examples/live/live.py [--node PROGRAM] [--duration-s 60] [--no-browser]
 
-The drive is recorded once, in `results/live/`, and driven again and again until Ctrl-C.
+The page of the node opens in a browser. The drive is recorded once, in `results/live/`, and
+repeated until Ctrl-C.
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ import access_av
 
 ROOT = Path(__file__).parents[2]
 SCENARIO = "yard"
-# So long it takes at 15 km/h (s); a drive that is to last longer is slower.
+# Duration of the drive at 15 km/h (s); the vehicle is slower in a longer drive.
 LASTS_S = 420.0
 PORTS = {"port": 2000, "odometry_port": 2100}
 PAGE = "127.0.0.1:8400"
 
 
 def recorded(folder: Path, duration_s: float, *, continuous: bool = False) -> Path:
-    """The drive's folder, recorded if it is not there yet: all of it, or its SSBs alone."""
+    """Returns the folder of the drive, and records it if absent: all samples, or only the SSBs."""
     if not (folder / "iq.sigmf-meta").exists():
         print(f"recording {duration_s:g} s of the scenario `{SCENARIO}` in {folder} …", flush=True)
         slower = {"vehicle.top_speed_kmh": 15.0 * min(LASTS_S / duration_s, 1.0) ** 1.5}
@@ -37,7 +38,7 @@ def recorded(folder: Path, duration_s: float, *, continuous: bool = False) -> Pa
 
 
 def main() -> int:
-    """Drives until Ctrl-C."""
+    """Repeats the drive until Ctrl-C."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--node", default=str(ROOT / "target/release/access-av-node"))
     parser.add_argument("--duration-s", type=float, default=60.0)

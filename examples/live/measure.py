@@ -1,17 +1,23 @@
-"""What a node takes while a simulated drive comes in: processor, memory, latencies.
+"""Resources of a node during a simulated drive: processor time, memory, latencies.
 
     python examples/live/measure.py [--node PROGRAM] [--duration-s 60] [--every-ssb]
         [--stream-off | --radio | --times 8 [--speed 0.25]] [--core 1] [--first] [--tabs 2]
 
-Samples come by ZeroMQ; with `--stream-off` as a recording played in real time, which is not read
-where the node wants nothing, as a radio that is switched off (61 MB a second on disk); with
-`--radio` from a SoapySDR module that plays it, for a node built with the feature `soapy`; with
-`--times` by one TCP stream of integers at so many times 3.84 Msps. Prints the share of one core by
-the node's own processor time, per second of the drive, over all and once it tracks, thread by
-thread; its memory; and from the arrival of an SSB's last sample to the pose with its angle. Measure
-on a computer that does nothing else; `--first` puts transmitter and node before all others that
-run there (SCHED_FIFO, for root), `--speed` below 1 is for one that is not fast enough for them;
-`--tabs` looks at the page as so many browsers do.
+Sources of samples:
+
+- ZeroMQ, by default;
+- `--stream-off`: a recording played in real time (61 MB a second on disk). Parts that the node does
+  not need are not read, as if the radio was off;
+- `--radio`: a SoapySDR module that plays the recording, for a node built with the feature `soapy`;
+- `--times N`: one TCP stream of integers at N × 3.84 Msps.
+
+The program prints the processor time of the node as a share of one core, per second of the drive:
+overall, while tracking, and for each thread. It also prints the memory and the latency from the
+arrival of an SSB's last sample to the pose that uses its angle.
+
+Measure on an otherwise idle computer. `--first` gives transmitter and node real-time priority
+(SCHED_FIFO, requires root). A `--speed` below 1 suits a computer that is too slow for real time.
+`--tabs N` opens the page in N browser connections.
 """
 
 from __future__ import annotations
@@ -44,19 +50,19 @@ from transmitter import (
 import access_av
 from radio import Radio
 
-# By then the SSBs are found and the pose is.
+# Time at which the SSBs and the pose are found (s).
 TRACKS_S = 8.0
 ANY_PORT = "127.0.0.1:0"
 
 
 def resident_mib(process: int) -> float:
-    """Memory of a process."""
+    """Returns the resident memory of a process (MiB)."""
     pages = int(Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
 def busy_s(process: int) -> dict[str, float]:
-    """Processor time of a process, by the names of its threads."""
+    """Returns the processor time (s) of each thread of a process, by thread name."""
     used: dict[str, float] = {}
     for thread in Path(f"/proc/{process}/task").iterdir():
         stat = (thread / "stat").read_text(encoding="ascii")
@@ -68,7 +74,7 @@ def busy_s(process: int) -> dict[str, float]:
 
 
 class Node:
-    """A node that runs, and its page."""
+    """A running node and its page."""
 
     def __init__(
         self,
@@ -93,12 +99,12 @@ class Node:
                 pass
 
     def state(self) -> dict[str, Any]:
-        """How it stands."""
+        """Returns the state of the node."""
         with urllib.request.urlopen(f"{self.page}state.json") as answer:
             return dict(json.load(answer))
 
     def end(self) -> None:
-        """Ends it."""
+        """Stops the node."""
         self.process.terminate()
         self.process.communicate()
 
@@ -171,7 +177,7 @@ def main() -> None:
         while sending.is_alive():
             sending.join(1.0)
             memory_mib.append(resident_mib(process))
-            # That of a thread that has ended is not told any more.
+            # The processor time of a thread that has ended is not available.
             used |= busy_s(process)
             if tracking is None and time.monotonic() - began >= TRACKS_S / arguments.speed:
                 tracking = (time.monotonic(), used.copy())

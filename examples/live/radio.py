@@ -1,4 +1,4 @@
-"""A radio that is none: `replay_radio.cpp` for SoapySDR, and the wheels of its drive."""
+"""Simulated radio for SoapySDR (`replay_radio.cpp`), with the odometry of the same drive."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SOURCE = Path(__file__).with_name("replay_radio.cpp")
 
 
 class Radio:
-    """Plays a drive that `access-av synth --continuous` recorded to who opens it by SoapySDR."""
+    """Plays a drive of `access-av synth --continuous` to the program that opens it by SoapySDR."""
 
     def __init__(self, recording: Path, scratch: Path) -> None:
         module = scratch / "libreplay.so"
@@ -32,7 +32,7 @@ class Radio:
 
     @property
     def samples(self) -> str:
-        """Of node.toml."""
+        """`[samples]` settings of node.toml."""
         return f"""
 source = "soapy"
 device = "{self.device}"
@@ -43,7 +43,7 @@ antennas = [0, 1, 2, 3]
 """
 
     def run(self) -> None:
-        """Sends the odometry in step with the radio, by this computer's clock."""
+        """Sends the odometry synchronously with the radio, by this computer's clock."""
         until = time.monotonic() + OPENED_WITHIN_S
         while not (self.log.exists() and self.log.read_text(encoding="ascii").endswith("\n")):
             if time.monotonic() > until:
@@ -55,7 +55,7 @@ antennas = [0, 1, 2, 3]
         wheels.run(began_s=0.0)
 
     def on(self) -> list[tuple[float, float]]:
-        """From when to when it was on, in seconds since it was opened."""
+        """Intervals in which the radio was on (s since it was opened)."""
         rows = [line.split() for line in self.log.read_text(encoding="ascii").splitlines()[1:]]
         return [(float(began), float(ended)) for began, ended in rows]
 
@@ -64,5 +64,5 @@ antennas = [0, 1, 2, 3]
         self.wheels.stop()
 
     def close(self) -> None:
-        """Closes its socket."""
+        """Closes the socket."""
         self.wheels.close()

@@ -1,8 +1,8 @@
-// A radio for SoapySDR, driver `replay`: plays `path`, interleaved 16-bit integers of `channels`
-// channels at `rate` samples per second, in real time by a clock of its own. As a real one it
-// delivers nothing while it is off, needs a while to start, and loses what is not fetched in time.
-// `log` gets the time of the recording's begin by this computer's clock, and then from when to when
-// it was on.
+// Simulated SoapySDR radio, driver `replay`: plays `path`, interleaved 16-bit integers of `channels`
+// channels at `rate` samples per second, in real time by its own clock. Like a real radio, it
+// delivers no samples while it is off, has a start-up time, and loses samples that are not read in
+// time. `log` receives the start time of the recording by this computer's clock, and then the
+// intervals in which the radio was on.
 //
 //     g++ -O2 -shared -fPIC -o FOLDER/libreplay.so replay_radio.cpp -lSoapySDR
 //     SOAPY_SDR_PLUGIN_PATH=FOLDER SoapySDRUtil --find=driver=replay
@@ -25,7 +25,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
-// What the radio's clock shows when it is opened: not the computer's time.
+// Time of the radio's clock when it is opened; differs from the computer's time.
 constexpr double OPENED_S = 1000.0;
 constexpr double STARTS_IN_S = 0.005;
 constexpr double BUFFER_S = 0.1;
@@ -87,7 +87,7 @@ class Replay : public SoapySDR::Device {
             next = static_cast<long long>(now_s() * rate);
             return SOAPY_SDR_OVERFLOW;
         }
-        // Beyond the recording it hears nothing.
+        // No samples after the end of the recording.
         block.assign(static_cast<size_t>(count) * channels * 2, 0);
         file.clear();
         file.seekg(next * static_cast<long long>(channels) * 4);

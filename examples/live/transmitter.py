@@ -1,10 +1,9 @@
-"""A simulated drive sent as radios and wheels would: samples by ZeroMQ, odometry by TCP.
+"""Transmitter of a simulated drive: samples by ZeroMQ, odometry by TCP.
 
-Samples: a REP socket for each antenna, which answers every request by cf32 samples, as the drivers
-of srsRAN, OCUDU and OpenAirInterface do; between the recorded bursts there is noise. Odometry:
-newline JSON to whoever connects. Both run in real time from when the first samples are asked for.
-Others of `Transmitter`'s kind: `Wheels`, odometry alone, and `RawTransmitter`, samples by one TCP
-stream.
+Samples: each antenna has a REP socket that answers every request by cf32 samples, as the drivers of
+srsRAN, OCUDU and OpenAirInterface do. Between the recorded bursts there is noise. Odometry: newline
+JSON to every connected client. Both run in real time from the first request for samples.
+`Wheels` sends only odometry, and `RawTransmitter` sends samples by one TCP stream.
 
     python examples/live/transmitter.py DRIVE [--port 2000] [--odometry-port 2100] [--once]
 
@@ -34,19 +33,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FULL_SCALE = 32768.0
-# Samples of each answer: 1 ms at 3.84 Msps, as a base station's slot.
+# Samples of each answer: 1 ms at 3.84 Msps, the duration of a slot.
 ANSWER = 3840
 
 
 def odometry_of(folder: Path) -> list[dict[str, float]]:
-    """Odometry of a drive that was written by `access-av synth`."""
+    """Returns the odometry of a drive that `access-av synth` wrote."""
     with (folder / "odometry.csv").open(encoding="utf-8") as file:
         rows = csv.DictReader(file)
         return [{key: float(row[key]) for key in row if row[key]} for row in rows]
 
 
 class Drive:
-    """Samples and odometry of a drive that was written by `access-av synth`."""
+    """Samples and odometry of a drive that `access-av synth` wrote."""
 
     def __init__(self, folder: Path) -> None:
         metadata = json.loads((folder / "iq.sigmf-meta").read_text(encoding="utf-8"))
@@ -64,7 +63,7 @@ class Drive:
         self.ends = ends
         self.length = self.captures[-1][1] + ends[-1] - self.captures[-1][0]
         self.odometry = odometry_of(folder)
-        # Noise as it stands between two SSBs: the quieter half of the first burst tells its power.
+        # Noise between two SSBs: its power is estimated from the quieter half of the first burst.
         first = self.samples[: ends[0]].astype(np.float32) / FULL_SCALE
         power = np.sort((first**2).sum(axis=2).mean(axis=1))[: len(first) // 4].mean()
         random = np.random.default_rng(1)
@@ -74,7 +73,7 @@ class Drive:
         )
 
     def answers(self) -> Iterator[tuple[int, list[NDArray[np.float32]]]]:
-        """Number of samples up to each answer's end, and the samples of every antenna."""
+        """Yields the sample count up to the end of each answer, and the samples per antenna."""
         sent = 0
         for (first, index), end in zip(self.captures, self.ends, strict=True):
             for start in range(sent, index, ANSWER):
@@ -89,7 +88,7 @@ class Drive:
 
 
 class Wheels:
-    """Sends odometry as newline JSON to whoever has connected."""
+    """Sends odometry as newline JSON to every connected client."""
 
     def __init__(self, odometry: list[dict[str, float]], port: int = 0) -> None:
         self.odometry = odometry
@@ -101,18 +100,18 @@ class Wheels:
 
     @property
     def address(self) -> str:
-        """What the node connects to."""
+        """Address for the node's messages."""
         host, port = self.server.getsockname()
         return f"tcp://{host}:{port}"
 
     def send_until(self, now_s: float) -> None:
-        """Sends what the wheels have told up to a time."""
+        """Sends the odometry up to a time."""
         while self.sent < len(self.odometry) and self.odometry[self.sent]["time_s"] <= now_s:
             self._send(self.odometry[self.sent])
             self.sent += 1
 
     def run(self, *, began_s: float | None = None) -> None:
-        """Sends all of it in real time, from when somebody connects on, or counted from a time."""
+        """Sends all odometry in real time, from the first connection on, or from a given time."""
         self.server.settimeout(0.2)
         while self.peer is None and not self.stopped.is_set():
             with contextlib.suppress(TimeoutError):
@@ -148,7 +147,7 @@ class Wheels:
 
 
 class Transmitter:
-    """Sends a drive, again and again or once."""
+    """Sends a drive once or repeatedly."""
 
     def __init__(self, drive: Drive, port: int = 0, odometry_port: int = 0) -> None:
         self.drive = drive
@@ -165,16 +164,16 @@ class Transmitter:
 
     @property
     def endpoints(self) -> list[str]:
-        """What the node connects to for samples, antenna by antenna."""
+        """ZeroMQ endpoints of the samples, one for each antenna."""
         return [rep.getsockopt_string(zmq.LAST_ENDPOINT) for rep in self.sockets]
 
     @property
     def odometry(self) -> str:
-        """What the node connects to for odometry."""
+        """Address of the odometry."""
         return self.wheels.address
 
     def run(self, *, speed: float = 1.0) -> None:
-        """Sends the drive once, at so many times real time; slower where the computer is."""
+        """Sends the drive once, at a multiple of real time; slower if the computer is too slow."""
         if not all(self._asked(rep) for rep in self.sockets):
             return
         began = time.monotonic()
@@ -213,12 +212,12 @@ class Transmitter:
 
 
 class RawTransmitter:
-    """Sends a drive by one TCP stream of 16-bit integers, at a whole multiple of its rate."""
+    """Sends a drive by one TCP stream of 16-bit integers, at an integer multiple of its rate."""
 
     def __init__(self, drive: Drive, times: int) -> None:
         self.drive = drive
         self.times = times
-        # All of it is made before it is needed: resampling takes longer than the drive.
+        # The stream is prepared in advance, because resampling takes longer than the drive.
         self.parts = self._parts()
         self.wheels = Wheels(drive.odometry)
         self.server = socket.create_server(("127.0.0.1", 0))
@@ -227,12 +226,12 @@ class RawTransmitter:
 
     @property
     def address(self) -> str:
-        """What the node connects to for samples."""
+        """Address of the samples."""
         host, port = self.server.getsockname()
         return f"tcp://{host}:{port}"
 
     def _parts(self) -> list[tuple[float, bytes | memoryview]]:
-        """The whole stream: until when each part lasts, and its bytes."""
+        """Yields the whole stream: the end time of each part, and its bytes."""
         noise = memoryview(self._integers(self.drive.noise[:, : 1 << 16]))
         sample_bytes = 4 * self.drive.antennas * self.times
         parts: list[tuple[float, bytes | memoryview]] = []
@@ -246,13 +245,13 @@ class RawTransmitter:
         return parts
 
     def _integers(self, samples: NDArray[np.float32]) -> bytes:
-        """Samples of every antenna, [antenna, sample, part], in turn and at the higher rate."""
+        """Interleaved samples of all antennas, [antenna, sample, part], at the higher rate."""
         finer = resample_poly(samples, self.times, 1, axis=1) if self.times > 1 else samples
         scaled = np.clip(np.rint(finer * FULL_SCALE), -FULL_SCALE, FULL_SCALE - 1)
         return scaled.astype("<i2").transpose(1, 0, 2).tobytes()
 
     def run(self, *, speed: float = 1.0) -> None:
-        """Sends the drive once, at so many times real time; slower where the computer is."""
+        """Sends the drive once, at a multiple of real time; slower if the computer is too slow."""
         peer: socket.socket | None = None
         while peer is None and not self.stopped.is_set():
             with contextlib.suppress(TimeoutError):
@@ -280,7 +279,7 @@ class RawTransmitter:
 
 
 def settings_of(samples: str, messages: str, page: str) -> str:
-    """Settings of a node with such samples, odometry of `messages`, and a page."""
+    """Returns node settings with the given samples, odometry by `messages`, and a page."""
     return f"""\
 name = "simulated"
 messages = ["{messages}"]
@@ -293,7 +292,7 @@ listen = "{page}"
 
 
 def stream_toml(drive: Drive, times: int = 1) -> str:
-    """What the samples of a drive are."""
+    """Returns the settings of the sample stream of a drive."""
     return f"""
 [samples.stream]
 rate_msps = {times * drive.rate_hz / 1e6}
@@ -304,7 +303,7 @@ clock.start-time-s = 0.0
 
 
 def node_toml(transmitter: Transmitter, page: str) -> str:
-    """Settings of a node that listens to a transmitter."""
+    """Returns the settings of a node that receives from a transmitter."""
     samples = f'source = "zeromq"\nendpoints = {json.dumps(transmitter.endpoints)}\n'
     samples += stream_toml(transmitter.drive)
     return settings_of(samples, transmitter.odometry, page)

@@ -1,15 +1,15 @@
-"""What else an SSB tells of the place: bounds of its delay, its carrier phase and its power.
+"""Ranging by SSBs: bounds of the delay, the carrier phase and the power.
 
     .venv/bin/python examples/outlook/ranging.py
 
-The known elements of an SSB are PSS and SSS (127 each, in the middle) and the broadcast channel's
-reference signals (144 over all 240 subcarriers). Cramér–Rao bounds of delay τ and phase φ of one
-path at N elements f_n of M antennas, SNR γ of an element:
+The known elements of an SSB are the PSS and the SSS (127 each, in the middle) and the reference
+signals of the broadcast channel (144 over all 240 subcarriers). Cramér–Rao bounds of the delay τ
+and the phase φ of one path at N elements f_n of M antennas, with an SNR γ of each element:
 
     var(τ) = 1 / (2 M γ Σ (2π (f_n − f̄))²),   var(φ) = 1 / (2 M N γ)
 
-(Kay, Estimation Theory, 3.11). Power tells the distance by Friis: σ_d = d ln(10)/20 σ_dB, and its
-fading of 3 dB stays over metres, so that more SSBs say no more.
+(Kay, Estimation Theory, 3.11). The power gives the distance by Friis: σ_d = d ln(10)/20 σ_dB.
+Fading of 3 dB is correlated over metres, so that averaging over SSBs does not reduce the error.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ REFERENCES = np.concatenate([np.arange(-120, 120, 4), np.arange(-120, 120, 4),
 
 
 def bounds(snr_db: float, spacing_hz: float) -> tuple[float, float]:
-    """Standard deviations of the delay as metres, and of the carrier phase as millimetres."""
+    """Standard deviations of the delay (m) and of the carrier phase (mm)."""
     tones_hz = spacing_hz * np.concatenate([MIDDLE, MIDDLE, REFERENCES])
     gain = 2.0 * ANTENNAS * 10.0 ** (snr_db / 10.0)
     spread = np.sum((2.0 * np.pi * (tones_hz - tones_hz.mean())) ** 2)
@@ -31,7 +31,7 @@ def bounds(snr_db: float, spacing_hz: float) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Print the bounds."""
+    """Prints the bounds."""
     print("SNR/dB   ToA m (15 kHz)   ToA m (30 kHz)   TDoA m (30 kHz)   phase mm")
     for snr_db in (10.0, 20.0, 30.0):
         (narrow_m, phase_mm), (wide_m, _) = (bounds(snr_db, hz) for hz in (15e3, 30e3))
