@@ -1,8 +1,8 @@
-"""Instructions per estimate on aarch64: NEON against the portable code, counted under emulation.
+"""Instructions per estimate on aarch64: NEON and portable code, counted under emulation.
 
-Four antennas, 20 snapshots, batches of 64. Every instruction that the emulator executes is one line
-of its log; two runs of different length leave only the batches. Needs what ``make test-aarch64``
-needs::
+Four antennas, 20 snapshots, batches of 64. The emulator logs one line for each executed
+instruction; the difference between two runs of different length counts only the batches. Requires
+the tools of ``make test-aarch64``::
 
     make count-aarch64
 """
@@ -23,7 +23,7 @@ BATCHES = [
 
 
 def build(cargo: str, *features: str) -> Path:
-    """The program that runs batches, built with these features."""
+    """Builds the program that runs batches, with the given features."""
     target = Path("target") / ("count-" + "-".join(features or ("neon",)))
     command = [cargo, "build", "--quiet", "--release", "--target", TARGET, "--target-dir", target]
     command += ["-p", "aoa-array", "--example", "batches"]
@@ -34,7 +34,7 @@ def build(cargo: str, *features: str) -> Path:
 
 
 def executed(program: Path, what: str, times: int) -> int:
-    """Instructions of so many batches, and of the start and the end of a program."""
+    """Returns the number of executed instructions of a program for a number of batches."""
     command = ["qemu-aarch64", "-L", "/", "-singlestep", "-d", "exec,nochain", program, what, times]
     with subprocess.Popen([str(it) for it in command], stderr=subprocess.PIPE) as run:
         assert run.stderr is not None
@@ -47,12 +47,12 @@ def executed(program: Path, what: str, times: int) -> int:
 
 
 def per_item(program: Path, what: str) -> float:
-    """Instructions per estimate."""
+    """Returns the number of instructions per estimate."""
     return (executed(program, what, 3) - executed(program, what, 1)) / (2 * ITEMS)
 
 
 def main() -> None:
-    """Count and print."""
+    """Counts and prints."""
     cargo = sys.argv[1] if len(sys.argv) > 1 else "cargo"
     neon, portable = build(cargo), build(cargo, "portable")
     print(f"{'':16}{'portable':>10}{'NEON':>10}{'ratio':>8}")

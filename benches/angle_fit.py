@@ -1,12 +1,12 @@
-"""What an angle's standard deviation and verdict are worth, case by case.
+"""Calibration of an angle's standard deviation and of its reliability flag, case by case.
 
-For each case: how many estimates are named as not to be relied on, the root mean square of error
-over standard deviation of the others (1 if they are as wrong as they say), the same of all, and the
-median error. Simulated cases draw directions anew; an echo has the source's waveform and a phase at
-random. Beside them what nobody can do better than: how many are named by a test that accuses one
-plane wave in a hundred, as ours does, and knows all but the noise (directions, waveforms, the
-echo's phase), and the z-RMS of what escapes it. Real ones need recordings of others, at
-``ACCESS_AV_DATA`` or ``../shared/data``, and are left out without::
+Each case lists the fraction of estimates that are flagged as unreliable, the RMS of the normalised
+error (error over standard deviation; 1 if consistent) of the other estimates and of all, and the
+median error. Simulated cases draw new directions; an echo has the waveform of the source and a
+random phase. "at most" and "at least" are bounds: the power, and the RMS of the normalised error of
+undetected cases, of a test with a false-alarm rate of 1 % that knows everything except the noise
+(directions, waveforms, phase of the echo). Cases with real data need third-party recordings in
+``ACCESS_AV_DATA`` or ``../shared/data``; otherwise, they are omitted::
 
     python benches/angle_fit.py --seeds 2000
 """
@@ -36,23 +36,23 @@ if TYPE_CHECKING:
     Case = tuple[str, NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_], NDArray | None]
 
 ANTENNAS, SNAPSHOTS = 4, 20
-# Nearer than this an echo from beside the source arrives as one plane wave: a fifth of the beam.
+# Minimum separation (degrees): with less, source and echo act as one plane wave.
 APART_DEG = 10.0
 
 
-# False alarms of ours: one in a hundred.
+# Quantile of a false-alarm rate of 1 %.
 ALARM_DEVIATE = 2.326
 
 
 def gaussian(rng: np.random.Generator, *shape: int) -> NDArray[np.complex128]:
-    """Circular, of unit variance."""
+    """Circular complex Gaussian samples of unit variance."""
     return (rng.normal(size=(*shape, 2)) @ [1, 1j]) / np.sqrt(2)
 
 
 def directions(
     rng: np.random.Generator, count: int, apart_deg: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Electrical angles of sources, and of others at least so far from them."""
+    """Electrical angles (rad) of sources, and of other sources at a minimum separation."""
     first = rng.uniform(20, 160, count)
     second = rng.uniform(20, 160, count)
     while (close := np.abs(first - second) < apart_deg).any():
@@ -61,9 +61,9 @@ def directions(
 
 
 def most_named(signal: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Power of the test of Neyman and Pearson between a signal and the plane wave nearest to it.
+    """Power of the Neyman-Pearson test between a signal and the nearest plane wave.
 
-    Both known, noise of unit variance: `Phi(sqrt(2) |x - a s| - 2.326)` (Kay 1998, 4.3).
+    Both are known, with noise of unit variance: `Phi(sqrt(2) |x - a s| - 2.326)` (Kay 1998, 4.3).
     """
     size = 4096
     spectrum = np.fft.fft(signal, size, axis=1)
@@ -73,7 +73,7 @@ def most_named(signal: NDArray[np.complex128]) -> NDArray[np.float64]:
 
 
 def simulated(count: int) -> Iterator[Case]:
-    """One plane wave; a reflection; two sources that are taken for one."""
+    """One plane wave; a reflection; two sources that are processed as one."""
     steering = np.arange(ANTENNAS)
     rng = np.random.default_rng(count)
     cases: list[tuple[str, float, float | None, str, float]] = []
@@ -102,7 +102,7 @@ def simulated(count: int) -> Iterator[Case]:
 
 
 def real_arrays(data: Path) -> Iterator[Case]:
-    """Four antennas, 30 places each, an unmodulated carrier."""
+    """Four antennas, 30 positions each, an unmodulated carrier."""
     for path in sorted((data / "captures").glob("aoa4_day1_array*.sigmf-meta")):
         bursts = [it for it in estimate_bursts(path) if it.truth_deg is not None]
         errors = [it.azimuth_from_broadside_deg - (it.truth_deg or 0.0) for it in bursts]
@@ -116,7 +116,7 @@ def real_arrays(data: Path) -> Iterator[Case]:
 
 
 def two_channels(path: Path) -> Iterator[Case]:
-    """Two receivers' channels over the carriers, at set angles from broadside."""
+    """Channels of two receivers over the carriers, at given angles from broadside."""
     responses: dict[float, dict[str, list[complex]]] = defaultdict(
         lambda: defaultdict(lambda: [0j, 0j])
     )
@@ -142,9 +142,9 @@ def two_channels(path: Path) -> Iterator[Case]:
 
 
 def channel_estimates(count: int) -> Iterator[Case]:
-    """What `nr` tells of one SSB in noise: its channel estimate, smoothed over the subcarriers.
+    """Channel estimate of `nr` for one SSB in noise, smoothed over the subcarriers.
 
-    Taken for 240 snapshots, whitened by its covariance, and the angle that `nr` gives itself.
+    The variants are 240 snapshots, snapshots whitened by their covariance, and the angle of `nr`.
     """
     rng = np.random.default_rng(count + 1)
     burst = nr.build_burst(42, ssb_indices=[1], sfn=6, ssb_freq_hz=3.7008e9)
@@ -183,12 +183,12 @@ def channel_estimates(count: int) -> Iterator[Case]:
 
 
 def rms(values: NDArray[np.float64], weights: NDArray[np.float64] | None = None) -> str:
-    """Root mean square; a dash of nothing."""
+    """Root mean square; a dash if there are no values."""
     return f"{np.sqrt(np.average(values**2, weights=weights)):.2f}" if values.size else "–"
 
 
 def main() -> None:
-    """Print the table."""
+    """Prints the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=1000, help="estimates of each simulated case")
     count = parser.parse_args().seeds

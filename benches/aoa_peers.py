@@ -1,14 +1,14 @@
-"""Angle of arrival against its peers: accuracy and time in one table.
+"""Angle of arrival compared with other libraries: accuracy and time in one table.
 
-Four antennas half a wavelength apart, 20 snapshots, one Gaussian source between 20 and 160 degrees;
-everybody gets the same data, in the same run, on one thread. Times are the least of several
-repetitions and include the covariance. Run with the extra ``bench`` installed::
+Four antennas half a wavelength apart, 20 snapshots, one Gaussian source between 20 and 160 degrees.
+All libraries process the same data in the same run on one thread. Times are the minimum of several
+repetitions and include the covariance. Requires the extra ``bench``::
 
     python benches/aoa_peers.py
 
-Two peers are not on the package index and are stated anew, by their formulas: KrakenSDR's MUSIC,
-compiled by Numba as there (GPL: nothing of it is in here), and doatools' Root-MUSIC and MUSIC, of
-which only the arithmetic is done, so that it cannot be slower than the library.
+Two methods are not on the package index and are implemented here from their formulas: MUSIC of
+KrakenSDR, compiled by Numba (GPL: no code is copied), and Root-MUSIC and MUSIC of doatools. For the
+latter, only the arithmetic is timed, so that it cannot be slower than the library.
 """
 
 # ruff: noqa: E402  (the number of threads must be set before NumPy is imported)
@@ -46,7 +46,7 @@ LIGHT_M_S = 299_792_458.0
 
 
 def simulate(snr_db: float, trials: int, rng: np.random.Generator) -> tuple[Snapshots, Angles]:
-    """Snapshots ``(trials, antennas, snapshots)`` in unit noise, and the true angles in rad."""
+    """Returns snapshots ``(trials, antennas, snapshots)`` in unit noise, and true angles (rad)."""
 
     def gaussian(*shape: int) -> Snapshots:
         return (rng.normal(size=(*shape, 2)) @ [1, 1j]) / np.sqrt(2)
@@ -58,16 +58,16 @@ def simulate(snr_db: float, trials: int, rng: np.random.Generator) -> tuple[Snap
 
 
 class BatchedNumpy:
-    """What a careful NumPy user would write: the whole batch at once, no eigenvalues."""
+    """Optimized NumPy code: processes the whole batch at once, without eigenvalues."""
 
     def __init__(self, points: int = 32) -> None:
         self.grid = 2 * np.pi * np.arange(points) / points
         lags = np.arange(1, ANTENNAS)[:, None]
-        # Real and imaginary parts side by side, so that the search is one real product.
+        # Real and imaginary parts are concatenated, so that the search is one real product.
         self.basis = np.concatenate([np.cos(lags * self.grid), np.sin(lags * self.grid)])
 
     def maximum_likelihood(self, snapshots: Snapshots) -> Angles:
-        """Angles in rad: the best of the grid, then two steps of Newton's method."""
+        """Angles in rad: maximum of the grid, then two steps of Newton's method."""
         covariance = np.matmul(snapshots, snapshots.conj().swapaxes(1, 2))
         r1 = covariance[:, 1, 0] + covariance[:, 2, 1] + covariance[:, 3, 2]
         r2 = covariance[:, 2, 0] + covariance[:, 3, 1]
@@ -85,7 +85,7 @@ class BatchedNumpy:
 
 
 class DoaPy:
-    """doa_py, whose angles are from broadside."""
+    """doa_py; its angles are measured from broadside."""
 
     def __init__(self) -> None:
         from doa_py import algorithm, arrays
@@ -133,11 +133,11 @@ class Pyroomacoustics:
 
 
 class Doatools:
-    """Root-MUSIC and MUSIC on a grid of 1 degree with refinement, as doatools computes them.
+    """Root-MUSIC and MUSIC on a grid of 1 degree with refinement, as in doatools.
 
-    An eigendecomposition, then either the roots of the noise subspace's polynomial nearest to the
-    unit circle (Barabell 1983), or the best of the spectrum over a grid, looked at again on three
-    finer grids of ten points between the neighbours of the best.
+    After the eigendecomposition, Root-MUSIC takes the roots of the noise subspace's polynomial that
+    are nearest to the unit circle (Barabell 1983). MUSIC takes the maximum of the spectrum over a
+    grid, refined on three finer grids of ten points between the neighbours of the maximum.
     """
 
     def __init__(self) -> None:
@@ -176,7 +176,7 @@ class Doatools:
 
 
 class KrakenSdr:
-    """MUSIC over 181 directions of one degree, compiled by Numba, as KrakenSDR runs it."""
+    """MUSIC over 181 directions of one degree, compiled by Numba, as in KrakenSDR."""
 
     def __init__(self) -> None:
         import numba
@@ -206,9 +206,9 @@ class KrakenSdr:
 
 
 def least_times_us(calls: dict[str, tuple[Callable[[], object], int]]) -> dict[str, float]:
-    """Time per estimate: the least of many, taken in turns so that all meet the same machine.
+    """Minimum time per estimate (µs); the methods take turns to have the same machine load.
 
-    Each is timed for some 50 µs at a time: much longer, and a busy machine takes its own share.
+    Each repetition lasts about 50 µs, because a busy machine interrupts longer ones more often.
     """
 
     def elapsed_s(call: Callable[[], object], repetitions: int) -> float:
@@ -228,7 +228,7 @@ def least_times_us(calls: dict[str, tuple[Callable[[], object], int]]) -> dict[s
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measures and prints."""
     warnings.simplefilter("ignore")
     rng = np.random.default_rng(2026)
     data = {snr_db: simulate(snr_db, TRIALS, rng) for snr_db in SNRS_DB}

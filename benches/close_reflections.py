@@ -1,7 +1,7 @@
-"""Reflections within one beamwidth: how many are detected, and the error of those that are not.
+"""Reflections within one beamwidth: detection rate, and error of undetected reflections.
 
-Four antennas half a wavelength apart, 20 snapshots, direct path at 90 degrees. Their beamwidth
-(3 dB) is 26 degrees.
+Four antennas half a wavelength apart, 20 snapshots, direct path at 90 degrees. The beamwidth (3 dB)
+is 26 degrees.
 """
 
 from __future__ import annotations

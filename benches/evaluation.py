@@ -1,4 +1,4 @@
-"""Time and memory of the whole evaluation, and how time grows with the number of runs."""
+"""Time and memory of the whole evaluation, and growth of the time with the number of runs."""
 
 from __future__ import annotations
 

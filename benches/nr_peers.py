@@ -1,16 +1,17 @@
-"""Finding a 5G cell against py3gpp: 20 ms, from samples to the MIB, both in the same run.
+"""Cell search compared with py3gpp: 20 ms, from samples to the MIB, in the same run.
 
 One SSB at 15 kHz subcarrier spacing in 20 ms at 3.84 Msps, 10 dB per resource element, no frequency
-offset. Ours searches four antennas together, three PSS at three frequency hypotheses each, every
-SSB index, and measures the angle too; once with a searcher that keeps its plans, once with a plan
-for each call. py3gpp has one antenna and one frequency hypothesis. It is used in two ways:
+offset. `access_av.nr` searches four antennas jointly, with three PSS at three frequency hypotheses
+each and every SSB index, and also measures the angle. It runs with a reused searcher, and with a
+new searcher in each call. py3gpp has one antenna and one frequency hypothesis. It runs in two
+variants:
 
-- as its example notebook does: the PSS by correlation and again by its timing estimate, all 336 SSS
-  made while searching, the DM-RS of eight SSB indices each with a channel estimate;
-- lean: one correlation per PSS, the SSS made before the clock starts, the SSB index told.
+- as in its example notebook: the PSS by correlation and again by its timing estimate, all 336 SSS
+  generated during the search, the DM-RS of eight SSB indices with a channel estimate each;
+- lean: one correlation per PSS, the SSS generated in advance, the SSB index given.
 
-Each time is the least of several, on one thread, the receivers taking turns so that a busy machine
-slows all alike. Run with the extra ``bench`` installed::
+Each time is the minimum of several repetitions on one thread. The receivers take turns, so that
+they have the same machine load. Requires the extra ``bench``::
 
     python benches/nr_peers.py
 """
@@ -50,12 +51,12 @@ ANTENNAS, RESOURCE_BLOCKS = 4, 20
 SNR_DB = 10.0
 ASKED = 100.0
 ROUNDS = 8
-# Ours is short: the least of more is as steady as theirs.
+# Repetitions of the short searches; more are needed for a minimum of equal stability.
 REPETITIONS = 10
 
 
 def recording(rng: np.random.Generator) -> Samples:
-    """20 ms that hold one SSB, ``(antennas, samples)``."""
+    """Returns 20 ms that contain one SSB, ``(antennas, samples)``."""
     burst = nr.build_burst(
         PCI, case="A", lmax=LMAX, ssb_indices=[SSB_INDEX], sfn=SFN, ssb_freq_hz=FREQUENCY_HZ,
         sample_rate_hz=RATE_HZ,
@@ -64,14 +65,14 @@ def recording(rng: np.random.Generator) -> Samples:
     start = 12_345
     steering = np.exp(0.7j * np.arange(ANTENNAS))
     samples[:, start : start + burst.size] = np.outer(steering, burst)
-    # A resource element of amplitude one has 1/256 of its power in a sample.
+    # A resource element of unit power has the power 1/256 in a sample.
     scale = np.sqrt(0.5 / TRANSFORM) * 10 ** (-SNR_DB / 20)
     noise = scale * (rng.normal(size=(*samples.shape, 2)) @ [1, 1j])
     return samples + noise.astype(np.complex64)
 
 
 def ours_kept() -> Receiver:
-    """A searcher prepared once."""
+    """Searches with a reused searcher."""
     searcher = nr.Searcher(
         RATE_HZ,
         centre_frequency_hz=FREQUENCY_HZ,
@@ -88,7 +89,7 @@ def ours_kept() -> Receiver:
 
 
 def ours_anew(samples: Samples) -> tuple[int, int | None]:
-    """A search that plans its transforms in the call."""
+    """Searches with transforms that are planned in the call."""
     (cell,) = nr.search(
         samples,
         RATE_HZ,
@@ -100,14 +101,14 @@ def ours_anew(samples: Samples) -> tuple[int, int | None]:
 
 
 def pss_grid(n_id_2: int, symbols: int, place: int) -> Grid:
-    """A resource grid that holds nothing but a PSS."""
+    """Returns a resource grid that contains only a PSS."""
     grid = np.zeros((12 * RESOURCE_BLOCKS, symbols), dtype=complex)
     grid[py3gpp.nrPSSIndices(), place] = py3gpp.nrPSS(n_id_2)
     return grid
 
 
 def strongest_pss(samples: Samples) -> tuple[int, int]:
-    """N_ID2 of the strongest PSS, and its first sample without cyclic prefix."""
+    """Returns N_ID2 of the strongest PSS, and its first sample without cyclic prefix."""
     peaks = []
     for n_id_2 in range(3):
         symbol, _ = py3gpp.nrOFDMModulate(
@@ -120,8 +121,8 @@ def strongest_pss(samples: Samples) -> tuple[int, int]:
 
 
 def ssb_grid(samples: Samples, pss_start: int) -> Grid:
-    """The SSB's four symbols, the phase resets of TS 38.211 section 5.4 undone."""
-    # Seen as a slot: its first symbol, with the long prefix, lies before the SSB.
+    """Returns the SSB's four symbols, without the phase resets of TS 38.211 section 5.4."""
+    # The symbols of a slot: its first symbol, with the long prefix, precedes the SSB.
     first = pss_start - PREFIX - (TRANSFORM + PREFIX + 2)
     wave = samples[first : first + 8 * (TRANSFORM + PREFIX)]
     grid = py3gpp.nrOFDMDemodulate(
@@ -133,7 +134,7 @@ def ssb_grid(samples: Samples, pss_start: int) -> Grid:
 
 
 def decoded(grid: Grid, pci: int, ssb_index: int) -> tuple[int, int]:
-    """PCI and SFN, from an SSB of known index."""
+    """Returns PCI and SFN of an SSB with known index."""
     reference = np.zeros((12 * RESOURCE_BLOCKS, 4), dtype=complex)
     py3gpp.nrSetResources(
         py3gpp.nrPBCHDMRSIndices(pci), reference, py3gpp.nrPBCHDMRS(pci, ssb_index)
@@ -154,7 +155,7 @@ def decoded(grid: Grid, pci: int, ssb_index: int) -> tuple[int, int]:
 
 
 def py3gpp_lean() -> Receiver:
-    """All that can be made beforehand is."""
+    """Searches with everything prepared that can be prepared."""
     table = np.array([py3gpp.nrSSS(pci) for pci in range(1008)])
 
     def receive(samples: Samples) -> tuple[int, int]:
@@ -168,7 +169,7 @@ def py3gpp_lean() -> Receiver:
 
 
 def py3gpp_notebook(samples: Samples) -> tuple[int, int]:
-    """As in its own example."""
+    """Searches as in py3gpp's example."""
     antenna = samples[0]
     n_id_2, _ = strongest_pss(antenna)
     start = py3gpp.nrTimingEstimate(
@@ -188,12 +189,12 @@ def py3gpp_notebook(samples: Samples) -> tuple[int, int]:
         with np.errstate(divide="ignore", invalid="ignore"):
             channel, noise = py3gpp.nrChannelEstimate(rxGrid=grid, refGrid=reference)
         qualities.append(float(np.mean(np.abs(channel) ** 2) / noise))
-    # SSB indices and half frames share the eight sequences where a cell has four indices.
+    # With L_max 4, the eight sequences encode the SSB index and the half frame.
     return decoded(grid, pci, int(np.argmax(qualities)) % LMAX)
 
 
 def least_s(receivers: dict[str, tuple[Receiver, int]], samples: Samples) -> dict[str, float]:
-    """The least time of each, in seconds."""
+    """Returns the minimum time of each search in seconds."""
     times = dict.fromkeys(receivers, np.inf)
     for _ in range(ROUNDS):
         for name, (receive, repetitions) in receivers.items():
@@ -205,7 +206,7 @@ def least_s(receivers: dict[str, tuple[Receiver, int]], samples: Samples) -> dic
 
 
 def main() -> None:
-    """Print the table."""
+    """Prints the table."""
     samples = recording(np.random.default_rng(1))
     notebook, lean = "py3gpp, as its notebook", "py3gpp, lean"
     receivers: dict[str, tuple[Receiver, int]] = {
@@ -235,7 +236,7 @@ def main() -> None:
 
 
 def judged(ratio: float) -> str:
-    """The ratio, and whether it falls short of what is asked."""
+    """Returns the ratio, and whether it is below the requirement."""
     return f"{ratio:.0f}" if ratio >= ASKED else f"{ratio:.0f}, below {ASKED:.0f}"
 
 

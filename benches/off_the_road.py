@@ -1,14 +1,15 @@
-"""Off the road: the localizer beside a textbook filter that is told the same.
+"""Off the road: the localizer compared with a textbook filter that has the same inputs.
 
     python benches/off_the_road.py                 # every row, 20 drives each
     python benches/off_the_road.py white late --drives 5 --set receiver.lateness_std_s=0.1
 
-The simulator and the filter (``tests/hall_drive.py``) are written from docs/locate.md alone. RMS
-is of all drives together, after half a minute where the place has to be found first; NEES is
-halved, so that 1 is honest; ``beyond`` is the share beyond the protection level among what is
-``ok``, ``dark`` the time beyond it in any state later than three seconds after the tenth refused
-angle, ``distrust`` the longest time from that angle (from the start where fewer are refused) to the
-last epoch that is ``ok`` and wrong.
+The simulator and the filter (``tests/hall_drive.py``) depend on docs/locate.md only. The RMS is
+over all drives; with an unknown or wrong start, the first half minute is excluded. The NEES is
+halved, so that a consistent filter has 1. ``beyond`` is the fraction of ``ok`` epochs whose error
+exceeds the protection level. ``dark`` is the time (s) with an error above the protection level in
+any state, from three seconds after the tenth rejected angle on. ``distrust`` is the maximum time
+(s) from the tenth rejected angle, or from the start if there are fewer, to the last epoch that is
+``ok`` with an error above the alert limit.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ LAP_S = hall_drive.LAP_S
 
 @dataclass(frozen=True)
 class Case:
-    """A row: what is so, and what the files say."""
+    """One row: the simulated conditions, and the content of the files."""
 
     group: str
     name: str
@@ -123,7 +124,7 @@ def vehicle_toml(case: Case, settings: list[str]) -> str:
 
 
 def locate(case: Case, seed: int, settings: list[str]) -> dict[str, float]:
-    """One drive: squares of errors, and what became of it."""
+    """Locates one drive: squared errors, and figures of integrity."""
     drive = simulate(World(seed=seed, **case.world))  # type: ignore[arg-type]
     with tempfile.TemporaryDirectory() as folder:
         odometry, angles = Path(folder) / "odometry.csv", Path(folder) / "angles.csv"
@@ -163,7 +164,7 @@ def locate(case: Case, seed: int, settings: list[str]) -> dict[str, float]:
     late_refused = min(tenth, LAP_S) + DISTRUST_S
     refused_s = rows[9] if len(rows) > 9 else 0.0
     wrong_ok = ok & (error > ALERT_LIMIT_M)
-    dark = error > level  # beyond the level, whatever the state
+    dark = error > level  # exceeds the protection level, in any state
     time_s = poses["time_s"].to_numpy()
     settles = RECOVERY_S if case.group in ("start", "scratch") else 0.1
     settled, settled_of_truth = time_s >= settles, drive.time_s >= settles

@@ -1,18 +1,19 @@
-"""Real drives: the localizer beside dead reckoning, a textbook filter and, if installed, GTSAM.
+"""Real drives: the localizer compared with dead reckoning, a textbook filter and GTSAM.
 
-The drives are wheel odometry, bearings to landmarks and motion-capture truth that others recorded:
-the UTIAS multi-robot data sets (MRCLAM; Leung et al., IJRR 2011,
+The drives are third-party recordings of wheel odometry, bearings to landmarks and motion-capture
+truth: the UTIAS multi-robot data sets (MRCLAM; Leung et al., IJRR 2011,
 http://asrl.utias.utoronto.ca/datasets/mrclam/), for education and research. Download and unpack
 one, convert a robot's drive and compare:
 
     python benches/real_drives.py convert MRCLAM_Dataset6 3 drives/d6r3
     python benches/real_drives.py table drives
 
-``table`` takes any folder of drives in this form, one folder each: ``odometry.csv`` (time_s,
+``table`` reads any folder of drives in this form, one folder each: ``odometry.csv`` (time_s,
 distance_m, speed_mps, yaw_rate_radps), ``angles.csv`` (time_s, pci, phase_rad, phase_sigma_rad),
 ``landmarks.csv`` (pci, x_m, y_m), ``start.csv`` (x_m, y_m, heading_rad, mounting_angle_rad) and
-``truth.tum``; without an argument ``$ACCESS_AV_DATA/drives``. A ``vehicle.toml`` beside them is the
-data sheet; else MRCLAM's is taken (measured against truth), or the defaults with ``--defaults``.
+``truth.tum``. The default folder is ``$ACCESS_AV_DATA/drives``. A ``vehicle.toml`` in the folder of
+a drive is its data sheet; without it, MRCLAM's data sheet (measured against truth) is used, or the
+defaults with ``--defaults``. GTSAM is compared if it is installed.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ bias_std_radps = 0.005
 
 
 def wrap(angle):
-    """An angle in -π..π."""
+    """Wraps an angle to -π..π."""
     return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
@@ -53,12 +54,12 @@ def columns(file: Path) -> dict[str, np.ndarray]:
 
 
 def numbers(file: Path) -> np.ndarray:
-    """Rows of numbers; ``#`` begins a comment."""
+    """Reads rows of numbers; ``#`` begins a comment."""
     return np.loadtxt(file, comments="#", ndmin=2)
 
 
 def convert(dataset: Path, robot: int, out: Path) -> None:
-    """A robot's drive of an MRCLAM data set as CSV files and a TUM trajectory."""
+    """Converts a robot's drive of an MRCLAM data set to CSV files and a TUM trajectory."""
     commands = numbers(dataset / f"Robot{robot}_Odometry.dat")
     seen = numbers(dataset / f"Robot{robot}_Measurement.dat")
     truth = numbers(dataset / f"Robot{robot}_Groundtruth.dat")
@@ -83,7 +84,7 @@ def convert(dataset: Path, robot: int, out: Path) -> None:
         for time_s, code, _, bearing in seen:
             subject = subjects.get(int(code))
             if subject in landmarks and first_s <= time_s <= last_s:
-                # The array's axis points to the left: what is seen to either side is one-to-one.
+                # The array's axis points to the left, so that bearings ahead are unambiguous.
                 phase = slope * math.cos(bearing - math.pi / 2)
                 sigma = slope * abs(math.sin(bearing - math.pi / 2)) * BEARING_STD_RAD
                 file.write(f"{time_s - first_s:.3f},{subject},{phase:.6f},{sigma:.6f}\n")
@@ -103,7 +104,7 @@ def convert(dataset: Path, robot: int, out: Path) -> None:
 
 
 def read(folder: Path) -> dict:
-    """A drive; its electrical angles as bearings."""
+    """Reads a drive; its electrical angles become bearings."""
     start = {name: float(values[0]) for name, values in columns(folder / "start.csv").items()}
     angles = columns(folder / "angles.csv")
     slope = 2 * math.pi * WAVELENGTHS
@@ -138,7 +139,7 @@ def dead_reckoning(drive: dict) -> np.ndarray:
 
 
 def textbook_filter(drive: dict, sheet: dict[str, float]) -> np.ndarray:
-    """An extended Kalman filter over x, y, heading, odometer scale, yaw-rate bias and mounting."""
+    """Extended Kalman filter over x, y, heading, odometer scale, yaw-rate bias and mounting."""
     odometry, start = drive["odometry"], drive["start"]
     state = np.array([start["x_m"], start["y_m"], start["heading_rad"], 1.0, 0.0, 0.0])
     covariance = np.diag([0.05, 0.05, 0.05, sheet["scale"], sheet["bias"], sheet["mounting"]]) ** 2
@@ -181,7 +182,7 @@ def textbook_filter(drive: dict, sheet: dict[str, float]) -> np.ndarray:
 
 
 def smoothing_and_mapping(drive: dict, sheet: dict[str, float]) -> np.ndarray | None:
-    """GTSAM's iSAM2 with robust bearings, one pose each 0.2 s; nothing where not installed."""
+    """GTSAM's iSAM2 with robust bearings, one pose each 0.2 s; `None` if not installed."""
     try:
         import gtsam
     except ImportError:
@@ -235,7 +236,7 @@ def smoothing_and_mapping(drive: dict, sheet: dict[str, float]) -> np.ndarray | 
 
 
 def rms_m(drive: dict, path: np.ndarray) -> float:
-    """Root mean square distance from truth, at the truth's own times."""
+    """Root mean square distance (m) from the truth, at the times of the truth."""
     truth = drive["truth"]
     inside = truth[(truth[:, 0] >= path[0, 0]) & (truth[:, 0] <= path[-1, 0])]
     x = np.interp(inside[:, 0], path[:, 0], path[:, 1])
@@ -244,7 +245,7 @@ def rms_m(drive: dict, path: np.ndarray) -> float:
 
 
 def ours(drive: dict, sheet: str) -> dict[str, float] | None:
-    """The localizer, online and smoothed, with its integrity; nothing where it is not installed."""
+    """Runs the localizer, online and smoothed, with its integrity; `None` if not installed."""
     try:
         import access_av
         from access_av import drives

@@ -1,12 +1,12 @@
-"""Remedies of a plant: does the order that a study gives them agree with many paired drives?
+"""Remedies of a plant: compares their order in a study with that in many paired drives.
 
     python benches/remedies.py                       # bends, 200 drives each
     python benches/remedies.py yard --drives 50
 
-The study drives as many as it does of itself. Here each remedy, and the plant as it is, is driven
-in the same worlds, other ones than the study's. Of two remedies the one is surely the better where
-the 95 % interval of their paired difference leaves 0 out; such a pair agrees where the study has it
-in the same order.
+The study uses its default number of drives. Here, each remedy and the unchanged plant are driven
+with the same seeds, which differ from those of the study. One of two remedies is better with 95 %
+confidence if the 95 % interval of their paired difference excludes 0. The pair agrees if the study
+has the same order.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ STUDY_SEED, SEED = 1, 1001
 
 
 def main() -> None:
-    """Print the paired differences, and the pairs that agree."""
+    """Prints the paired differences, and the pairs that agree."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("plant", nargs="?", default="bends", help="shipped name, or a file")
     parser.add_argument("--drives", type=int, default=200)

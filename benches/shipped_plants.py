@@ -1,11 +1,11 @@
-"""Studies of all shipped plants: seconds of two cores, and whether each recommends a sound point.
+"""Studies of all shipped plants: time on two cores, and soundness of the recommended point.
 
     python benches/shipped_plants.py                 # all of them
     python benches/shipped_plants.py bends yard
 
-Sound is a point of the front, driven with a protection level as everything beside it. Seconds are
-those of computing, over two: what two cores take that do nothing else. The pages' code, which is
-made once in a process, is counted with the first.
+A sound point is on the front and was driven with a protection level, like all other points. The
+time is half of the processor time (s): the duration on two idle cores. The code of the pages is
+built once in a process, and its time is part of the first plant.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ MOST_S = 90.0
 
 
 def main() -> None:
-    """Print a row for each plant; exit code 1 where one of them falls short."""
+    """Prints a row for each plant; exit code 1 if one has no sound point."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("plants", nargs="*", default=access_av.Plant.names())
     asked = parser.parse_args()

@@ -1,7 +1,7 @@
-"""Quantiles of TR 38.901 drops by Sionna, to hold the simulator's against.
+"""Quantiles of TR 38.901 drops by Sionna: reference for the simulator.
 
-Needs ``pip install sionna-no-rt`` (Apache-2.0; it brings torch, so it is in no extra). Writes the
-table that ``crates/simulate/tests/all/tr38901.rs`` reads::
+Requires ``pip install sionna-no-rt`` (Apache-2.0; it depends on torch, so that it is in no extra).
+Writes the table that ``crates/simulate/tests/all/tr38901.rs`` reads::
 
     python benches/tr38901_oracle.py > crates/simulate/tests/all/data/tr38901_sionna.txt
 """
@@ -19,7 +19,7 @@ DROPS = 100_000
 BATCH = 5_000
 CARRIER_HZ = 3.5e9
 PROBABILITIES = (0.05, 0.25, 0.5, 0.75, 0.95)
-# Heights of radio head and array as the models have them, and horizontal distances.
+# Heights of radio head and array in each model (m), and horizontal distances (m).
 MODELS = {
     "umi": (10.0, 1.5, 20.0, 120.0),
     "inf-sl": (1.5, 1.5, 5.0, 60.0),
@@ -30,7 +30,7 @@ MODELS = {
 
 
 def drops(model: str) -> dict[str, np.ndarray]:
-    """Line-of-sight state and parameters of every drop."""
+    """Returns line-of-sight state and parameters of every drop."""
     head_m, array_m, least_m, most_m = MODELS[model]
     antenna = {
         "num_rows_per_panel": 1,
@@ -80,13 +80,13 @@ def drops(model: str) -> dict[str, np.ndarray]:
                 angular_spreads_from_rays(rays, lsp, scenario)["asa"]
             ),
         }
-        # The next topology is written over this one.
+        # The next topology overwrites this one.
         parts.append({name: value.numpy().ravel().copy() for name, value in found.items()})
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def main() -> None:
-    """Print one row per model, state and quantity."""
+    """Prints one row per model, state and quantity."""
     torch.manual_seed(1)
     print("model state quantity", *PROBABILITIES)
     for model in sys.argv[1:] or MODELS:
@@ -95,7 +95,7 @@ def main() -> None:
         print(model, "all line_of_sight", *[f"{clear.mean():.4f}"] * len(PROBABILITIES))
         for state, mask in (("clear", clear), ("hidden", ~clear)):
             for name, values in found.items():
-                # Sionna's metric puts the line of sight too into the parts of a strong cluster.
+                # Sionna also adds the line of sight to the subclusters of a strong cluster.
                 if (name, state) in {("k_db", "hidden"), ("paths_delay_spread_ns", "clear")}:
                     continue
                 quantiles = np.quantile(values[mask], PROBABILITIES)

@@ -1,7 +1,7 @@
 //! Angles from arbitrary samples, covariances and manifolds.
 //!
-//! Byte 0: what is given. Byte 1: method and averaging, byte 2: sources and subarray. The rest, as f64
-//! and again from its beginning as often as needed: samples, entries, places, elevations.
+//! Byte 0: kind of input. Byte 1: method and averaging. Byte 2: sources and subarray. The remaining
+//! bytes are f64 values, repeated as often as needed: samples, entries, positions, elevations.
 
 use aoa::{
     AngleEstimate, ArbitraryArray, Array, Batch, Complex64, Covariance, DirectionEstimate,
@@ -54,7 +54,7 @@ pub fn run(data: &[u8]) {
         1 => {
             let entry: [[Complex64; N]; N] =
                 std::array::from_fn(|_| std::array::from_fn(|_| Complex64::new(next(), next())));
-            // As it is, or as a covariance: X X^H.
+            // The matrix X itself, or the covariance X X^H.
             let matrix = if how >> 3 & 1 == 1 {
                 entry
             } else {

@@ -8,7 +8,7 @@ use recording::{OdometryLog, RecordingError, read_angles_mcap, read_odometry_mca
 static NEXT: AtomicUsize = AtomicUsize::new(0);
 
 thread_local! {
-    /// Where this thread has its bag.
+    /// Folder of this thread's bag.
     static BAG: PathBuf = {
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let name = format!("access-av-fuzz-bag-{}-{number}", std::process::id());
@@ -36,8 +36,8 @@ pub fn run(input: &[u8]) {
             );
             assert!(log.remarks.iter().all(|it| !it.to_string().is_empty()));
         }
-        // Repeated messages add nothing but remarks. Faults of time stamps are judged by the other
-        // stamps, so that a damaged log may be judged differently if it is repeated.
+        // Repeated messages add only remarks. A time stamp is checked against the other
+        // stamps, so that repetition may change the diagnosis of a damaged log.
         if let (Ok(alone), Ok(twice)) = (&alone, &twice)
             && alone.remarks.is_empty()
         {

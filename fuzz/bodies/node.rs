@@ -1,6 +1,6 @@
-//! What the node takes from sockets and files: newline JSON, frames of ZeroMQ, samples, settings, addresses.
+//! Inputs of the node from sockets and files: newline JSON, frames of ZeroMQ, samples, settings, addresses.
 //!
-//! Byte 0: which of them. The rest: what comes.
+//! Byte 0: kind of input. The remaining bytes are the input.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,7 +12,7 @@ use access_av_node::source::{Framing, Lines, answer, greet, parse};
 use access_av_node::statistics::SourceHealth;
 use onboard::settings::{Shipped, TomlFile};
 
-/// A peer that says this, whatever it is told.
+/// A peer that sends these bytes, whatever it receives.
 struct Peer<'a>(&'a [u8]);
 
 impl std::io::Read for Peer<'_> {
@@ -50,7 +50,7 @@ pub fn run(data: &[u8]) {
             let mut lines = Lines::default();
             let take = |line: Option<&[u8]>| {
                 if let Some(Ok(Some(Input::Odometry(sample)))) = line.map(parse) {
-                    // A distance that is not told is NaN; all else is a number.
+                    // An absent distance is NaN; all other values are finite.
                     assert!(sample.time_s.is_finite() && sample.speed_mps.is_finite());
                 }
             };
@@ -63,10 +63,10 @@ pub fn run(data: &[u8]) {
             let mut peer = Peer(rest);
             let _ = greet(&mut peer);
             let mut samples = Vec::new();
-            // An answer of an even number of bytes is passed over.
+            // An answer of an even number of bytes is skipped.
             let is_wanted = |length: usize| length % 2 == 1;
             while answer(&mut peer, &mut samples, is_wanted).is_ok() {}
-            // Room is made for what came, not for what is announced.
+            // Memory is allocated for the received bytes, not for the announced length.
             assert!(samples.capacity() <= 4 * (rest.len() + (1 << 16)));
         }
         2 => {

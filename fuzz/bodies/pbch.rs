@@ -1,7 +1,7 @@
-//! PBCH decoder on arbitrary ratios.
+//! PBCH decoder on arbitrary log-likelihood ratios.
 //!
 //! Byte 0: burst set size, list size, whether periods are combined. Bytes 1 and 2: the cell. The
-//! rest, as f32 and again from its beginning as often as needed: 864 ratios a period.
+//! remaining bytes are f32 values, repeated as often as needed: 864 ratios per period.
 
 use nr_ssb::pbch::{Decoder, Period};
 use nr_ssb::{Error, Lmax, Pci};

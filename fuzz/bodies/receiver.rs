@@ -1,10 +1,10 @@
 //! Front end, diagnosis, search and tracking on arbitrary samples.
 //!
-//! Bytes alone would never come near a cell, so the samples begin as one SSB in silence and the
-//! input says what is wrong with them. Byte 0: spacing, antennas, whether the frequency is known,
-//! whether the front end comes first. Byte 1: the cell. Byte 2: where its SSB begins. Byte 3: how
-//! many samples there are. Then, 8 bytes each, damages: what, first sample (2), how many, a value
-//! (f32).
+//! Random samples would never contain a cell. Therefore, the samples are one SSB in silence, and the
+//! input describes changes to them. Byte 0: subcarrier spacing, antennas, whether the frequency is
+//! known, whether the front end is applied. Byte 1: the cell. Byte 2: position of its SSB. Byte 3:
+//! number of samples. Then changes of 8 bytes each: kind, first sample (2 bytes), number of samples,
+//! value (f32).
 
 use std::cell::RefCell;
 
@@ -19,7 +19,7 @@ const SPACINGS: [SubcarrierSpacing; 2] = [SubcarrierSpacing::Khz15, SubcarrierSp
 const MOST_ANTENNAS: usize = 4;
 
 thread_local! {
-    /// Planning a search takes longer than one, so that each is planned once.
+    /// Cached searchers, because planning takes longer than a search.
     static SEARCHERS: RefCell<Vec<Searcher>> = RefCell::new(
         SPACINGS
             .into_iter()
@@ -114,7 +114,7 @@ fn receive(spacing_index: usize, frequency_known: bool, antennas: &[&[Complex32]
             assert_eq!(ssb.measurements().len(), antennas.len());
             if let Ok(mut tracker) = Tracker::<1>::new(&config, ssb) {
                 for expected in [ssb.sample_start, ssb.sample_start + 3.0, 1e30] {
-                    // An error or nothing is as good an answer as any.
+                    // An error and an empty result are both valid.
                     if let Ok(Some(tracked)) = tracker.track(&[antennas[0]], 0.0, expected, true) {
                         assert!((-20.0..samples as f64).contains(&tracked.sample_start));
                         assert!(tracked.cfo_hz.is_finite());
@@ -122,7 +122,7 @@ fn receive(spacing_index: usize, frequency_known: bool, antennas: &[&[Complex32]
                 }
             }
         }
-        // In two blocks all is as well.
+        // Two blocks of these samples.
         searcher.reset();
         for block in [0..samples / 3, samples / 3..samples] {
             let part: Vec<_> = antennas.iter().map(|x| &x[block.clone()]).collect();

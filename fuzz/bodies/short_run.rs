@@ -1,10 +1,10 @@
-//! A short fuzz run without libFuzzer, for the ordinary tests: the same bodies, on seeds and random
-//! changes of them, the same ones every time.
+//! A short fuzz run without libFuzzer, for the ordinary tests: the same bodies, on seeds and on
+//! pseudo-random changes of the seeds that are equal in every run.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Floats where arithmetic goes wrong.
+/// Special floating-point values.
 const AWKWARD: [f32; 8] = [
     f32::NAN,
     f32::INFINITY,
@@ -17,7 +17,7 @@ const AWKWARD: [f32; 8] = [
 ];
 const LONGEST: usize = 4096;
 
-/// Prints the input that a body did not survive.
+/// Prints the input with which a body panics.
 struct Report<'a>(&'a [u8]);
 
 impl Drop for Report<'_> {
@@ -28,7 +28,7 @@ impl Drop for Report<'_> {
     }
 }
 
-/// Runs `body` on the seeds and on `count` changes of them; changes build on one another.
+/// Runs `body` on the seeds and on `count` changed inputs; changes accumulate.
 pub fn run(seeds: &[Vec<u8>], count: usize, body: fn(&[u8])) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut corpus = seeds.to_vec();

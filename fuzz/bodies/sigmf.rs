@@ -1,5 +1,5 @@
-//! SigMF reader on arbitrary files: the input up to its first zero byte is the metadata, what
-//! follows the data.
+//! SigMF reader on arbitrary files: the input up to its first zero byte is the metadata, the rest is
+//! the data.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -9,7 +9,7 @@ use recording::{Recording, RecordingError};
 static NEXT: AtomicUsize = AtomicUsize::new(0);
 
 thread_local! {
-    /// Where this thread writes its files.
+    /// Folder of this thread's files.
     static STEM: PathBuf = {
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let name = format!("access-av-fuzz-{}-{number}", std::process::id());

@@ -1,6 +1,6 @@
-//! Text files with a row a line: CSV of odometry, wheels, angles and roads, roads as GeoJSON, TUM.
+//! Text files: CSV of odometry, wheels, angles and roads, roads as GeoJSON, TUM.
 //!
-//! Byte 0: which of them. The rest: the file.
+//! Byte 0: kind of file. The remaining bytes are the file.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -11,7 +11,7 @@ use recording::{Files, read_angle_log, read_odometry_csv, read_tum, read_wheel_o
 static NEXT: AtomicUsize = AtomicUsize::new(0);
 
 thread_local! {
-    /// Where this thread writes its file.
+    /// Path of this thread's file.
     static STEM: PathBuf = {
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let name = format!("access-av-fuzz-table-{}-{number}", std::process::id());
@@ -46,7 +46,7 @@ pub fn run(input: &[u8]) {
             2 => {
                 if let Ok(log) = told(read_angle_log(&file)) {
                     for it in &log.angles {
-                        // Of phase and angle the one that is not told follows from the array.
+                        // The array model converts between phase and angle: the file needs only one of them.
                         let it = &it.measured;
                         assert!(it.time_s.is_finite());
                         assert!(it.phase_rad.is_finite() || it.angle_rad.is_finite());
@@ -73,7 +73,7 @@ pub fn run(input: &[u8]) {
     });
 }
 
-/// What is refused is refused in words.
+/// Asserts that an error has a message.
 fn told<T, E: std::fmt::Display>(read: Result<T, E>) -> Result<T, E> {
     if let Err(error) = &read {
         assert!(!error.to_string().is_empty());

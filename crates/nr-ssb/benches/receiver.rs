@@ -1,4 +1,4 @@
-//! Search of 20 ms and tracking of one SSB, four antennas, one thread; scan of a whole band, all threads.
+//! Time to search 20 ms and to track one SSB (four antennas, one thread), and to scan a band (all threads).
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 #[path = "../tests/all/air/mod.rs"]
@@ -52,7 +52,7 @@ fn track_one_ssb_of_4_antennas(bencher: divan::Bencher, decode_pbch: bool) {
     });
 }
 
-/// A cell off the raster at 5 dB, on one antenna at 46.08 Msps for 20 ms, nothing told.
+/// A cell off the raster at 5 dB, on one antenna at 46.08 Msps for 20 ms, with unknown parameters.
 #[divan::bench(sample_count = 3, sample_size = 1)]
 fn scan_off_raster_20_ms_at_46_msps(bencher: divan::Bencher) {
     let (spacing, rate_hz, centre_hz) = (SubcarrierSpacing::Khz30, 46.08e6, 3.7e9);
@@ -62,7 +62,7 @@ fn scan_off_raster_20_ms_at_46_msps(bencher: divan::Bencher) {
     let mut base = air::silence(1, 153_600);
     cell.add_to(&mut base);
     let mut samples = vec![air::raised(&base[0], 6, 6e6 / rate_hz)];
-    // `raised` keeps amplitudes: noise of the same density is stronger by the ratio of the rates.
+    // `raised` preserves amplitudes: noise of equal density has a power proportional to the rate.
     air::add_noise(&mut samples, 5.0 - 10.0 * 6_f64.log10(), &mut rng);
     let slices = air::slices(&samples);
     bencher.bench_local(|| {
@@ -71,7 +71,7 @@ fn scan_off_raster_20_ms_at_46_msps(bencher: divan::Bencher) {
     });
 }
 
-/// What the four symbols of four antennas cost in bare transforms: the machine's yardstick.
+/// Reference for the speed of the computer: the transforms of four symbols of four antennas.
 #[divan::bench]
 fn yardstick_16_transforms_of_256(bencher: divan::Bencher) {
     let fft = rustfft::FftPlanner::new().plan_fft_forward(256);

@@ -1,4 +1,4 @@
-//! How often 20 ms of noise are taken for a cell, on one and on four antennas:
+//! False-alarm rate of the cell search in 20 ms of noise, with one and with four antennas:
 //! `cargo run --release --example false_cells -- [searches] [seed]`
 #![allow(
     clippy::unwrap_used,
@@ -14,12 +14,12 @@ mod noise_only;
 
 use noise_only::{Tally, search_noise, upper_limit};
 
-/// Paths of the list and of its retry, per PBCH and burst set size tried.
+/// Number of decoder paths, in the list and in its retry, per PBCH and burst set size.
 const PATHS: f64 = 8.0 + 32.0;
 /// Probability that a path on noise passes: 21 bits of the CRC that the decoder has not used, and
-/// one of the MIB.
+/// one bit of the MIB.
 const PASSES: f64 = 1.0 / (1 << 22) as f64;
-/// Burst set sizes tried when none is given.
+/// Number of burst set sizes that are tried if none is given.
 const SIZES: f64 = 2.0;
 
 fn main() {

@@ -1,5 +1,6 @@
-//! Every cell in a recording of one channel: `find_cells FILE RATE_HZ [CENTRE_HZ]`, the file holding
-//! interleaved 32-bit floats (`cf32_le`, as of SigMF and GNU Radio). Without a file, in a made one.
+//! Finds every cell in a recording of one channel: `find_cells FILE RATE_HZ [CENTRE_HZ]`. The file
+//! contains interleaved 32-bit floats (`cf32_le`, as in SigMF and GNU Radio). Without a file, the
+//! example generates samples.
 #![allow(clippy::print_stdout, reason = "it is what the example is for")]
 
 use std::error::Error;

@@ -1,6 +1,6 @@
-//! How soon a cell is found whose oscillator is off, and whether its beams are told apart: by a receiver of a
-//! stream that searches 20 ppm, as Python's is, and by one of windows about the bursts that searches 60 ppm, as a
-//! vehicle that sleeps in between has.
+//! Acquisition time of a cell with an oscillator error, and identification of its beams, by two receivers: one of
+//! a stream that searches ±20 ppm (default of Python), and one of windows around the bursts that searches ±60 ppm
+//! (a vehicle whose receiver sleeps between bursts).
 //!
 //! ```sh
 //! cargo run --release -p nr-ssb --example oscillators -- 5    # trials of each setting
@@ -17,16 +17,16 @@ use nr_ssb::{Complex32, Lmax};
 
 const ANTENNAS: usize = 2;
 const SNR_DB: f64 = 5.0;
-/// A cell is to be found within three bursts, or a quarter of a second where that is more; it is then heard
-/// for three more.
+/// Maximum number of bursts until a cell is found; `SOON_S` (s) applies if it is longer. The reception then
+/// continues for `MORE` bursts.
 const SOON: usize = 3;
 const SOON_S: f64 = 0.25;
 const MORE: usize = 3;
 const SSB_FREQ_HZ: f64 = 3.6e9;
-/// What the receiver on a vehicle searches.
+/// Searched oscillator error of a receiver on a vehicle (ppm).
 const VEHICLE_PPM: f64 = 60.0;
 
-/// What was heard: number of the burst, beam.
+/// Received SSBs: number of the burst, beam.
 type Heard = Vec<(usize, u8)>;
 
 struct Air {
@@ -46,7 +46,7 @@ impl Air {
         Self { cell, period }
     }
 
-    /// All samples from the beginning of a period to the next one's, and the first one's number.
+    /// Returns the number of the first sample of a period, and all samples of the period.
     fn period(&self, number: usize, seed: u64) -> (usize, Vec<Vec<Complex32>>) {
         let [start, end] =
             [number, number + 1].map(|it| (it as f64 * self.period).floor() as usize);
@@ -58,7 +58,7 @@ impl Air {
         (start, samples)
     }
 
-    /// The burst that an SSB is of, if it is where one of this beam was sent.
+    /// Returns the burst of an SSB, if the SSB is at a transmission of this beam.
     fn burst_of(&self, sample_start: f64, ssb_index: u8) -> Option<usize> {
         let bursts = (sample_start - self.cell.ssb_start(ssb_index)) / self.period;
         let near = ((bursts - bursts.round()) * self.period).abs() < 20.0;
@@ -66,7 +66,7 @@ impl Air {
     }
 }
 
-/// Bursts that a cell is to be found within.
+/// Returns the maximum number of bursts until a cell is found.
 fn soon(period_s: f64) -> usize {
     SOON.max((SOON_S / period_s).ceil() as usize)
 }
@@ -101,7 +101,7 @@ fn trial(spacing: SubcarrierSpacing, period_s: f64, ppm: f64, seed: u64) -> [(He
                 |ssb: &nr_ssb::receiver::HeardSsb| note(0, ssb.sample_start, ssb.ssb_index);
             stream.push(&blocks, &mut take).unwrap();
         }
-        // Awake around the burst alone.
+        // The receiver is on only around the burst.
         let from = (air.cell.delay as usize).saturating_sub(300);
         let to = (from + (0.0051 * spacing.base_rate_hz()) as usize + 600).min(antennas[0].len());
         let around: Vec<&[Complex32]> = antennas.iter().map(|it| &it[from..to]).collect();

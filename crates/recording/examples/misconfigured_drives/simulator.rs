@@ -1,5 +1,5 @@
-//! A small simulator of drives as log files would tell them, independent of the `simulate` crate:
-//! kinematics on straights and arcs, ideal angles with noise and outliers, an odometer that is off.
+//! A small simulator of logged drives, independent of the `simulate` crate: kinematics on straights
+//! and arcs, ideal angles with noise and outliers, an odometer with errors.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
@@ -14,18 +14,18 @@ use rand_distr::StandardNormal;
 use recording::replay::{LocatedDrive, StartChoice, as_stated, locate_angles};
 use recording::{AngleLog, LoggedAngle, OdometryLog};
 
-/// What is driven.
+/// Kind of vehicle and course.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A road vehicle on a road that the site knows.
+    /// A road vehicle on the road of the site.
     OnRoad,
-    /// The same drive where the site has no road.
+    /// A road vehicle on a site without a road.
     WithoutRoad,
     /// A robot on two driven wheels in a hall.
     Robot,
 }
 
-/// A drive: what is stated of it, what was logged, and where the vehicle was.
+/// A drive: its settings, its logs, and the true poses.
 #[derive(Clone)]
 pub struct Drive {
     pub kind: Kind,
@@ -50,7 +50,7 @@ fn sign(rng: &mut ChaCha8Rng) -> f64 {
     if rng.random::<bool>() { 1.0 } else { -1.0 }
 }
 
-/// Straights and bends: length and turn of each.
+/// Returns the length (m) and the heading change (rad) of each straight and bend.
 fn road(rng: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
     let mut segments = vec![(uniform(rng, 30.0, 70.0), 0.0)];
     for _ in 0..2 {
@@ -62,7 +62,7 @@ fn road(rng: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
     segments
 }
 
-/// Speed (m/s) and yaw rate (rad/s) of each sample of a vehicle that follows a road.
+/// Returns speed (m/s) and yaw rate (rad/s) of each sample of a vehicle that follows a road.
 fn along_road(segments: &[(f64, f64)], rate_hz: f64, rng: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
     let cruise_mps = uniform(rng, 1.5, 4.0);
     let length_m: f64 = segments.iter().map(|(length_m, _)| length_m).sum();
@@ -93,7 +93,8 @@ fn along_road(segments: &[(f64, f64)], rate_hz: f64, rng: &mut ChaCha8Rng) -> Ve
     steps
 }
 
-/// The same of a robot that winds through a hall, keeps from its walls, and turns on the spot.
+/// Returns speed (m/s) and yaw rate (rad/s) of each sample of a robot that drives to random goals in
+/// a hall and turns on the spot.
 fn through_hall(size_m: f64, start: Pose, rate_hz: f64, rng: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
     let cruise_mps = uniform(rng, 0.4, 0.9);
     let (mut pose, mut steps) = (start, Vec::new());
@@ -127,7 +128,7 @@ fn moved(pose: Pose, speed_mps: f64, yaw_radps: f64, duration_s: f64) -> Pose {
     }
 }
 
-/// Places of radio heads: of a road beside it, of a hall at its walls.
+/// Returns positions (m) of radio heads: next to a road, or at the walls of a hall.
 fn places(path: &[Pose], size_m: Option<f64>, rng: &mut ChaCha8Rng) -> Vec<[f64; 3]> {
     let count = if size_m.is_some() {
         4 + rng.random_range(0..4)
@@ -157,7 +158,7 @@ fn places(path: &[Pose], size_m: Option<f64>, rng: &mut ChaCha8Rng) -> Vec<[f64;
     places
 }
 
-/// A sound drive, of another course, other radio heads, speeds and rates for each seed.
+/// Returns a drive without misconfiguration. Course, radio heads, speeds and rates depend on the seed.
 pub fn drive(kind: Kind, seed: u64, guarded: bool) -> Drive {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let rng = &mut rng;
@@ -189,7 +190,7 @@ pub fn drive(kind: Kind, seed: u64, guarded: bool) -> Drive {
     }
     let heads = places(&truth, size_m, rng);
 
-    // The odometer as its data sheet says; the array at right angles to the road or along it.
+    // The odometer errors agree with the data sheet; the array is across the road or along it.
     let (scale_std, noise) = if size_m.is_some() {
         (0.02, 0.02)
     } else {
@@ -308,14 +309,14 @@ pub fn drive(kind: Kind, seed: u64, guarded: bool) -> Drive {
 }
 
 impl Drive {
-    /// Locates it as an angle log is located.
+    /// Locates the drive as an angle log is located.
     pub fn locate(&self) -> LocatedDrive {
         let (site, vehicle) = as_stated(&self.site, &self.vehicle);
         let start = StartChoice::At(self.start);
         locate_angles(&site, &vehicle, start, &self.odometry, &self.angles, false).unwrap()
     }
 
-    /// Horizontal error, root mean square (m).
+    /// Returns the RMS horizontal error (m).
     pub fn rms_error_m(&self, located: &LocatedDrive) -> f64 {
         let pairs = located.poses.iter().zip(&self.truth);
         let squares = pairs.map(|(pose, truth)| {
