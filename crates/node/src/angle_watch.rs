@@ -116,6 +116,8 @@ impl AngleWatch {
 
 #[cfg(test)]
 mod tests {
+    use onboard::observation::MeasurementKind;
+
     use super::*;
 
     #[test]
@@ -135,6 +137,7 @@ mod tests {
     #[test]
     fn two_heads_of_one_pci_are_reported_within_20_ssbs_and_noise_is_not() {
         let angle = |burst: u32, offset_s: f64, phase_rad: f64| AngleObservation {
+            kind: MeasurementKind::Angle,
             pci: 22,
             ssb_index: 1,
             time_s: 0.02 * f64::from(burst) + offset_s,

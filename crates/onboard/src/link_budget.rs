@@ -60,6 +60,7 @@ mod tests {
         assert!((budget.path_loss_db(100.0) - (40.0 + 190.881 - 147.552)).abs() < 1e-3);
         let head = RadioHead {
             eirp_dbm: -17.0,
+            array: None,
             ..RadioHead::from(&site.radio_heads[0])
         };
         // −27 + 10 + 5 − 83.329 + 103.412 = 8.08 dB at 100 m; minus 6.02 dB at twice the distance.

@@ -146,13 +146,41 @@ impl SsbObservation {
     }
 }
 
+/// Kind of a measurement, which selects the measurement model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MeasurementKind {
+    /// Angle of arrival of a radio head's signal at the array on the vehicle.
+    #[default]
+    Angle,
+    /// Azimuth of the vehicle, measured by the array of a radio head, in the frame of that array.
+    AngleAtHead,
+}
+
+impl MeasurementKind {
+    /// Kind of an angle that was measured at a radio head, or at the vehicle.
+    pub const fn of_angle(is_at_head: bool) -> Self {
+        if is_at_head {
+            Self::AngleAtHead
+        } else {
+            Self::Angle
+        }
+    }
+
+    /// Whether the measurement was made at a radio head.
+    pub const fn is_at_head(self) -> bool {
+        matches!(self, Self::AngleAtHead)
+    }
+}
+
 /// Angle of arrival, the measurement of a localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngleMeasurement {
+    /// Array that measured the angle.
+    pub kind: MeasurementKind,
     /// Time in seconds.
     pub time_s: f64,
     /// Electrical angle ω = 2π(d/λ)·cos θ between neighbouring antennas of a uniform linear array,
-    /// in radians; for other arrays the azimuth from the array axis.
+    /// in radians; for other arrays, and at a radio head, the azimuth from the array axis.
     pub phase_rad: f64,
     /// Standard deviation of `phase_rad` due to noise, in radians.
     pub phase_sigma_rad: f64,

@@ -1,7 +1,7 @@
 //! Radio heads of the nominal model.
 
 use crate::geometry::Point;
-use crate::settings::{RadioHeadSettings, Site, Vehicle};
+use crate::settings::{HeadArraySettings, RadioHeadSettings, Site, Vehicle};
 
 /// Surveyed radio head and its SSB.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,6 +18,8 @@ pub struct RadioHead {
     pub position_std_m: f64,
     /// Equivalent isotropically radiated power (EIRP) in dBm: transmit power plus antenna gain.
     pub eirp_dbm: f64,
+    /// Its array, where it measures angles.
+    pub array: Option<HeadArraySettings>,
 }
 
 impl RadioHead {
@@ -53,6 +55,7 @@ impl From<&RadioHeadSettings> for RadioHead {
             height_m,
             position_std_m: settings.position_std_m,
             eirp_dbm: settings.eirp_dbm,
+            array: settings.array,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::geometry::{Pose, wrap_angle};
 use crate::manifold::Measurand;
+use crate::observation::MeasurementKind;
 use crate::radio_head::RadioHead;
 use crate::settings::Vehicle;
 
@@ -28,10 +29,21 @@ impl Sight {
         &self.measurand
     }
 
-    /// Returns a measured value minus the predicted value for a radio head and a pose (rad).
-    pub fn residual_rad(&self, pose: Pose, head: &RadioHead, value_rad: f64) -> f64 {
+    /// Returns a measured value minus the predicted value for a radio head and a pose (rad). NaN if
+    /// the radio head measured the value and has no array.
+    pub fn residual_rad(
+        &self,
+        kind: MeasurementKind,
+        pose: Pose,
+        head: &RadioHead,
+        value_rad: f64,
+    ) -> f64 {
         let [forward_m, left_m, up_m] = self.position_m;
         let array = pose.beside(forward_m, left_m);
+        if kind.is_at_head() {
+            let axis_rad = head.array.map_or(f64::NAN, |own| own.azimuth_rad);
+            return wrap_angle(value_rad - head.position.bearing_rad(array) + axis_rad);
+        }
         let ground_m = array.distance_m(head.position);
         let level = ground_m / ground_m.hypot(head.height_m - up_m).max(f64::MIN_POSITIVE);
         let azimuth_rad = array.bearing_rad(head.position) - pose.heading_rad - self.mounting_rad;

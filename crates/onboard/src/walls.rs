@@ -67,6 +67,7 @@ impl Walls {
         let (k, passing) = (self.rician_k, self.passing(head.position, place));
         (passing == 1.0 || k * passing >= 1.0).then(|| RadioHead {
             eirp_dbm: head.eirp_dbm + 10.0 * ((k * passing + 1.0) / (k + 1.0)).log10(),
+            array: None,
             ..*head
         })
     }

@@ -9,7 +9,7 @@ use onboard::live::{
     Outcome as CoreOutcome, Status as CoreStatus, StreamConfig,
 };
 use onboard::localize::OdometryVerdict;
-use onboard::observation::OdometrySample;
+use onboard::observation::{MeasurementKind, OdometrySample};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use recording::load;
@@ -395,9 +395,12 @@ impl Live {
     ///     SNR per antenna in dB.
     /// resolved : bool
     ///     Whether the estimator reports the angle as resolved.
+    /// at_head : bool
+    ///     Whether the array of the radio head measured the angle: `phase_rad` is the azimuth of the
+    ///     vehicle in the frame of that array (`radio_heads.array` of the site).
     /// arrival_s : float, optional
     ///     Arrival time of the angle according to a monotonic clock, in seconds.
-    #[pyo3(signature = (pci, time_s, phase_rad, sigma_rad, *, ssb_index = 0, snr_db = None, resolved = true, arrival_s = None))]
+    #[pyo3(signature = (pci, time_s, phase_rad, sigma_rad, *, ssb_index = 0, snr_db = None, resolved = true, at_head = false, arrival_s = None))]
     #[allow(clippy::too_many_arguments)] // Python's keywords
     fn angle(
         &self,
@@ -409,10 +412,12 @@ impl Live {
         ssb_index: u8,
         snr_db: Option<f64>,
         resolved: bool,
+        at_head: bool,
         arrival_s: Option<f64>,
     ) -> PyResult<()> {
         let arrival_s = finite_arrival(arrival_s)?;
         let angle = AngleObservation {
+            kind: MeasurementKind::of_angle(at_head),
             pci,
             ssb_index,
             time_s,

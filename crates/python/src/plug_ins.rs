@@ -438,6 +438,10 @@ impl Localizer for PythonLocalizer {
         head: &CoreHead,
         measured: &AngleMeasurement,
     ) -> Result<UpdateVerdict, BoxError> {
+        // The method `angle` is defined for angles at the vehicle.
+        if measured.kind.is_at_head() {
+            return Ok(UpdateVerdict::unused(UpdateReason::Unusable));
+        }
         let accepted = Python::attach(|py| {
             let what = format!("in localizer.angle, at {} s", measured.time_s);
             let arguments = (

@@ -4,6 +4,10 @@
 //! standard deviation `phase_sigma_rad`, or `angle_rad` (θ from the array's axis) with
 //! `angle_sigma_rad`; where both are given the former counts. `ssb_index` (0 without) and `snr_db`
 //! need not be there, nor `resolved` (1, or 0 of an angle that is in doubt; 1 without). The deviation is taken for all of the angle's error.
+//!
+//! `at_head` is 1 for an angle that the array of the radio head has measured, and 0 (default) for one measured on the
+//! vehicle. Measured at the radio head, `angle_rad` and `phase_rad` are both the azimuth of the vehicle in the frame of the
+//! head's array, whose direction is `radio_heads.array.azimuth_rad` of the site.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -16,11 +20,11 @@ use crate::table::Table;
 use onboard::Observed;
 use onboard::burst::OfSsb;
 use onboard::live::AngleObservation;
-use onboard::localize::AngleMeasurement;
+use onboard::localize::{AngleMeasurement, MeasurementKind};
 use onboard::observation::SensedSsb;
 use onboard::time_unit::TimeUnit;
 
-const COLUMNS: [&str; 8] = [
+const COLUMNS: [&str; 9] = [
     "time_s",
     "pci",
     "ssb_index",
@@ -29,11 +33,12 @@ const COLUMNS: [&str; 8] = [
     "angle_rad",
     "snr_db",
     "resolved",
+    "at_head",
 ];
 
 /// Columns that every log has, and those of which some may be missing.
 const REQUIRED: [&str; 2] = ["time_s", "pci"];
-const OPTIONAL: [&str; 7] = [
+const OPTIONAL: [&str; 8] = [
     "ssb_index",
     "phase_rad",
     "phase_sigma_rad",
@@ -41,6 +46,7 @@ const OPTIONAL: [&str; 7] = [
     "angle_sigma_rad",
     "snr_db",
     "resolved",
+    "at_head",
 ];
 
 /// What the deviations need.
@@ -70,6 +76,7 @@ impl From<&LoggedAngle> for AngleObservation {
     fn from(logged: &LoggedAngle) -> Self {
         let LoggedAngle { ssb, measured } = logged;
         Self {
+            kind: measured.kind,
             pci: ssb.pci,
             ssb_index: ssb.ssb_index,
             time_s: ssb.time_s,
@@ -225,6 +232,7 @@ pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
         angle_sigma_rad,
         snr_db,
         resolved,
+        at_head,
     ] = values
     else {
         return Err("too few columns".to_owned());
@@ -245,11 +253,14 @@ pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     let ssb_index = finite(ssb_index, "ssb_index")?.unwrap_or(0.0);
     let snr_db = finite(snr_db, "snr_db")?.unwrap_or(UNSTATED_SNR_DB);
     let angle_rad = finite(angle_rad, "angle_rad")?;
-    let resolved = match resolved {
-        None | Some(1.0) => true,
-        Some(0.0) => false,
-        Some(value) => return Err(format!("resolved {value} is neither 1 nor 0")),
+    let flag = |value: Option<f64>, name: &str, default: bool| match value {
+        None => Ok(default),
+        Some(1.0) => Ok(true),
+        Some(0.0) => Ok(false),
+        Some(value) => Err(format!("{name} {value} is neither 1 nor 0")),
     };
+    let resolved = flag(resolved, "resolved", true)?;
+    let kind = MeasurementKind::of_angle(flag(at_head, "at_head", false)?);
     // Without a phase the deviation is that of the angle, until the array's spacing is known.
     let deviation = |value: Option<f64>, name: &str| match needed(value, name)? {
         value if value > 0.0 && value < MOST_SIGMA_RAD => Ok(value),
@@ -282,6 +293,7 @@ pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
             snr_db,
         },
         measured: AngleMeasurement {
+            kind,
             time_s,
             phase_rad,
             phase_sigma_rad,
@@ -302,7 +314,7 @@ pub fn write_angle_log(file: &Path, angles: &[LoggedAngle]) -> Result<(), Record
         // Writing into a string does not fail.
         let _ = writeln!(
             text,
-            "{},{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{}",
             measured.time_s,
             ssb.pci,
             ssb.ssb_index,
@@ -311,6 +323,7 @@ pub fn write_angle_log(file: &Path, angles: &[LoggedAngle]) -> Result<(), Record
             measured.angle_rad,
             measured.snr_db,
             u8::from(measured.resolved),
+            u8::from(measured.kind.is_at_head()),
         );
     }
     files::write(file, text.as_bytes())

@@ -8,7 +8,7 @@ use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Of
 use onboard::estimator::{EstimatedAngle, built_in};
 use onboard::localize::InitialPose;
 use onboard::localize::ekf::EkfConfig;
-use onboard::localize::{AngleMeasurement, Ekf};
+use onboard::localize::{AngleMeasurement, Ekf, MeasurementKind};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::receive::{Receiver, ReceiverConfig, Window};
@@ -126,6 +126,7 @@ fn angle_to_pose(bencher: divan::Bencher, (map, estimates_bias): (bool, bool)) {
     at(1.0);
     let bearing = start.pose.point().bearing_rad(heads[0].position) - start.pose.heading_rad;
     let measured = AngleMeasurement {
+        kind: MeasurementKind::Angle,
         time_s: 0.25,
         phase_rad: 0.5 * TAU * bearing.cos(),
         phase_sigma_rad: 0.05,
@@ -166,6 +167,7 @@ fn burst_to_pose(bencher: divan::Bencher, guarded: bool) {
         for head in &heads {
             let angle_rad = pose.point().bearing_rad(head.position) - pose.heading_rad;
             let measured = AngleMeasurement {
+                kind: MeasurementKind::Angle,
                 time_s,
                 phase_rad: 0.5 * TAU * angle_rad.cos(),
                 phase_sigma_rad: 0.05,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # Columns of a log that localization uses.
 USED = (
     "time_s", "pci", "ssb_index", "phase_rad", "phase_sigma_rad", "angle_rad", "angle_sigma_rad",
-    "snr_db", "resolved",
+    "snr_db", "resolved", "at_head",
 )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 use onboard::geometry::Pose;
 use onboard::live::AngleObservation;
-use onboard::observation::OdometrySample;
+use onboard::observation::{MeasurementKind, OdometrySample};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
@@ -34,6 +34,8 @@ struct Angle {
     snr_db: Option<f64>,
     #[serde(default = "yes")]
     resolved: bool,
+    #[serde(default)]
+    at_head: bool,
 }
 
 #[derive(Deserialize)]
@@ -115,6 +117,7 @@ fn odometry(message: &Odometry) -> Input {
 
 const fn angle(message: &Angle) -> Input {
     Input::Angle(AngleObservation {
+        kind: MeasurementKind::of_angle(message.at_head),
         pci: message.pci,
         ssb_index: message.ssb_index,
         time_s: message.time_s,

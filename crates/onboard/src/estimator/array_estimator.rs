@@ -8,7 +8,7 @@ use super::angle_estimator::{AngleEstimator, EstimatedAngle};
 use super::likelihood::circular_gaussian;
 use crate::BoxError;
 use crate::elements::for_elements;
-use crate::localize::AngleMeasurement;
+use crate::localize::{AngleMeasurement, MeasurementKind};
 use crate::manifold::{ArrayManifold, Measurand};
 use crate::observation::{SensedSsb, SsbObservation};
 use crate::settings::{EstimatorMethod, Vehicle};
@@ -131,6 +131,7 @@ pub fn measurement(
         }
     };
     Some(AngleMeasurement {
+        kind: MeasurementKind::Angle,
         time_s: ssb.time_s,
         phase_rad,
         phase_sigma_rad,

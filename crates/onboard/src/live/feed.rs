@@ -19,8 +19,8 @@ use super::time_check::TimeCheck;
 use crate::BoxError;
 use crate::burst::{Burst, OfSsb};
 use crate::energy::{Energy, EnergyModel};
-use crate::geometry::Pose;
-use crate::localize::{AngleMeasurement, OdometryVerdict, UpdateReason};
+use crate::geometry::{Pose, wrap_angle};
+use crate::localize::{AngleMeasurement, MeasurementKind, OdometryVerdict, UpdateReason};
 use crate::monitor::Confirmation;
 use crate::observation::{BURST_S, OdometrySample, SensedSsb};
 use crate::pipeline::{Custom, OdometryDefect, Onboard};
@@ -41,6 +41,8 @@ const UNSTATED_SNR_DB: f64 = 20.0;
 /// An angle that was estimated elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngleObservation {
+    /// Array that measured the angle.
+    pub kind: MeasurementKind,
     /// Physical cell identity.
     pub pci: u16,
     /// Index of the SSB in its burst.
@@ -48,7 +50,7 @@ pub struct AngleObservation {
     /// Reception time in seconds.
     pub time_s: f64,
     /// Electrical angle ω = 2π(d/λ)·cos θ between neighbours in a row, or azimuth from the axis of any
-    /// other array, in radians.
+    /// other array, in radians; measured at a radio head, the azimuth in the frame of its array.
     pub phase_rad: f64,
     /// Its standard deviation in radians.
     pub sigma_rad: f64,
@@ -354,10 +356,14 @@ impl Live {
             snr_db,
         };
         let measured = AngleMeasurement {
+            kind: angle.kind,
             time_s,
             phase_rad: angle.phase_rad,
             phase_sigma_rad: sigma_rad,
-            angle_rad: self.sight.measurand().angle_rad(angle.phase_rad),
+            angle_rad: match angle.kind {
+                MeasurementKind::Angle => self.sight.measurand().angle_rad(angle.phase_rad),
+                MeasurementKind::AngleAtHead => wrap_angle(angle.phase_rad),
+            },
             snr_db,
             resolved: angle.resolved,
         };
@@ -499,9 +505,10 @@ impl Live {
             let residual_rad = (status.as_ref())
                 .zip(execution.measured)
                 .map(|(it, measured)| {
-                    let value_rad = measured.phase_rad;
-                    self.sight.residual_rad(after.pose, &it.head, value_rad)
-                });
+                    let (kind, value_rad) = (measured.kind, measured.phase_rad);
+                    (self.sight).residual_rad(kind, after.pose, &it.head, value_rad)
+                })
+                .filter(|it| it.is_finite());
             if verdict.accepted {
                 self.last_angle_s = Some(ssb.time_s);
             }

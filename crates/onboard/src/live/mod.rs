@@ -7,6 +7,7 @@
 //!
 //! ```
 //! use onboard::live::{AngleObservation, State};
+//! use onboard::localize::MeasurementKind;
 //! use onboard::observation::OdometrySample;
 //! use onboard::settings::{Platform, Shipped, Site, TomlFile, Vehicle};
 //! use onboard::{Custom, Live};
@@ -18,6 +19,7 @@
 //! let mut live = Live::new(&site, &vehicle, &platform, None, None, Custom::default())?;
 //! live.odometry(&OdometrySample::of_speed(0.0, 1.5, None))?;
 //! live.angle(&AngleObservation {
+//!     kind: MeasurementKind::Angle,
 //!     pci: site.radio_heads[0].pci,
 //!     ssb_index: 0,
 //!     time_s: 0.01,

@@ -6,8 +6,7 @@ use super::output::PoseEstimate;
 use super::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
 use crate::BoxError;
 use crate::geometry::{Point, Pose, wrap_angle};
-use crate::observation::AngleMeasurement;
-use crate::observation::OdometrySample;
+use crate::observation::{AngleMeasurement, MeasurementKind, OdometrySample};
 use crate::radio_head::RadioHead;
 use crate::settings::HeadingBetween;
 
@@ -132,7 +131,11 @@ impl Localizer for DeadReckoning {
         measured: &AngleMeasurement,
     ) -> Result<UpdateVerdict, BoxError> {
         self.advance_to(measured.time_s);
-        Ok(self.take_heading(head, measured))
+        // An angle measured at the radio head does not depend on the heading.
+        Ok(match measured.kind {
+            MeasurementKind::Angle => self.take_heading(head, measured),
+            MeasurementKind::AngleAtHead => UpdateVerdict::unused(UpdateReason::Unusable),
+        })
     }
 
     fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
@@ -193,6 +196,7 @@ mod tests {
             height_m: 0.0,
             position_std_m: 0.0,
             eirp_dbm: 0.0,
+            array: None,
         };
         let mut localizer = DeadReckoning::new(Pose::default(), between, mounting_rad);
         let mut worst_m = 0f64;
@@ -210,6 +214,7 @@ mod tests {
             let to_axis_rad =
                 truth.point().bearing_rad(head.position) - truth.heading_rad - mounting_rad;
             let measured = AngleMeasurement {
+                kind: MeasurementKind::Angle,
                 time_s,
                 phase_rad: std::f64::consts::PI * to_axis_rad.cos(),
                 phase_sigma_rad: 0.0,
@@ -290,8 +295,10 @@ mod tests {
             height_m: 0.0,
             position_std_m: 0.0,
             eirp_dbm: 0.0,
+            array: None,
         };
         let measured = AngleMeasurement {
+            kind: MeasurementKind::Angle,
             time_s: 0.0,
             phase_rad: f64::NAN,
             phase_sigma_rad: f64::NAN,

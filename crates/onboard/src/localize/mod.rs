@@ -17,7 +17,7 @@ pub mod modes;
 mod out_of_sequence;
 mod output;
 
-pub use crate::observation::AngleMeasurement;
+pub use crate::observation::{AngleMeasurement, MeasurementKind};
 pub use choose::built_in;
 pub use dead_reckoning::DeadReckoning;
 pub use ekf::Ekf;

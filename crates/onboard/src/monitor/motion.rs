@@ -12,7 +12,7 @@
 
 use crate::geometry::{Pose, wrap_angle};
 use crate::localize::AngleUpdate;
-use crate::observation::OdometrySample;
+use crate::observation::{MeasurementKind, OdometrySample};
 use crate::radio_head::RadioHead;
 use crate::sight::Sight;
 
@@ -81,6 +81,7 @@ struct Reference {
 /// An angle of a burst, reduced to what is compared.
 #[derive(Debug, Clone, Copy)]
 struct Seen {
+    kind: MeasurementKind,
     head: RadioHead,
     time_s: f64,
     value_rad: f64,
@@ -198,7 +199,11 @@ impl MotionMonitor {
             }
             // The pose at the time of the angle.
             let ahead_m = (last.time_s - measured.time_s).max(0.0) * last.speed_mps;
+            if measured.kind.is_at_head() && update.head.array.is_none() {
+                continue;
+            }
             let seen = Seen {
+                kind: measured.kind,
                 head: update.head,
                 time_s: measured.time_s,
                 value_rad: measured.phase_rad,
@@ -265,7 +270,8 @@ impl MotionMonitor {
         let stands = moved_m.abs() <= STANDING_M && turned_rad.abs() <= STANDING_RAD;
         let change_rad = |share: f64, turn_rad: f64| {
             let pose = reference.pose.along_chord(share * moved_m, turn_rad);
-            let residual_rad = self.sight.residual_rad(pose, &seen.head, seen.value_rad);
+            let residual_rad =
+                (self.sight).residual_rad(seen.kind, pose, &seen.head, seen.value_rad);
             wrap_angle(residual_rad - reference.residual_rad)
         };
         let mut next = reference;
@@ -334,7 +340,7 @@ impl MotionMonitor {
             yaw_rad: seen.yaw_rad,
             residual_rad: self
                 .sight
-                .residual_rad(seen.pose, &seen.head, seen.value_rad),
+                .residual_rad(seen.kind, seen.pose, &seen.head, seen.value_rad),
             variance: seen.variance,
             evidence: [0.0; 2],
             jumped_s: None,

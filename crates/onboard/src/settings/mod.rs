@@ -41,7 +41,7 @@ pub use odometry::{DriveKind, GyroscopeSettings, LaneKeepingSettings, OdometerSe
 pub use overlay::lay_over;
 pub use platform::Platform;
 pub use power::{CorePower, CpuSettings, IdleSettings, PowerMode, ReceiverPower, SuspendSettings};
-pub use radio::{RadioHeadSettings, SsbSettings};
+pub use radio::{HeadArraySettings, RadioHeadSettings, SsbSettings};
 pub use read::{from_table, parse};
 pub use receiver::{EstimatorMethod, EstimatorSettings, Pilots, ReceiverSettings};
 pub use road::{RoadSettings, SegmentSettings};

@@ -34,6 +34,23 @@ pub struct RadioHeadSettings {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 40.0))]
     pub eirp_std_db: f64,
+    /// Array of the radio head that measures the azimuth of the vehicle; required for angles measured at
+    /// the radio head (`at_head` = 1).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub array: Option<HeadArraySettings>,
+}
+
+/// `[radio_heads.array]`
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HeadArraySettings {
+    /// Direction of azimuth 0 of the array, counter-clockwise from +x of the map, in radians.
+    #[schemars(range(min = -6.3, max = 6.3))]
+    pub azimuth_rad: f64,
+    /// Standard deviation of that direction, in radians.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 3.2))]
+    pub azimuth_std_rad: f64,
 }
 
 impl RadioHeadSettings {

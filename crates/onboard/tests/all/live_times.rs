@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use onboard::geometry::Pose;
 use onboard::live::{AngleObservation, LiveError, Reason, State, TimeDefect};
-use onboard::observation::OdometrySample;
+use onboard::observation::{MeasurementKind, OdometrySample};
 use onboard::settings::{Platform, Shipped, Site, TomlFile, Vehicle};
 use onboard::{Custom, Live};
 use rand::{RngExt, SeedableRng};
@@ -95,6 +95,7 @@ impl Drive {
             let range_m = forward_m.hypot(head_y_m).hypot(head_z_m);
             let noise: f64 = self.random.sample(StandardNormal);
             self.live.angle(&AngleObservation {
+                kind: MeasurementKind::Angle,
                 pci,
                 ssb_index: 0,
                 time_s: self.now_s() + self.angle_clock_s,
@@ -310,6 +311,7 @@ fn angles_ahead_of_the_odometry_or_received_twice_are_rejected() {
     let before = drive.live.status(drive.now_s()).unwrap();
     for time_s in [drive.now_s() + 2.0, 1e300, f64::NAN, -1e300] {
         let angle = AngleObservation {
+            kind: MeasurementKind::Angle,
             pci: 1,
             ssb_index: 0,
             time_s,
@@ -323,6 +325,7 @@ fn angles_ahead_of_the_odometry_or_received_twice_are_rejected() {
     assert_eq!(drive.live.status(drive.now_s()).unwrap(), before);
     // Twice in a burst, and after it.
     let angle = AngleObservation {
+        kind: MeasurementKind::Angle,
         pci: 2,
         ssb_index: 0,
         time_s: drive.now_s() + 0.01,

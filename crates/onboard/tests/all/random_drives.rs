@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use onboard::geometry::Pose;
 use onboard::localize::{
-    AngleMeasurement, AngleUpdate, History, UpdateReason, UpdateVerdict, built_in,
+    AngleMeasurement, AngleUpdate, History, MeasurementKind, UpdateReason, UpdateVerdict, built_in,
 };
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
@@ -94,6 +94,7 @@ fn drive(seed: u64) {
             let level = ground_m / ground_m.hypot(head.height_m - 0.5).max(1e-9);
             let phase_rad = PI * level * (eye.bearing_rad(head.position) - truth.heading_rad).cos();
             let measured = AngleMeasurement {
+                kind: MeasurementKind::Angle,
                 time_s: time_s - late_s,
                 phase_rad: phase_rad + 0.1 * noise + outlier,
                 phase_sigma_rad: 0.1,

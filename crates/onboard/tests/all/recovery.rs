@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use onboard::geometry::Pose;
-use onboard::localize::{AngleMeasurement, Localizer, built_in};
+use onboard::localize::{AngleMeasurement, Localizer, MeasurementKind, built_in};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
@@ -91,6 +91,7 @@ impl Drive {
         for head in self.heads.clone() {
             let bearing_rad = self.truth.point().bearing_rad(head.position);
             let measured = AngleMeasurement {
+                kind: MeasurementKind::Angle,
                 time_s: self.time_s(),
                 phase_rad: PI * (bearing_rad - self.truth.heading_rad).cos() + 0.05 * self.normal(),
                 phase_sigma_rad: 0.05,

@@ -4,7 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use onboard::geometry::{Point, Pose};
-use onboard::localize::{AngleMeasurement, IntegrityState, built_in};
+use onboard::localize::{AngleMeasurement, IntegrityState, MeasurementKind, built_in};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
@@ -167,6 +167,7 @@ fn drive(place: &Place, seed: u64, given: Option<fn(Pose) -> Pose>) -> Driven {
                     phase_rad = PI * (2.0 * normal()[1] - 1.0);
                 }
                 let measured = AngleMeasurement {
+                    kind: MeasurementKind::Angle,
                     time_s,
                     phase_rad,
                     phase_sigma_rad: SIGMA_RAD,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use onboard::geometry::Pose;
 use onboard::localize::ekf::EkfConfig;
-use onboard::localize::{AngleMeasurement, Ekf, UpdateReason};
+use onboard::localize::{AngleMeasurement, Ekf, MeasurementKind, UpdateReason};
 use onboard::localize::{InitialPose, OdometryVerdict};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
@@ -50,6 +50,7 @@ fn sample(time_s: f64, distance_m: f64) -> OdometrySample {
 
 fn angle(time_s: f64, phase_rad: f64, phase_sigma_rad: f64) -> AngleMeasurement {
     AngleMeasurement {
+        kind: MeasurementKind::Angle,
         time_s,
         phase_rad,
         phase_sigma_rad,

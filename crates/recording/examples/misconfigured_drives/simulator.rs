@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
 use onboard::geometry::{Pose, wrap_angle};
-use onboard::localize::AngleMeasurement;
+use onboard::localize::{AngleMeasurement, MeasurementKind};
 use onboard::observation::{OdometrySample, SensedSsb};
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
 use rand::{RngExt, SeedableRng};
@@ -244,6 +244,7 @@ pub fn drive(kind: Kind, seed: u64, guarded: bool) -> Drive {
                     snr_db: 15.0,
                 },
                 measured: AngleMeasurement {
+                    kind: MeasurementKind::Angle,
                     time_s: step as f64 / rate_hz,
                     phase_rad,
                     phase_sigma_rad: sigma_rad,

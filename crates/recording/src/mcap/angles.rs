@@ -11,7 +11,8 @@ use crate::error::RecordingError;
 
 /// Reads the angles that `access_av_msgs/msg/AngleVerdict` messages of an MCAP file or a rosbag2 folder tell, of
 /// one topic where it is named: those that a node or `access-av locate` has recorded. Verdicts without an angle
-/// are passed over; files from before verdicts told `resolved` hold none in doubt.
+/// are passed over. Files written before the messages had `resolved` and `at_head` hold angles that are resolved and measured on
+/// the vehicle.
 ///
 /// # Errors
 /// [`RecordingError`] when a file is no MCAP or is damaged, or there is no such message. Single messages, and a file
@@ -52,7 +53,7 @@ pub fn read_angles_mcap(bag: &Path, topic: Option<&str>) -> Result<AngleLog, Rec
 }
 
 /// The phase, which is not a number where there is no angle, and all columns of an angle log.
-fn decode(message: &[u8]) -> Option<(f64, [Option<f64>; 9])> {
+fn decode(message: &[u8]) -> Option<(f64, [Option<f64>; 10])> {
     let mut decoder = Decoder::new(message)?;
     let time_s = stamp_s(&mut decoder)?;
     decoder.skip_string()?;
@@ -61,6 +62,7 @@ fn decode(message: &[u8]) -> Option<(f64, [Option<f64>; 9])> {
     let [phase_rad, phase_sigma_rad, snr_db] = decoder.f64s()?;
     let _mahalanobis_threshold_and_wake_up: [f64; 3] = decoder.f64s()?;
     let is_resolved = decoder.u8().is_none_or(|it| it != 0);
+    let is_at_head = decoder.u8().is_some_and(|it| it != 0);
     let columns = [
         Some(time_s),
         Some(f64::from(pci)),
@@ -71,6 +73,7 @@ fn decode(message: &[u8]) -> Option<(f64, [Option<f64>; 9])> {
         None,
         Some(snr_db),
         Some(f64::from(u8::from(is_resolved))),
+        Some(f64::from(u8::from(is_at_head))),
     ];
     Some((phase_rad, columns))
 }

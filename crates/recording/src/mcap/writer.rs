@@ -226,7 +226,8 @@ impl<W: Write + Seek> McapWriter<W> {
             .f64(verdict.mahalanobis_squared.unwrap_or(f64::NAN))
             .f64(verdict.threshold.unwrap_or(f64::NAN))
             .f64(execution.wake_up_time_s)
-            .u8(u8::from(measured.is_some_and(|it| it.resolved)));
+            .u8(u8::from(measured.is_some_and(|it| it.resolved)))
+            .u8(u8::from(measured.is_some_and(|it| it.kind.is_at_head())));
         self.write(topic, &VERDICT, ssb.time_s)
     }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use onboard::geometry::wrap_angle;
+use onboard::localize::MeasurementKind;
 use onboard::settings::{Site, Vehicle};
 
 use super::error::ReplayError;
@@ -74,6 +75,8 @@ pub fn warnings(
         warnings.push((start_s, text));
     }
 
+    warnings.extend(without_array(site, angles).map(|text| (start_s, text)));
+
     let turns = |it: &&LoggedAngle| {
         let told_rad = [it.measured.phase_rad, it.measured.angle_rad];
         told_rad.iter().any(|told_rad| told_rad.abs() > TAU)
@@ -91,7 +94,10 @@ pub fn warnings(
     let measurand = vehicle.array.measurand();
     let both = angles.iter().filter(|it| it.measured.angle_rad.is_finite());
     let contradicts = |it: &&LoggedAngle| {
-        let expected = measurand.value_rad(it.measured.angle_rad, 1.0);
+        let expected = match it.measured.kind {
+            MeasurementKind::Angle => measurand.value_rad(it.measured.angle_rad, 1.0),
+            MeasurementKind::AngleAtHead => it.measured.angle_rad,
+        };
         wrap_angle(it.measured.phase_rad - expected).abs() > CONTRADICTION_RAD
     };
     let contradicting = both.clone().filter(contradicts).count();
@@ -129,6 +135,27 @@ pub fn warnings(
         warnings.push((start_s, text));
     }
     Ok(warnings)
+}
+
+/// Reports angles measured at radio heads whose array the site does not define; such angles are not used.
+fn without_array<'a>(
+    site: &'a Site,
+    angles: &'a [LoggedAngle],
+) -> impl Iterator<Item = String> + 'a {
+    let heads = site.radio_heads.iter().enumerate();
+    heads.filter(|(_, head)| head.array.is_none()).filter_map(move |(number, head)| {
+        let is_of_it = |it: &&LoggedAngle| {
+            it.measured.kind.is_at_head()
+                && (it.ssb.pci, it.ssb.ssb_index) == (head.pci, head.ssb_index)
+        };
+        let count = angles.iter().filter(is_of_it).count();
+        (count > 0).then(|| {
+            format!(
+                "{count} angles of pci {}, ssb_index {} were measured at the radio head (at_head is 1), but                  the site does not define the direction of its array; they are not used; add                  radio_heads[{number}].array.azimuth_rad to the site",
+                head.pci, head.ssb_index
+            )
+        })
+    })
 }
 
 /// Distances that the speeds contradict.

@@ -2,6 +2,7 @@
 
 use onboard::gaussian::{Innovation, with_outliers};
 use onboard::geometry::{Point, Pose, wrap_angle};
+use onboard::localize::MeasurementKind;
 use onboard::manifold::Measurand;
 
 use super::evidence::{HeadId, OUTLIERS, head_of};
@@ -28,8 +29,9 @@ const AS_GOOD: f64 = 3.0;
 /// Angles without which no place is told.
 const LEAST_ANGLES: usize = 10;
 
-/// An angle, from where it was seen: of the array, and the direction of its axis.
+/// An angle, the position of the vehicle's array, and the direction of azimuth 0 of the array that measured it.
 struct Sighted {
+    kind: MeasurementKind,
     from: Point,
     axis_rad: f64,
     phase_rad: f64,
@@ -48,9 +50,14 @@ pub fn triangulate(drive: &Drive<'_>, head: HeadId, path: &[Option<Pose>]) -> Op
     let sighted: Vec<Sighted> = (own.filter(|(angle, _)| head_of(angle) == head))
         .filter_map(|(angle, pose)| {
             let (measured, pose) = (with_phase(angle, &measurand).measured, (*pose)?);
+            let axis_rad = match measured.kind {
+                MeasurementKind::Angle => pose.heading_rad + array.mounting_rad,
+                MeasurementKind::AngleAtHead => settings.array?.azimuth_rad,
+            };
             Some(Sighted {
+                kind: measured.kind,
                 from: pose.beside(forward_m, left_m),
-                axis_rad: pose.heading_rad + array.mounting_rad,
+                axis_rad,
                 phase_rad: measured.phase_rad,
                 variance: measured.phase_sigma_rad.powi(2) + PATH_STD_RAD.powi(2),
             })
@@ -101,7 +108,12 @@ fn log_likelihood(sighted: &[Sighted], place: Point, rise_m: f64, measurand: &Me
     let of_angle = |it: &Sighted| {
         let ground_m = it.from.distance_m(place);
         let level = ground_m / ground_m.hypot(rise_m).max(f64::MIN_POSITIVE);
-        let predicted = measurand.value_rad(it.from.bearing_rad(place) - it.axis_rad, level);
+        let predicted = match it.kind {
+            MeasurementKind::Angle => {
+                measurand.value_rad(it.from.bearing_rad(place) - it.axis_rad, level)
+            }
+            MeasurementKind::AngleAtHead => place.bearing_rad(it.from) - it.axis_rad,
+        };
         let innovation = Innovation {
             residual: wrap_angle(it.phase_rad - predicted),
             variance: it.variance,

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use onboard::geometry::wrap_angle;
 use onboard::manifold::Measurand;
 use onboard::settings::{DriveKind, Site, Vehicle};
 
@@ -38,11 +39,15 @@ pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
 }
 
 /// The electrical angle of a row for one that was logged as the angle from the array's axis; of any
-/// other array that is what is measured.
+/// other array, and at a radio head, both are the same azimuth.
 pub fn with_phase(logged: &LoggedAngle, measurand: &Measurand) -> LoggedAngle {
     let mut logged = *logged;
     let measured = &mut logged.measured;
-    if measured.phase_rad.is_nan() {
+    if measured.kind.is_at_head() {
+        if measured.phase_rad.is_nan() {
+            measured.phase_rad = wrap_angle(measured.angle_rad);
+        }
+    } else if measured.phase_rad.is_nan() {
         measured.phase_rad = measurand.value_rad(measured.angle_rad, 1.0);
         if let Measurand::ElectricalAngle {
             spacing_wavelengths,

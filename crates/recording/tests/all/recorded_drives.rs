@@ -10,7 +10,9 @@ use proptest::prelude::*;
 
 use onboard::Execution;
 use onboard::geometry::Pose;
-use onboard::localize::{AngleMeasurement, PoseEstimate, UpdateReason, UpdateVerdict};
+use onboard::localize::{
+    AngleMeasurement, MeasurementKind, PoseEstimate, UpdateReason, UpdateVerdict,
+};
 use onboard::observation::{OdometrySample, SensedSsb};
 use recording::mcap::{Frames, Twist};
 use recording::{
@@ -316,6 +318,7 @@ fn angle_logs_come_back_and_bad_lines_are_left_out() {
             snr_db: 12.5,
         },
         measured: AngleMeasurement {
+            kind: MeasurementKind::Angle,
             time_s,
             phase_rad: 0.1,
             phase_sigma_rad: 0.02,
@@ -356,6 +359,7 @@ fn angles_are_read_from_the_verdicts_of_mcap_and_those_without_an_angle_passed_o
             snr_db: 12.5,
         };
         let measured = phase_rad.map(|phase_rad| AngleMeasurement {
+            kind: MeasurementKind::Angle,
             time_s,
             phase_rad,
             phase_sigma_rad: 0.02,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use onboard::localize::AngleMeasurement;
+use onboard::localize::{AngleMeasurement, MeasurementKind};
 use onboard::observation::{OdometrySample, SensedSsb};
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Check, Shipped, TomlFile, UncertaintySettings, WakeUpSettings};
@@ -97,6 +97,7 @@ fn drive(scenario: &Scenario) -> u32 {
                     snr_db: 20.0,
                 },
                 measured: AngleMeasurement {
+                    kind: MeasurementKind::Angle,
                     time_s,
                     phase_rad: PI * angle_rad.cos() + outlier,
                     phase_sigma_rad: 0.05,

@@ -6,7 +6,7 @@ use num_complex::Complex32;
 use onboard::live::{
     AngleObservation, Continuity, LiveError, Outcome, Reason, State, StreamConfig,
 };
-use onboard::observation::OdometrySample;
+use onboard::observation::{MeasurementKind, OdometrySample};
 use onboard::settings::{FixedSettings, Platform, Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution, Live};
 use recording::replay::{StartChoice, locate_angles, locate_recording};
@@ -179,6 +179,7 @@ fn live_angles_give_the_poses_of_the_log() {
     for (sample, pose) in odometry.samples.iter().zip(&located.poses) {
         while let Some(angle) = angles.next_if(|it| it.ssb.time_s < sample.time_s) {
             live.angle(&AngleObservation {
+                kind: MeasurementKind::Angle,
                 pci: angle.ssb.pci,
                 ssb_index: angle.ssb.ssb_index,
                 time_s: angle.ssb.time_s,
@@ -266,6 +267,7 @@ fn rejected_inputs_change_nothing() {
         ));
     }
     let angle = AngleObservation {
+        kind: MeasurementKind::Angle,
         pci: 1,
         ssb_index: 0,
         time_s: 0.2,

@@ -495,6 +495,7 @@ mod tests {
     use rand_distr::StandardNormal;
 
     use super::*;
+    use crate::observation::MeasurementKind;
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
 
     /// Drives from `start_m` until found; the error then, in metres and in standard deviations.
@@ -523,6 +524,7 @@ mod tests {
                 let phase_rad =
                     std::f64::consts::PI * (bearing_rad - truth.heading_rad).cos() + 0.1 * noise;
                 let measured = AngleMeasurement {
+                    kind: MeasurementKind::Angle,
                     time_s,
                     phase_rad: wrap_angle(phase_rad),
                     phase_sigma_rad: 0.001,

@@ -5,6 +5,7 @@ use super::state::{ACROSS, ALONG, CURVATURE, DATUM, HEADING, MOUNTING, PHASE, ST
 use crate::gaussian::{Matrix, dot};
 use crate::geometry::Pose;
 use crate::manifold::Measurand;
+use crate::observation::MeasurementKind;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
 
@@ -132,11 +133,25 @@ pub struct SecondOrder {
     pub variance: f64,
 }
 
-impl AngleModel {
-    /// A radio head seen from `pose` by an array whose mounting and phase are those of the state
-    /// `mean`; `None` when it is as good as above or in the array, where its direction is any. What
-    /// nearness leaves of an angle is for [`bend`](Self::bend) to say.
-    pub fn new(
+/// Line of sight between the array on the vehicle and a radio head.
+struct LineOfSight {
+    /// Bearing of the radio head from the array, in the map frame (rad).
+    bearing_rad: f64,
+    /// Horizontal distance, and distance (m).
+    ground_m: f64,
+    range_m: f64,
+    /// Cosine of the angle between the horizontal line of sight and the vehicle's forward axis.
+    along: f64,
+    /// Steps of the array by each state, towards the radio head and to the left of that direction.
+    steps: [[f64; STATES]; 2],
+    /// Change in the bearing by each state.
+    bearing_row: [f64; STATES],
+}
+
+impl LineOfSight {
+    /// Line of sight from the array of a vehicle at `pose`; `None` if the radio head is above the array or within it,
+    /// where it has no bearing.
+    fn new(
         head: &RadioHead,
         pose: Pose,
         frame: &RoadFrame,
@@ -151,9 +166,73 @@ impl AngleModel {
         if range_m < NEAREST_M || ground_m < NEAREST_M {
             return None;
         }
-        let bearing = eye.bearing_rad(place);
-        let level = ground_m / range_m; // cos ε
-        let azimuth = bearing - pose.heading_rad - mean[MOUNTING];
+        let bearing_rad = eye.bearing_rad(place);
+        let (left, ahead) = (bearing_rad - frame.direction_rad).sin_cos();
+        // Turning on the spot moves the array.
+        let (aside, along) = (bearing_rad - pose.heading_rad).sin_cos();
+        let mut steps = [[0.0; STATES]; 2];
+        steps[0][ALONG] = ahead * frame.stretch;
+        steps[0][ACROSS] = left;
+        steps[0][HEADING] = aside * forward_m - along * left_m;
+        steps[1][ALONG] = -left * frame.stretch;
+        steps[1][ACROSS] = ahead;
+        steps[1][HEADING] = along * forward_m + aside * left_m;
+        for step in &mut steps {
+            // Along a bend the vehicle turns as it goes.
+            step[ALONG] += frame.curvature_per_m * step[HEADING];
+        }
+        // A step to the left of the line of sight turns the bearing to the right.
+        let mut bearing_row = steps[1].map(|step| -step / ground_m);
+        // A step of the radio head east or north.
+        let (north, east) = bearing_rad.sin_cos();
+        (bearing_row[DATUM[0]], bearing_row[DATUM[1]]) = (-north / ground_m, east / ground_m);
+        Some(Self {
+            bearing_rad,
+            ground_m,
+            range_m,
+            along,
+            steps,
+            bearing_row,
+        })
+    }
+
+    /// Cosine of the elevation.
+    fn level(&self) -> f64 {
+        self.ground_m / self.range_m
+    }
+}
+
+impl AngleModel {
+    /// Model of an angle of this kind to a radio head, at a vehicle at `pose` with the state `mean`. `None` if the
+    /// radio head is above the array or within it, and for an angle measured at a radio head without an array.
+    /// [`bend`](Self::bend) corrects the prediction for the curvature at short distances.
+    pub fn of_kind(
+        kind: MeasurementKind,
+        head: &RadioHead,
+        pose: Pose,
+        frame: &RoadFrame,
+        mean: &[f64; STATES],
+        array: &ArrayModel,
+    ) -> Option<Self> {
+        match kind {
+            MeasurementKind::Angle => Self::new(head, pose, frame, mean, array),
+            MeasurementKind::AngleAtHead => Self::at_head(head, pose, frame, mean, array),
+        }
+    }
+
+    /// A radio head seen from `pose` by an array whose mounting and phase are those of the state
+    /// `mean`; `None` when it is as good as above or in the array, where its direction is any. What
+    /// nearness leaves of an angle is for [`bend`](Self::bend) to say.
+    pub fn new(
+        head: &RadioHead,
+        pose: Pose,
+        frame: &RoadFrame,
+        mean: &[f64; STATES],
+        array: &ArrayModel,
+    ) -> Option<Self> {
+        let sight = LineOfSight::new(head, pose, frame, mean, array)?;
+        let level = sight.level();
+        let azimuth = sight.bearing_rad - pose.heading_rad - mean[MOUNTING];
         let value = array.measurand.value_rad(azimuth, level);
         // By the azimuth twice, by cos ε and by the phase.
         let (slopes, by_level, by_phase) = match array.measurand {
@@ -167,49 +246,62 @@ impl AngleModel {
             }
             Measurand::Azimuth { .. } => ([-1.0, 0.0], 0.0, 0.0),
         };
-        let (left, ahead) = (bearing - frame.direction_rad).sin_cos();
-        // Turning on the spot moves the array.
-        let (aside, along) = (bearing - pose.heading_rad).sin_cos();
-        let mut steps = [[0.0; STATES]; 2];
-        steps[0][ALONG] = ahead * frame.stretch;
-        steps[0][ACROSS] = left;
-        steps[0][HEADING] = aside * forward_m - along * left_m;
-        steps[1][ALONG] = -left * frame.stretch;
-        steps[1][ACROSS] = ahead;
-        steps[1][HEADING] = along * forward_m + aside * left_m;
-        for step in &mut steps {
-            // Along a bend the vehicle turns as it goes.
-            step[ALONG] += frame.curvature_per_m * step[HEADING];
-        }
-        // A step to the left of the line of sight turns the bearing to the right.
-        let mut turn = steps[1].map(|step| -step / ground_m);
+        let mut turn = sight.bearing_row;
         turn[ALONG] -= frame.curvature_per_m;
         turn[HEADING] -= 1.0;
         turn[MOUNTING] = -1.0;
-        // A step towards the radio head raises it: d cos ε = −sin² ε dρ/R.
-        let climb = by_level * (1.0 - level * level) / range_m;
         let mut row = turn.map(|turn| -slopes[0] * turn);
-        for (value, step) in row.iter_mut().zip(steps[0]) {
+        // A step towards the radio head raises it: d cos ε = −sin² ε dρ/R.
+        let climb = by_level * (1.0 - level * level) / sight.range_m;
+        for (value, step) in row.iter_mut().zip(sight.steps[0]) {
             *value -= climb * step;
         }
         row[PHASE] = by_phase;
         // The radio head's own step east, and north, is the vehicle's back.
-        let (north, east) = bearing.sin_cos();
-        for (state, away, left) in [(DATUM[0], east, -north), (DATUM[1], north, east)] {
-            row[state] = climb * away - slopes[0] * left / ground_m;
-        }
+        let (north, east) = sight.bearing_rad.sin_cos();
+        row[DATUM[0]] += climb * east;
+        row[DATUM[1]] += climb * north;
         let survey_variance = head.position_std_m.powi(2) + array.position_std_m.powi(2);
         Some(Self {
             phase_rad: value + by_phase * mean[PHASE],
             row,
-            range_m,
-            toward: along * level,
-            survey_variance: (slopes[0] / ground_m).powi(2) * survey_variance,
+            range_m: sight.range_m,
+            toward: sight.along * level,
+            survey_variance: (slopes[0] / sight.ground_m).powi(2) * survey_variance,
             aperture: array.measurand.aperture(azimuth, level),
             turn,
-            steps,
-            ground_m,
+            steps: sight.steps,
+            ground_m: sight.ground_m,
             slopes,
+        })
+    }
+
+    /// Azimuth of the vehicle's array in the frame of the array of a radio head: the bearing from the radio head to
+    /// the vehicle, minus the azimuth of the head's array. It does not depend on the heading, except by the offset of the
+    /// vehicle's array from the odometer's point. The scatter of the channel is part of the measurement's own standard
+    /// deviation, so that the aperture is infinite here.
+    fn at_head(
+        head: &RadioHead,
+        pose: Pose,
+        frame: &RoadFrame,
+        mean: &[f64; STATES],
+        array: &ArrayModel,
+    ) -> Option<Self> {
+        let own = head.array?;
+        let sight = LineOfSight::new(head, pose, frame, mean, array)?;
+        let position_variance = head.position_std_m.powi(2) + array.position_std_m.powi(2);
+        Some(Self {
+            phase_rad: sight.bearing_rad + std::f64::consts::PI - own.azimuth_rad,
+            row: sight.bearing_row,
+            range_m: sight.range_m,
+            toward: sight.along * sight.level(),
+            survey_variance: position_variance / sight.ground_m.powi(2)
+                + own.azimuth_std_rad.powi(2),
+            aperture: f64::INFINITY,
+            turn: sight.bearing_row,
+            steps: sight.steps,
+            ground_m: sight.ground_m,
+            slopes: [-1.0, 0.0],
         })
     }
 
@@ -249,8 +341,9 @@ impl AngleModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point;
+    use crate::geometry::{Point, wrap_angle};
     use crate::manifold::scatter_bound;
+    use crate::settings::HeadArraySettings;
 
     fn head(x_m: f64, y_m: f64, height_m: f64) -> RadioHead {
         RadioHead {
@@ -260,6 +353,7 @@ mod tests {
             height_m,
             position_std_m: 0.0,
             eirp_dbm: 0.0,
+            array: None,
         }
     }
 
@@ -330,6 +424,63 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn the_azimuth_at_a_head_and_its_gradient_are_those_of_the_bearing_from_there() {
+        let kappa = 0.01;
+        let array = ArrayModel {
+            position_m: [0.8, -0.3, 1.2],
+            ..ARRAY
+        };
+        let own = HeadArraySettings {
+            azimuth_rad: 0.7,
+            azimuth_std_rad: 0.02,
+        };
+        let head = RadioHead {
+            array: Some(own),
+            position_std_m: 0.1,
+            ..head(70.0, 40.0, 9.0)
+        };
+        let see = |x: [f64; 5]| {
+            let (pose, frame) = on_circle(x[0], x[1], x[2], kappa);
+            let mut mean = mean(0.3, 0.2);
+            (mean[DATUM[0]], mean[DATUM[1]]) = (x[3], x[4]);
+            let kind = MeasurementKind::AngleAtHead;
+            let model = AngleModel::of_kind(kind, &head, pose, &frame, &mean, &array).unwrap();
+            let place = head.position.moved([x[3], x[4]]);
+            let bearing = place.bearing_rad(pose.beside(0.8, -0.3));
+            assert!(wrap_angle(model.phase_rad - (bearing - 0.7)).abs() < 1e-12);
+            model
+        };
+        let x = [30.0, 0.8, 0.05, 1.5, -0.7];
+        let model = see(x);
+        let mut expected = [0.0; STATES];
+        let states = [ALONG, ACROSS, HEADING, DATUM[0], DATUM[1]];
+        for (i, state) in states.into_iter().enumerate() {
+            let (mut up, mut down) = (x, x);
+            up[i] += 1e-5;
+            down[i] -= 1e-5;
+            expected[state] = (see(up).phase_rad - see(down).phase_rad) / 2e-5;
+        }
+        // Neither mounting nor phase of the vehicle's array matters.
+        for (state, (expected, row)) in expected.iter().zip(model.row).enumerate() {
+            assert!(
+                (expected - row).abs() < 1e-8,
+                "state {state}: {expected} {row}"
+            );
+        }
+        let expected = 0.1_f64.powi(2) / model.ground_m.powi(2) + 0.02_f64.powi(2);
+        assert!((model.survey_variance - expected).abs() < 1e-12);
+        let without = RadioHead {
+            array: None,
+            ..head
+        };
+        let (pose, frame) = on_circle(30.0, 0.8, 0.05, kappa);
+        let kind = MeasurementKind::AngleAtHead;
+        assert!(
+            AngleModel::of_kind(kind, &without, pose, &frame, &mean(0.0, 0.0), &array).is_none()
+        );
     }
 
     #[test]

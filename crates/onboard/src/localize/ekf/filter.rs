@@ -13,7 +13,7 @@ use crate::gaussian::CERTAIN_SIGMAS;
 use crate::gaussian::smoother::Journal;
 use crate::localize::bias::CorrelatedBias;
 use crate::localize::output::InitialPose;
-use crate::observation::OdometrySample;
+use crate::observation::{MeasurementKind, OdometrySample};
 use crate::radio_head::RadioHead;
 use crate::road::{Gap, Road};
 
@@ -33,6 +33,8 @@ pub(super) enum OffMap {
 pub(super) struct Head {
     pub known: RadioHead,
     pub excluded: bool,
+    /// Kind of its last angle that was used.
+    pub kind: MeasurementKind,
     /// Distance driven when its last angle was used (m) ...
     pub last_update_m: f64,
     /// ... the time then (s) ...
@@ -86,6 +88,7 @@ impl Ekf {
         let head = |&known| Head {
             known,
             excluded: false,
+            kind: MeasurementKind::default(),
             last_update_m: f64::NEG_INFINITY,
             last_update_s: f64::NEG_INFINITY,
             last_update_rad: f64::NEG_INFINITY,

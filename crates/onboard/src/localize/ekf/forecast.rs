@@ -156,7 +156,8 @@ impl Ekf {
         }
         let (pose, frame) = locate(&belief.mean, 0.0, self.map.as_deref());
         let array = &self.config.array;
-        let angle_model = AngleModel::new(&known.known, pose, &frame, &belief.mean, array)?;
+        let (kind, head) = (known.kind, &known.known);
+        let angle_model = AngleModel::of_kind(kind, head, pose, &frame, &belief.mean, array)?;
         let travelled_m = self.driven_m + ahead_m - known.last_update_m;
         let own = (self.config.noise_ratio() * thermal(angle_model.range_m)).sqrt();
         let mut variance = self

@@ -10,7 +10,7 @@ use crate::gaussian::{Innovation, with_outliers};
 use crate::geometry::wrap_angle;
 use crate::localize::bias::{self, JumpHypotheses, MOST_VARIANCE};
 use crate::localize::output::{UpdateReason, UpdateVerdict};
-use crate::observation::AngleMeasurement;
+use crate::observation::{AngleMeasurement, MeasurementKind};
 use crate::radio_head::RadioHead;
 
 /// Most that angles can be later than stated (s).
@@ -101,14 +101,19 @@ impl Ekf {
             .map(|reading| self.step(&self.belief, &reading));
         let mean = (ahead.as_ref()).map_or(&self.belief.mean, |ahead| &ahead.mean);
         let angle_model = self
-            .angle_model(&head.known, mean)
+            .angle_model(measured.kind, &head.known, mean)
             .ok_or(UpdateReason::Unusable)?;
         let bend = angle_model.bend(&self.belief.covariance);
         let place_m = self.driven_m + ahead_m;
         let travelled_m = place_m - head.last_update_m;
         let shared = (self.config).shared_variance(travelled_m, &angle_model);
         let elapsed_s = measured.time_s - head.last_update_s;
-        let turned_rad = self.turned_rad - head.last_update_rad;
+        // A turn of the vehicle shows the radio head to another part of its array, but not the vehicle to another part
+        // of the head's.
+        let turned_rad = match measured.kind {
+            MeasurementKind::Angle => self.turned_rad - head.last_update_rad,
+            MeasurementKind::AngleAtHead => 0.0,
+        };
         let moved = (travelled_m, turned_rad);
         let stated = self.phase_bias().variance(sigma, elapsed_s, moved);
         let (row, strayed) = (ahead.as_ref()).map_or((angle_model.row, 0.0), |ahead| {
@@ -159,11 +164,16 @@ impl Ekf {
     }
 
     /// A radio head as it is seen from a state, or rather was seen when the angle was received.
-    fn angle_model(&self, head: &RadioHead, mean: &[f64; STATES]) -> Option<AngleModel> {
+    fn angle_model(
+        &self,
+        kind: MeasurementKind,
+        head: &RadioHead,
+        mean: &[f64; STATES],
+    ) -> Option<AngleModel> {
         let (map, array) = (self.map.as_deref(), &self.config.array);
         if self.config.lateness_std_s == 0.0 {
             let (pose, frame) = locate(mean, 0.0, map);
-            return AngleModel::new(head, pose, &frame, mean, array);
+            return AngleModel::of_kind(kind, head, pose, &frame, mean, array);
         }
         let speed_mps = self.speed_mps();
         let (mut pose, frame) = locate(mean, -speed_mps * mean[LATENESS], map);
@@ -175,7 +185,7 @@ impl Ekf {
                 read.filter(|rate| rate.abs() <= top).unwrap_or_default() - mean[YAW_RATE_BIAS];
             pose.heading_rad -= rate_radps * mean[LATENESS];
         }
-        let mut angle_model = AngleModel::new(head, pose, &frame, mean, array)?;
+        let mut angle_model = AngleModel::of_kind(kind, head, pose, &frame, mean, array)?;
         let (sin, cos) = (pose.heading_rad - frame.direction_rad).sin_cos();
         let row = &mut angle_model.row;
         row[LATENESS] = -speed_mps * (row[ALONG] * cos / frame.stretch + row[ACROSS] * sin)
@@ -183,7 +193,15 @@ impl Ekf {
         Some(angle_model)
     }
 
-    /// Corrects the state by one electrical angle to a radio head.
+    /// Probability that an angle of this kind is of another lobe of the vehicle's array, where that is not negligible.
+    const fn wrong_lobe(&self, kind: MeasurementKind) -> Option<f64> {
+        match kind {
+            MeasurementKind::Angle => self.config.wrong_lobe,
+            MeasurementKind::AngleAtHead => None,
+        }
+    }
+
+    /// Corrects the state by one angle to a radio head.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         self.update_predicted(self.predict_measurement(head, measured), measured)
     }
@@ -212,7 +230,7 @@ impl Ekf {
         }
         let (mut residual, mut variance) = (seen.residual, seen.measurement_variance);
         let unresolved = (!measured.resolved).then_some(WRONG_IF_UNRESOLVED);
-        if let Some(wrong) = unresolved.or(self.config.wrong_lobe) {
+        if let Some(wrong) = unresolved.or(self.wrong_lobe(measured.kind)) {
             let Some(likely) = equivalent(&seen, wrong) else {
                 return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
             };
@@ -297,6 +315,7 @@ impl Ekf {
         self.learn_what_stays(predicted, before);
         self.keep_bounds();
         if let Some(head) = self.heads.get_mut(predicted.head) {
+            head.kind = measured.kind;
             head.last_update_m = predicted.place_m;
             head.last_update_s = measured.time_s;
             head.last_update_rad = self.turned_rad;

@@ -509,6 +509,7 @@ mod tests {
     use crate::geometry::Pose;
     use crate::localize::ekf::EkfConfig;
     use crate::localize::output::InitialPose;
+    use crate::observation::MeasurementKind;
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
 
     /// A minute of driving past four radio heads, of which number 2 is off by `bias_rad`; what was
@@ -533,6 +534,7 @@ mod tests {
                 let bias_rad = if number == 2 { bias_rad } else { 0.0 };
                 let phase_rad = std::f64::consts::PI * (bearing_rad - pose.heading_rad).cos();
                 let measured = AngleMeasurement {
+                    kind: MeasurementKind::Angle,
                     time_s,
                     phase_rad: phase_rad + bias_rad,
                     phase_sigma_rad: 0.05,

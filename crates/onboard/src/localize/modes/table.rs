@@ -149,7 +149,7 @@ pub(in crate::localize) mod trip {
 
     use crate::localize::ekf::{Ekf, EkfConfig};
     use crate::localize::output::InitialPose;
-    use crate::observation::AngleMeasurement;
+    use crate::observation::{AngleMeasurement, MeasurementKind};
     use crate::radio_head::RadioHead;
     use crate::road::Road;
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
@@ -182,6 +182,7 @@ pub(in crate::localize) mod trip {
     /// An angle.
     pub(in crate::localize) const fn angle(time_s: f64, phase_rad: f64) -> AngleMeasurement {
         AngleMeasurement {
+            kind: MeasurementKind::Angle,
             time_s,
             phase_rad,
             phase_sigma_rad: SIGMA_RAD,
