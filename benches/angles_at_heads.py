@@ -24,13 +24,14 @@ from access_av import drives
 RATE_HZ = 10.0
 SCALE_ERROR = 0.01
 NOISE_M_PER_SQRT_M = 0.02
-# Angle random walk of a gyroscope (3.4 degrees per root of an hour); the scale errs like the odometer's.
+# Angle random walk of a gyroscope (3.4 degrees per root of an hour). Its scale error is that of
+# the odometer.
 YAW_NOISE_RAD_PER_SQRT_S = 0.001
 # Standard deviation of the motion's smoothing (s), and speed below which it has no direction (m/s).
 SMOOTHING_S = 0.3
 LEAST_SPEED_MPS = 0.03
-# RMS error of the angles is 0.25 to 0.58 rad by access point, because of reflections and of angles near the
-# axis of an array, which appear on the other side. The errors stay for metres.
+# The RMS error of the angles is 0.25 to 0.58 rad, because of reflections and because a signal near
+# the axis of an array appears on the other side. The errors are correlated over metres.
 SIGMA_RAD = 0.3
 CORRELATION_M = 3.0
 # Angles are taken this far apart (s): the recording holds each value.
@@ -38,10 +39,14 @@ PERIOD_S = 0.5
 VEHICLE = f"""
 name = "robot"
 drive = "differential"
-odometer = {{ rate_hz = {RATE_HZ}, scale_std = {SCALE_ERROR}, noise_m_per_sqrt_m = {NOISE_M_PER_SQRT_M}, noise_m_per_sqrt_s = 0.001 }}
 gyroscope = {{ noise_rad_per_sqrt_s = {YAW_NOISE_RAD_PER_SQRT_S}, bias_std_radps = 1e-4 }}
 start = {{ position_std_m = 0.05, heading_std_rad = 0.02 }}
 integrity = {{ enabled = false }}
+[odometer]
+rate_hz = {RATE_HZ}
+scale_std = {SCALE_ERROR}
+noise_m_per_sqrt_m = {NOISE_M_PER_SQRT_M}
+noise_m_per_sqrt_s = 0.001
 [receiver]
 lateness_std_s = 1e-3
 phase_bias_share = 1.0

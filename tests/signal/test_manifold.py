@@ -172,7 +172,12 @@ def real_phases(file: Path) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     return values[:, 1].astype(np.int64), np.angle(tone)
 
 
-def test_a_manifold_of_half_of_the_positions_is_good_at_the_others(data: Path) -> None:
+# 90 % of the errors on the opposite half are below 13 degrees: two of its 24 pairs of position and
+# beacon have strong reflections. Even a fit of all positions leaves them 5 to 12 degrees off.
+@pytest.mark.parametrize(("first", "percentile_deg"), [(0, 6.0), (1, 13.5)])
+def test_a_manifold_of_half_of_the_positions_is_good_at_the_others(
+    data: Path, first: int, percentile_deg: float
+) -> None:
     received, azimuths, positions = [], [], []
     for file in sorted((data / "arrays" / "ble_circle").glob("*.gz")):
         x, y = (3 * int(it) for it in re.findall(r"[xy](\d)", file.name.split("_")[1]))
@@ -185,7 +190,7 @@ def test_a_manifold_of_half_of_the_positions_is_good_at_the_others(data: Path) -
             positions.append(np.full(own.sum(), f"{x:02}, {y:02}"))
     snapshots = np.concatenate(received).T
     azimuth, position = np.concatenate(azimuths), np.concatenate(positions)
-    is_fitted = np.isin(position, np.unique(position)[::2])
+    is_fitted = np.isin(position, np.unique(position)[first::2])
     fit = aoa.fit_manifold(
         snapshots[:, is_fitted],
         azimuth[is_fitted],
@@ -207,5 +212,5 @@ def test_a_manifold_of_half_of_the_positions_is_good_at_the_others(data: Path) -
     quantiles = np.percentile(off, [50, 90]).round(2)
     print(f"terms {fit.terms}, {quantiles} degrees, z-RMS {np.sqrt(np.mean(z**2)):.2f}")
     assert np.median(off) <= 2.1
-    assert np.percentile(off, 90) <= 6.0
+    assert np.percentile(off, 90) <= percentile_deg
     assert np.sqrt(np.mean(z**2)) <= 1.5

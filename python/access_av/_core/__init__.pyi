@@ -173,6 +173,7 @@ class Live:
         ssb_index: int = 0,
         snr_db: float | None = None,
         resolved: bool = True,
+        at_head: bool = False,
         arrival_s: float | None = None,
     ) -> None: ...
     def clock_step(self) -> float | None: ...

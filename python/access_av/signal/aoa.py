@@ -9,9 +9,10 @@ smoothed channel estimate has correlated noise and must be passed through `white
 ``p_value`` tests whether plane waves in white noise explain the snapshots (false-alarm rate 1 %).
 If they do not, ``verdict`` gives the cause: reflections or a wrong array model, or another source.
 The standard deviations then include the displacement that the residual shows. They also include the
-uncertainty of the noise variance of few snapshots. With fewer than eight degrees of freedom (one
-snapshot of up to five antennas, two snapshots of two or three antennas) no angle is reliable.
-Samples of constant modulus are treated as phases, which contain only half of the noise.
+uncertainty of the noise variance of few snapshots. No angle is reliable if that variance has fewer
+than eight degrees of freedom: one snapshot of up to five antennas, up to two snapshots of three
+antennas, up to four snapshots of two antennas. Samples of constant modulus are treated as phases,
+which contain only half of the noise.
 
 Examples
 --------

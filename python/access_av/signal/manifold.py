@@ -28,8 +28,6 @@ _ROUNDS = 8
 _RIDGE = 1e-12
 # Parts of the snapshots that are left out in turn: up to eight groups, one by one.
 _FOLDS = 8
-# Ratio of a median absolute deviation of a Gaussian to its standard deviation.
-_MEDIAN_OF_GAUSSIAN = 0.6745
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +51,9 @@ class ManifoldFit:
         Azimuth of each snapshot, estimated by a manifold that was fitted without it, less the given
         one, in ``(-pi, pi]``.
     sigma_rad
-        RMS of `azimuth_error_rad`, outliers clipped at three standard deviations. To be added in
-        quadrature to the standard deviation of an estimate, because the latter does not know the
-        error of the manifold.
+        RMS of `azimuth_error_rad`, including outliers by reflections, because reflections are as
+        frequent at other positions. To be added in quadrature to the standard deviation of an
+        estimate, which does not contain the error of the manifold.
     """
 
     manifold: MeasuredManifold
@@ -216,7 +214,7 @@ def fit_manifold(
         },
         residual=residual,
         azimuth_error_rad=errors,
-        sigma_rad=_deviation(errors),
+        sigma_rad=float(np.sqrt(np.mean(errors**2))),
     )
 
 
@@ -334,12 +332,6 @@ def _centre(angles: NDArray[np.float64]) -> float:
     distances = np.abs(_wrapped(angles[:, None] - trials)).mean(axis=0)
     middle = trials[distances.argmin()]
     return float(middle + np.median(_wrapped(angles - middle)))
-
-
-def _deviation(errors: NDArray[np.float64]) -> float:
-    """Returns the RMS of the errors, clipped at three robust standard deviations."""
-    limit = 3 * np.median(np.abs(errors)) / _MEDIAN_OF_GAUSSIAN
-    return float(np.sqrt(np.mean(np.minimum(errors**2, limit**2))))
 
 
 def _errors(
