@@ -32,7 +32,7 @@ SMOOTHING_S = 0.3
 LEAST_SPEED_MPS = 0.03
 # The RMS error of the angles is 0.25 to 0.58 rad, because of reflections and because a signal near
 # the axis of an array appears on the other side. The errors are correlated over metres.
-SIGMA_RAD = 0.3
+SIGMA_RAD = 0.25
 CORRELATION_M = 3.0
 # Angles are taken this far apart (s): the recording holds each value.
 PERIOD_S = 0.5
@@ -41,7 +41,6 @@ name = "robot"
 drive = "differential"
 gyroscope = {{ noise_rad_per_sqrt_s = {YAW_NOISE_RAD_PER_SQRT_S}, bias_std_radps = 1e-4 }}
 start = {{ position_std_m = 0.05, heading_std_rad = 0.02 }}
-integrity = {{ enabled = false }}
 [odometer]
 rate_hz = {RATE_HZ}
 scale_std = {SCALE_ERROR}
