@@ -162,7 +162,7 @@ def test_a_truth_from_the_axis_is_understood() -> None:
         ),
         (
             {"time_s": [1.0], "pci": [1], "phase_rad": [None], "phase_sigma_rad": [0.1]},
-            "neither phase_rad nor angle_rad",
+            "phase_rad and angle_rad are both missing",
         ),
     ],
 )

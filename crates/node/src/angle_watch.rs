@@ -1,5 +1,5 @@
-//! Watch over angles: radio heads that the site does not have, radio heads that send the same SSB, and angle messages
-//! that no longer come.
+//! Monitor of the angle messages: unknown radio heads, two radio heads with equal SSBs, and missing
+//! messages.
 
 use std::time::{Duration, Instant};
 
@@ -9,17 +9,20 @@ use onboard::observation::BURST_S;
 
 use crate::inbox::Level;
 
-/// Time without an angle message after which angles are absent, in seconds: 50 bursts of 20 ms, six of 160 ms.
+/// Time without an angle message after which angles are reported as missing, in seconds: 50 bursts
+/// of 20 ms, six of 160 ms.
 const ABSENT_S: f64 = 1.0;
-/// Maximum number of radio heads that are reported; it bounds the memory.
+/// Maximum number of reported radio heads, which limits the memory.
 const MAX_UNKNOWN: usize = 64;
 
-/// Difference of two angles of one SSB that counts as a contradiction, in standard deviations: 6e-7 of Gaussian errors.
+/// Minimum difference of two angles of one SSB that is a contradiction, in standard deviations; the
+/// probability for Gaussian errors is 6e-7.
 const CONTRADICTION_SIGMAS: f64 = 5.0;
-/// Contradictions, less SSBs without one, that are reported: within 20 SSBs even if every second one is received.
+/// Minimum number of contradictions minus SSBs without one that is reported: within 20 SSBs even if
+/// only every second one is received.
 const CONTRADICTIONS: u32 = 5;
 
-/// The last angle of an SSB, and how often two of one burst have differed.
+/// Last angle of an SSB, and counter of contradictions within a burst.
 #[derive(Debug, Clone, Copy)]
 struct Sent {
     head: (u16, u8),
@@ -30,7 +33,7 @@ struct Sent {
     is_reported: bool,
 }
 
-/// Radio heads reported so far, and the last angle message.
+/// State of the monitor.
 #[derive(Debug, Default)]
 pub struct AngleWatch {
     unknown: Vec<(u16, u8)>,
@@ -40,12 +43,12 @@ pub struct AngleWatch {
 }
 
 impl AngleWatch {
-    /// Notes the arrival of an angle message.
+    /// Records the arrival of an angle message.
     pub const fn came(&mut self, at: Instant) {
         self.last = Some(at);
     }
 
-    /// Text for an SSB whose radio head the site does not have, once for each PCI and SSB index.
+    /// Returns the text for an SSB of an unknown radio head, once per PCI and SSB index.
     pub fn unknown(&mut self, pci: u16, ssb_index: u8) -> Option<String> {
         let head = (pci, ssb_index);
         if self.unknown.contains(&head) || self.unknown.len() == MAX_UNKNOWN {
@@ -57,8 +60,9 @@ impl AngleWatch {
         ))
     }
 
-    /// Text if two radio heads send the same SSB: angles of one burst with the same PCI and SSB index have differed
-    /// repeatedly by more than their errors. It is given again only after as many SSBs without a contradiction.
+    /// Returns the text if two radio heads transmit the same SSB: angles of one burst with equal
+    /// PCI and SSB index have repeatedly differed by more than their errors. The text is repeated
+    /// only after an equal number of SSBs without a contradiction.
     pub fn duplicate(&mut self, angle: &AngleObservation) -> Option<String> {
         let head = (angle.pci, angle.ssb_index);
         let Some(sent) = self.sent.iter_mut().find(|it| it.head == head) else {
@@ -78,7 +82,7 @@ impl AngleWatch {
         let difference_rad = wrap_angle(angle.phase_rad - sent.phase_rad).abs();
         let sigma_rad = angle.sigma_rad.hypot(sent.sigma_rad);
         if is_of_one_burst && difference_rad > CONTRADICTION_SIGMAS * sigma_rad {
-            // Two more, because the next burst takes one away.
+            // Each burst without a contradiction subtracts one, so that a contradiction adds two.
             sent.contradictions = (sent.contradictions + 2).min(2 * CONTRADICTIONS);
         } else {
             sent.contradictions = sent.contradictions.saturating_sub(1);
@@ -96,8 +100,8 @@ impl AngleWatch {
         ))
     }
 
-    /// Event when angle messages begin to be absent or come again. Without any message so far there is none: samples
-    /// may provide the angles.
+    /// Returns the event when angle messages stop or resume. There is no event before the first
+    /// message, because samples may provide the angles.
     pub fn change(&mut self, now: Instant) -> Option<(Level, String)> {
         let absent = now.saturating_duration_since(self.last?);
         let is_absent = absent >= Duration::from_secs_f64(ABSENT_S);
@@ -109,7 +113,7 @@ impl AngleWatch {
             let text = format!("no angle message for {:.1} s", absent.as_secs_f64());
             (Level::Warn, text)
         } else {
-            (Level::Info, "angle messages come again".to_owned())
+            (Level::Info, "angle messages arrive again".to_owned())
         })
     }
 }
@@ -148,7 +152,8 @@ mod tests {
         };
         let mut watch = AngleWatch::default();
         for burst in 0..1000 {
-            // Each angle twice, with opposite errors of three standard deviations of their difference.
+            // Two angles each, with opposite errors of three standard deviations of their
+            // difference.
             for (offset_s, sign) in [(0.0, 1.0), (1e-4, -1.0)] {
                 let sent = angle(burst, offset_s, 3.1 + sign * 0.06);
                 assert_eq!(watch.duplicate(&sent), None);
@@ -167,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn absence_is_reported_once_and_so_is_its_end() {
+    fn missing_messages_and_their_return_are_reported_once() {
         let (mut watch, began) = (AngleWatch::default(), Instant::now());
         let at = |s: f64| began + Duration::from_secs_f64(s);
         assert_eq!(watch.change(at(100.0)), None);

@@ -1,4 +1,4 @@
-//! The thread that owns the pipeline: takes what comes in, hands on what comes of it.
+//! Thread that owns the pipeline: processes inputs and publishes results.
 
 mod reports;
 mod samples;
@@ -27,24 +27,25 @@ use crate::statistics::{Punctuality, SourceHealth};
 use crate::supervisor::Watchdog;
 use crate::web::Board;
 
-/// The engine looks at the time this often, whatever comes.
+/// Maximum interval between two checks of the time without input.
 pub(crate) const TICK: Duration = Duration::from_millis(50);
 /// Time between two saved states.
 const SAVE_EVERY: Duration = Duration::from_secs(1);
-/// Status and diagnoses come once a second (REP-107).
+/// Period of the status and of the diagnoses in seconds (REP-107).
 const STATUS_S: f64 = 1.0;
-/// Arrivals of blocks remembered, to tell when an SSB's last sample came.
+/// Number of remembered block arrivals, from which the arrival time of an SSB's last sample is
+/// determined.
 const ARRIVALS: usize = 64;
 
-/// What the vehicle is, and where.
+/// Configuration of the pipeline.
 pub struct Setup {
-    /// The site.
+    /// Site.
     pub site: Site,
-    /// The vehicle.
+    /// Vehicle.
     pub vehicle: Vehicle,
-    /// Its platform.
+    /// Platform of the vehicle.
     pub platform: Platform,
-    /// Its samples.
+    /// Stream of samples; `None` without samples.
     pub stream: Option<StreamConfig>,
 }
 
@@ -54,10 +55,10 @@ impl Setup {
         self.site == other.site && self.vehicle == other.vehicle && self.platform == other.platform
     }
 
-    /// The pipeline at the start of a drive.
+    /// Creates the pipeline at the start of a drive.
     ///
     /// # Errors
-    /// [`LiveError`] where these do not go together.
+    /// [`LiveError`] if site, vehicle and platform are incompatible.
     pub fn live(&self) -> Result<Live, LiveError> {
         let Self {
             site,
@@ -69,26 +70,26 @@ impl Setup {
     }
 }
 
-/// Loads site, vehicle and platform again.
+/// Function that loads site, vehicle and platform again.
 pub type Load = Box<dyn Fn() -> anyhow::Result<Setup> + Send>;
 
-/// A request to load site and vehicle again, as by SIGHUP.
+/// Request to load site and vehicle again, for example by SIGHUP.
 pub struct Reload {
-    /// Set when it is requested.
+    /// Flag of the request.
     pub requested: Arc<AtomicBool>,
-    /// Loads them.
+    /// Function that loads them.
     pub load: Load,
 }
 
 /// State that was saved before the start.
 struct Earlier {
     state: SavedState,
-    /// Its age when it was read, in seconds.
+    /// Age of the state when it was read, in seconds.
     age_s: f64,
     read: Instant,
 }
 
-/// The pipeline and everything around it that does not care where its input comes from.
+/// Pipeline with its clocks, monitors, events and outputs, independent of the kind of input.
 pub struct Engine {
     setup: Setup,
     live: Live,
@@ -100,25 +101,25 @@ pub struct Engine {
     windows: Windows,
     sleeps: bool,
     interruptions: Interruptions,
-    /// Gaps that the SSBs have shown.
+    /// Number of gaps that were detected from the SSBs.
     unreported_gaps: u64,
     period_s: f64,
-    /// Samples that the pipeline has not got yet.
+    /// Samples that are not yet processed by the pipeline.
     pending: Block,
-    /// Ends of blocks in the stream's time, and when they arrived.
+    /// End of each recent block in the time of the stream, and its arrival.
     arrivals: VecDeque<(f64, Instant)>,
     last_pose: Option<(f64, Instant)>,
     last_status_s: f64,
-    /// Active faults that were reported.
+    /// Reported active faults.
     faults: ActiveFaults,
-    /// Silent sources that were named.
+    /// Sources that are reported as silent.
     silent: Vec<&'static str>,
     angle_watch: AngleWatch,
     watchdog: Watchdog,
     began: Instant,
     /// Repeated events.
     repeated: Collapse,
-    /// Origin of the arrival times, where inputs arrive as they were measured.
+    /// Origin of the arrival times; `None` unless inputs arrive in real time.
     arrivals_from: Option<Instant>,
     sources: Vec<Arc<SourceHealth>>,
     /// Whether it was reported that the clocks of angles and odometry differ.
@@ -131,10 +132,10 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// At the start of a drive.
+    /// Creates the engine at the start of a drive.
     ///
     /// # Errors
-    /// As [`Setup::live`].
+    /// Errors of [`Setup::live`].
     pub fn new(
         setup: Setup,
         records: Arc<Distributor>,
@@ -177,18 +178,20 @@ impl Engine {
         })
     }
 
-    /// Validates time stamps against the arrival of inputs from now on, which arrive as they were measured.
+    /// Enables the validation of time stamps against the arrival times, for inputs that arrive in
+    /// real time.
     pub fn validate_arrivals(&mut self) {
         self.arrivals_from = Some(Instant::now());
     }
 
-    /// Loads site and vehicle again on request.
+    /// Enables loading of site and vehicle on request.
     pub fn reload_by(&mut self, reload: Reload) {
         self.reload = Some(reload);
     }
 
-    /// Saves the state once a second, and resumes the one that was `read` from the file at the first odometry: a state
-    /// with its age in seconds, nothing at the first start, or why the file cannot be used.
+    /// Enables saving of the state once a second, and resumes the state that was `read` from the
+    /// file at the first odometry. `read` is a state with its age in seconds, `None` at the first
+    /// start, or the reason why the file cannot be used.
     ///
     /// # Errors
     /// [`LiveError::Custom`].
@@ -216,7 +219,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Searches for the pose, if the vehicle can be found: the configured start pose is that of the first start only.
+    /// Starts a search for the pose if the vehicle supports it, because the configured start pose
+    /// is valid at the first start only.
     fn search(&mut self) -> Result<(), LiveError> {
         let text = match self.live.reset() {
             Ok(()) => "the pose is searched for".to_owned(),
@@ -230,15 +234,15 @@ impl Engine {
         Ok(())
     }
 
-    /// The pipeline itself.
+    /// Returns the pipeline.
     pub const fn live_mut(&mut self) -> &mut Live {
         &mut self.live
     }
 
-    /// Runs until `stop`, or until all sources have ended.
+    /// Runs until `stop` is set or all sources have ended.
     ///
     /// # Errors
-    /// [`LiveError`] for what cannot go on at all.
+    /// [`LiveError`] for an unrecoverable error.
     pub fn run(
         &mut self,
         inbox: &Inbox,
@@ -263,7 +267,8 @@ impl Engine {
         self.save()
     }
 
-    /// Time of arrival for the validation of time stamps, in seconds.
+    /// Returns the arrival time for the validation of time stamps in seconds; `None` without
+    /// validation.
     fn arrival_s(&self, came: Option<Instant>) -> Option<f64> {
         let from = self.arrivals_from?;
         Some(came?.saturating_duration_since(from).as_secs_f64())
@@ -312,10 +317,10 @@ impl Engine {
         Ok(())
     }
 
-    /// Takes in odometry, and hands on the pose by it.
+    /// Processes odometry and publishes the resulting pose.
     ///
     /// # Errors
-    /// [`LiveError`] for what cannot go on at all.
+    /// [`LiveError`] for an unrecoverable error.
     pub fn odometry(
         &mut self,
         sample: &OdometrySample,
@@ -357,7 +362,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Resumes the state that was saved before the start, at the first odometry.
+    /// Resumes the saved state at the first odometry.
     fn resume_earlier(&mut self, sample: &OdometrySample) -> Result<(), LiveError> {
         if self.earlier.is_none() || TimeCheck::range(sample.time_s).is_err() {
             return Ok(());
@@ -387,10 +392,10 @@ impl Engine {
         Ok(())
     }
 
-    /// Has the state written, if there is one.
+    /// Requests that the state is written, if there is one.
     fn save(&mut self) -> Result<(), LiveError> {
         self.saved = Instant::now();
-        // An earlier state that waits for odometry is not replaced.
+        // A saved state that waits for odometry is not overwritten.
         if let (Some(store), None) = (&self.store, &self.earlier)
             && let Some(state) = self.live.saved_state()?
         {
@@ -399,8 +404,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Loads site and vehicle again if that was requested, and resumes the pose with them; where they cannot be used
-    /// the earlier ones stay.
+    /// Loads site and vehicle again if requested, and resumes the pose with them. If they cannot be
+    /// used, the current ones remain.
     fn reload_if_requested(&mut self) -> Result<(), LiveError> {
         let Some(reload) = &self.reload else {
             return Ok(());
@@ -432,12 +437,12 @@ impl Engine {
         Ok(())
     }
 
-    /// Goes on with another site and vehicle at the pose there is.
+    /// Continues with another site and vehicle at the current pose.
     fn swap(&mut self, setup: Setup, mut live: Live) -> Result<(), LiveError> {
         let state = self.live.saved_state()?;
         let excluded = self.live.heads().iter().filter(|it| it.is_excluded);
         for pci in excluded.map(|it| it.head.pci) {
-            // The new site may have no such radio head.
+            // The new site may not have this radio head.
             let _ = live.exclude(pci);
         }
         if let Some(sample) = &self.newest_odometry {
@@ -446,7 +451,8 @@ impl Engine {
                 None => false,
             };
             if !resumed {
-                // A configured start pose is that of the first start only; not every vehicle can be searched for.
+                // The configured start pose is valid at the first start only; not every vehicle
+                // supports a search.
                 let _ = live.reset();
             }
             live.odometry(sample)?;
@@ -495,7 +501,7 @@ impl Engine {
         }
     }
 
-    /// What was heard since the last time, and the pose after it.
+    /// Publishes the results since the last call, and the pose after them.
     ///
     /// # Errors
     /// [`LiveError::Custom`].
@@ -525,7 +531,7 @@ impl Engine {
         Ok(())
     }
 
-    /// What is due by the clock: a status a second, and what the page shows.
+    /// Performs the periodic tasks: a status per second, and updates of the web page.
     ///
     /// # Errors
     /// [`LiveError::Custom`].
@@ -550,7 +556,7 @@ impl Engine {
             self.board.show(now_s, &status, heads, &energy, counts);
         }
         if tells {
-            // In step, not a second from whatever came first after the last was due.
+            // Keep the period constant, instead of one second after the last status.
             let due_s = self.last_status_s + STATUS_S;
             self.last_status_s = if now_s - due_s < STATUS_S {
                 due_s
@@ -571,12 +577,12 @@ impl Engine {
         Ok(())
     }
 
-    /// Says that the pipeline is alive, where it waits.
+    /// Notifies the watchdog while the thread waits.
     pub fn alive(&mut self) {
         self.watchdog.alive();
     }
 
-    /// Notes a time of the drive.
+    /// Advances the time of the drive.
     pub fn see(&mut self, time_s: f64) {
         self.clock.move_to(time_s);
     }

@@ -44,7 +44,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    // The schemas need no other argument.
+    // The subcommand `schema` has no other arguments.
     let mut arguments = std::env::args().skip(1);
     if arguments.next().as_deref() == Some("schema") {
         return print_schema(&arguments.collect::<Vec<_>>());
@@ -124,7 +124,7 @@ fn setup_of(
     (site, vehicle, platform): (Site, Vehicle, Platform),
     stream: Option<StreamConfig>,
 ) -> Setup {
-    // The stated standard deviations of angles from elsewhere contain all of their errors.
+    // The specified standard deviations of logged angles are the total errors.
     let (site, vehicle) = match settings.samples {
         None => as_stated(&site, &vehicle),
         Some(_) => (site, vehicle),
@@ -137,7 +137,7 @@ fn setup_of(
     }
 }
 
-/// Loads site and vehicle again when SIGHUP has come.
+/// Creates the request that loads site and vehicle again after SIGHUP.
 fn reload(arguments: &Arguments, settings: &NodeSettings, setup: &Setup) -> Reload {
     let (arguments, settings) = (arguments.clone(), settings.clone());
     let (stream, antennas) = (setup.stream, setup.vehicle.array.elements);
@@ -158,7 +158,7 @@ fn reload(arguments: &Arguments, settings: &NodeSettings, setup: &Setup) -> Relo
     }
 }
 
-/// Returns the text of a dry run.
+/// Returns the report of a dry run.
 fn report(settings: &NodeSettings, setup: &Setup) -> String {
     let mut lines = Vec::new();
     let (site, vehicle) = (&setup.site, &setup.vehicle);
@@ -280,7 +280,7 @@ fn drive(
     engine.event(Level::Info, "node", format!("{} ends", settings.name));
     if let Some((store, saving)) = saving {
         store.close();
-        // A thread that panicked has ended, too.
+        // A thread that panicked has ended as well.
         let _ = saving.join();
     }
     sources.inbox.close();
@@ -293,7 +293,7 @@ fn drive(
     Ok(())
 }
 
-/// Serves the page, if it is configured, and handles signals, on a thread of its own.
+/// Serves the web page, if configured, and handles signals in a separate thread.
 fn serve(
     page: Option<&PageSettings>,
     board: &Arc<Board>,
@@ -313,7 +313,7 @@ fn serve(
         }
         None => None,
     };
-    // Registered before anything is started: without them, a signal would end the process at once.
+    // Signal handlers are registered first; otherwise a signal would end the process immediately.
     let context = runtime.enter();
     let mut terminated = signal(SignalKind::terminate())?;
     let mut interrupted = signal(SignalKind::interrupt())?;

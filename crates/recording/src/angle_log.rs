@@ -1,4 +1,4 @@
-//! Angles of arrival that some receiver has already estimated, one per line.
+//! Log of angles of arrival that a receiver has already estimated, one angle per line.
 //!
 //! Columns: `time_s`, `pci` and either `phase_rad` (electrical angle ω = 2π(d/λ)·cos θ) with its
 //! standard deviation `phase_sigma_rad`, or `angle_rad` (θ from the array's axis) with
@@ -36,7 +36,7 @@ const COLUMNS: [&str; 9] = [
     "at_head",
 ];
 
-/// Columns that every log has, and those of which some may be missing.
+/// Columns that every log must have.
 const REQUIRED: [&str; 2] = ["time_s", "pci"];
 const OPTIONAL: [&str; 8] = [
     "ssb_index",
@@ -49,24 +49,25 @@ const OPTIONAL: [&str; 8] = [
     "at_head",
 ];
 
-/// What the deviations need.
+/// Error text for missing angle columns.
 const NEEDED: &str = "there must be phase_rad and phase_sigma_rad, or angle_rad and \
                       angle_sigma_rad";
 
-/// What is said of the deviations where a log is written.
-const DEVIATIONS: &str = "# phase_sigma_rad: all of the error that is believed, receiver noise and the site's \
-                          scatter (rician_k_db); mounting and calibration of the array are not in it\n";
+/// Comment on the standard deviations in written logs.
+const DEVIATIONS: &str = "# phase_sigma_rad: total modelled error: receiver noise and the site's \
+                          scatter (rician_k_db); mounting and calibration errors of the array are \
+                          not included\n";
 
-/// Standard deviation of an angle of which nothing is known, π/√3 (rad).
+/// Standard deviation of a uniformly distributed angle, π/√3 (rad).
 const MOST_SIGMA_RAD: f64 = 1.813_799_364_234_217_8;
 
-/// SNR (dB) of an angle of which none is stated: good enough for any policy.
+/// Default SNR (dB) of an angle, sufficient for any policy.
 const UNSTATED_SNR_DB: f64 = 20.0;
 
-/// One angle and the SSB it came from.
+/// Angle with its SSB.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoggedAngle {
-    /// Cell, beam, time and strength.
+    /// Cell, SSB index, time and SNR.
     pub ssb: SensedSsb,
     /// The angle.
     pub measured: AngleMeasurement,
@@ -98,25 +99,25 @@ impl OfSsb for LoggedAngle {
     }
 }
 
-/// The usable angles of a file, in its order, and the lines left out.
+/// Usable angles of a file in order, and remarks on the omitted lines.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AngleLog {
     /// The angles.
     pub angles: Vec<LoggedAngle>,
-    /// What was left out and why.
+    /// Remarks on the omitted lines.
     pub remarks: Vec<AngleRemark>,
 }
 
-/// An item of an angle log that was left out.
+/// Omitted item of an angle log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AngleRemark {
     /// "line" of a CSV file, "row" of a table or "message" of a bag.
     pub kind: &'static str,
     /// Number of the item in the file, from 1.
     pub line: usize,
-    /// Time of the last usable angle before it, in seconds.
+    /// Time of the previous usable angle in seconds.
     pub time_s: f64,
-    /// Why.
+    /// Reason.
     pub message: String,
 }
 
@@ -133,8 +134,8 @@ impl fmt::Display for AngleRemark {
 /// Reads an angle log.
 ///
 /// # Errors
-/// [`RecordingError`] when the file cannot be read or lacks a column. Single lines are only
-/// remarked upon.
+/// [`RecordingError`] if the file cannot be read or lacks a column. Invalid single lines are
+/// reported as remarks only.
 pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
     let table = Table::read(file, &REQUIRED, &OPTIONAL)?;
     if let Some(key) = untold(|name| table.has(name)) {
@@ -151,11 +152,11 @@ pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
     Ok(log)
 }
 
-/// Takes an angle log out of the columns of a table that was read from `file`, NaN where a value is
-/// missing. Rows are counted from 1.
+/// Creates an angle log from the columns of a table that was read from `file`, with NaN for missing
+/// values. Rows are numbered from 1.
 ///
 /// # Errors
-/// [`RecordingError`] when a column is missing. Single rows are only remarked upon.
+/// [`RecordingError`] if a column is missing. Invalid single rows are reported as remarks only.
 pub fn angle_log_of_columns(
     file: &Path,
     columns: &BTreeMap<String, Vec<f64>>,
@@ -183,7 +184,7 @@ pub fn angle_log_of_columns(
     Ok(log)
 }
 
-/// The column that is missing for a log to tell angles and their deviations.
+/// Returns the name of a missing column that is required for angles and standard deviations.
 fn untold(has: impl Fn(&str) -> bool) -> Option<&'static str> {
     let told = |column, sigma| has(column) && has(sigma);
     if told("phase_rad", "phase_sigma_rad") || told("angle_rad", "angle_sigma_rad") {
@@ -198,7 +199,7 @@ fn untold(has: impl Fn(&str) -> bool) -> Option<&'static str> {
 }
 
 impl AngleLog {
-    /// Takes in a line, or remarks on why it is left out.
+    /// Adds the angle of a line, or a remark with the reason of its omission.
     pub(crate) fn add(
         &mut self,
         kind: &'static str,
@@ -220,7 +221,7 @@ impl AngleLog {
     }
 }
 
-/// The angle of the columns [`REQUIRED`] and [`OPTIONAL`], or why there is none.
+/// Returns the angle of the columns [`REQUIRED`] and [`OPTIONAL`], or the reason why there is none.
 pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     let &[
         time_s,
@@ -247,7 +248,7 @@ pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     let (time_s, pci) = (needed(time_s, "time_s")?, needed(pci, "pci")?);
     if let Some(unit) = TimeUnit::of_epoch(time_s) {
         return Err(format!(
-            "time_s {time_s} is no time of a drive, and likely in {unit}; it must be seconds"
+            "time_s {time_s} is not a time of a drive and probably in {unit}; it must be seconds"
         ));
     }
     let ssb_index = finite(ssb_index, "ssb_index")?.unwrap_or(0.0);
@@ -265,14 +266,14 @@ pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     let deviation = |value: Option<f64>, name: &str| match needed(value, name)? {
         value if value > 0.0 && value < MOST_SIGMA_RAD => Ok(value),
         value if value > 0.0 => Err(format!(
-            "{name} {value} says nothing of an angle; check its unit"
+            "{name} {value} is too large for an angle; check its unit"
         )),
         value => Err(format!("{name} {value} is not above 0")),
     };
     let (phase_rad, phase_sigma_rad) = match (finite(phase_rad, "phase_rad")?, angle_rad) {
         (Some(phase_rad), _) => (phase_rad, deviation(phase_sigma_rad, "phase_sigma_rad")?),
         (None, Some(_)) => (f64::NAN, deviation(angle_sigma_rad, "angle_sigma_rad")?),
-        (None, None) => return Err("neither phase_rad nor angle_rad is there".to_owned()),
+        (None, None) => return Err("phase_rad and angle_rad are both missing".to_owned()),
     };
     let angle_rad = angle_rad.unwrap_or(f64::NAN);
     let whole = |value: f64, most: f64| value.fract() == 0.0 && (0.0..=most).contains(&value);
@@ -304,7 +305,7 @@ pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     })
 }
 
-/// Writes an angle log as [`read_angle_log`] reads it.
+/// Writes an angle log in the format of [`read_angle_log`].
 ///
 /// # Errors
 /// [`RecordingError::Io`].

@@ -1,4 +1,4 @@
-//! Recorded wheel odometry, whatever file it came from.
+//! Recorded wheel odometry from any file format.
 
 use std::fmt;
 
@@ -7,23 +7,23 @@ use onboard::observation::OdometrySample;
 use crate::clock_faults::TimeFault;
 use crate::counter_jumps::Jump;
 
-/// A step in time this many times the usual one is a gap.
+/// Minimum time step of a gap, in median steps.
 const GAP_STEPS: f64 = 5.0;
 
-/// Odometry in order of time, and defects of single items of the file.
+/// Odometry in order of time, with remarks on single items of the file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OdometryLog {
-    /// The usable samples, of strictly increasing time.
+    /// Usable samples with strictly increasing times.
     pub samples: Vec<OdometrySample>,
     /// Defects and properties of single items.
     pub remarks: Vec<OdometryRemark>,
     /// Names of the quantities in the file.
     pub fields: OdometryFields,
-    /// Whether distance and speed were both read, and not one derived from the other.
+    /// Whether distance and speed are from different fields, instead of one derived from the other.
     pub has_both: bool,
 }
 
-/// Names of the quantities of odometry, as its file names them.
+/// Names of the odometry quantities in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OdometryFields {
     /// Time (s).
@@ -60,117 +60,118 @@ impl Default for OdometryFields {
 }
 
 impl OdometryLog {
-    /// Times of the first and the last sample (s).
+    /// Returns the times of the first and the last sample (s).
     pub fn interval_s(&self) -> Option<[f64; 2]> {
         let (first, last) = (self.samples.first()?, self.samples.last()?);
         Some([first.time_s, last.time_s])
     }
 
-    /// Whether a time is that of the drive, up to a second before it or after.
+    /// Whether a time is within the drive, with a tolerance of one second.
     pub fn covers(&self, time_s: f64) -> bool {
         let covers = |[first_s, last_s]: [f64; 2]| (first_s - 1.0..=last_s + 1.0).contains(&time_s);
         self.interval_s().is_some_and(covers)
     }
 }
 
-/// What is remarkable about one item of an odometry file.
+/// Remark on one item of an odometry file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OdometryRemark {
     /// Line of the CSV file or number of the MCAP message, from 1.
     pub item: usize,
-    /// What it is the number of: "line" or "message".
+    /// Unit of `item`: "line" or "message".
     pub kind: &'static str,
-    /// Time of the last usable sample before it, or its own if it is used, in seconds.
+    /// Time of the item if it is used, otherwise of the previous usable sample, in seconds.
     pub time_s: f64,
-    /// What it is.
+    /// Kind of remark.
     pub issue: OdometryIssue,
 }
 
-/// Why an odometry item was left out; a gap only is pointed at.
+/// Kind of a remark on an odometry item.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum OdometryIssue {
-    /// It cannot be read.
+    /// The item cannot be read.
     Malformed(String),
     /// A value is missing, NaN or infinite.
     NotFinite {
-        /// Its column.
+        /// Name of the column.
         column: &'static str,
     },
     /// The value of a field is out of range.
     OutOfRange {
-        /// Its field.
+        /// Name of the field.
         field: &'static str,
-        /// Its value.
+        /// Value of the field.
         value: f64,
-        /// What is allowed.
+        /// Allowed values.
         allowed: &'static str,
     },
-    /// Its time comes before the clock was set.
+    /// The time is before the clock was set.
     TimeNotSet {
-        /// The field of the time.
+        /// Name of the time field.
         field: &'static str,
-        /// Its value (s).
+        /// Value of the time (s).
         time_s: f64,
     },
-    /// Its time comes before the clock was set; the time at which it was recorded was used instead.
+    /// The time is before the clock was set; the time of recording is used instead.
     TimeRestored {
-        /// The field of the time.
+        /// Name of the time field.
         field: &'static str,
-        /// Its value (s).
+        /// Value of the time (s).
         time_s: f64,
     },
-    /// Its time is far ahead of the times before and after it.
+    /// The time is far ahead of the previous and following times.
     TimeAhead {
-        /// The field of the time.
+        /// Name of the time field.
         field: &'static str,
-        /// Its value (s).
+        /// Value of the time (s).
         time_s: f64,
     },
-    /// Used, but the distance makes a step that no vehicle drives, which was replaced by the speed of its neighbours.
+    /// The item is used, but its distance makes an impossible step, which is replaced by the speed
+    /// of its neighbours.
     DistanceJump {
-        /// The field of the distance.
+        /// Name of the distance field.
         field: &'static str,
-        /// The step (m).
+        /// Step of the distance (m).
         step_m: f64,
         /// Speed of the neighbouring steps (m/s).
         speed_mps: f64,
     },
-    /// Used; a property of the file, as a sentence.
+    /// Property of the file as a sentence; the item is used.
     Noted(String),
-    /// Used; a property of the file that may displace the vehicle, as a sentence.
+    /// Property of the file that may cause a position error, as a sentence; the item is used.
     Doubtful(String),
-    /// The time of the sample before.
+    /// The time equals that of the previous sample.
     Duplicate {
-        /// That time in seconds.
+        /// Time in seconds.
         time_s: f64,
     },
-    /// Earlier than the sample before.
+    /// The time is earlier than that of the previous sample.
     TimeReversed {
-        /// Its time in seconds.
+        /// Time in seconds.
         time_s: f64,
-        /// The time of the one before.
+        /// Time of the previous sample in seconds.
         before_s: f64,
     },
-    /// Used, but long after the sample before.
+    /// The item is used, but follows a gap in time.
     Gap {
-        /// Time since the sample before, in seconds.
+        /// Time since the previous sample in seconds.
         gap_s: f64,
     },
     /// The file was not closed, so that its last items may be missing; the text names the file.
     Truncated(String),
-    /// A column is made of something else.
+    /// A column is derived from other columns.
     Derived {
-        /// The column.
+        /// Name of the column.
         column: &'static str,
-        /// What it is taken from.
+        /// Source of the column.
         from: String,
     },
-    /// Something else that could have told, and cannot.
+    /// A possible source of a quantity is not used.
     Unused {
-        /// What it is.
+        /// Name of the source.
         source: String,
-        /// Why not.
+        /// Reason.
         why: String,
     },
 }
@@ -188,7 +189,7 @@ impl OdometryRemark {
 }
 
 impl OdometryIssue {
-    /// Whether the item was used all the same.
+    /// Whether the item was used nevertheless.
     pub const fn used(&self) -> bool {
         matches!(
             self,
@@ -268,7 +269,7 @@ impl fmt::Display for OdometryRemark {
     }
 }
 
-/// Decides item by item which are usable, by their times and values.
+/// Collector that decides which items are usable, from their times and values.
 #[derive(Debug)]
 pub struct OdometryCollector {
     kind: &'static str,
@@ -289,8 +290,8 @@ impl OdometryCollector {
         }
     }
 
-    /// Whether an item is usable: its values are finite and its time is later than that of the last usable one.
-    /// Reports it otherwise.
+    /// Whether an item is usable: its values are finite, and its time is later than that of the
+    /// previous usable item. Adds a remark otherwise.
     pub fn accept(
         &mut self,
         item: usize,
@@ -320,7 +321,7 @@ impl OdometryCollector {
         false
     }
 
-    /// Reports something about an item.
+    /// Adds a remark on an item.
     pub fn report(&mut self, item: usize, issue: OdometryIssue) {
         let last_s = self.usable.last().map(|last| last.1);
         self.remarks.push(OdometryRemark {
@@ -331,7 +332,7 @@ impl OdometryCollector {
         });
     }
 
-    /// Reports a step of a distance that was replaced, at the usable item of this index.
+    /// Adds a remark on a replaced step of the distance at the usable item with this index.
     pub fn report_jump(&mut self, jump: &Jump, field: &'static str) {
         let Some(&(item, time_s)) = self.usable.get(jump.index) else {
             return;
@@ -348,17 +349,17 @@ impl OdometryCollector {
         });
     }
 
-    /// Reports something about the file itself.
+    /// Adds a remark on the file itself.
     pub fn remark(&mut self, issue: OdometryIssue) {
         self.remarks.push(OdometryRemark::of_file(self.kind, issue));
     }
 
-    /// Times of the usable items (s).
+    /// Returns the times of the usable items (s).
     pub fn times_s(&self) -> Vec<f64> {
         self.usable.iter().map(|it| it.1).collect()
     }
 
-    /// The log of these samples, one for each usable item, with the gaps between them reported.
+    /// Creates the log from the samples, one per usable item, with remarks on gaps.
     pub fn finish(mut self, samples: Vec<OdometrySample>, has_both: bool) -> OdometryLog {
         let steps_s = self.usable.windows(2).map(|pair| match pair {
             [(_, a_s), (_, b_s)] => b_s - a_s,

@@ -1,4 +1,4 @@
-//! Newline JSON: one object a line.
+//! Newline-delimited JSON messages, one object per line.
 
 use onboard::geometry::Pose;
 use onboard::live::AngleObservation;
@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use crate::clock::unix_s;
 use crate::inbox::{Command, Input};
 
-/// Values of the key `type`.
+/// Allowed values of the key `type`.
 const TYPES: &str = "odometry, angle, set-pose, reset, exclude or readmit";
 
 #[derive(Deserialize)]
@@ -62,10 +62,10 @@ const fn yes() -> bool {
     true
 }
 
-/// Parses a line; `None` if it is blank.
+/// Parses a line; `None` for a blank line.
 ///
 /// # Errors
-/// What is wrong with the line, with the key.
+/// Description of the error with the key.
 pub fn parse(line: &[u8]) -> Result<Option<Input>, String> {
     if line.trim_ascii().is_empty() {
         return Ok(None);
@@ -93,7 +93,7 @@ pub fn parse(line: &[u8]) -> Result<Option<Input>, String> {
     }))
 }
 
-/// The rest of a message; errors name the key.
+/// Deserializes a message; errors contain the key.
 fn read<T: DeserializeOwned>(message: Map<String, Value>) -> Result<T, String> {
     serde_path_to_error::deserialize(Value::Object(message)).map_err(|error| {
         let key = error.path().to_string();
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_line_is_said() {
+    fn invalid_lines_are_reported_with_their_error() {
         for (line, said) in [
             ("{", "EOF"),
             ("[1]", "type"),

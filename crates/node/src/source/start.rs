@@ -1,4 +1,4 @@
-//! Starts every source that the settings name.
+//! Start of all configured sources.
 
 use std::sync::Arc;
 use std::thread;
@@ -18,36 +18,36 @@ use crate::inbox::{Inbox, Input};
 use crate::settings::{NodeSettings, SampleSource};
 use crate::statistics::SourceHealth;
 
-/// What the sources share with the pipeline, and the files among them, opened.
+/// State shared between the sources and the pipeline, and the opened files.
 pub struct Sources {
-    /// What comes in.
+    /// Queue of the inputs.
     pub inbox: Arc<Inbox>,
-    /// Which samples are wanted.
+    /// Gate of the required samples.
     pub gate: Arc<Gate>,
-    /// Health of each.
+    /// Health of each source.
     pub health: Vec<Arc<SourceHealth>>,
-    /// What the samples are; `None` where there are none.
+    /// Stream of samples; `None` without samples.
     pub stream: Option<StreamConfig>,
-    /// Odometry and angles of files, and a recording.
+    /// Odometry, angles and recording from files.
     pub files: Files,
 }
 
-/// Files that are played back.
+/// Files for playback.
 #[derive(Default)]
 pub struct Files {
-    /// A recording, and the time of its first sample.
+    /// Recording and the time of its first sample.
     pub recording: Option<(Recording, f64)>,
-    /// Odometry of a file.
+    /// Odometry from a file.
     pub odometry: OdometryLog,
-    /// Angles of a file.
+    /// Angles from a file.
     pub angles: Vec<LoggedAngle>,
 }
 
 impl Sources {
-    /// Opens what files there are, for a vehicle with so many antennas.
+    /// Opens the files for a vehicle with `antennas` antennas.
     ///
     /// # Errors
-    /// What is wrong with a file, or with samples that are not of this vehicle.
+    /// An invalid file, or samples that do not match the vehicle.
     pub fn open(
         settings: &NodeSettings,
         antennas: usize,
@@ -134,11 +134,11 @@ impl Sources {
     }
 }
 
-/// Starts the threads of all sources; what files there are is played in real time. When those that end have all
-/// ended, [`Input::End`] comes.
+/// Starts the threads of all sources; files are played in real time. [`Input::End`] follows after
+/// all finite sources have ended.
 ///
 /// # Errors
-/// Where a thread cannot be started.
+/// An error if a thread cannot be started.
 pub fn start(settings: &NodeSettings, sources: &mut Sources) -> Result<()> {
     let files = std::mem::take(&mut sources.files);
     let mut threads = Vec::new();
@@ -186,7 +186,7 @@ pub fn start(settings: &NodeSettings, sources: &mut Sources) -> Result<()> {
             }
             #[cfg(feature = "soapy")]
             SampleSource::Soapy(radio) => {
-                // The format is that of Soapy's own conversion.
+                // SoapySDR converts the samples to this format.
                 let format = crate::settings::SampleFormat::Cf32;
                 let framing = Framing::new(&radio.stream, format, Arc::clone(&gate), inbox, health);
                 let radio = radio.clone();
@@ -194,7 +194,7 @@ pub fn start(settings: &NodeSettings, sources: &mut Sources) -> Result<()> {
                 spawn("samples", Box::new(work))?;
             }
             #[cfg(not(feature = "soapy"))]
-            SampleSource::Soapy(_) => {} // refused where the files are opened
+            SampleSource::Soapy(_) => {} // rejected when the files are opened
         }
     }
     for address in &settings.messages {
@@ -222,7 +222,7 @@ pub fn start(settings: &NodeSettings, sources: &mut Sources) -> Result<()> {
         .name("sources".to_owned())
         .spawn(move || {
             for thread in threads {
-                // A source that panicked has ended like any other.
+                // A source that panicked has ended as well.
                 let _ = thread.join();
             }
             inbox.put(Input::End);
@@ -230,7 +230,7 @@ pub fn start(settings: &NodeSettings, sources: &mut Sources) -> Result<()> {
     Ok(())
 }
 
-/// Plays timed inputs in real time from the first on.
+/// Plays timed inputs in real time, starting with the first.
 fn play(log: Vec<(f64, Input)>, inbox: &Inbox, health: &SourceHealth) {
     let began = Instant::now();
     let first_s = log.first().map_or(0.0, |(time_s, _)| *time_s);
@@ -245,7 +245,7 @@ fn play(log: Vec<(f64, Input)>, inbox: &Inbox, health: &SourceHealth) {
     }
 }
 
-/// Reads newline JSON until it or the node ends.
+/// Reads newline-delimited JSON until it ends or the node stops.
 fn messages(address: &Address, inbox: &Inbox, health: &SourceHealth) {
     let mut lines = Lines::default();
     let mut take = |line: Option<&[u8]>| {
@@ -261,7 +261,7 @@ fn messages(address: &Address, inbox: &Inbox, health: &SourceHealth) {
             }
             Err(why) => {
                 health.defect();
-                // The first few tell enough.
+                // Report the first errors and then every 1000th.
                 if health.defects() <= 10 || health.defects().is_multiple_of(1000) {
                     let (source, text) = ("messages", format!("{address}: left out, {why}"));
                     inbox.put(Input::warning(source, text));

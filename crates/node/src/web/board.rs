@@ -1,4 +1,4 @@
-//! The state that the page and the metrics show: written by the pipeline, read by the web server.
+//! State of the web page and the metrics, written by the pipeline and read by the web server.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,20 +16,20 @@ use crate::statistics::{ODOMETRY_TO_POSE_TARGETS, Punctuality, SSB_TO_POSE_TARGE
 const EVENTS: usize = 30;
 /// Maximum number of points of the track; with more, every second one is kept.
 const TRACK: usize = 2000;
-/// Distance between points of the track, at first (m).
+/// Initial distance between points of the track (m).
 const TRACK_M: f64 = 0.25;
 
-/// Counters of the other parts of the node.
+/// Counters of other parts of the node.
 pub struct Counters {
-    /// Input.
+    /// Queue of the inputs.
     pub inbox: Arc<Inbox>,
-    /// Output.
+    /// Outputs.
     pub records: Arc<Distributor>,
-    /// Punctuality.
+    /// Latencies.
     pub punctuality: Arc<Punctuality>,
-    /// The sources.
+    /// Sources.
     pub sources: Vec<Arc<SourceHealth>>,
-    /// Rate of the samples; 0 without.
+    /// Sample rate in Hz; 0 without samples.
     pub rate_hz: f64,
     /// Names of the radio heads, with cell and beam.
     pub heads: Vec<(u16, u8, String)>,
@@ -220,7 +220,7 @@ impl Board {
         value
     }
 
-    /// Returns the share of the samples that were processed; `None` without samples.
+    /// Returns the fraction of the samples that were processed; `None` without samples.
     pub fn duty(&self, shown: &Shown) -> Option<f64> {
         let samples = self
             .counters

@@ -251,7 +251,7 @@ pub fn text(board: &Board) -> String {
     text.0
 }
 
-/// A label's value as Prometheus has it.
+/// Escapes the value of a label for Prometheus.
 fn escaped(value: &str) -> String {
     value
         .replace('\\', "\\\\")

@@ -1,4 +1,4 @@
-//! The page to look at, and metrics.
+//! Web page and metrics.
 
 mod board;
 mod metrics;

@@ -1,4 +1,5 @@
-//! Serves page, events and metrics. Everything is read only: nothing that comes by network changes anything here.
+//! Web server of the page, the events and the metrics. It is read-only: no request changes the
+//! node.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -20,7 +21,7 @@ use super::board::Board;
 use super::metrics;
 use crate::settings::PageSettings;
 
-/// Nothing is loaded from elsewhere.
+/// Content security policy: nothing is loaded from other servers.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; \
                       img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 const PAGE: &str = include_str!("page.html");
@@ -32,10 +33,10 @@ struct Shared {
     period: Duration,
 }
 
-/// Opens the page's port.
+/// Opens the port of the web page.
 ///
 /// # Errors
-/// Where it cannot be had, with its key.
+/// An error with the key if the port is not available.
 pub async fn open(settings: &PageSettings) -> Result<TcpListener> {
     let named = || format!("page.listen is {:?}", settings.listen);
     TcpListener::bind(&settings.listen)
@@ -43,10 +44,10 @@ pub async fn open(settings: &PageSettings) -> Result<TcpListener> {
         .with_context(named)
 }
 
-/// Serves until the node ends.
+/// Serves until the node stops.
 ///
 /// # Errors
-/// Those of the socket.
+/// Errors of the socket.
 pub async fn serve(
     listener: TcpListener,
     settings: &PageSettings,
@@ -99,13 +100,13 @@ async fn prometheus(State(shared): State<Shared>) -> impl IntoResponse {
     (headers, metrics::text(&shared.board))
 }
 
-/// What the page shows, whenever it has changed.
+/// Returns the content of the page at each change.
 async fn events(
     State(shared): State<Shared>,
 ) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
     let changes = stream::unfold((shared, None), |(shared, last)| async move {
         let mut number = shared.board.number();
-        // Once a second also where nothing changes, for the ages of what is shown.
+        // Also update once per second without a change, because ages are displayed.
         let mut waited = Duration::ZERO;
         while Some(number) == last && waited < Duration::from_secs(1) {
             sleep(shared.period).await;

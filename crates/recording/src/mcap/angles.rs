@@ -1,4 +1,4 @@
-//! Angles out of the verdicts of MCAP files.
+//! Reader of angles from the verdicts of MCAP files.
 
 use std::path::Path;
 
@@ -15,8 +15,8 @@ use crate::error::RecordingError;
 /// the vehicle.
 ///
 /// # Errors
-/// [`RecordingError`] when a file is no MCAP or is damaged, or there is no such message. Single messages, and a file
-/// that was not closed, are only remarked upon.
+/// [`RecordingError`] if a file is not MCAP or is damaged, or if there is no such message. Invalid
+/// single messages and an unclosed file are reported as remarks only.
 pub fn read_angles_mcap(bag: &Path, topic: Option<&str>) -> Result<AngleLog, RecordingError> {
     let mut log = AngleLog::default();
     let mut item = 0;

@@ -1,4 +1,4 @@
-//! Poses, verdicts and diagnostics into an MCAP file.
+//! Writer of poses, verdicts and diagnostics to an MCAP file.
 
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
@@ -16,7 +16,7 @@ use onboard::localize::PoseEstimate;
 /// Indices of x, y and yaw among x, y, z, roll, pitch, yaw.
 const PLANE: [usize; 3] = [0, 1, 5];
 
-/// What rosbag2 needs to play a channel back: reliable, the last ten kept, volatile.
+/// QoS profile that rosbag2 needs for playback: reliable, keep last 10, volatile.
 const QOS_PROFILES: &str = "- history: 1\n  depth: 10\n  reliability: 1\n  durability: 2\n  \
     deadline:\n    sec: 9223372036\n    nsec: 854775807\n  lifespan:\n    sec: 9223372036\n    \
     nsec: 854775807\n  liveliness: 1\n  liveliness_lease_duration:\n    sec: 9223372036\n    \
@@ -25,7 +25,7 @@ const QOS_PROFILES: &str = "- history: 1\n  depth: 10\n  reliability: 1\n  durab
 /// Motion of the vehicle in its own frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Twist {
-    /// Speed along its forward axis in m/s.
+    /// Speed along the forward axis in m/s.
     pub speed_mps: f64,
     /// Variance of the speed in (m/s)².
     pub speed_variance: f64,
@@ -36,52 +36,52 @@ pub struct Twist {
 /// Names of coordinate frames (REP-105).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frames<'a> {
-    /// The frame of the pose.
+    /// Frame of the pose.
     pub parent: &'a str,
-    /// The frame of the twist.
+    /// Frame of the twist.
     pub child: &'a str,
 }
 
 impl Frames<'_> {
-    /// What a localizer says.
+    /// Frames of a localizer's pose.
     pub const MAP: Frames<'static> = Frames {
         parent: "map",
         child: "base_link",
     };
-    /// What odometry says.
+    /// Frames of an odometry pose.
     pub const ODOM: Frames<'static> = Frames {
         parent: "odom",
         child: "base_link",
     };
 }
 
-/// How serious a diagnosis is.
+/// Severity of a diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DiagnosticLevel {
-    /// All is well.
+    /// No problem.
     Ok = 0,
-    /// Something needs watching.
+    /// Warning.
     Warn = 1,
-    /// Something does not work.
+    /// Error.
     Error = 2,
-    /// Nothing has been heard for too long.
+    /// No recent data.
     Stale = 3,
 }
 
 /// One diagnosis.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DiagnosticStatus {
-    /// How serious it is.
+    /// Severity.
     pub level: DiagnosticLevel,
-    /// What it is about.
+    /// Name of the component.
     pub name: String,
-    /// In a few words.
+    /// Short description.
     pub message: String,
-    /// In values.
+    /// Details as key and value.
     pub values: Vec<(String, String)>,
 }
 
-/// An MCAP file being written; [`finish`](Self::finish) makes it complete.
+/// Writer of an MCAP file; [`finish`](Self::finish) completes the file.
 pub struct McapWriter<W: Write + Seek> {
     file: Writer<W>,
     /// Channel and next sequence number of each topic.
@@ -90,12 +90,12 @@ pub struct McapWriter<W: Write + Seek> {
 }
 
 impl<W: Write> McapWriter<NoSeek<W>> {
-    /// Begins a file whose chunks are compressed in memory and written as a whole, for a destination that only
-    /// appends. An interrupted write therefore never leaves a chunk with an invalid length in the middle of the
-    /// file.
+    /// Creates a file whose chunks are compressed in memory and written as a whole, for a
+    /// destination that only appends. Therefore, an interrupted write never leaves a chunk with an
+    /// invalid length in the middle of the file.
     ///
     /// # Errors
-    /// [`McapError`] when the destination cannot be written.
+    /// [`McapError`] if the destination cannot be written.
     pub fn appending(file: W) -> Result<Self, McapError> {
         // Zstandard's own threads cost more than they save for chunks of a few kilobytes.
         let options = WriteOptions::new()
@@ -107,19 +107,18 @@ impl<W: Write> McapWriter<NoSeek<W>> {
 }
 
 impl<W: Write + Seek> McapWriter<W> {
-    /// Begins a file.
+    /// Creates a file.
     ///
     /// # Errors
-    /// [`McapError`] when it cannot be written.
+    /// [`McapError`] if the file cannot be written.
     pub fn new(file: W) -> Result<Self, McapError> {
         Self::with_compression(file, None)
     }
 
-    /// Begins a file whose chunks are compressed by Zstandard: a tenth of the size, for files that grow for a
-    /// day.
+    /// Creates a file whose chunks are compressed by Zstandard to about a tenth of their size.
     ///
     /// # Errors
-    /// [`McapError`] when it cannot be written.
+    /// [`McapError`] if the file cannot be written.
     pub fn compressed(file: W) -> Result<Self, McapError> {
         Self::with_compression(file, Some(Compression::Zstd))
     }
@@ -143,16 +142,16 @@ impl<W: Write + Seek> McapWriter<W> {
     /// read from the file even if no further byte is written.
     ///
     /// # Errors
-    /// [`McapError`] when the destination cannot be written.
+    /// [`McapError`] if the destination cannot be written.
     pub fn flush(&mut self) -> Result<(), McapError> {
         self.file.flush()
     }
 
-    /// Writes a pose as `nav_msgs/msg/Odometry`. Axes that are not observed, and all of them where
-    /// the localizer does not know its own error, have a variance of 1e6.
+    /// Writes a pose as `nav_msgs/msg/Odometry`. Unobserved axes have a variance of 1e6, and all
+    /// axes if the localizer provides no covariance.
     ///
     /// # Errors
-    /// [`McapError`] when it cannot be written.
+    /// [`McapError`] if the message cannot be written.
     pub fn odometry(
         &mut self,
         topic: &str,
@@ -174,7 +173,7 @@ impl<W: Write + Seek> McapWriter<W> {
             self.message.f64(value);
         }
         let mut covariance = unobserved();
-        // A vehicle on wheels does not move sideways.
+        // A wheeled vehicle has no lateral velocity.
         for (axis, variance) in
             PLANE
                 .into_iter()
@@ -191,7 +190,7 @@ impl<W: Write + Seek> McapWriter<W> {
     /// Writes transforms as `tf2_msgs/msg/TFMessage`: the pose of each child frame in its parent (REP-105).
     ///
     /// # Errors
-    /// [`McapError`] when it cannot be written.
+    /// [`McapError`] if the message cannot be written.
     pub fn transforms(
         &mut self,
         time_s: f64,
@@ -208,10 +207,10 @@ impl<W: Write + Seek> McapWriter<W> {
         self.write("/tf", &TRANSFORMS, time_s)
     }
 
-    /// Writes what the localizer did with an angle as `access_av_msgs/msg/AngleVerdict`.
+    /// Writes the localizer's result for an angle as `access_av_msgs/msg/AngleVerdict`.
     ///
     /// # Errors
-    /// [`McapError`] when it cannot be written.
+    /// [`McapError`] if the message cannot be written.
     pub fn verdict(&mut self, topic: &str, execution: &Execution) -> Result<(), McapError> {
         let (ssb, verdict) = (&execution.ssb, &execution.verdict);
         let measured = execution.measured.as_ref();
@@ -234,7 +233,7 @@ impl<W: Write + Seek> McapWriter<W> {
     /// Writes diagnoses as `diagnostic_msgs/msg/DiagnosticArray`.
     ///
     /// # Errors
-    /// [`McapError`] when it cannot be written.
+    /// [`McapError`] if the message cannot be written.
     pub fn diagnostics(
         &mut self,
         time_s: f64,
@@ -258,7 +257,7 @@ impl<W: Write + Seek> McapWriter<W> {
     /// Completes the file.
     ///
     /// # Errors
-    /// [`McapError`] when it cannot be written.
+    /// [`McapError`] if the file cannot be written.
     pub fn finish(mut self) -> Result<(), McapError> {
         self.file.finish().map(|_| ())
     }
@@ -289,12 +288,12 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// Nanoseconds since the epoch; times before it become the epoch.
+/// Converts a time to nanoseconds since the epoch; negative times become 0.
 fn nanoseconds(time_s: f64) -> u64 {
     (time_s * 1e9).round() as u64
 }
 
-/// Begins a message with a `std_msgs/msg/Header`.
+/// Starts a message with a `std_msgs/msg/Header`.
 fn header<'a>(message: &'a mut Encoder, time_s: f64, frame: &str) -> &'a mut Encoder {
     stamp(message.start(), time_s, frame)
 }
@@ -308,7 +307,7 @@ fn stamp<'a>(message: &'a mut Encoder, time_s: f64, frame: &str) -> &'a mut Enco
         .string(frame)
 }
 
-/// 6 × 6, row by row (REP-103), nothing observed.
+/// Returns a 6 × 6 covariance, row by row (REP-103), without any observed axis.
 fn unobserved() -> [f64; 36] {
     let mut covariance = [0.0; 36];
     covariance

@@ -1,4 +1,4 @@
-//! Data-quality warnings: what a recorded drive shows to be wrong before it is located.
+//! Data-quality warnings: errors of a recorded drive that are detected before it is located.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -11,19 +11,19 @@ use super::error::ReplayError;
 use crate::angle_log::LoggedAngle;
 use crate::odometry::OdometryLog;
 
-/// Time without any angle that is remarked on (s).
+/// Minimum time without any angle that is reported (s).
 const SILENCE_S: f64 = 20.0;
 
-/// By how much phase and angle may contradict each other (rad).
+/// Maximum difference of the phase and the phase of the given angle (rad).
 const CONTRADICTION_RAD: f64 = 0.2;
 
-/// Remarks, and when in the drive they belong (s).
+/// Remarks with their times in the drive (s).
 pub type Warnings = Vec<(f64, String)>;
 
-/// What odometry and angles show to be wrong with themselves, each other, site or vehicle.
+/// Returns the contradictions within and between odometry, angles, site and vehicle.
 ///
 /// # Errors
-/// [`ReplayError::Clocks`] where not a single angle falls into the time of the odometry.
+/// [`ReplayError::Clocks`] if no angle is within the time of the odometry.
 pub fn warnings(
     site: &Site,
     vehicle: &Vehicle,
@@ -128,8 +128,8 @@ pub fn warnings(
     let (turning, all) = (turning.count(), samples.len());
     if 0 < turning && turning < all {
         let text = format!(
-            "odometry: yaw_rate_radps is empty in {} of {all} samples; nothing tells how the vehicle \
-             turns there",
+            "odometry: yaw_rate_radps is empty in {} of {all} samples; the yaw change is unknown \
+             there",
             all - turning
         );
         warnings.push((start_s, text));

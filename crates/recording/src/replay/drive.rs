@@ -1,4 +1,4 @@
-//! A drive being replayed.
+//! Replay of a drive.
 
 use onboard::burst::{Burst, OfSsb, first_burst};
 use onboard::geometry::Pose;
@@ -15,28 +15,30 @@ use super::located::{Diagnosis, LocatedDrive, LocatedPose, Remark, gathered};
 use crate::library::load;
 use crate::odometry::OdometryLog;
 
-/// Departures of the odometer's scale and of the array's mounting (rad) below which nobody minds.
+/// Minimum deviation of the odometer's scale that is reported.
 const LEAST_SCALE: f64 = 0.03;
+/// Minimum deviation of the array's mounting that is reported (rad).
 const LEAST_MOUNTING_RAD: f64 = 0.05;
 
-/// A drive being located.
+/// Drive that is being located.
 pub struct Replay<'a> {
     onboard: Onboard,
     odometry: std::iter::Peekable<std::slice::Iter<'a, OdometrySample>>,
     drive: LocatedDrive,
-    /// Whether the localizer was lost, and how it came back last.
+    /// Whether the localizer was lost at the previous pose.
     was_lost: bool,
+    /// Last recovery of the localizer.
     recovered: Option<Recovered>,
     /// Whether the odometry before told of the end of the road.
     beyond_map: bool,
-    /// Where the gaps of the road begin that were remarked on (m).
+    /// Start positions of the reported gaps of the road (m).
     gaps_m: Vec<f64>,
-    /// What was taken off the angles' times (s).
+    /// Correction of the angles' times (s).
     set_back_s: f64,
 }
 
 impl<'a> Replay<'a> {
-    /// A drive of a vehicle at a site, from `start` on.
+    /// Creates the replay of a drive of a vehicle at a site, from `start`.
     ///
     /// # Errors
     /// [`ReplayError::Settings`], [`ReplayError::NoOdometry`].
@@ -76,12 +78,12 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// The angles' times come with a lateness (s) taken off that their settings do not state.
+    /// Sets the time offset (s) that was already subtracted from the angles' times.
     pub const fn set_back(&mut self, lateness_s: f64) {
         self.set_back_s = lateness_s;
     }
 
-    /// Takes in SSBs, or angles, in the order they are given, after the odometry up to each burst.
+    /// Processes SSBs or angles in the given order, with the odometry up to each burst first.
     ///
     /// # Errors
     /// [`ReplayError::Custom`].
@@ -100,13 +102,13 @@ impl<'a> Replay<'a> {
         Ok(())
     }
 
-    /// Remarks on what the drive showed of the vehicle that its settings do not say.
+    /// Adds remarks on constants of the vehicle that deviate from the settings.
     fn remark_on_constants(&mut self) {
         let Some(constants) = self.drive.constants else {
             return;
         };
         if self.drive.suspicions().next().is_some() {
-            return; // found where the vehicle never was
+            return; // the estimates belong to a wrong position
         }
         let time_s = self
             .drive
@@ -156,8 +158,8 @@ impl<'a> Replay<'a> {
         }
         if let Some(how) = recovered.filter(|_| recovered != self.recovered) {
             let text = format!(
-                "angles at {time_s:.1} s: found again, {:.2} m from and {:.2} rad against where it \
-                 was believed to be",
+                "angles at {time_s:.1} s: position found again, {:.2} m and {:.2} rad from the \
+                 previous estimate",
                 how.moved_m, how.turned_rad
             );
             self.remark(time_s, text);
@@ -176,7 +178,7 @@ impl<'a> Replay<'a> {
         self.odometry_until(f64::INFINITY)
     }
 
-    /// Takes in the rest of the odometry, and hands over the drive.
+    /// Processes the remaining odometry and returns the located drive.
     ///
     /// # Errors
     /// [`ReplayError::Custom`].
@@ -191,13 +193,13 @@ impl<'a> Replay<'a> {
         Ok(self.drive)
     }
 
-    /// Drives to be smoothed, in order of time from now on.
+    /// Records the drive for smoothing; from now on, late angles are rejected.
     pub fn keep_journal(&mut self) {
         self.onboard.keep_journal();
     }
 
-    /// The poses at the odometry samples as seen from the end of the drive, from the first known
-    /// one on.
+    /// Smoothed poses at the odometry samples, from the first known one on; they use the
+    /// measurements of the whole drive.
     ///
     /// # Errors
     /// [`ReplayError::Custom`].
@@ -214,23 +216,23 @@ impl<'a> Replay<'a> {
             .collect())
     }
 
-    /// Remarks on something that is not the pipeline's to see.
+    /// Adds a remark on something that the pipeline does not detect itself.
     pub fn remark(&mut self, time_s: f64, text: String) {
         self.drive.remarks.push(Remark { time_s, text });
     }
 
-    /// The angles so far and what became of them.
+    /// Angles so far, each with its result (used or rejected).
     pub fn executions(&self) -> &[Execution] {
         &self.drive.executions
     }
 
-    /// The drive so far.
+    /// Located drive so far.
     pub const fn located(&self) -> &LocatedDrive {
         &self.drive
     }
 
-    /// Says what is wrong with the input. A wrong start does no harm once the vehicle was found
-    /// again.
+    /// Adds a diagnosis of the input, also as a remark. A wrong start is harmless if the vehicle
+    /// was found again.
     pub fn diagnose(&mut self, mut diagnosis: Diagnosis) {
         let first = self.drive.poses.first();
         let time_s = first.map_or(f64::NEG_INFINITY, |first| first.estimate.time_s);
@@ -281,7 +283,7 @@ impl<'a> Replay<'a> {
                     }
                 }
                 Ok(_) => self.beyond_map = false,
-                // Nothing is known of the vehicle's place by a sample that is left out.
+                // A sample that is left out gives no information on the vehicle's position.
                 Err(defect) => {
                     self.remark(at_s, format!("odometry at {at_s} s: left out, {defect}"));
                     continue;

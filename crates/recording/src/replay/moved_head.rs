@@ -1,4 +1,4 @@
-//! Where a radio head stands by its own angles, along a path that the others tell.
+//! Position of a radio head estimated from its own angles and the path estimated from the others.
 
 use onboard::gaussian::{Innovation, with_outliers};
 use onboard::geometry::{Point, Pose, wrap_angle};
@@ -9,24 +9,27 @@ use super::evidence::{HeadId, OUTLIERS, head_of};
 use super::hypotheses::Drive;
 use super::stated::with_phase;
 
-/// What the path adds to an angle's deviation (rad).
+/// Standard deviation of an angle due to errors of the path (rad).
 const PATH_STD_RAD: f64 = 0.1;
 
-/// How far from the path and from its stated place a radio head is looked for (m), and in what steps.
+/// Maximum distance of the search from the path and from the site file's position (m).
 const REACH_M: f64 = 60.0;
+/// Number of grid steps of the search in each direction.
 const STEPS: usize = 60;
 
-/// Places that are refined, and to what step (m).
+/// Number of grid positions that are refined.
 const REFINED: usize = 12;
+/// Step size that ends the refinement (m).
 const FINEST_M: f64 = 0.05;
 
-/// Moves with one step: one to each side of a cell, along both axes.
+/// Maximum number of moves with one step size: one to each side of a cell along both axes.
 const MOST_MOVES: usize = 4;
 
-/// Log-likelihood within which places are as good as each other; the nearest to the stated is taken.
+/// Log-likelihood difference below which positions are equally good; the one nearest to the site
+/// file's position is selected.
 const AS_GOOD: f64 = 3.0;
 
-/// Angles without which no place is told.
+/// Minimum number of angles for an estimate.
 const LEAST_ANGLES: usize = 10;
 
 /// An angle, the position of the vehicle's array, and the direction of azimuth 0 of the array that measured it.
@@ -38,8 +41,8 @@ struct Sighted {
     variance: f64,
 }
 
-/// Where the angles of a radio head come from; `None` where they do not tell. `path` is the believed
-/// pose at each of the drive's angles.
+/// Returns the estimated position of a radio head; `None` if the angles do not determine it. `path`
+/// contains the estimated pose at each of the drive's angles.
 pub fn triangulate(drive: &Drive<'_>, head: HeadId, path: &[Option<Pose>]) -> Option<Point> {
     let settings = (drive.site.radio_heads.iter()).find(|it| (it.pci, it.ssb_index) == head)?;
     let array = &drive.vehicle.array;
@@ -124,8 +127,9 @@ fn log_likelihood(sighted: &[Sighted], place: Point, rise_m: f64, measurand: &Me
     sighted.iter().map(of_angle).sum()
 }
 
-/// Pattern search (Hooke and Jeeves, J. ACM 8(2), 1961) from a place on; no farther with a step than the grid that it
-/// comes from could have missed, for along a path that has diverged the likelihood rises for kilometres.
+/// Pattern search (Hooke and Jeeves, J. ACM 8(2), 1961) from a start position. The number of moves
+/// per step size is limited to the resolution of the previous grid, because the likelihood may
+/// increase for kilometres along a diverged path.
 fn refine(
     mut best: (f64, Point),
     mut step_m: f64,

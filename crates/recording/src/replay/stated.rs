@@ -1,4 +1,4 @@
-//! What is believed of angles whose deviation somebody else has stated.
+//! Error model of angles with a standard deviation from another receiver.
 
 use std::f64::consts::TAU;
 
@@ -8,20 +8,20 @@ use onboard::settings::{DriveKind, Site, Vehicle};
 
 use crate::angle_log::LoggedAngle;
 
-/// Share of a stated variance that stays from angle to angle. On the sensors that were looked into,
-/// cameras and a laser, whose data sheets are cautious, it is 0.08 to 0.2.
+/// Fraction of the specified variance that is correlated between angles. The examined sensors
+/// (cameras and a laser with cautious data sheets) have 0.08 to 0.2.
 const USUAL_SHARE: f64 = 0.25;
 
-/// Probability that errors stay over metres where nobody knows of scatter.
+/// Prior probability of errors that are correlated over metres, if the scatter is unknown.
 const UNKNOWN: f64 = 0.75;
 
-/// Rician K (dB) of no scatter.
+/// Rician K factor (dB) without scatter.
 const NO_SCATTER_DB: f64 = 200.0;
 
-/// Site and vehicle for angles whose stated deviation is all of their error: the site's scatter is
-/// not added to it, and looks at one radio head within a second or a metre do not count as
-/// independent, unless the receiver's settings say otherwise. On a road vehicle, where nothing is stated
-/// of errors that stay, they are found while driving.
+/// Returns the site and vehicle for angles whose specified standard deviation is the total error.
+/// The site's scatter is not added. Angles to one radio head within a second or a metre are not
+/// independent, unless the receiver's settings specify otherwise. For a road vehicle without
+/// specified correlated errors, these errors are estimated while driving.
 pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
     let site = Site {
         rician_k_db: NO_SCATTER_DB,
@@ -29,8 +29,8 @@ pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
     };
     let mut vehicle = vehicle.clone();
     let receiver = &mut vehicle.receiver;
-    // A differential drive is as often lost as its angles are off by reflections, and would take the
-    // one for the other.
+    // Angles of a differential drive with reflections resemble those of a lost drive, so that the
+    // two would be confused.
     let is_unstated = receiver.phase_bias_share.is_none() && receiver.phase_bias_std_rad == 0.0;
     let may_be_found = is_unstated && vehicle.drive == DriveKind::Road;
     (receiver.phase_bias_probability).get_or_insert(if may_be_found { UNKNOWN } else { 0.0 });
@@ -56,7 +56,7 @@ pub fn with_phase(logged: &LoggedAngle, measurand: &Measurand) -> LoggedAngle {
         {
             let (sin, cos) = measured.angle_rad.sin_cos();
             let sigma = measured.phase_sigma_rad;
-            // Along the axis the angle moves the phase by its square.
+            // Near the axis, the phase is a quadratic function of the angle.
             measured.phase_sigma_rad =
                 TAU * spacing_wavelengths * sigma * sin.abs().hypot(sigma * cos);
         }
