@@ -168,6 +168,9 @@ macro_rules! toml_file {
     };
 }
 
+/// Name, both ends in metres, horizontal error in metres, and share of the time in percent.
+type NamedStretch = (String, f64, f64, f64, f64);
+
 toml_file! {
     /// Site: validated nominal model of the plant.
     Site(CoreSite), "site",
@@ -278,7 +281,7 @@ toml_file! {
     /// Return the targets of positions and stretches: name, both ends as distances along the road in metres, horizontal error
     /// in metres, and share of the time in percent.
     #[getter]
-    fn targets(&self) -> PyResult<Vec<(String, f64, f64, f64, f64)>> {
+    fn targets(&self) -> PyResult<Vec<NamedStretch>> {
         let check = Check { file: &self.0.name };
         let path = self.0.scenario(&self.0.channel).path(check);
         let road_m = path.map_err(settings_error)?.length_m();
