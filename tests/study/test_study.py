@@ -762,7 +762,7 @@ def test_whoever_closes_the_pipe_still_gets_the_files(
             stdout=writing,
             stderr=subprocess.PIPE,
             text=True,
-            timeout=240,
+            timeout=600,
             check=False,
         )
     finally:
