@@ -1,4 +1,4 @@
-"""``python -m attack``: run many cases, count what is wrong with them, keep those that fail."""
+"""``python -m attack``: runs many cases, counts the findings, and keeps the cases that fail."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from pathlib import Path
 from attack import kinds
 
 LONGEST_S = 20.0
-# Before the first case, what all of them need is made.
+# Maximum start time of a worker (s): it prepares the files that all cases share.
 STARTING_S = 300.0
 
 
 class Worker:
-    """A worker process, and a new one where it died."""
+    """A worker process; it is replaced if it ends."""
 
     def __init__(self, seed: int, place: Path):
         self.command = [sys.executable, "-m", "attack.worker", str(seed), str(place)]
         self.process: subprocess.Popen[bytes] | None = None
 
     def ask(self, kind: str, number: int) -> dict[str, object]:
-        """What is wrong with a case: as the worker says, or that it died or hung of it."""
+        """Returns the findings of a case, including an abort or a hang of the worker."""
         process = self.process or self._start()
         assert process.stdin is not None
         process.stdin.write(f"{kind} {number}\n".encode())
         process.stdin.flush()
-        # Beside much else, everything takes as much longer as there is else.
+        # The time limit is proportional to the load of the computer.
         busy = max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
         line = self._line(process, LONGEST_S * busy)
         if line:
             return dict(json.loads(line))
-        try:  # what ends closes its output a moment before it has ended
+        try:  # a process closes its output shortly before it ends
             what = f"abort: the process ended with {process.wait(1.0)}"
         except subprocess.TimeoutExpired:
             what = f"hang: more than {LONGEST_S:.0f} s"
@@ -67,7 +67,7 @@ class Worker:
         return process.stdout.readline() if ready else b""
 
     def stop(self) -> None:
-        """End the process."""
+        """Ends the process."""
         if self.process is not None:
             self.process.kill()
             self.process.wait()
@@ -76,7 +76,7 @@ class Worker:
 def attack(
     seed: int, cases: list[tuple[str, int]], workers: int, kept: Path
 ) -> tuple[Counter[str], int, int]:
-    """Count kinds of findings, and the epochs that said ``ok`` and were beyond their level."""
+    """Counts kinds of findings, ``ok`` epochs, and ``ok`` epochs above their protection level."""
     waiting: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
     for case in cases:
         waiting.put(case)
@@ -107,13 +107,13 @@ def attack(
 
     with ThreadPoolExecutor(workers) as pool:
         for done in [pool.submit(work) for _ in range(workers)]:
-            done.result()  # raises what the thread did
+            done.result()  # raises the exception of the thread
     shutil.rmtree(place, ignore_errors=True)
     return counts, epochs[0], epochs[1]
 
 
 def main() -> None:
-    """Exit code 1 where anything is wrong."""
+    """Runs the campaign; exit code 1 if there are findings."""
     options = argparse.ArgumentParser(prog="python -m attack", description=__doc__)
     options.add_argument("--seed", type=int, help="repeat an attack; else a new one each time")
     options.add_argument("--inputs", type=int, default=20_000, help="cases other than drives")
@@ -141,7 +141,7 @@ def main() -> None:
         print(f"findings: {dict(counts)}")
         print(f"each in a folder of its own, to be run there by `sh command.sh`: {kept}")
         sys.exit(1)
-    with suppress(OSError):  # an earlier attack may have kept something there
+    with suppress(OSError):  # the folder may contain cases of an earlier campaign
         kept.rmdir()
     print("no findings")
 

@@ -1,4 +1,4 @@
-"""Numbers and words on the command line: every option of every command."""
+"""Numbers and words on the command line, for every option of every command."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from attack.case import Case
 
-# What makes a case of each command that ends soon; options in it are not drawn.
+# Arguments that give each command a short run time; the options in them are not drawn.
 QUICK: dict[str, list[str]] = {
     "run": ["short.toml"],
     "evaluate": ["--scenario", "papier"],
@@ -50,7 +50,7 @@ QUICK: dict[str, list[str]] = {
 
 @cache
 def options(command: str) -> list[Any]:
-    """The options of a command that change something, as the command itself has them."""
+    """Returns the options of a command that change its behaviour, from its parser."""
     from access_av.cli.main import app
 
     found: Any = typer.main.get_command(app)
@@ -63,7 +63,7 @@ def options(command: str) -> list[Any]:
 
 
 def arguments(random: Random, case: Case) -> list[str]:
-    """One command, one to three of its options at random."""
+    """One command with one to three random options."""
     for name, content in recorded().items():
         case.write(name, content)
     case.write("short.toml", SHORT)
@@ -76,7 +76,7 @@ def arguments(random: Random, case: Case) -> list[str]:
     for option in random.sample(known, min(len(known), random.choice((1, 1, 2, 3)))):
         words += [option.opts[0], _value(random, option)]
     if "--runs" in words and words[words.index("--runs") + 1].isdigit():
-        at = words.index("--runs") + 1  # those between few and too many only take long
+        at = words.index("--runs") + 1  # other numbers of runs are valid, but take long
         words[at] = words[at] if int(words[at]) < 5 or int(words[at]) > 10**5 else "3"
     if not known or random.random() < 0.1:
         words.append(_without_nul(random.choice(mutate.TEXTS)))

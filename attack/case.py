@@ -1,4 +1,4 @@
-"""A case: a folder of files, and a command that is run in it."""
+"""A case: a folder of files, and a command that runs in it."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ SCRIPT = "case.py"
 
 @dataclass(frozen=True)
 class Case:
-    """What a case is made of: its folder is the current directory of its command."""
+    """A case; its folder is the current directory of its command."""
 
     folder: Path
 
     def write(self, name: str, content: str | bytes | dict[str, Any]) -> str:
-        """Put a file into the folder; a table becomes TOML."""
+        """Writes a file into the folder; a table is written as TOML."""
         if isinstance(content, dict):
             content = mutate.toml(content)
         if isinstance(content, str):
@@ -30,11 +30,11 @@ class Case:
         return name
 
     def access_av(self, *arguments: object) -> list[str]:
-        """Run the command line."""
+        """Returns a command of the command line."""
         return self._command(["access-av", *map(str, arguments)])
 
     def python(self, script: str) -> list[str]:
-        """Run a script."""
+        """Returns a command that runs a script."""
         self.write(SCRIPT, script)
         return self._command(["python", SCRIPT])
 

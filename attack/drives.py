@@ -1,4 +1,4 @@
-"""Random drives: roads, radio heads, noises, stops and gaps that may well be so."""
+"""Random drives: roads, radio heads, noise, stops and gaps in plausible ranges."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ found.runs.write_parquet("runs.parquet")
 
 
 def drive(random: Random, case: Case) -> list[str]:
-    """One drive of a random scenario, by the tracker, mostly guarded."""
+    """One drive of a random scenario with the tracker, usually with integrity monitoring."""
     case.write("scenario.toml", scenario(random))
     return case.python(DRIVE.format(seed=random.randrange(2**32)))
 
 
 def scenario(random: Random) -> dict[str, Any]:
-    """Anything that a plant may have and a vehicle be, each in its usual range."""
+    """Returns a random plant and vehicle, with each value in its usual range."""
     road, length_m = _road(random)
     heads = [_head(random, pci, length_m) for pci in range(random.choice((1, 2, 3, 3, 4, 6)))]
     made: dict[str, Any] = {
@@ -59,7 +59,7 @@ def scenario(random: Random) -> dict[str, Any]:
 
 
 def _road(random: Random) -> tuple[dict[str, Any], float]:
-    """Lines and arcs of 60 to 300 m, here and there not surveyed."""
+    """Returns straights and arcs of 30 to 400 m in total, partly not surveyed."""
     segments = []
     for index in range(random.randrange(1, 5)):
         length_m = random.uniform(30.0, 100.0)

@@ -1,4 +1,4 @@
-"""Files that were changed: settings, recordings, logs, truth, results."""
+"""Changed files: settings, recordings, logs, truth, results."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from attack.case import Case
 
-# What comes out of a settings file that is fine is tried: driven if it is short, and bounded.
+# Scripts that run the scenario of a valid settings file if it is short, and compute its bound.
 TRY_SCENARIO = """\
 import access_av
 scenario = access_av.Scenario.load({name!r})
@@ -51,7 +51,7 @@ KINDS: dict[str, Any] = {
 
 @cache
 def settings(what: str, name: str) -> dict[str, Any]:
-    """A shipped file with every default written out."""
+    """Returns a shipped file with all default values written out."""
     return tomllib.loads(KINDS[what].load(name).to_toml())
 
 
@@ -60,21 +60,21 @@ def _names(what: str) -> list[str]:
 
 
 def settings_text(random: Random, case: Case) -> list[str]:
-    """A settings file, its bytes changed."""
+    """A settings file with changed bytes."""
     what = random.choice(list(KINDS))
     text = mutate.toml(settings(what, random.choice(_names(what))))
     return case.access_av(what, "check", case.write("x.toml", mutate.data(random, text.encode())))
 
 
 def settings_table(random: Random, case: Case) -> list[str]:
-    """A settings file, its values changed."""
+    """A settings file with changed values."""
     what = random.choice(list(KINDS))
     changed = mutate.table(random, settings(what, random.choice(_names(what))))
     return case.access_av(what, "check", case.write("x.toml", changed))
 
 
 def short_scenario(random: Random) -> dict[str, Any]:
-    """A shipped scenario, of which a few metres are driven."""
+    """Returns a shipped scenario with few SSBs and no stops, usually with a start near the end."""
     made = deepcopy(settings("scenario", random.choice(_names("scenario"))))
     made["motion"] |= {"start_at_m": random.choice((0.0, 250.0, 280.0)), "stops": []}
     made["site"]["ssb"]["period_ms"] = 80.0
@@ -82,13 +82,13 @@ def short_scenario(random: Random) -> dict[str, Any]:
 
 
 def scenario(random: Random, case: Case) -> list[str]:
-    """A scenario with a value changed, driven if it is still fine."""
+    """A scenario with a changed value; it is run if it is still valid."""
     name = case.write("x.toml", mutate.table(random, short_scenario(random)))
     return case.python(TRY_SCENARIO.format(name=name))
 
 
 def at_the_limits(random: Random, case: Case) -> list[str]:
-    """A scenario with numbers at the ends of their ranges, driven."""
+    """A scenario with numbers at the limits of their ranges, which is run."""
     made = short_scenario(random)
     schema = json.loads(access_av.Scenario.schema_json())
     numbers = [path for path in mutate.places(made) if _range(schema, path) is not None]
@@ -104,7 +104,7 @@ def at_the_limits(random: Random, case: Case) -> list[str]:
 
 
 def _range(schema: dict[str, Any], path: tuple[Any, ...]) -> tuple[float, float] | None:
-    """Least and most of a number, as the JSON Schema has them."""
+    """Returns minimum and maximum of a number in the JSON Schema."""
     found = [schema]
     for step in (*path, None):
         resolved = []
@@ -135,7 +135,7 @@ def _range(schema: dict[str, Any], path: tuple[Any, ...]) -> tuple[float, float]
 
 @cache
 def recorded() -> dict[str, bytes]:
-    """Files of a short drive that was recorded and located, by their names."""
+    """Returns the files of a short drive that was recorded and located, by name."""
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         access_av.synthesize("paper-real-odometry-2", place, duration_s=0.3)
@@ -171,7 +171,7 @@ def _locate(case: Case, random: Random, *changed: str) -> list[str]:
         case.write(name, content)
     odometry = "odometry.mcap" if "odometry.mcap" in changed else "odometry.csv"
     if odometry == "odometry.mcap" and random.random() < 0.5:
-        # As a bag of two files, of which one is as it was, or neither.
+        # A bag of two files: one of them, or neither, is unchanged.
         (case.folder / "bag").mkdir()
         second = random.choice((recorded()[odometry], mutate.data(random, recorded()[odometry])))
         case.write("bag/a.mcap", second)
@@ -189,12 +189,12 @@ def _locate(case: Case, random: Random, *changed: str) -> list[str]:
 
 
 def odometry(random: Random, case: Case) -> list[str]:
-    """A log of odometry."""
+    """An odometry log."""
     return _locate(case, random, random.choice(("odometry.csv", "odometry.mcap")))
 
 
 def angles(random: Random, case: Case) -> list[str]:
-    """A log of angles."""
+    """An angle log."""
     return _locate(case, random, random.choice(("angles.csv", "angles.csv", "angles.parquet")))
 
 
@@ -204,7 +204,7 @@ def truth(random: Random, case: Case) -> list[str]:
 
 
 def recording(random: Random, case: Case) -> list[str]:
-    """A SigMF recording, data or metadata changed, as bytes or as a table."""
+    """A SigMF recording with changed data or metadata, as bytes or as a table."""
     held = dict(recorded())
     if random.random() < 0.3:
         held["iq.sigmf-data"] = mutate.data(random, held["iq.sigmf-data"])
@@ -228,7 +228,7 @@ def recording(random: Random, case: Case) -> list[str]:
 
 
 def road_file(random: Random, case: Case) -> list[str]:
-    """The survey of a road that a site names."""
+    """The survey of a site's road."""
     name = random.choice(("road.csv", "road.geojson"))
     line = {"type": "LineString", "coordinates": [[11.0, 48.0], [11.001, 48.0], [11.002, 48.001]]}
     held = recorded()["road.csv"] if name == "road.csv" else json.dumps(line).encode()

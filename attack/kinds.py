@@ -1,4 +1,4 @@
-"""The kinds of cases: each a function of a random stream and a case, which gives its command."""
+"""Kinds of cases: each is a function of a random generator and a case, and returns a command."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-# How often each kind comes in a hundred inputs; drives are counted apart.
+# Weight of each kind among the inputs; the number of drives is a separate option.
 KINDS: dict[str, tuple[Callable[[Random, Case], list[str]], int]] = {
     "settings-text": (files.settings_text, 15),
     "settings-table": (files.settings_table, 26),
@@ -33,12 +33,12 @@ KINDS: dict[str, tuple[Callable[[Random, Case], list[str]], int]] = {
 
 
 def inputs(seed: int, count: int) -> list[tuple[str, int]]:
-    """Kinds and numbers of so many inputs, mixed."""
+    """Returns kinds and numbers of the given number of inputs, in random order."""
     random = Random(seed)
     weights = [weight for _, weight in KINDS.values()]
     return [(kind, n) for n, kind in enumerate(random.choices(list(KINDS), weights, k=count))]
 
 
 def make(seed: int, kind: str, number: int, folder: Path) -> list[str]:
-    """Write a case's files into a folder; its command."""
+    """Writes the files of a case into a folder; returns its command."""
     return KINDS[kind][0](Random(f"{seed}:{kind}:{number}"), Case(folder))

@@ -1,4 +1,4 @@
-"""Changes to values, tables, texts and bytes: the extremes, and what is next to what is there."""
+"""Changes to values, tables, texts and bytes: extreme values, and values close to the original."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TEXTS = (
 
 
 def number(random: Random, old: float = 1.0) -> float:
-    """Another number: an extreme, or one a little or many powers of ten from the old one."""
+    """Returns another number: an extreme, or one that differs slightly or by many powers of ten."""
     choice = random.random()
     if choice < 0.4:
         return random.choice(NUMBERS)
@@ -37,7 +37,7 @@ def number(random: Random, old: float = 1.0) -> float:
 
 
 def value(random: Random, old: Any) -> Any:
-    """Another value, usually of the same type."""
+    """Returns another value, usually of the same type."""
     if random.random() < 0.1:
         return random.choice((True, 3, 2.5, "word", [], {}, [1, "a"], {"a": 1}, [[[]]]))
     if isinstance(old, bool):
@@ -59,7 +59,7 @@ def _list(random: Random, old: list[Any]) -> list[Any]:
 
 
 def places(table: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """Paths of everything inside a table of tables, lists and values."""
+    """Returns the paths of all items of a table of tables, lists and values."""
     found = [path] if path else []
     items = table.items() if isinstance(table, dict) else ()
     items = enumerate(table) if isinstance(table, list) else items
@@ -69,7 +69,7 @@ def places(table: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 def table(random: Random, original: Any, *, changes: int | None = None) -> Any:
-    """A table with one to three things in it changed, dropped, doubled or added."""
+    """Returns a table in which one to three items are changed, removed, repeated or added."""
     made = copy.deepcopy(original)
     for _ in range(changes or random.choice((1, 1, 1, 2, 3))):
         known = places(made)
@@ -90,7 +90,7 @@ def table(random: Random, original: Any, *, changes: int | None = None) -> Any:
 
 
 def data(random: Random, original: bytes) -> bytes:
-    """Bytes with some exchanged, cut out, doubled or put in."""
+    """Returns bytes of which some are changed, removed, repeated or inserted."""
     made = bytearray(original)
     for _ in range(random.choice((1, 1, 2, 5, 20))):
         place, length = random.randrange(len(made) + 1), random.choice((1, 1, 4, 8, 100))
@@ -120,7 +120,7 @@ def data(random: Random, original: bytes) -> bytes:
 
 
 def lines(random: Random, original: str) -> str:
-    """A table of text, of which cells and lines are changed."""
+    """Returns a text table with changed cells and lines."""
     rows = original.splitlines()
     separator = "," if "," in rows[0] else " "
     for _ in range(random.choice((1, 1, 3, 10))):
@@ -144,14 +144,14 @@ def lines(random: Random, original: str) -> str:
 
 
 def text(random: Random, original: str) -> bytes:
-    """A text file: mostly its cells and lines are changed, sometimes its bytes."""
+    """Returns a text file with changed cells and lines, sometimes with changed bytes."""
     if random.random() < 0.7:
         return lines(random, original).encode("utf-8", "surrogatepass")
     return data(random, original.encode())
 
 
 def toml(settings: dict[str, Any]) -> str:
-    """A table as TOML, a line for each of its keys."""
+    """Returns a table as TOML, with one line for each key."""
     return "".join(f"{_key(key)} = {_inline(item)}\n" for key, item in settings.items())
 
 

@@ -1,4 +1,4 @@
-"""A user's own code that answers what it should not."""
+"""Plug-ins of a user that return invalid values."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ else:
 
 
 def plug_in(random: Random, case: Case) -> list[str]:
-    """An estimator, a policy or a localizer, one of whose answers is strange."""
+    """An estimator, a policy or a localizer that returns one invalid value."""
     place = random.choice(("estimator=answer", "policy=PlugIn", "localizer=PlugIn"))
     good = {
         "stated": "0.5",
@@ -79,6 +79,6 @@ def plug_in(random: Random, case: Case) -> list[str]:
     answer = random.choice(ANSWERS)
     if strange is not None:
         good[random.choice(strange)] = answer.replace("answer()", "self.call()")
-    if good["stated"] != "0.5":  # an attribute, made where the class is
+    if good["stated"] != "0.5":  # a class attribute
         good["stated"] = random.choice(ANSWERS[:28])
     return case.python(SCRIPT.format(answer=answer, place=place, **good))

@@ -1,4 +1,4 @@
-"""Tables and figures that a user gives or asks: results, masts, paths, a fleet, a design space."""
+"""Tables and figures of a user: results, masts, paths, a fleet, a design space."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SPACE: dict[str, Any] = {
 
 
 def held(name: str) -> dict[str, list[Any]]:
-    """A table as it lies among the results."""
+    """Returns a table of the results, by name."""
     text = {"energy_provenance": "fitted", "reading": "gate", "campaign": "adaptive"}
     return {
         column: [
@@ -47,7 +47,7 @@ def held(name: str) -> dict[str, list[Any]]:
 
 
 def results(random: Random, case: Case) -> list[str]:
-    """A folder of results that is asked."""
+    """A folder of results, and a command that reads it."""
     name, command = random.choice(
         (
             ("operating_points", ("explore", "--results", ".", "--max-energy-j", "1000")),
@@ -63,7 +63,7 @@ def results(random: Random, case: Case) -> list[str]:
     try:
         pl.DataFrame(table, strict=False).write_parquet(file)
     except (pl.exceptions.PolarsError, TypeError, ValueError, OverflowError):
-        file.write(b"PAR1")  # no table can hold that
+        file.write(b"PAR1")  # no Parquet table can contain these columns
     content = file.getvalue() if choice < 0.6 else mutate.data(random, file.getvalue())
     case.write(f"{name}.parquet", content)
     return case.access_av(*command, "--json")
@@ -85,7 +85,7 @@ def given(random: Random, case: Case) -> list[str]:
 
 
 def figures(random: Random, case: Case) -> list[str]:
-    """The figures of a fleet, or a space of designs."""
+    """The figures of a fleet, or a design space."""
     if random.random() < 0.6:
         fleet = mutate.table(random, shipped("economics", "balance.toml"))
         return case.access_av("balance", case.write("fleet.toml", fleet))

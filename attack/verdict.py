@@ -1,4 +1,4 @@
-"""What is wrong with what came of a case: with its end, its messages and its files."""
+"""Verdict of a case: faults in its end, its messages and its files."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from mcap.reader import make_reader
 if TYPE_CHECKING:
     from pathlib import Path
 
-# Fine; bad input; located, but mostly lost.
+# Exit codes: success; invalid input; located, but mostly lost.
 CODES = (0, 2, 3)
 LONGEST_MESSAGE = 500
 NONSENSE_M = 100.0
-# Least eigenvalue of a covariance in units of its own variances: what rounding takes.
+# Minimum eigenvalue of a correlation matrix: tolerance for rounding.
 ROUNDING = -1e-9
-# Deviations by which a pose may move beyond what the odometer reads, and the most that it reads of
-# what is driven: the faults of random drives slip by half.
+# Tolerance of the motion of a pose (standard deviations), and maximum ratio of odometer reading to
+# driven distance: the faults of random drives have a slip of up to one half.
 LEAP_SIGMAS = 5.0
 MOST_READ = 1.6
 # Doubles at the end of a nav_msgs/msg/Odometry: pose and twist with their covariances.
@@ -30,24 +30,24 @@ ODOMETRY_NUMBERS = 85
 
 @dataclass
 class Verdict:
-    """Findings, and how many epochs said ``ok`` and how many of those were beyond their level."""
+    """Findings, number of ``ok`` epochs, and number of them with an error above the level."""
 
     findings: list[str] = field(default_factory=list)
     ok: int = 0
     beyond: int = 0
 
     def says(self, kind: str, text: object) -> None:
-        """Add a finding; its first word says which kind it is."""
+        """Adds a finding; its first word is the kind."""
         self.findings.append(f"{kind}: {str(text)[:300]}")
 
 
 def judge(
     folder: Path, command: list[str], before: set[Path], end: dict[str, Any], *, odometer: bool
 ) -> Verdict:
-    """Look at how a command ended, and at the files that were not there ``before``.
+    """Judges the end of a command, and the files that were not there ``before``.
 
-    Only where the odometer reads no more than ``MOST_READ`` of what is driven it tells how far a
-    pose may move.
+    ``odometer``: whether the odometer reads at most ``MOST_READ`` of the driven distance. If true,
+    the odometer limits the plausible motion of the pose.
     """
     verdict = Verdict()
     if end["raised"]:
@@ -124,7 +124,7 @@ def _table(verdict: Verdict, name: str, table: pl.DataFrame, *, odometer: bool) 
 
 
 def _covariances(verdict: Verdict, name: str, table: pl.DataFrame) -> None:
-    """Variances at least zero; correlations that make a positive matrix."""
+    """Checks that variances are not negative, and correlation matrices positive semidefinite."""
     axes = ("xx_m2", "xy_m2", "x_heading_m_rad", "yy_m2", "y_heading_m_rad", "heading_rad2")
     if "covariance_x_heading_m_rad" not in table.columns:
         axes = ("xx_m2", "xy_m2", "yy_m2")
@@ -143,7 +143,7 @@ def _covariances(verdict: Verdict, name: str, table: pl.DataFrame) -> None:
 
 
 def _honesty(verdict: Verdict, table: pl.DataFrame) -> None:
-    """Errors while ``ok``: none absurd, few beyond the protection level."""
+    """Checks the errors of ``ok`` epochs against `NONSENSE_M` and the protection level."""
     error_m = (pl.col("error_x_m") ** 2 + pl.col("error_y_m") ** 2).sqrt()
     ok = table.filter(integrity="ok").select(error_m=error_m, level_m="protection_level_m")
     verdict.ok, verdict.beyond = ok.height, int((ok["error_m"] > ok["level_m"]).sum())
@@ -152,7 +152,7 @@ def _honesty(verdict: Verdict, table: pl.DataFrame) -> None:
 
 
 def _leaps(verdict: Verdict, table: pl.DataFrame) -> None:
-    """No pose moves farther in one step than odometer and covariance allow."""
+    """Checks that no pose moves farther in one step than odometer and covariance allow."""
     steps = np.diff(table.select("x_m", "y_m", "true_x_m", "true_y_m").to_numpy(), axis=0)
     moved_m, driven_m = np.hypot(steps[:, 0], steps[:, 1]), np.hypot(steps[:, 2], steps[:, 3])
     xx, xy, yy = (table[f"covariance_{axis}_m2"].to_numpy() for axis in ("xx", "xy", "yy"))

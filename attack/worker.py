@@ -1,7 +1,7 @@
-"""A process that runs cases one after another, within limits on memory; who asks limits the time.
+"""Process that runs cases one after another with a memory limit; the caller limits the time.
 
-Reads ``kind number`` a line, answers each with a line of JSON. What a case prints goes into files:
-whatever it does to the process, the folder of the case tells.
+Reads one ``kind number`` per line, and answers each with a line of JSON. The output of a case is
+written to files, so that the folder of the case shows the cause even if the process dies.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ MEMORY_BYTES = 2 << 30
 
 
 def limit_memory() -> None:
-    """Allow so much more address space than is taken now."""
+    """Limits the address space to the current size plus `MEMORY_BYTES`."""
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     taken = pages * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (taken + MEMORY_BYTES,) * 2)
 
 
 def execute(command: list[str]) -> dict[str, Any]:
-    """Run a command in this process: exit code, and what was raised other than an exit."""
+    """Runs a command in this process: exit code, and exceptions other than an exit."""
     from access_av.cli import main
 
     sys.argv = list(command)
@@ -47,10 +47,10 @@ def execute(command: list[str]) -> dict[str, Any]:
     except SystemExit as stopped:
         code = stopped.code or 0
     except (SettingsError, RecordingError, InputError, OSError) as error:
-        # A script's caller has the exception as it is; the command line makes a message of it.
+        # A script may raise these errors; the command line has to report them as messages.
         print(f"error: {plain(str(error))}", file=sys.stderr)
         code = 2 if command[0] == "python" else "an error that the command line let pass"
-    except BaseException:  # whatever it is, it is what this looks for
+    except BaseException:  # any other exception is a finding
         raised = traceback.format_exc()
     sys.stdout.flush()
     sys.stderr.flush()
@@ -58,7 +58,7 @@ def execute(command: list[str]) -> dict[str, Any]:
 
 
 def run(seed: int, kind: str, number: int, folder: Path) -> dict[str, Any]:
-    """Make a case in ``folder``, run it there, and judge it."""
+    """Creates a case in ``folder``, runs it there, and judges it."""
     folder.mkdir(parents=True)
     command = kinds.make(seed, kind, number, folder)
     before = set(folder.rglob("*"))
@@ -83,10 +83,10 @@ def run(seed: int, kind: str, number: int, folder: Path) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Answer until there is nothing more to read."""
+    """Answers until the end of the input."""
     seed, place = int(sys.argv[1]), Path(sys.argv[2])
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    # Tables and charts are loaded before the limit is set: it is of what a case takes.
+    # Tables and charts are loaded before the limit is set, so that it applies to a case only.
     page.bundle()
     files.recorded()
     limit_memory()

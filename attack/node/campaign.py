@@ -112,7 +112,7 @@ def table(verdicts: list[Verdict]) -> Table:
 
 
 def markdown(verdicts: list[Verdict]) -> str:
-    """The same table for the documentation: maxima in seconds."""
+    """Table for the documentation: maxima in seconds."""
 
     def largest(values: list[float | None]) -> str:
         known = [it for it in values if it is not None]

@@ -119,7 +119,7 @@ class Node:
         self.process = None
 
     def errors(self) -> str:
-        """What the process wrote to standard error."""
+        """Standard error of the process."""
         return (self.folder / "stderr.txt").read_text(encoding="utf-8", errors="replace")
 
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 PLAIN = [
     "CONTRIBUTING.md",
     "README.md",
+    "attack/*.py",
+    "attack/node/*.py",
     "benches/*.py",
     "crates/aoa/README.md",
     "crates/aoa/benches/*.rs",
