@@ -147,6 +147,10 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    if sys.argv[1:3] == ["node", "gaps"]:
+        from attack.node import gaps
+
+        sys.exit(gaps.main(sys.argv[3:]))
     if sys.argv[1:2] == ["node"]:
         from attack.node import campaign
 

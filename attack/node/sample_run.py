@@ -7,7 +7,7 @@ import subprocess
 import threading
 import time
 import zlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,10 @@ from attack.node.recorder import Recorder
 from attack.node.run import MQTT_PERIOD_S, Recorded
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
+
+    from attack.node.recorder import Arrival
 
 # Drive time before a fault (s); a random part of 1 s is added. The SSBs are found by then.
 BEFORE_S = 4.0
@@ -76,11 +79,32 @@ def play(fault: Fault, seed: int, repetition: int, folder: Path, recorded: Path)
     )
 
 
-def stream(fault: Fault, seed: int, repetition: int, folder: Path, recorded: Path) -> Recorded:
-    """Sends samples and odometry in real time; the samples of the fault are withheld."""
-    withheld = fault.withheld
-    assert withheld is not None
-    _, window = _drawn(fault, seed, repetition)
+class Transmission(NamedTuple):
+    """Result of samples and odometry that were sent in real time; times are Unix times (s)."""
+
+    epoch_s: float
+    ended_s: float
+    arrivals: list[Arrival]
+    node: Node
+    resources: list[Resources | None]
+    lateness_s: float
+
+
+def transmit(
+    folder: Path,
+    recorded: Path,
+    is_withheld: Callable[[float], bool],
+    begin_s: float,
+    settings: str = "",
+    *,
+    counts_samples: bool = False,
+) -> Transmission:
+    """Sends a drive, without the samples at the drive times of `is_withheld`.
+
+    The resources of the process are measured before `begin_s` (drive time) and at the end.
+    `settings` are further top-level keys of the node's file. With `counts_samples`, the node's
+    clock counts samples from 0, and so do the times of the odometry.
+    """
     folder.mkdir(parents=True)
     ports = {name: free_port() for name in ("messages", "json", "page")}
     recorder = Recorder(ports["json"], ports["page"])
@@ -89,11 +113,13 @@ def stream(fault: Fault, seed: int, repetition: int, folder: Path, recorded: Pat
         shutil.copy(recorded / name, folder)
     sleeping = access_av.Vehicle.load(str(folder / "vehicle.toml")).with_overrides(SLEEPING)
     (folder / "vehicle.toml").write_text(sleeping.to_toml(), encoding="utf-8")
-    settings = f"""\
+    clock = "clock.start-time-s = 0.0\n" if counts_samples else ""
+    text = f"""\
 name = "campaign"
 messages = ["tcp-listen://127.0.0.1:{ports["messages"]}"]
 page.listen = "127.0.0.1:{ports["page"]}"
-{sender.toml()}
+{settings}
+{sender.toml(clock)}
 [output]
 json.address = "tcp-listen://127.0.0.1:{ports["json"]}"
 [output.mqtt]
@@ -103,7 +129,7 @@ topic = "fleet/position"
 map_id = "campaign"
 rate_hz = {1.0 / MQTT_PERIOD_S}
 """
-    (folder / "node.toml").write_text(settings, encoding="utf-8")
+    (folder / "node.toml").write_text(text, encoding="utf-8")
     files = [str(folder / name) for name in ("site.toml", "vehicle.toml", "node.toml")]
     command = [*main_program(), "--site", files[0], "--vehicle", files[1], files[2]]
     node, client = Node(folder, command), Client(ports["messages"])
@@ -111,10 +137,7 @@ rate_hz = {1.0 / MQTT_PERIOD_S}
     resources: list[Resources | None] = []
     lateness_s = 0.0
     epoch_s = time.time() + SETTLE_S
-
-    def is_withheld(now_s: float) -> bool:
-        return now_s in window and withheld(now_s - window.begin_s)
-
+    origin_s = 0.0 if counts_samples else epoch_s
     sending = threading.Thread(target=sender.run, args=(epoch_s, is_withheld))
     try:
         node.start()
@@ -123,8 +146,8 @@ rate_hz = {1.0 / MQTT_PERIOD_S}
             message = Message(sample["time_s"], {"type": "odometry", **sample})
             time.sleep(max(0.0, epoch_s + message.send_s - time.time()))
             lateness_s = max(lateness_s, time.time() - epoch_s - message.send_s)
-            client.send(message.encode(epoch_s))
-            if not resources and message.send_s > window.begin_s - 0.5:
+            client.send(message.encode(origin_s))
+            if not resources and message.send_s > begin_s - 0.5:
                 resources.append(node.resources())
             node.watch()
         resources.append(node.resources())
@@ -136,18 +159,33 @@ rate_hz = {1.0 / MQTT_PERIOD_S}
         sending.join()
         sender.close()
         recorder.stop()
+    arrivals = [it for it in recorder.arrivals if it.at_s <= ended_s]
+    lateness_s = max(lateness_s, recorder.pause_s)
+    return Transmission(epoch_s, ended_s, arrivals, node, resources, lateness_s)
+
+
+def stream(fault: Fault, seed: int, repetition: int, folder: Path, recorded: Path) -> Recorded:
+    """Sends samples and odometry in real time; the samples of the fault are withheld."""
+    withheld = fault.withheld
+    assert withheld is not None
+    _, window = _drawn(fault, seed, repetition)
+
+    def is_withheld(now_s: float) -> bool:
+        return now_s in window and withheld(now_s - window.begin_s)
+
+    sent = transmit(folder, recorded, is_withheld, window.begin_s)
     return Recorded(
         fault=fault,
         motion=samples.Trajectory(recorded),
-        epoch_s=epoch_s,
+        epoch_s=sent.epoch_s,
         window=window,
-        ended_s=ended_s,
-        arrivals=[it for it in recorder.arrivals if it.at_s <= ended_s],
-        exits=node.unexpected_exits,
-        is_hung=node.is_hung,
-        resources=resources,
-        errors=node.errors(),
-        lateness_s=max(lateness_s, recorder.pause_s),
+        ended_s=sent.ended_s,
+        arrivals=sent.arrivals,
+        exits=sent.node.unexpected_exits,
+        is_hung=sent.node.is_hung,
+        resources=sent.resources,
+        errors=sent.node.errors(),
+        lateness_s=sent.lateness_s,
     )
 
 

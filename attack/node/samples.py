@@ -59,11 +59,11 @@ class Trajectory:
         return Pose(x_m, y_m, math.nan)
 
 
-def record(folder: Path) -> Path:
+def record(folder: Path, duration_s: float = DURATION_S) -> Path:
     """Records the drive, unless the folder has it."""
     if not (folder / "vehicle.toml").exists():
         scenario = access_av.Scenario.load("yard").with_overrides(OVERRIDES)
-        access_av.synthesize(scenario, folder, duration_s=DURATION_S)
+        access_av.synthesize(scenario, folder, duration_s=duration_s)
     return folder
 
 
@@ -151,13 +151,13 @@ class Stream:
         self.endpoints = [it.getsockopt_string(zmq.LAST_ENDPOINT) for it in self.sockets]
         self.stopped = threading.Event()
 
-    def toml(self) -> str:
-        """`[samples]` of the node, with its default clock."""
+    def toml(self, clock: str = "") -> str:
+        """`[samples]` of the node, with its default clock or a line that configures another."""
         return (
             f'[samples]\nsource = "zeromq"\nendpoints = {json.dumps(self.endpoints)}\n'
             f"[samples.stream]\nrate_msps = {self.drive.rate_hz / 1e6}\n"
             f"centre_mhz = {self.drive.centre_mhz}\n"
-            f"antennas = {list(range(self.drive.antennas))}\n"
+            f"antennas = {list(range(self.drive.antennas))}\n{clock}"
         )
 
     def run(self, epoch_s: float, is_withheld: Callable[[float], bool]) -> None:
@@ -170,7 +170,7 @@ class Stream:
             for rep, samples in zip(self.sockets, block, strict=True):
                 if not self._was_asked(rep):
                     return
-                rep.send(np.ascontiguousarray(samples))
+                rep.send(samples.tobytes())
 
     def _was_asked(self, rep: Any) -> bool:
         while not self.stopped.is_set():

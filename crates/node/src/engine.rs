@@ -424,6 +424,7 @@ impl Engine {
             }
             Ok((setup, live)) => {
                 self.swap(setup, live)?;
+                self.board.set_site(&self.setup.site);
                 let text = "site and vehicle are loaded again; the pose is resumed and is to be confirmed by angles";
                 self.event(Level::Info, "node", text.to_owned());
             }

@@ -208,8 +208,8 @@ fn drive(
     let fingerprint = state::fingerprint(&setup.site, &setup.vehicle);
     let punctuality = Arc::new(Punctuality::default());
     let page_s = settings.page.as_ref().map_or(1.0, |it| 1.0 / it.rate_hz);
-    let heads = setup.site.radio_heads.iter();
     let board = Arc::new(Board::new(
+        &settings.name,
         Duration::from_secs_f64(page_s),
         Counters {
             inbox: Arc::clone(&sources.inbox),
@@ -217,13 +217,10 @@ fn drive(
             punctuality: Arc::clone(&punctuality),
             sources: sources.health.clone(),
             rate_hz: sources.stream.map_or(0.0, |it| it.rate_hz),
-            heads: heads
-                .map(|it| (it.pci, it.ssb_index, it.name.clone()))
-                .collect(),
         },
     ));
+    board.set_site(&setup.site);
     let stop = Arc::new(AtomicBool::new(false));
-    let site = web::site_json(&setup.site, &settings.name);
     let gate = Arc::clone(&sources.gate);
     let mut engine = Engine::new(
         setup,
@@ -239,15 +236,12 @@ fn drive(
     if !is_playback {
         engine.reload_by(reload);
     }
-    serve(
-        settings.page.as_ref(),
-        &board,
-        site,
-        &stop,
-        reload_requested,
-    )?;
+    serve(settings.page.as_ref(), &board, &stop, reload_requested)?;
     let writing = sink::start(sinks, &records)?;
     engine.event(Level::Info, "node", format!("{} begins", settings.name));
+    for (source, text) in std::mem::take(&mut sources.remarks) {
+        engine.event(Level::Warn, source, text);
+    }
     let saving = match &settings.state_file {
         Some(file) => {
             let path = PathBuf::from(file);
@@ -297,7 +291,6 @@ fn drive(
 fn serve(
     page: Option<&PageSettings>,
     board: &Arc<Board>,
-    site: serde_json::Value,
     stop: &Arc<AtomicBool>,
     reload_requested: Arc<AtomicBool>,
 ) -> Result<()> {
@@ -330,7 +323,7 @@ fn serve(
             };
             let serving = async {
                 match listener {
-                    Some((listener, page)) => web::serve(listener, &page, board, &site).await,
+                    Some((listener, page)) => web::serve(listener, &page, board).await,
                     None => std::future::pending().await,
                 }
             };

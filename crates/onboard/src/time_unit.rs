@@ -131,16 +131,18 @@ pub struct StreamTimes {
     steps_s: [f64; STREAM_STEPS],
     count: usize,
     times: OdometryTimes,
+    unit: Option<TimeUnit>,
 }
 
 impl StreamTimes {
-    /// Takes a sample; returns the unit of its times if they are not seconds. A distance of NaN is not given.
+    /// Takes a sample; returns the unit of the stream's times if they are not seconds, also for all later samples. A
+    /// distance of NaN is not given.
     pub fn add(&mut self, sample: &OdometrySample) -> Option<TimeUnit> {
         let Some(last) = self.last.replace(*sample) else {
             return TimeUnit::of_epoch(sample.time_s);
         };
         let Some(slot) = self.steps_s.get_mut(self.count) else {
-            return TimeUnit::of_epoch(sample.time_s);
+            return self.unit.or_else(|| TimeUnit::of_epoch(sample.time_s));
         };
         let step_s = sample.time_s - last.time_s;
         if step_s.is_nan() || step_s <= 0.0 {
@@ -162,7 +164,8 @@ impl StreamTimes {
         let mut sorted_s = self.steps_s;
         sorted_s.sort_unstable_by(f64::total_cmp);
         self.times.step_s = sorted_s.get(STREAM_STEPS / 2).copied().unwrap_or(0.0);
-        self.times.unit()
+        self.unit = self.times.unit();
+        self.unit
     }
 }
 
@@ -179,7 +182,7 @@ mod tests {
     ) -> Option<TimeUnit> {
         let mut times = StreamTimes::default();
         let samples = (0..20).map(|k| f64::from(k) / rate_hz);
-        let mut units = samples.map(|time_s| {
+        let units = samples.map(|time_s| {
             times.add(&OdometrySample {
                 time_s: (start_s + time_s) * per_second,
                 distance_m: if has_distance { time_s } else { f64::NAN },
@@ -187,7 +190,11 @@ mod tests {
                 yaw_rate_radps: None,
             })
         });
-        units.find_map(|unit| unit)
+        let units: Vec<_> = units.collect();
+        // The verdict of the first intervals holds for all later samples.
+        let judged = &units[STREAM_STEPS..];
+        assert!(judged.iter().all(|it| *it == judged[0]), "{units:?}");
+        units.into_iter().find_map(|unit| unit)
     }
 
     #[test]

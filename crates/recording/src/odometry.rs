@@ -177,6 +177,11 @@ pub enum OdometryIssue {
 }
 
 impl OdometryRemark {
+    /// Whether an item was left out, or items may be missing.
+    pub const fn is_defect(&self) -> bool {
+        !self.issue.used() || matches!(self.issue, OdometryIssue::Truncated(_))
+    }
+
     /// A remark on the file itself, of items of a kind.
     pub(crate) fn of_file(kind: &'static str, issue: OdometryIssue) -> Self {
         Self {

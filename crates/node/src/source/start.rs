@@ -30,6 +30,8 @@ pub struct Sources {
     pub stream: Option<StreamConfig>,
     /// Odometry, angles and recording from files.
     pub files: Files,
+    /// Defects of the files, each with its source.
+    pub remarks: Vec<(&'static str, String)>,
 }
 
 /// Files for playback.
@@ -53,7 +55,7 @@ impl Sources {
         antennas: usize,
         track_width_m: Option<f64>,
     ) -> Result<Self> {
-        let mut files = Files::default();
+        let (mut files, mut remarks) = (Files::default(), Vec::new());
         let mut stream = None;
         let mut health = Vec::new();
         if let Some(samples) = &settings.samples {
@@ -109,11 +111,16 @@ impl Sources {
                 track_width_m,
             };
             files.odometry = recording::read_odometry(odometry.file.as_ref(), &choice)?;
+            let defects = files.odometry.remarks.iter();
+            let defects = defects.filter(|it| it.is_defect()).map(ToString::to_string);
+            remarks.extend(defects.map(|text| ("odometry", text)));
             health.push("odometry");
         }
         if let Some(angles) = &settings.angles {
             let topic = angles.topic.as_deref();
-            files.angles = recording::read_angles(angles.file.as_ref(), topic)?.angles;
+            let log = recording::read_angles(angles.file.as_ref(), topic)?;
+            remarks.extend(log.remarks.iter().map(|it| ("angles", it.to_string())));
+            files.angles = log.angles;
             health.push("angles");
         }
         recording::replay::check_times(&files.odometry, &files.angles)?;
@@ -126,6 +133,7 @@ impl Sources {
                 .collect(),
             stream,
             files,
+            remarks,
         })
     }
 

@@ -5,8 +5,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use onboard::live::{HeadStatus, LiveEnergy, Status, StreamCounts};
+use onboard::settings::Site;
 use serde_json::{Value, json};
 
+use super::site::site_json;
 use crate::events;
 use crate::inbox::{Inbox, Level};
 use crate::sink::{Distributor, EnergyMessage, HeadMessage, PoseFields};
@@ -31,8 +33,17 @@ pub struct Counters {
     pub sources: Vec<Arc<SourceHealth>>,
     /// Sample rate in Hz; 0 without samples.
     pub rate_hz: f64,
+}
+
+/// The site of the map.
+#[derive(Debug, Clone, Default)]
+pub struct ShownSite {
+    /// Road and radio heads as JSON, with the number of the site.
+    pub json: Arc<str>,
     /// Names of the radio heads, with cell and beam.
-    pub heads: Vec<(u16, u8, String)>,
+    pub heads: Arc<[(u16, u8, String)]>,
+    /// Number of changes since the start.
+    pub number: u64,
 }
 
 /// The newest state.
@@ -52,6 +63,7 @@ pub struct Shown {
 
 #[derive(Default)]
 struct State {
+    site: ShownSite,
     shown: Option<Shown>,
     /// Time of the newest state.
     shown_at: Option<Instant>,
@@ -76,6 +88,7 @@ struct Row {
 /// The state that the page and the metrics show.
 pub struct Board {
     state: Mutex<State>,
+    name: String,
     period: Duration,
     /// Counters of the other parts of the node.
     pub counters: Counters,
@@ -83,14 +96,15 @@ pub struct Board {
 }
 
 impl Board {
-    /// An empty board with this update period.
-    pub fn new(period: Duration, counters: Counters) -> Self {
+    /// An empty board of a node, by its name, with this update period.
+    pub fn new(name: &str, period: Duration, counters: Counters) -> Self {
         let state = State {
             track_m: TRACK_M,
             ..State::default()
         };
         Self {
             state: Mutex::new(state),
+            name: name.to_owned(),
             period,
             counters,
             began: Instant::now(),
@@ -99,6 +113,24 @@ impl Board {
 
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Sets the site of the map.
+    pub fn set_site(&self, site: &Site) {
+        let mut json = site_json(site, &self.name);
+        let heads = site.radio_heads.iter();
+        let heads = heads.map(|it| (it.pci, it.ssb_index, it.name.clone()));
+        let mut state = self.lock();
+        state.number += 1;
+        state.site.number += 1;
+        json["number"] = json!(state.site.number);
+        state.site.json = json.to_string().into();
+        state.site.heads = heads.collect();
+    }
+
+    /// Returns the site of the map.
+    pub fn site(&self) -> ShownSite {
+        self.lock().site.clone()
     }
 
     /// Whether the next update is due.
@@ -179,6 +211,7 @@ impl Board {
     pub fn to_json(&self) -> Value {
         let state = self.lock();
         let (shown, shown_at) = (state.shown.clone(), state.shown_at);
+        let site_number = state.site.number;
         let events: Vec<Value> = state.events.iter().map(row_json).collect();
         drop(state);
         let counters = &self.counters;
@@ -187,6 +220,7 @@ impl Board {
         let sources: Vec<Value> = counters.sources.iter().map(|it| source_json(it)).collect();
         let mut value = json!({
             "uptime_s": self.began.elapsed().as_secs_f64(),
+            "site_number": site_number,
             "age_s": shown_at.map(|it| it.elapsed().as_secs_f64()),
             "events": events,
             "sources": sources,

@@ -216,11 +216,12 @@ pub fn text(board: &Board) -> String {
             |it| Some(f64::from(u8::from(it.is_faulty))),
         ),
     ];
+    let names = board.site().heads;
     for (name, kind, help, value) in of_heads {
         text.family(name, kind, help);
         for head in &shown.heads {
             let (pci, beam) = (head.head.pci, head.head.ssb_index);
-            let known = counters.heads.iter().find(|it| (it.0, it.1) == (pci, beam));
+            let known = names.iter().find(|it| (it.0, it.1) == (pci, beam));
             let named = known.map_or("", |(_, _, name)| name.as_str());
             if let Some(value) = value(head) {
                 let (pci, beam) = (pci.to_string(), beam.to_string());

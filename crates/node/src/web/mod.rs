@@ -8,4 +8,3 @@ mod site;
 pub use board::{Board, Counters};
 pub use metrics::text as metrics_text;
 pub use server::{open, serve};
-pub use site::site_json;

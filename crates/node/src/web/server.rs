@@ -29,7 +29,6 @@ const PAGE: &str = include_str!("page.html");
 #[derive(Clone)]
 struct Shared {
     board: Arc<Board>,
-    site: Arc<str>,
     period: Duration,
 }
 
@@ -52,18 +51,16 @@ pub async fn serve(
     listener: TcpListener,
     settings: &PageSettings,
     board: Arc<Board>,
-    site: &serde_json::Value,
 ) -> Result<()> {
     let shared = Shared {
         board,
-        site: site.to_string().into(),
         period: Duration::from_secs_f64(1.0 / settings.rate_hz),
     };
     let router = Router::new()
         .route("/", get(page))
         .route(
             "/site.json",
-            get(|State(it): State<Shared>| async move { json_text(&it.site) }),
+            get(|State(it): State<Shared>| async move { json_text(&it.board.site().json) }),
         )
         .route("/state.json", get(state))
         .route("/events", get(events))

@@ -5,6 +5,7 @@ use super::time_base::{ClockStep, TimeBase};
 use super::time_check::{MAX_ANGLE_LEAD_S, TimeCheck, TimeDefect};
 use crate::localize::HISTORY_S;
 use crate::observation::{BURST_S, OdometrySample};
+use crate::time_unit::StreamTimes;
 
 /// The same lead where arrival times are not known, in seconds: a gap of the odometry is shorter.
 const MAX_LEAD_WITHOUT_ARRIVALS_S: f64 = 10.0;
@@ -29,6 +30,8 @@ pub struct Clocks {
     /// Clock of samples and angles.
     pub angles: TimeBase,
     last_odometry: Option<OdometrySample>,
+    /// Unit of the odometry's times, where arrival times do not show it.
+    times: StreamTimes,
     disagreement: Option<Disagreement>,
     step: Option<ClockStep>,
 }
@@ -56,6 +59,12 @@ impl Clocks {
             .last_odometry
             .is_some_and(|last| is_copy(&last, sample));
         let step = self.odometry.next(sample.time_s, self.arrival_s, is_copy)?;
+        if self.arrival_s.is_none()
+            && let Some(unit) = self.times.add(sample)
+        {
+            let ratio = unit.per_second();
+            return Err(TimeDefect::WrongUnit { unit, ratio });
+        }
         self.last_odometry = Some(*sample);
         if let (Some(_), None) = (step, self.arrival_s) {
             // Without arrival times the clocks are taken as one.

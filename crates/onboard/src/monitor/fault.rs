@@ -156,6 +156,12 @@ impl ActiveFaults {
         faults.find(|it| it.source() == FaultSource::Odometry)
     }
 
+    /// Whether a receive channel is at fault: the localizer then gets no angles.
+    pub fn has_channel(&self) -> bool {
+        self.iter()
+            .any(|it| matches!(it.fault.source(), FaultSource::Channel(_)))
+    }
+
     /// Whether a fault makes every angle wrong: channels that are inverted or exchanged.
     pub fn affects_angles(&self) -> bool {
         self.of_angles().is_some()

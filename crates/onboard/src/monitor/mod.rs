@@ -120,9 +120,7 @@ impl Monitors {
 
     /// Whether the burst at a time (s) is to be received, whatever the wake-up policy says.
     pub fn wants(&self, time_s: f64) -> bool {
-        self.faults.of_odometry().is_some()
-            || !self.confirmation.is_confirmed()
-            || self.motion.wants(time_s)
+        !self.faults.is_empty() || !self.confirmation.is_confirmed() || self.motion.wants(time_s)
     }
 
     /// Notes that the burst at a time (s) is received.

@@ -5,6 +5,7 @@ use onboard::geometry::Pose;
 use onboard::localize::OdometryVerdict;
 use onboard::localize::Recovered;
 use onboard::localize::ekf::EstimatedConstants;
+use onboard::monitor::ActiveFaults;
 use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
 use onboard::{Custom, Execution, Onboard};
@@ -29,6 +30,8 @@ pub struct Replay<'a> {
     was_lost: bool,
     /// Last recovery of the localizer.
     recovered: Option<Recovered>,
+    /// Active faults of the sensors that were remarked on.
+    faults: ActiveFaults,
     /// Whether the odometry before told of the end of the road.
     beyond_map: bool,
     /// Start positions of the reported gaps of the road (m).
@@ -60,6 +63,7 @@ impl<'a> Replay<'a> {
             onboard,
             was_lost: false,
             recovered: None,
+            faults: ActiveFaults::default(),
             beyond_map: false,
             gaps_m: Vec::new(),
             set_back_s: 0.0,
@@ -97,6 +101,7 @@ impl<'a> Replay<'a> {
             let heard = heard.map_err(ReplayError::Custom)?;
             self.drive.executions.extend_from_slice(heard.executions);
             self.remark_on_loss(time_s);
+            self.remark_on_faults(time_s);
             ssbs = later;
         }
         Ok(())
@@ -170,6 +175,45 @@ impl<'a> Replay<'a> {
         (self.was_lost, self.recovered) = (is_lost, recovered);
     }
 
+    /// Remarks on faults of odometry and receive channels that begin or end.
+    fn remark_on_faults(&mut self, time_s: f64) {
+        let before = std::mem::replace(&mut self.faults, *self.onboard.faults());
+        let now = self.faults;
+        for begun in now.iter().filter(|it| !before.contains(it.fault)) {
+            let text = format!(
+                "fault {} at {time_s:.1} s: {}; {}",
+                begun.fault.name(),
+                begun.fault,
+                begun.fault.what_to_do()
+            );
+            self.remark(time_s, text);
+        }
+        for ended in before.iter().filter(|it| !now.contains(it.fault)) {
+            let text = format!(
+                "fault {} at {time_s:.1} s: it has ended",
+                ended.fault.name()
+            );
+            self.remark(time_s, text);
+        }
+    }
+
+    /// Diagnoses the faults of the sensors that are active at the end of the drive.
+    fn diagnose_faults(&mut self) {
+        let active = self.faults;
+        for it in active.iter() {
+            self.drive.diagnoses.push(Diagnosis {
+                text: format!(
+                    "since {:.1} s {}; {}",
+                    it.since_s,
+                    it.fault,
+                    it.fault.what_to_do()
+                ),
+                is_of_start: false,
+                is_harmless: false,
+            });
+        }
+    }
+
     /// Takes in the rest of the odometry.
     ///
     /// # Errors
@@ -189,6 +233,7 @@ impl<'a> Replay<'a> {
             constants.lateness_s.found += self.set_back_s;
         }
         self.remark_on_constants();
+        self.diagnose_faults();
         self.drive.remarks = gathered(self.drive.remarks);
         Ok(self.drive)
     }
@@ -289,6 +334,7 @@ impl<'a> Replay<'a> {
                     continue;
                 }
             }
+            self.remark_on_faults(at_s);
             self.drive.poses.push(LocatedPose {
                 estimate: self.onboard.pose(at_s).map_err(ReplayError::Custom)?,
                 speed_mps: sample.speed_mps,
