@@ -199,16 +199,24 @@ def money_section(study: Study) -> str:
         return ""
     fleet = json.loads(study.plant.to_json())["fleet"]
     years, currency = fleet["years"], escape(study.prices.currency)
-    ways = study.ways.values()
-    rows = [
-        (f"to buy / {currency}", *(ends(way.capital) for way in ways)),
-        (f"a year / {currency}", *(ends(way.yearly) for way in ways)),
-        (f"{years:g} years / {currency}", *(ends(economy.total(way, years)) for way in ways)),
-        ("production / kgCO2e", *(ends(way.embodied_kg) for way in ways)),
-        ("use a year / kgCO2e", *(ends(way.use_kg_per_year) for way in ways)),
-        (f"{years:g} years / kgCO2e", *(ends(economy.total_kg(way, years)) for way in ways)),
+    money = [
+        (escape(name), ends(way.capital), ends(way.yearly), ends(economy.total(way, years)))
+        for name, way in study.ways.items()
     ]
-    head = (f"{fleet['vehicles']} vehicles by", *study.ways)
+    carbon = [
+        (
+            escape(name),
+            ends(way.embodied_kg),
+            ends(way.use_kg_per_year),
+            ends(economy.total_kg(way, years)),
+        )
+        for name, way in study.ways.items()
+    ]
+    vehicles = f"{fleet['vehicles']} vehicles by"
+    money_head = (vehicles, f"to buy / {currency}", f"a year / {currency}",
+                  f"{years:g} years / {currency}")  # fmt: skip
+    carbon_head = (vehicles, "production / kgCO2e", "use a year / kgCO2e",
+                   f"{years:g} years / kgCO2e")  # fmt: skip
     used = [
         "receiver", "computer", "lidar", "roadside_unit", "roadside_unit_yearly", "uwb_anchor",
         "uwb_anchor_spacing_m", "uwb_tag", "electricity_per_kwh", "grid_g_per_kwh",
@@ -224,5 +232,7 @@ def money_section(study: Study) -> str:
         "year. The cells are there anyway and are not counted; a computer counts with its price, "
         f"production and idle power. {published} of {len(used)} figures are published ones and "
         "unverified for this plant.",
-        table(head, rows, numbers=range(1, 1 + len(study.ways))) + sources(study, used),
+        table(money_head, money, numbers=range(1, 4))
+        + table(carbon_head, carbon, numbers=range(1, 4))
+        + sources(study, used),
     )
