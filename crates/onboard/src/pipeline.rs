@@ -1,4 +1,4 @@
-//! The pipeline on the vehicle.
+//! Pipeline on the vehicle.
 
 use crate::BoxError;
 use crate::estimator::{self, AngleEstimator};
@@ -18,7 +18,7 @@ use crate::thermal::ThermalNoise;
 use crate::wake_up::{self, Situation, WakeUpPolicy};
 use crate::walls::Walls;
 
-/// The pipeline on the vehicle. Nothing is allocated once it is warm.
+/// Pipeline on the vehicle. Nothing is allocated after initialisation.
 pub struct Onboard {
     surroundings: Surroundings,
     thermal: ThermalNoise,
@@ -32,28 +32,28 @@ pub struct Onboard {
     sensed: Vec<SensedSsb>,
     chosen: Vec<bool>,
     executions: Vec<Execution>,
-    /// Those of them that are for the localizer.
+    /// Updates for the localizer.
     burst: Vec<AngleUpdate>,
-    /// Monitors of the sensors, where the vehicle has an integrity monitor and a built-in localizer.
+    /// Sensor monitors, if the vehicle has integrity monitoring and a built-in localizer.
     monitors: Option<Box<Monitors>>,
     faults: ActiveFaults,
     keeps_journal: bool,
 }
 
-/// What does not change during a drive.
+/// Model that is constant during a drive.
 struct Surroundings {
     heads: Vec<RadioHead>,
-    /// Those that the user has excluded.
+    /// Radio heads that the user has excluded.
     excluded: Vec<RadioHead>,
     walls: Walls,
-    /// Of the radio heads those in sight of where the vehicle is believed to be, where there are walls.
+    /// Radio heads in line of sight of the estimated position, if the site has walls.
     seen: Vec<RadioHead>,
     budget: LinkBudget,
     height_m: f64,
 }
 
 impl Surroundings {
-    /// Looks about from where the vehicle is believed to be.
+    /// Updates the radio heads in line of sight of the estimated position.
     fn look(&mut self, time_s: f64, localizer: &History) -> Result<(), BoxError> {
         if self.walls.is_empty() || is_searching(localizer.localizer()) {
             return Ok(());
@@ -89,88 +89,88 @@ impl Surroundings {
     }
 }
 
-/// The user's own code in place of parts of the pipeline.
+/// User code that replaces parts of the pipeline.
 #[derive(Default)]
 pub struct Custom {
-    /// In place of the vehicle's angle estimator.
+    /// Replaces the angle estimator.
     pub estimator: Option<Box<dyn AngleEstimator>>,
-    /// In place of the vehicle's localizer.
+    /// Replaces the localizer.
     pub localizer: Option<Box<dyn Localizer>>,
-    /// In place of the vehicle's wake-up policy.
+    /// Replaces the wake-up policy.
     pub policy: Option<Box<dyn WakeUpPolicy>>,
 }
 
-/// An SSB burst, as far as the pipeline wants to know of it.
+/// SSB burst as an input of the pipeline.
 pub trait SsbSource {
-    /// Adds what can be told of the burst's SSBs without estimating an angle; the receiver must be
-    /// on for it.
+    /// Appends the SSBs of the burst, without angle estimates; the receiver must be on.
     ///
     /// # Errors
-    /// Whatever the source fails with; it ends the drive.
+    /// Errors of the source; an error ends the drive.
     fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError>;
 
-    /// The SSB that was sensed as number `index` of the burst.
+    /// Returns the SSB number `index` of the burst.
     ///
     /// # Errors
-    /// Whatever the source fails with; it ends the drive.
+    /// Errors of the source; an error ends the drive.
     fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError>;
 }
 
-/// An SSB, ready for the localizer or not yet.
+/// SSB with snapshots, or with an angle that was estimated elsewhere.
 #[derive(Debug, Clone, Copy)]
 pub enum Observed<'a> {
-    /// As the array received it.
+    /// Snapshots of the array.
     Snapshots(&'a SsbObservation),
-    /// With an angle that was estimated elsewhere.
+    /// Angle that was estimated elsewhere.
     Angle(AngleMeasurement),
 }
 
-/// What became of a burst.
+/// Result of a burst.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heard<'a> {
-    /// Whether the receiver listened to it at all.
+    /// Whether the burst was received.
     pub listened: bool,
-    /// The angles that were estimated.
+    /// Estimated angles.
     pub executions: &'a [Execution],
-    /// Whether the error keeps the policy's bound until the next burst, where it has one.
+    /// Whether the error remains below the policy's target until the next burst, if there is one.
     pub keeps_bound: Option<bool>,
 }
 
-/// One estimated angle and what became of it.
+/// Estimated angle and its result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Execution {
     /// The SSB.
     pub ssb: SensedSsb,
-    /// Its angle; `None` when its snapshots carry none.
+    /// Angle; `None` if the snapshots contain none.
     pub measured: Option<AngleMeasurement>,
-    /// What the localizer did with it.
+    /// Verdict of the localizer.
     pub verdict: UpdateVerdict,
-    /// The wake-up time that was in force, in seconds.
+    /// Wake-up time at this SSB, in seconds.
     pub wake_up_time_s: f64,
 }
 
-/// Why an odometry sample was left out; the pipeline goes on from what it had.
+/// Reason for the rejection of an odometry sample; the state is unchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum OdometryDefect {
-    /// Not later than the sample before.
+    /// The time is not after that of the previous sample.
     #[error("its time is not after the last sample's")]
     TimeReversed,
-    /// A value that is not a number.
+    /// A value is not finite.
     #[error("a value is not a finite number")]
     NotFinite,
 }
 
-/// As long as a pose is searched for, every angle helps.
+/// During a search for the pose, every angle is used.
 fn is_searching(localizer: &dyn Localizer) -> bool {
     localizer.hypotheses().is_some() || localizer.is_lost()
 }
 
 impl Onboard {
-    /// The pipeline of a vehicle at a site, at 0 s and `start`, or in search of its start where the
-    /// vehicle's settings say that it is not known.
+    /// Creates the pipeline of a vehicle at a site, at 0 s and `start`, or with a search if the
+    /// vehicle's settings specify an unknown start.
     ///
     /// # Errors
-    /// [`SettingsError`] when the vehicle cannot serve there, or the platform lacks what it asks.
+    /// [`SettingsError`] if the vehicle cannot operate at the site, or the platform lacks a
+    /// required value.
     pub fn new(
         site: &Site,
         vehicle: &Vehicle,
@@ -227,12 +227,12 @@ impl Onboard {
         })
     }
 
-    /// Takes in an odometry sample, and says what the localizer made of it. The first one is where
-    /// distances are counted from.
+    /// Processes an odometry sample and returns the verdict of the localizer. The first sample
+    /// defines the origin of the distance.
     ///
     /// # Errors
-    /// Whatever a user's localizer fails with. What is wrong with the sample itself is an
-    /// [`OdometryDefect`]; the state is kept.
+    /// Errors of a custom localizer. An invalid sample returns an [`OdometryDefect`] and leaves the
+    /// state unchanged.
     pub fn odometry(
         &mut self,
         sample: &OdometrySample,
@@ -254,14 +254,15 @@ impl Onboard {
         Ok(Ok(verdict))
     }
 
-    /// Changes the localizer where the odometry's faults begin and end.
+    /// Changes the localizer at the start and end of odometry faults.
     fn follow_monitors(&mut self) -> Result<(), BoxError> {
         let Some(monitors) = &mut self.monitors else {
             return Ok(());
         };
         self.faults = *monitors.faults();
         let localizer = self.localizer.localizer();
-        // A search for the first pose takes every angle anyway; smoothing needs one filter for the whole drive.
+        // A search for the initial pose uses every angle anyway; smoothing needs one filter for the
+        // whole drive.
         if localizer.hypotheses().is_some() || self.keeps_journal {
             return Ok(());
         }
@@ -281,17 +282,17 @@ impl Onboard {
         Ok(())
     }
 
-    /// The active faults of odometry and receive channels.
+    /// Returns the active faults of odometry and receive channels.
     pub const fn faults(&self) -> &ActiveFaults {
         &self.faults
     }
 
-    /// Takes in the SSB burst at `time_s`: listens if the policy says so, considers what is sensed,
-    /// selects the SSBs worth an angle, estimates those and lets the localizer have them. The burst
-    /// may be older than the newest odometry.
+    /// Processes the SSB burst at `time_s`: receives it if the policy requests it, measures its
+    /// SSBs, selects SSBs, estimates their angles and updates the localizer. The burst may be older
+    /// than the newest odometry.
     ///
     /// # Errors
-    /// Whatever the source, or a user's estimator, policy or localizer, fails with.
+    /// Errors of the source or of user code.
     pub fn hear(&mut self, time_s: f64, source: &mut dyn SsbSource) -> Result<Heard<'_>, BoxError> {
         self.sensed.clear();
         self.executions.clear();
@@ -315,7 +316,7 @@ impl Onboard {
                 self.chosen.fill(true);
             }
             if !searching && !self.surroundings.walls.is_empty() {
-                // What comes from behind a wall says nothing of where it is sent.
+                // The angle of a wave through a wall contains no information about the radio head.
                 for (chosen, ssb) in self.chosen.iter_mut().zip(&self.sensed) {
                     *chosen &= now.head(ssb).is_some();
                 }
@@ -359,12 +360,12 @@ impl Onboard {
         }
     }
 
-    /// Whether a monitor wants the burst at a time (s).
+    /// Whether a monitor requests the burst at `time_s`.
     fn is_wanted(&self, time_s: f64) -> bool {
         (self.monitors.as_ref()).is_some_and(|monitors| monitors.wants(time_s))
     }
 
-    /// Hands the angles of the burst at a time (s) to the monitors.
+    /// Passes the angles of the burst at `time_s` to the monitors.
     fn monitor_angles(&mut self, time_s: f64) -> Result<(), BoxError> {
         let Some(monitors) = &mut self.monitors else {
             return Ok(());
@@ -380,15 +381,15 @@ impl Onboard {
         self.follow_monitors()
     }
 
-    /// The angles that were estimated of the last burst that was heard.
+    /// Returns the angles of the last received burst.
     pub fn executions(&self) -> &[Execution] {
         &self.executions
     }
 
-    /// Whether the receiver is to listen to the burst at `time_s`, as things stand now.
+    /// Whether the policy currently requests the burst at `time_s`.
     ///
     /// # Errors
-    /// Whatever a user's policy fails with.
+    /// Errors of a custom policy.
     pub fn listens(&mut self, time_s: f64) -> Result<bool, BoxError> {
         let is_wanted = self.is_wanted(time_s);
         let newest_s = self.odometry.map_or(time_s, |sample| sample.time_s);
@@ -398,8 +399,8 @@ impl Onboard {
         Ok(is_wanted || is_searching(now.localizer) || self.policy.listens(&now)?)
     }
 
-    /// Leaves the angles of a cell out from now on, or takes them in again; `false` where the site has
-    /// no such cell.
+    /// Excludes the angles of a cell from now on, or includes them again; returns `false` if the
+    /// site does not have the cell.
     pub fn exclude(&mut self, pci: u16, excluded: bool) -> bool {
         let Surroundings {
             heads,
@@ -412,11 +413,10 @@ impl Onboard {
         known
     }
 
-    /// Goes on with another localizer, which knows nothing of what came before but the newest odometry,
-    /// from where it counts distances.
+    /// Replaces the localizer by another one, which starts at the newest odometry.
     ///
     /// # Errors
-    /// Whatever a user's localizer fails with.
+    /// Errors of a custom localizer.
     pub fn replace_localizer(&mut self, localizer: Box<dyn Localizer>) -> Result<(), BoxError> {
         self.localizer = History::new(localizer);
         if let Some(newest) = &self.odometry {
@@ -429,7 +429,7 @@ impl Onboard {
         Ok(())
     }
 
-    /// Forgets the odometry so far: its clock, or its distance, begins anew.
+    /// Removes the odometry state, because its clock or its distance restarts.
     pub fn forget_odometry(&mut self) {
         self.odometry = None;
         if let Some(monitors) = &mut self.monitors {
@@ -438,7 +438,7 @@ impl Onboard {
         }
     }
 
-    /// The newest odometry.
+    /// Returns the newest odometry.
     pub const fn newest_odometry(&self) -> Option<&OdometrySample> {
         self.odometry.as_ref()
     }
@@ -458,7 +458,7 @@ impl Onboard {
         Ok(())
     }
 
-    /// Remembers an SSB's angle for the localizer, which has those of a burst together.
+    /// Stores the angle of an SSB for the localizer, which processes those of a burst together.
     fn collect(&mut self, ssb: SensedSsb, measured: Option<AngleMeasurement>) {
         let measured = measured.map(|measured| AngleMeasurement {
             time_s: measured.time_s - self.lateness_s,
@@ -491,26 +491,26 @@ impl Onboard {
         });
     }
 
-    /// Number of places the vehicle may be at while it searches for its first pose; `None` once
-    /// that is known. Until then [`pose`](Self::pose) is the mean of these places.
+    /// Returns the number of hypotheses during the search for the initial pose; `None` afterwards.
+    /// During the search, [`pose`](Self::pose) returns the mean of the hypotheses.
     pub fn searching(&self) -> Option<usize> {
         self.localizer.localizer().hypotheses()
     }
 
-    /// Whether the angles come from elsewhere than expected, so that the pose is not to be relied on.
+    /// Whether most angles contradict the prediction, so that the pose must not be used.
     pub fn is_lost(&self) -> bool {
         self.localizer.localizer().is_lost()
     }
 
-    /// How the localizer came back when it was lost last.
+    /// Returns the last recovery of a lost localizer.
     pub fn recovered(&self) -> Option<Recovered> {
         self.localizer.localizer().recovered()
     }
 
-    /// Where the vehicle is believed to be at `time_s`, not before the newest odometry.
+    /// Returns the estimated pose at `time_s`, which is not before the newest odometry.
     ///
     /// # Errors
-    /// Whatever a user's localizer fails with.
+    /// Errors of a custom localizer.
     pub fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
         let mut estimate = self.localizer.localizer().pose(time_s)?;
         if self.faults.affects_angles()
@@ -519,14 +519,15 @@ impl Onboard {
             integrity.state = IntegrityState::Unavailable;
         }
         if self.faults.of_odometry().is_some() {
-            // The level of a monitored localizer assumes that the odometry is right.
+            // The level of a monitored localizer assumes correct odometry.
             let level_m = Fallback::level_m(&estimate);
             estimate.integrity = Some(Integrity::unavailable(level_m));
         }
         Ok(estimate)
     }
 
-    /// Constants of odometer, yaw rate, array and clock as estimated by now, where the localizer does.
+    /// Returns the estimated constants of odometer, yaw rate, array and clock, if the localizer
+    /// estimates them.
     pub fn constants(&self) -> Option<EstimatedConstants> {
         let mut constants = self.localizer.localizer().ekf()?.constants();
         constants.lateness_s.stated += self.lateness_s;
@@ -534,15 +535,15 @@ impl Onboard {
         Some(constants)
     }
 
-    /// Keeps from now on what smoothing takes, where the localizer is one filter and no bank,
-    /// whose filters take each other's place. Angles must come in time from now on.
+    /// Keeps a journal for smoothing from now on, if the localizer is a single filter; the filters
+    /// of a bank replace each other. Angles must be in order of time from now on.
     pub fn keep_journal(&mut self) {
         self.keeps_journal = true;
         self.localizer.keep_journal();
     }
 
-    /// Where the vehicle was at each odometry sample since the journal was begun, by everything
-    /// that is known now; nowhere without a journal.
+    /// Returns the smoothed pose at each odometry sample since the start of the journal; empty
+    /// without a journal.
     pub fn smoothed(&self) -> Vec<PoseEstimate> {
         let ekf = self.localizer.localizer().ekf();
         ekf.map(Ekf::smoothed).unwrap_or_default()

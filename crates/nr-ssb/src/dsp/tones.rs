@@ -6,7 +6,8 @@
 //! sidelobes are 92 dB below the main lobe) and transformed. The power of a bin is summed over the antennas
 //! and its median is taken over the frames: bursts that last for less than half of the frames are no
 //! lines. A bin is a line if it exceeds the medians of its surroundings, 5 to 16 bins away, on either side by
-//! [`PROMINENCE`]: the edge of a band exceeds one of them only. Resource elements are 8 bins wide at the base rate and stay below that.
+//! [`PROMINENCE`]: the edge of a band exceeds only one of them. Resource elements are 8 bins wide
+//! at the base rate, and remain below that.
 //! An input without lines is left unchanged, bit by bit.
 //!
 //! # Removal
@@ -153,7 +154,7 @@ impl ToneCanceller {
         !self.lines.is_empty()
     }
 
-    /// Forgets all lines.
+    /// Removes all lines.
     pub(crate) fn forget(&mut self) {
         self.lines.clear();
     }
@@ -390,7 +391,7 @@ impl ToneCanceller {
         }
     }
 
-    /// Whether the line added last is none of its own.
+    /// Whether the line added last coincides with another line.
     fn coincide(&self, length: usize) -> bool {
         let Some((last, others)) = self.lines.split_last() else {
             return false;

@@ -1,16 +1,16 @@
-//! What makes a scan impossible.
+//! Errors of a scan.
 
 use crate::input::front_end::FrontEndError;
 use crate::search::SearchError;
 
-/// What makes a scan impossible.
+/// Reason why a scan is impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScanError {
-    /// The recording's rate or channels do not suit.
+    /// The rate or the channels of the recording are invalid.
     #[error(transparent)]
     FrontEnd(#[from] FrontEndError),
-    /// The search refused its input.
+    /// The search rejected its input.
     #[error(transparent)]
     Search(#[from] SearchError),
 }

@@ -1,4 +1,4 @@
-//! What a scan finds.
+//! Results of a scan.
 
 use super::point::RasterPoint;
 use crate::dsp::base_rate::SYMBOL_SAMPLES;
@@ -6,23 +6,24 @@ use crate::search::DetectedSsb;
 use crate::standard::grid::SUBCARRIERS;
 use crate::standard::numerology::SubcarrierSpacing;
 
-/// What was found at one raster point.
+/// Cell search result at one raster point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RasterFind {
-    /// Where.
+    /// Raster point.
     pub point: RasterPoint,
     /// Subcarrier spacing of its SSBs.
     pub spacing: SubcarrierSpacing,
     /// Samples of the recording per sample at the base rate, the unit of
     /// [`DetectedSsb::sample_start`].
     pub input_per_output: f64,
-    /// The SSBs, in order of time.
+    /// Detected SSBs, in order of time.
     pub ssbs: Vec<DetectedSsb>,
 }
 
 impl RasterFind {
-    /// Whether the other is but this one's shadow: PSS and SSS are made of m-sequences, and one that
-    /// is shifted in frequency looks like another cell's. Its SSBs come at the same times, weaker.
+    /// Whether another result is a ghost of this one: PSS and SSS are m-sequences, and a
+    /// frequency-shifted m-sequence resembles that of another cell. The SSBs of a ghost are
+    /// simultaneous and weaker.
     pub(super) fn casts(&self, other: &Self) -> bool {
         let away_hz = (self.point.ssb_freq_hz - other.point.ssb_freq_hz).abs();
         let same_time = |a: &DetectedSsb, b: &DetectedSsb| {
@@ -38,7 +39,7 @@ impl RasterFind {
             })
     }
 
-    /// The SSB of highest SNR.
+    /// Returns the SSB with the highest SNR.
     pub(super) fn strongest(&self) -> Option<&DetectedSsb> {
         self.ssbs
             .iter()

@@ -1,7 +1,7 @@
-//! Finding the SSB's frequency and subcarrier spacing: the synchronization raster of TS 38.104
-//! §5.4.3, point by point through the recorded band, at 15 and 30 kHz or, in frequency range 2, at 120 and
-//! 240 kHz. Test networks place SSBs
-//! elsewhere; for them, and for recordings that do not state their centre, see [`scan_off_raster`].
+//! Search for the frequency and subcarrier spacing of SSBs: the synchronization raster of TS 38.104
+//! §5.4.3, point by point through the recorded band, at 15 and 30 kHz or, in frequency range 2, at
+//! 120 and 240 kHz. Test networks may use other frequencies; for them, and for recordings without a
+//! centre frequency, see [`scan_off_raster`].
 
 mod error;
 mod find;

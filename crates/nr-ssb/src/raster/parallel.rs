@@ -1,17 +1,17 @@
-//! The same work on many items, on as many threads as there are processors.
+//! Parallel processing of items with one thread per processor.
 
 use std::num::NonZero;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// More threads than this wait for memory, not for processors.
+/// Maximum number of threads; more would wait for memory, not for processors.
 const MOST_THREADS: usize = 16;
 
-/// What `work` makes of each item, in the items' order whatever the threads; each thread has a
-/// worker of its own, with its plans and buffers, from `worker`.
+/// Returns the result of `work` for each item, in the order of the items. Each thread has its own
+/// worker (plans and buffers) from `worker`.
 ///
 /// # Errors
-/// The first, in the items' order, of either.
+/// The first error in the order of the items.
 pub(super) fn in_parallel<T: Sync, W, R: Send, E: Send>(
     items: &[T],
     worker: impl Fn() -> Result<W, E> + Sync,
@@ -43,7 +43,7 @@ pub(super) fn in_parallel<T: Sync, W, R: Send, E: Send>(
         .min(items.len())
         .saturating_sub(1);
     let mut done = thread::scope(|scope| {
-        // Where no thread is to be had, the others and this one do its share.
+        // If no thread can be created, the existing ones process its items.
         let helpers: Vec<_> = (0..others)
             .filter_map(|_| thread::Builder::new().spawn_scoped(scope, run).ok())
             .collect();

@@ -1,18 +1,19 @@
-//! Which frequency an SSB was placed at, where that is not known beforehand.
+//! Frequency of an SSB if it is not known in advance.
 //!
-//! Cells that are to be searched for lie on the synchronization raster, others anywhere on the
-//! global frequency raster (TS 38.104 §5.4.2.1): multiples of 5 kHz below 3 GHz, of 15 kHz above, of
-//! 60 kHz from 24.25008 GHz on.
-//! Test signals keep to neither, as one at 3500.0 MHz.
-//! What is received is that frequency plus the offset of the oscillators, and inside a symbol the
-//! two cannot be told apart. Between symbols they can: by TS 38.211 §5.4 symbol `l` carries
-//! `exp(−j2π f_SSB t_l)`, whereas an offset turns it by `exp(+j2π Δf t_l)`. A receiver that supposes a
-//! wrong frequency therefore finds the right offset between the symbols, but another one inside
-//! them, just as much off as its supposition (modulo a turn per symbol, 14 kHz at 15 kHz spacing).
+//! Cells that UEs search for are on the synchronization raster, others anywhere on the global
+//! frequency raster (TS 38.104 §5.4.2.1): multiples of 5 kHz below 3 GHz, of 15 kHz above, of 60
+//! kHz from 24.25008 GHz on. Test signals may be on neither, for example at 3500.0 MHz.
 //!
-//! So a point is as likely as these two offsets agree there, and as the offset is small:
-//! oscillators are good to about a part in a million. That is what decides where points differ by
-//! about a turn, as neighbours above 3 GHz do at 15 kHz spacing.
+//! The received frequency is the SSB frequency plus the oscillator offset. Within a symbol, the two
+//! cannot be separated. Between symbols they can: according to TS 38.211 §5.4, symbol `l` contains
+//! `exp(−j2π f_SSB t_l)`, whereas an offset adds the phase `exp(+j2π Δf t_l)`. A receiver that
+//! assumes a wrong SSB frequency therefore estimates the correct offset between symbols, but within
+//! symbols an offset that differs by the error of the assumption (modulo one turn per symbol, 14
+//! kHz at 15 kHz spacing).
+//!
+//! The likelihood of a raster point therefore depends on the agreement of both offsets and on the
+//! size of the offset, because oscillators are accurate to about 1 ppm. The latter decides between
+//! points that differ by about one turn, such as neighbours above 3 GHz at 15 kHz spacing.
 
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
@@ -23,21 +24,21 @@ use crate::numeric::phasors::wrap;
 use crate::search::DetectedSsb;
 use crate::standard::numerology::{FR2_FROM_HZ, SubcarrierSpacing};
 
-/// Standard deviation of oscillators, relative to the frequency.
+/// Relative standard deviation of oscillator frequencies.
 const OSCILLATOR: f64 = 1e-6;
-/// Standard deviation of the offset seen inside the symbols at 0 dB, in subcarriers, ...
+/// Standard deviation of the offset estimated within symbols at 0 dB, in subcarriers, ...
 const COARSE_AT_0_DB: f64 = 0.04;
-/// ... and however strong the SSB, echoes reaching over the cyclic prefix.
+/// ... and its minimum at high SNR, due to echoes beyond the cyclic prefix.
 const COARSE_AT_BEST: f64 = 0.01;
-/// What must speak against a point of the synchronization raster, against one of the global frequency
-/// raster, and again against a multiple of 5 kHz, in squared standard deviations.
+/// Penalty of a point off the synchronization raster, of a point off the global frequency raster,
+/// and of a frequency that is not a multiple of 5 kHz, in squared standard deviations.
 const RASTER_PREFERENCE: f64 = 16.0;
-/// Transmitters that keep to no raster are set by people, to multiples of this, ...
+/// Transmitters off the rasters are usually configured to multiples of this frequency, ...
 const SET_BY_HAND_HZ: f64 = 5e3;
-/// ... or, less likely again, of this.
+/// ... or, less often, of this one.
 const FINEST_HZ: f64 = 1e3;
 
-/// What speaks against a frequency beforehand, in squared standard deviations: nothing if it is one of
+/// Returns the prior penalty of a frequency in squared standard deviations: zero for a frequency of
 /// TS 38.104 Table 5.4.2.1-1.
 fn oddness(frequency_hz: f64) -> f64 {
     let is_whole = |units: f64| (units - units.round()).abs() < 1e-3;
@@ -53,8 +54,8 @@ fn oddness(frequency_hz: f64) -> f64 {
     }
 }
 
-/// Where inside `band_hz` an SSB was placed that a search around `tuned_hz` found there, `on_raster`
-/// being whether that is a point of the synchronization raster.
+/// Returns the frequency within `band_hz` of an SSB that a search around `tuned_hz` detected;
+/// `on_raster` states whether that is a point of the synchronization raster.
 pub(crate) fn placed_at(
     tuned_hz: f64,
     on_raster: bool,
@@ -66,7 +67,7 @@ pub(crate) fn placed_at(
     let symbol_s = SYMBOL_SAMPLES as f64 / spacing.base_rate_hz();
     let strength = 10f64.powf(-0.05 * ssb.snr_db);
     let coarse_hz = spacing.hz() * (COARSE_AT_0_DB * strength).max(COARSE_AT_BEST);
-    // The phase from symbol to symbol, with the offset inside the symbols taken out.
+    // Phase step between symbols, without that of the offset within symbols.
     let step = ssb.symbol_phase_step_rad + TAU * symbol_s * (ssb.cfo_hz - ssb.coarse_cfo_hz);
     let cost = |frequency_hz: f64| {
         let carrier_step = carrier_reset_step(frequency_hz, spacing.base_rate_hz());
@@ -77,8 +78,9 @@ pub(crate) fn placed_at(
             + oddness(frequency_hz)
     };
     let nearest = (received_hz / FINEST_HZ).round();
-    // As far as multiples of 5 kHz must go for the phases to agree with some of them, whatever the
-    // offset: these and a turn per symbol, some 14 times 1 kHz at 15 kHz spacing, have little in common.
+    // Range of multiples of 5 kHz that contains an agreement of the phases for any offset: these
+    // multiples and a turn per symbol (about 14 times 1 kHz at 15 kHz spacing) have almost no
+    // common divisor.
     let reach = (2.5e-3 * spacing.hz()).floor();
     let best = (0..=2 * reach as usize)
         .map(|i| (nearest - reach + i as f64) * FINEST_HZ)

@@ -1,17 +1,17 @@
-//! The synchronization raster.
+//! Synchronization raster.
 
-/// A frequency where a cell may place an SSB.
+/// Frequency at which a cell may transmit an SSB.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RasterPoint {
     /// Global synchronization channel number; `None` off the raster.
     pub gscn: Option<u16>,
-    /// Frequency of the SSB's centre (subcarrier 120), Hz; relative to the recording's centre where
+    /// Frequency of the SSB's centre (subcarrier 120) in Hz; relative to the recording's centre if
     /// that is unknown.
     pub ssb_freq_hz: f64,
 }
 
 impl RasterPoint {
-    /// A point off the raster.
+    /// Creates a point off the raster.
     pub(super) const fn off(ssb_freq_hz: f64) -> Self {
         Self {
             gscn: None,
@@ -20,9 +20,9 @@ impl RasterPoint {
     }
 }
 
-/// The points of the synchronization raster from `low_hz` to `high_hz` (TS 38.104 Table 5.4.3.1-1):
-/// `N · 1.2 MHz + M · 50 kHz`, M = 1, 3, 5, below 3 GHz, `3 GHz + N · 1.44 MHz` up to 24.25 GHz,
-/// `24.25008 GHz + N · 17.28 MHz` up to 100 GHz.
+/// Returns the points of the synchronization raster from `low_hz` to `high_hz` (TS 38.104 Table
+/// 5.4.3.1-1): `N · 1.2 MHz + M · 50 kHz`, M = 1, 3, 5, below 3 GHz, `3 GHz + N · 1.44 MHz` up to
+/// 24.25 GHz, `24.25008 GHz + N · 17.28 MHz` up to 100 GHz.
 pub fn synchronization_raster(low_hz: f64, high_hz: f64) -> impl Iterator<Item = RasterPoint> {
     let below = (1..2500_u16).flat_map(|n| {
         [1, 3, 5].map(move |m| RasterPoint {

@@ -1,4 +1,4 @@
-//! Front end and search at one subcarrier spacing, moved through a recording's band.
+//! Front end and search at one subcarrier spacing, tuned through the band of a recording.
 
 use num_complex::Complex32;
 
@@ -9,15 +9,15 @@ use crate::input::front_end::{FrontEnd, FrontEndError};
 use crate::search::{SearchConfig, Searcher};
 use crate::standard::numerology::SubcarrierSpacing;
 
-/// Offsets that the front end is tuned to at once.
+/// Number of offsets that the front end processes together.
 pub(crate) const AT_ONCE: usize = 8;
 
-/// See the module; owns the searcher's plans and the samples at the base rate.
+/// Tunable search. It owns the searcher's plans and the samples at the base rate.
 pub(crate) struct PointSearch {
     spacing: SubcarrierSpacing,
     front_end: FrontEnd,
     searcher: Searcher,
-    /// Per offset tuned to, the channels at the base rate.
+    /// Channels at the base rate for each tuned offset.
     bases: Vec<Vec<Vec<Complex32>>>,
 }
 
@@ -40,8 +40,8 @@ impl PointSearch {
         })
     }
 
-    /// The SSBs at one point, its frequency absolute or, where that of the recording's centre is not
-    /// known, relative to it, and around a carrier frequency offset.
+    /// Returns the SSBs at one point, around a carrier frequency offset. The frequency is absolute
+    /// or, if that of the recording's centre is unknown, relative to it.
     pub(crate) fn search(
         &mut self,
         antennas: &[&[Complex32]],
@@ -54,7 +54,7 @@ impl PointSearch {
         self.look(0, point, centre_hz.is_some())
     }
 
-    /// The SSBs at up to [`AT_ONCE`] points of known frequency.
+    /// Returns the SSBs at up to [`AT_ONCE`] points of known frequency.
     pub(crate) fn search_all(
         &mut self,
         antennas: &[&[Complex32]],
@@ -71,13 +71,13 @@ impl PointSearch {
         Ok(finds)
     }
 
-    /// Brings each offset to 0 Hz and all channels to the base rate.
+    /// Shifts each offset to 0 Hz, and resamples all channels to the base rate.
     fn tune(&mut self, antennas: &[&[Complex32]], offsets_hz: &[f64]) -> Result<(), FrontEndError> {
         let bases = &mut self.bases[..offsets_hz.len()];
         self.front_end.process_at(antennas, offsets_hz, bases)
     }
 
-    /// Searches what was tuned to as number `index`.
+    /// Searches the tuned offset number `index`.
     fn look(
         &mut self,
         index: usize,

@@ -1,4 +1,4 @@
-//! Where in a band the PSS stands out, at whatever frequency.
+//! Detection of the PSS anywhere in a band.
 
 use num_complex::Complex32;
 
@@ -12,14 +12,14 @@ use crate::numeric::false_alarm::exponential_sum_threshold;
 use crate::standard::grid::SUBCARRIERS;
 use crate::standard::numerology::SubcarrierSpacing;
 
-/// The PSS is placed at multiples of this off the recording's centre.
+/// Grid of PSS frequencies relative to the recording's centre.
 pub(super) const OFFSET_UNIT_HZ: f64 = 15e3;
-/// Maxima that noise may offer. Each costs a look at three SSBs' time, and four times as many make up
-/// half of what is lost by adding powers.
+/// Expected number of maxima due to noise. Each costs a search over the duration of three SSBs;
+/// four times as many recover half of the loss due to the addition of powers.
 const NOISE_CANDIDATES: f64 = 16.0;
-/// Offsets that are worth a search at most.
+/// Maximum number of offsets that are searched.
 const MOST_OFFSETS: usize = 24;
-/// Lags that a thread takes at once, at the base rate, ...
+/// Number of lags per thread and chunk, at the base rate, ...
 const CHUNK: usize = 4 * HOP;
 /// ... and samples before and after, for the front end's filter and the PSS itself.
 const BEFORE: usize = 256;

@@ -1,34 +1,33 @@
-//! The cell's clock beside the receiver's: when the next SSB comes, and how well that is known.
+//! Clock of a cell relative to that of the receiver: time of the next SSB, and its uncertainty.
 //!
-//! A Kalman filter of two states: when the last SSB began, and by how much a sample of the cell
-//! lasts longer than one of the receiver. Both carrier and samples come from one oscillator, so
-//! that a frequency offset of `f` at a carrier `F` tells a drift of `−f/F` before any time has
-//! passed; from then on the drift is learned from when SSBs come. Between two of them it wanders,
-//! as oscillators and the Doppler effect of a changing speed make it.
+//! Kalman filter with two states: start of the last SSB, and relative clock drift. Carrier and
+//! samples derive from one oscillator, so that a frequency offset of `f` at a carrier `F` implies a
+//! drift of `−f/F` immediately; later, the times of SSBs determine the drift. Between SSBs the
+//! drift is a random walk, due to oscillators and the Doppler effect of a changing speed.
 
-/// Standard deviation by which the drift wanders in a second: oscillator and acceleration.
+/// Random walk of the drift per square root of second: oscillator and acceleration.
 const WANDER_PER_SQRT_S: f64 = 1e-8;
-/// Standard deviation of a drift that the frequency offset told.
+/// Standard deviation of a drift derived from the frequency offset.
 const DRIFT_BY_CFO: f64 = 1e-7;
-/// The same where no carrier frequency is known: the worst oscillators.
+/// Standard deviation of the drift without a known carrier frequency: the worst oscillators.
 const DRIFT_UNKNOWN: f64 = 2e-5;
-/// Standard deviation of the time that a search tells, samples.
+/// Standard deviation of the time from a search, in samples.
 const SEARCHED: f64 = 0.1;
-/// The least of any time: paths come and go, samples.
+/// Minimum standard deviation of any time, due to changing paths, in samples.
 const PATHS: f64 = 0.03;
 
-/// Follows one cell's clock.
+/// Clock tracking loop of one cell.
 #[derive(Debug, Clone)]
 pub(super) struct ClockLoop {
     base_rate_hz: f64,
     /// First sample of the last SSB.
     last_start: f64,
-    /// Samples per sample that the cell's clock is slow.
+    /// Relative drift of the cell's clock, in samples per sample; positive if it is slow.
     drift: f64,
     covariance: Covariance,
 }
 
-/// Of beginning and drift, samples.
+/// Covariance of start and drift, in samples.
 #[derive(Debug, Clone, Copy)]
 struct Covariance {
     start: f64,
@@ -37,7 +36,7 @@ struct Covariance {
 }
 
 impl ClockLoop {
-    /// From when a search found an SSB, and from its frequency offset if the carrier is known.
+    /// Creates the loop at an SSB from a search, with its frequency offset if the carrier is known.
     pub(super) fn new(start: f64, cfo_hz: f64, carrier_hz: Option<f64>, base_rate_hz: f64) -> Self {
         let told = carrier_hz.filter(|hz| *hz > 0.0).map(|hz| -cfo_hz / hz);
         let sigma = told.map_or(DRIFT_UNKNOWN, |_| DRIFT_BY_CFO);
@@ -53,28 +52,30 @@ impl ClockLoop {
         }
     }
 
-    /// When an SSB begins that is sent `samples` of the cell's clock after the last one.
+    /// Returns the start of an SSB that is transmitted `samples` of the cell's clock after the last
+    /// one.
     pub(super) fn expected_start(&self, samples: f64) -> f64 {
         self.last_start + samples * (1.0 + self.drift)
     }
 
-    /// How long after the last SSB, in samples of the cell's clock, one was sent that began at `start`.
+    /// Returns the time between the last SSB and one that begins at `start`, in samples of the
+    /// cell's clock.
     pub(super) fn sent_after(&self, start: f64) -> f64 {
         (start - self.last_start) / (1.0 + self.drift)
     }
 
-    /// Time since the last SSB, seconds.
+    /// Returns the time since the last SSB, in seconds.
     pub(super) fn elapsed_s(&self, start: f64) -> f64 {
         (start - self.last_start).abs() / self.base_rate_hz
     }
 
-    /// Standard deviation of what is expected to begin at `expected`, samples.
+    /// Returns the standard deviation of an SSB's start `expected`, in samples.
     pub(super) fn deviation(&self, expected: f64) -> f64 {
         self.predicted(expected).start.sqrt()
     }
 
-    /// Takes in an SSB that was expected at `expected` and came `late` samples later, known to
-    /// `variance`.
+    /// Updates with an SSB that was received `late` samples after its expected start, with the
+    /// variance `variance`.
     pub(super) fn follow(&mut self, expected: f64, late: f64, variance: f64) {
         let Covariance { start, both, drift } = self.predicted(expected);
         let total = start + variance + PATHS * PATHS;
@@ -88,8 +89,8 @@ impl ClockLoop {
         };
     }
 
-    /// Takes in an SSB that a search found, sent `samples` of the cell's clock after the last one:
-    /// the two tell the drift, whatever was believed of it.
+    /// Updates with an SSB from a search, transmitted `samples` of the cell's clock after the last
+    /// one; the two determine the drift, whatever its previous estimate.
     pub(super) fn found(&mut self, start: f64, samples: f64) {
         let drift = (start - self.last_start) / samples - 1.0;
         if drift.abs() < 10.0 * DRIFT_UNKNOWN {
@@ -102,7 +103,7 @@ impl ClockLoop {
         self.covariance.both = 0.0;
     }
 
-    /// The covariance when an SSB is expected to begin.
+    /// Returns the covariance at the expected start of an SSB.
     fn predicted(&self, expected: f64) -> Covariance {
         let elapsed = expected - self.last_start;
         let wander = WANDER_PER_SQRT_S.powi(2) / self.base_rate_hz * elapsed.abs();
@@ -133,7 +134,7 @@ mod tests {
             clock.follow(expected, truth(f64::from(n)) - expected, 1e-4);
         }
         assert!((clock.drift - 2.3e-6).abs() < 2e-9, "{}", clock.drift);
-        // Ten seconds of sleep are bridged within what it says of itself.
+        // The prediction after ten seconds of sleep is within its own uncertainty.
         let expected = clock.expected_start(500.0 * PERIOD);
         let error = (expected - truth(549.0)).abs();
         assert!(error < 4.0 * clock.deviation(expected), "{error}");
@@ -145,7 +146,7 @@ mod tests {
         let mut clock = ClockLoop::new(0.0, 0.0, Some(3.5e9), RATE);
         clock.found(50.0 * PERIOD * (1.0 - 1e-5), 50.0 * PERIOD);
         assert!((clock.drift + 1e-5).abs() < 1e-12);
-        // What cannot be a drift is another beginning.
+        // A jump that no drift explains is a new start.
         clock.found(60.0 * PERIOD, 5.0 * PERIOD);
         assert!((clock.drift + 1e-5).abs() < 1e-12);
     }

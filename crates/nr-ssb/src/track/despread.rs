@@ -1,4 +1,4 @@
-//! From received resource elements to one complex number per symbol and antenna.
+//! Despreading of received resource elements to one complex amplitude per symbol and antenna.
 
 use num_complex::{Complex32, Complex64};
 
@@ -7,7 +7,8 @@ use crate::dsp::timing;
 use crate::numeric::sums::complex_product;
 use crate::standard::grid::{SUBCARRIERS, SYMBOLS, SsbGrid};
 
-/// Blocks and numbers of pilots of [`Tracked`](super::Tracked), with `delay` samples more taken out.
+/// Computes the blocks and pilot numbers of [`Tracked`](super::Tracked), after the compensation of
+/// another `delay` samples.
 pub(super) fn despread<const A: usize>(
     grids: &[ReceivedGrid],
     reference: &SsbGrid,

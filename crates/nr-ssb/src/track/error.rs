@@ -1,12 +1,12 @@
-//! What makes tracking impossible.
+//! Errors of tracking.
 
 use crate::search::SearchError;
 
-/// What makes tracking impossible.
+/// Reason why tracking is impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrackError {
-    /// The window does not hold the SSB.
+    /// The window does not contain the SSB.
     #[error(
         "an SSB expected from sample {expected} on does not lie in a window of {samples} from {window_start} on"
     )]
@@ -18,7 +18,7 @@ pub enum TrackError {
         /// Samples in the window.
         samples: usize,
     },
-    /// As in a search.
+    /// The search configuration is invalid.
     #[error(transparent)]
     Search(#[from] SearchError),
 }

@@ -1,4 +1,4 @@
-//! The carrier frequency offset of a tracked cell, from one SSB to the next.
+//! Carrier frequency offset of a tracked cell, from one SSB to the next.
 
 use std::f64::consts::TAU;
 
@@ -9,23 +9,23 @@ use crate::numeric::phasors::wrap;
 use crate::search::DetectedSsb;
 use crate::standard::grid::SYMBOLS;
 
-/// Wander of the frequency offset in a second, Hz: oscillator and Doppler.
+/// Random walk of the frequency offset in Hz per square root of second: oscillator and Doppler.
 const CFO_WANDER_HZ_PER_SQRT_S: f64 = 35.0;
-/// Uncertainty of the frequency offset after the search, Hz.
+/// Standard deviation of the frequency offset after the search, in Hz.
 const CFO_FIRST_HZ: f64 = 200.0;
 
-/// Follows the offset.
+/// Frequency tracking loop.
 pub(super) struct FrequencyLoop {
     base_rate_hz: f64,
-    /// The offset, cycles per sample.
+    /// Frequency offset in cycles per sample.
     pub(super) cfo_cycles: f64,
     variance: f64,
-    /// Phase from symbol to symbol beyond that of the offset.
+    /// Phase step between symbols in excess of that of the offset.
     pub(super) phase_step: f64,
 }
 
 impl FrequencyLoop {
-    /// From what a search found.
+    /// Creates the loop from the result of a search.
     pub(super) fn new(cell: &DetectedSsb, base_rate_hz: f64) -> Self {
         Self {
             base_rate_hz,
@@ -35,8 +35,8 @@ impl FrequencyLoop {
         }
     }
 
-    /// Moves the frequency offset, after so many seconds, by the PSS–SSS phase, weighted by what
-    /// noise leaves of it.
+    /// Updates the frequency offset, after a time in seconds, with the phase between PSS and SSS,
+    /// weighted by its noise.
     pub(super) fn follow<const A: usize>(
         &mut self,
         elapsed_s: f64,

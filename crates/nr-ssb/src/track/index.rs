@@ -1,11 +1,11 @@
-//! Which SSB of its burst set one is, by the three low bits of its index and by when it comes.
+//! Index of an SSB in its burst set, from the three low bits of the index and its time.
 
 use crate::standard::numerology::{Case, Lmax, Numerology, SubcarrierSpacing};
 
-/// SSBs of a burst set of 64 that share their DM-RS.
+/// Number of SSBs with equal DM-RS in a burst set of 64.
 const ALIKE: u8 = 8;
 
-/// The SSB indices of one cell.
+/// SSB indices of one cell.
 #[derive(Debug, Clone)]
 pub(super) struct SsbIndex {
     lmax: Lmax,
@@ -14,7 +14,7 @@ pub(super) struct SsbIndex {
 }
 
 impl SsbIndex {
-    /// From the index of the SSB that the cell was found by.
+    /// Creates the state from the index of the detected SSB.
     pub(super) const fn new(lmax: Lmax, spacing: SubcarrierSpacing, last: u8) -> Self {
         Self {
             lmax,
@@ -27,8 +27,9 @@ impl SsbIndex {
         self.lmax
     }
 
-    /// The index of an SSB that was sent `samples` after the last one. Of 64, those that share their
-    /// DM-RS are half a millisecond apart at 120 kHz, a quarter at 240.
+    /// Returns the index of an SSB that was transmitted `samples` after the last one. In a burst
+    /// set of 64, SSBs with equal DM-RS are half a millisecond apart at 120 kHz, a quarter at 240
+    /// kHz.
     pub(super) fn of(&self, ibar_ssb: u8, samples: f64) -> u8 {
         if self.lmax != Lmax::L64 {
             return self.lmax.index_lsb(ibar_ssb);
@@ -48,12 +49,12 @@ impl SsbIndex {
         nearest.unwrap_or(ibar_ssb)
     }
 
-    /// Takes in what an SSB turned out to be.
+    /// Stores the index of the last SSB.
     pub(super) const fn follow(&mut self, index: u8) {
         self.last = index;
     }
 
-    /// First sample of an SSB in its half frame.
+    /// Returns the first sample of an SSB in its half frame.
     fn place(&self, index: u8) -> Option<f64> {
         let case = match self.spacing {
             SubcarrierSpacing::Khz240 => Case::E,

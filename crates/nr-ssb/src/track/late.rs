@@ -1,5 +1,5 @@
-//! How late an SSB is, before it is known which one: by PSS and SSS, whose 127 subcarriers are
-//! added up in groups.
+//! Delay of an SSB before its beam is known: from PSS and SSS, whose 127 subcarriers are added in
+//! groups.
 
 use num_complex::Complex32;
 
@@ -9,24 +9,25 @@ use crate::numeric::sums::{complex_product, energy};
 use crate::standard::grid::pss_indices;
 use crate::standard::sequence::pss::SYNC_LEN;
 
-/// Samples to either side that one demodulation lets be looked for: as far as the transform's
-/// window lies inside the cyclic prefix.
+/// Maximum delay on either side after one demodulation, in samples: while the FFT window is within
+/// the cyclic prefix.
 pub(super) const REACH: usize = 6;
-/// Delays looked at, a sample apart.
+/// Number of delays in the search, one sample apart.
 const DELAYS: usize = 2 * REACH + 1;
-/// Subcarriers of a group: over one the largest delay turns the phase by 1.2 rad, 0.5 dB.
+/// Subcarriers of a group: the maximum delay changes the phase within it by 1.2 rad, a loss of 0.5
+/// dB.
 const GROUP: usize = 8;
 const GROUPS: usize = SYNC_LEN.div_ceil(GROUP);
 
-/// Independent delays among those looked at: the PSS is as long as two samples.
+/// Number of independent delays of the search: the correlation length of the PSS is two samples.
 pub(super) const INDEPENDENT: f64 = DELAYS as f64 / 2.0;
 
-/// One antenna's sums over the groups.
+/// Sums over the groups for one antenna.
 pub(super) type Groups = [Complex32; GROUPS];
 
-/// Looks for the delay.
+/// Delay search.
 pub(super) struct DelaySearch {
-    /// `exp(j2πk'τ/256)` at the groups' centres, per delay.
+    /// `exp(j2πk'τ/256)` at the centres of the groups, for each delay.
     steering: [Groups; DELAYS],
 }
 
@@ -38,7 +39,7 @@ impl DelaySearch {
         }
     }
 
-    /// The delay in samples at which Σ |Σ z exp(j2πk'τ/256)|² over the antennas is largest.
+    /// Returns the delay in samples that maximises Σ |Σ z exp(j2πk'τ/256)|² over the antennas.
     pub(super) fn run(&self, antennas: &[Groups]) -> f64 {
         let power = |step: usize| -> f32 {
             let products = antennas
@@ -46,8 +47,8 @@ impl DelaySearch {
                 .map(|z| complex_product(z, &self.steering[step]));
             products.map(|sum| sum.norm_sqr()).sum()
         };
-        // Where expected there usually is more than half of the most that there can be; then no
-        // other delay has as much.
+        // At the expected delay, the value usually exceeds half of the possible maximum, so that no
+        // other delay can be larger.
         let most = GROUPS as f32 * antennas.iter().map(energy).sum::<f32>();
         let near = [power(REACH - 1), power(REACH), power(REACH + 1)];
         if near[1] > 0.5 * most && near[1] > near[0].max(near[2]) {
@@ -64,14 +65,15 @@ impl DelaySearch {
     }
 }
 
-/// Where the parabola through three values one apart is largest, from the middle one.
+/// Returns the position of the maximum of a parabola through three values one apart, relative to
+/// the middle one.
 fn parabola([before, here, after]: [f32; 3]) -> f64 {
     let bend = 2.0 * here - before - after;
     let offset = 0.5 * (after - before) / bend.max(f32::MIN_POSITIVE);
     f64::from(offset.clamp(-0.5, 0.5))
 }
 
-/// `exp(j2πk'τ/256)` at the groups' centres: takes a delay of τ samples out.
+/// Returns `exp(j2πk'τ/256)` at the centres of the groups, which removes a delay of τ samples.
 pub(super) fn ramp(delay: f64) -> Groups {
     let mut ramp = [Complex32::ZERO; GROUPS];
     let cycles = delay / SYMBOL_FFT as f64;
@@ -80,7 +82,7 @@ pub(super) fn ramp(delay: f64) -> Groups {
     ramp
 }
 
-/// Received elements times the chips sent, summed over the groups.
+/// Returns the received elements times the transmitted chips, summed over the groups.
 pub(super) fn grouped(received: &[Complex32; SYNC_LEN], chips: &[f32; SYNC_LEN]) -> Groups {
     let mut groups = [Complex32::ZERO; GROUPS];
     let (received, received_rest) = received.as_chunks::<GROUP>();

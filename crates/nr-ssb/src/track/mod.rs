@@ -1,13 +1,13 @@
-//! Tracking: a cell that is known, at a time that is known, for four transforms per antenna.
+//! Tracking of a known cell at a known time, with four FFTs per antenna.
 //!
-//! Per SSB: demodulate at the predicted delay and frequency offset; PSS and SSS say how late the
-//! SSB is and whether it is there at all; DM-RS says which beam it is; all pilots give delay and
-//! frequency offset anew and are despread, symbol by symbol, to one complex number per antenna. The
-//! PBCH is decoded only on request, and its 432 elements are then pilots as well.
+//! For each SSB: demodulate at the predicted delay and frequency offset; detect the SSB and measure
+//! its delay with PSS and SSS; identify the beam with the DM-RS; estimate delay and frequency
+//! offset with all pilots; despread each symbol to one complex amplitude per antenna. The PBCH is
+//! decoded on request only, and its 432 elements then are additional pilots.
 //!
-//! A tracker never searches: an SSB that is not within reach of where it is expected is missed, and
-//! expected again a period later. Who searches meanwhile, and how often, is the caller's choice;
-//! what is found is handed to [`Tracker::found`].
+//! A tracker never searches: an SSB outside the range of its expected delay is missed, and expected
+//! again one period later. The caller decides about searches in the meantime, and passes their
+//! results to [`Tracker::found`].
 
 mod beams;
 mod clock;

@@ -1,4 +1,4 @@
-//! What tracking says of one SSB.
+//! Result of the tracking of one SSB.
 
 use num_complex::Complex64;
 
@@ -7,34 +7,35 @@ use crate::standard::grid::SYMBOLS;
 use crate::standard::message::payload::BchPayload;
 use crate::standard::pci::Pci;
 
-/// One SSB of a tracked cell, seen by `A` antennas.
+/// SSB of a tracked cell, received by `A` antennas.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracked<const A: usize> {
-    /// The cell.
+    /// Physical cell identity.
     pub pci: Pci,
-    /// The beam: SSB index, by DM-RS; of 64 the three high bits by when it came.
+    /// SSB index (beam) from the DM-RS; in a burst set of 64 the three high bits from its time.
     pub ssb_index: u8,
-    /// Second half of the frame: by DM-RS at Lmax 4, else by the PBCH if decoded.
+    /// Whether the SSB is in the second half of the frame: from the DM-RS for Lmax 4, otherwise
+    /// from the PBCH if decoded.
     pub half_frame: Option<bool>,
-    /// First sample of the SSB, its cyclic prefix included, at the base rate.
+    /// First sample of the SSB including its cyclic prefix, at the base rate.
     pub sample_start: f64,
-    /// Carrier frequency offset after this SSB, filtered, Hz.
+    /// Filtered carrier frequency offset after this SSB, in Hz.
     pub cfo_hz: f64,
-    /// SNR of a resource element, mean over the antennas, dB.
+    /// SNR of a resource element, mean over the antennas, in dB.
     pub snr_db: f64,
-    /// Per symbol and antenna: received times conjugated pilots, summed over the subcarriers with
-    /// the delay taken out, over the root of the pilots' number: the noise keeps the variance it
-    /// has on a resource element. In the scale of an unnormalised transform.
+    /// Despread pilots of each symbol and antenna: received elements times conjugated pilots,
+    /// summed over the subcarriers after the compensation of the delay, divided by the square root
+    /// of the number of pilots. The noise variance is that of a resource element, in the scale of
+    /// an unnormalised DFT.
     pub blocks: [[Complex64; A]; SYMBOLS],
-    /// Samples by which the SSB came later than `received` has it: the delay that is taken out of
-    /// the blocks.
+    /// Delay in samples of the SSB relative to `received`; it is compensated in the blocks.
     pub residual_delay: f64,
-    /// Pilots behind each block: 127, 60, 151, 60; with the PBCH 127, 240, 223, 240.
+    /// Number of pilots of each block: 127, 60, 151, 60; with the PBCH 127, 240, 223, 240.
     pub pilots: [u16; SYMBOLS],
-    /// Variance of the noise on a resource element, per antenna.
+    /// Noise variance of a resource element, for each antenna.
     pub noise_variance: [f64; A],
-    /// SS-RSRP, SS-RSRQ and SS-SINR per antenna.
+    /// SS-RSRP, SS-RSRQ and SS-SINR of each antenna.
     pub measurements: [Measurement; A],
-    /// What the PBCH says, if it was asked for and its checksum held.
+    /// Payload of the PBCH, if its decoding was requested and its CRC is correct.
     pub payload: Option<BchPayload>,
 }

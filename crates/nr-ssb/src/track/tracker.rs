@@ -1,4 +1,4 @@
-//! The tracker of one cell.
+//! Tracker of one cell.
 
 use std::f64::consts::TAU;
 
@@ -27,20 +27,20 @@ use crate::standard::message::payload::BchPayload;
 use crate::standard::numerology::Lmax;
 use crate::standard::pci::Pci;
 
-/// Standard deviations of the time expected within which an SSB is looked for.
+/// Range of the search around the expected time, in standard deviations.
 const DEVIATIONS: f64 = 4.0;
-/// Samples beyond that: another path may have become the strongest.
+/// Extension of the range in samples, because another path may have become the strongest.
 const OTHER_PATH: f64 = 2.0;
-/// Demodulations to either side that a look takes at most: 60 samples.
+/// Maximum number of demodulations on either side: 60 samples.
 const STEPS: usize = 5;
-/// Samples from one to the next: their reaches meet.
+/// Samples between demodulations, so that their ranges adjoin.
 const STEP: f64 = 2.0 * REACH as f64;
-/// An SSB later or earlier than this, samples, is demodulated again where it is.
+/// Maximum delay without another demodulation, in samples.
 const NEAR: f64 = 0.5;
-/// Square of the spread of the pilots' phase over a delay of a sample, rad².
+/// Variance of the pilots' phase for a delay of one sample, in rad².
 const PHASE_SPREAD: f64 = (TAU * 60.0 / SYMBOL_FFT as f64) * (TAU * 60.0 / SYMBOL_FFT as f64);
 
-/// Tracker of one cell; owns all plans and buffers.
+/// Tracker of one cell. It owns all plans and buffers.
 pub struct Tracker<const A: usize> {
     pci: Pci,
     index: SsbIndex,
@@ -54,10 +54,11 @@ pub struct Tracker<const A: usize> {
 }
 
 impl<const A: usize> Tracker<A> {
-    /// Tracks a cell that a search with these settings found.
+    /// Creates a tracker of a cell that a search with this configuration detected.
     ///
     /// # Errors
-    /// [`SearchError`] for impossible settings, or unless they are for `A` antennas.
+    /// [`SearchError`] for an invalid configuration, or one for another number of antennas than
+    /// `A`.
     pub fn new(config: &SearchConfig, cell: &DetectedSsb) -> Result<Self, TrackError> {
         config.check()?;
         if config.antennas != A {
@@ -81,14 +82,14 @@ impl<const A: usize> Tracker<A> {
         })
     }
 
-    /// Where an SSB will begin that is sent `samples` of the cell's clock after the last one, the
-    /// drift of the clocks allowed for, after a sleep too.
+    /// Returns the start of an SSB that is transmitted `samples` of the cell's clock after the last
+    /// one, including the estimated clock drift, after a sleep too.
     pub fn expected_start(&self, samples: f64) -> f64 {
         self.clock.expected_start(samples)
     }
 
-    /// Takes up the cell where a search has found it, sent `samples` of the cell's clock after the
-    /// last SSB: what of the clocks was not foreseen is learned from it.
+    /// Continues at an SSB from a search, transmitted `samples` of the cell's clock after the last
+    /// one; the clock drift is estimated again.
     pub fn found(&mut self, cell: &DetectedSsb, samples: f64) {
         self.frequency = FrequencyLoop::new(cell, self.base_rate_hz);
         self.clock.found(cell.sample_start, samples);
@@ -96,22 +97,22 @@ impl<const A: usize> Tracker<A> {
         self.misses = 0;
     }
 
-    /// Carrier frequency offset, filtered, Hz.
+    /// Returns the filtered carrier frequency offset in Hz.
     pub fn cfo_hz(&self) -> f64 {
         self.frequency.cfo_cycles * self.base_rate_hz
     }
 
-    /// SSBs in a row that were not there.
+    /// Returns the number of consecutive missed SSBs.
     pub fn misses(&self) -> u32 {
         self.misses
     }
 
-    /// Looks for the SSB expected to begin at `expected_start`, in a window whose first sample is
-    /// number `window_start`: six samples to either side, and further the less certain the clocks
-    /// are. `None` if it is not there, or which beam it is stays in doubt.
+    /// Tracks the SSB with the expected start `expected_start`, in a window whose first sample has
+    /// the index `window_start`. The search range is six samples on either side, more if the clocks
+    /// are uncertain. Returns `None` if the SSB is not detected, or its beam is ambiguous.
     ///
     /// # Errors
-    /// [`TrackError::Window`] if the window does not hold the expected SSB.
+    /// [`TrackError::Window`] if the window does not contain the expected SSB.
     pub fn track(
         &mut self,
         antennas: &[&[Complex32]; A],
@@ -160,7 +161,7 @@ impl<const A: usize> Tracker<A> {
         let (blocks, noise) = (&tracked.blocks, &tracked.noise_variance);
         self.frequency.follow(elapsed_s, blocks, noise);
         tracked.cfo_hz = self.cfo_hz();
-        // Of a path on `N` elements in noise.
+        // For a path on `N` elements in noise.
         let pilots: u16 = tracked.pilots.iter().sum();
         let snr = 10.0_f64.powf(0.1 * tracked.snr_db) * A as f64 * f64::from(pilots);
         let variance = 0.5 / (PHASE_SPREAD * snr.max(1.0));
@@ -169,7 +170,7 @@ impl<const A: usize> Tracker<A> {
         Ok(seen)
     }
 
-    /// Demodulates the SSB that begins at `place` of the window, as far as it lies inside.
+    /// Demodulates the SSB that begins at `place` in the window, if it is within the window.
     fn demodulated(&mut self, antennas: &[&[Complex32]; A], place: f64) -> Option<Alignment> {
         let pss_start = place + CYCLIC_PREFIX as f64;
         if pss_start.is_nan() || pss_start < 0.0 {
@@ -188,20 +189,22 @@ impl<const A: usize> Tracker<A> {
         Some(alignment)
     }
 
-    /// Received resource elements of one antenna, `[symbol][subcarrier]`, of the last SSB, delay
-    /// and frequency offset as predicted taken out; [`Tracked::residual_delay`] is left.
+    /// Returns the received resource elements of one antenna, `[symbol][subcarrier]`, of the last
+    /// SSB. The predicted delay and frequency offset are compensated; [`Tracked::residual_delay`]
+    /// is not.
     pub fn received(&self, antenna: usize) -> Option<&[[Complex32; SUBCARRIERS]; SYMBOLS]> {
         self.acquirer.grids.get(antenna)
     }
 
-    /// The resource elements known in the last SSB, zero elsewhere: least squares is
-    /// [`received`](Self::received) times their conjugate.
+    /// Returns the known resource elements of the last SSB, zero elsewhere: the least-squares
+    /// channel is [`received`](Self::received) times their conjugate.
     pub fn known(&self) -> &SsbGrid {
         &self.acquirer.reference
     }
 
-    /// The channel on the 240 subcarriers of every antenna, by all that is known of the last SSB, with
-    /// its `residual_delay` taken out, and how its noise hangs together from subcarrier to subcarrier.
+    /// Returns the channel on the 240 subcarriers of every antenna, from all known elements of the
+    /// last SSB, with its `residual_delay` compensated, and the covariance of its noise over the
+    /// subcarriers.
     pub fn channel(
         &mut self,
         residual_delay: f64,
@@ -221,12 +224,12 @@ impl<const A: usize> Tracker<A> {
         estimate.covariance().delayed(residual_delay)
     }
 
-    /// SSBs of a burst set, told or taken for the likelier.
+    /// Returns the burst set size: decoded, or the more probable one.
     pub const fn lmax(&self) -> Lmax {
         self.index.lmax()
     }
 
-    /// Everything from the demodulated grids on.
+    /// Processes the demodulated grids.
     fn look(
         &mut self,
         antennas: &[&[Complex32]; A],
@@ -236,7 +239,7 @@ impl<const A: usize> Tracker<A> {
         let phases = alignment.symbol_phases();
         let mut travelled = 0.0;
         let mut found = self.beams.identify(&self.acquirer.grids, &phases)?;
-        // At the edge of the reach the delay may be larger than what was seen of it.
+        // At the edge of the range, the actual delay may be larger than the estimate.
         while found.delay.abs() > NEAR {
             travelled += found.delay.abs();
             if travelled > STEP {
@@ -268,7 +271,7 @@ impl<const A: usize> Tracker<A> {
         let delay = timing::refine_combined(&estimate.rows, found.delay);
         let (blocks, pilots) = despread(grids, reference, delay);
         let noise_variance = std::array::from_fn(|antenna| estimate.noise_variance[antenna]);
-        // Samples that are no numbers, or beyond all bounds, must not reach what is kept.
+        // Samples that are not finite, or far too large, must not change the state.
         if !(blocks.iter().flatten().all(|block| block.is_finite())
             && noise_variance.iter().all(|noise| noise.is_finite()))
         {
@@ -291,7 +294,7 @@ impl<const A: usize> Tracker<A> {
         };
         Some(Tracked {
             pci: self.pci,
-            // Of these, `track` makes index and place in the recording.
+            // `track` derives index and time from these values.
             ssb_index: ibar_ssb,
             half_frame,
             sample_start: alignment.first_sample(),
@@ -306,7 +309,7 @@ impl<const A: usize> Tracker<A> {
         })
     }
 
-    /// Decodes the PBCH and adds it to what is known.
+    /// Decodes the PBCH and adds it to the known elements.
     fn decode(&mut self, ibar_ssb: u8, alignment: Alignment) -> Option<BchPayload> {
         let Acquirer {
             estimate,

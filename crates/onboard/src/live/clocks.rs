@@ -7,7 +7,7 @@ use crate::localize::HISTORY_S;
 use crate::observation::{BURST_S, OdometrySample};
 use crate::time_unit::StreamTimes;
 
-/// The same lead where arrival times are not known, in seconds: a gap of the odometry is shorter.
+/// Maximum lead of an angle without arrival times, in seconds: a gap of the odometry is shorter.
 const MAX_LEAD_WITHOUT_ARRIVALS_S: f64 = 10.0;
 
 /// Consecutive bursts whose times contradict the odometry's, from which on the clocks count as different.
@@ -16,14 +16,14 @@ const DISAGREEING_BURSTS: u32 = 3;
 /// Time after the last such burst at which it no longer counts, in seconds.
 const EXPIRY_S: f64 = 5.0;
 
-/// Angles may be this much older than the last burst without a question of their clock, in seconds; the localizer
-/// takes no older ones.
+/// Maximum age of an angle relative to the last burst without a comparison of clocks, in seconds;
+/// the localizer rejects older ones.
 const MAX_ANGLE_DELAY_S: f64 = 1.0;
 
-/// The clocks of all sources.
+/// Clocks of all sources.
 #[derive(Debug, Clone, Default)]
 pub struct Clocks {
-    /// Time of arrival of the inputs that come next, by a monotonic clock, in seconds.
+    /// Arrival time of the next inputs by a monotonic clock, in seconds.
     pub arrival_s: Option<f64>,
     /// Clock of the odometry.
     pub odometry: TimeBase,
@@ -46,11 +46,11 @@ struct Disagreement {
 }
 
 impl Clocks {
-    /// Validates the time of odometry, and returns the sample at the pipeline's time, with the step of the clock that
-    /// it completes.
+    /// Validates the time of odometry. Returns the sample with the time of the pipeline, and the
+    /// clock step that it completes.
     ///
     /// # Errors
-    /// The cause of a rejection.
+    /// Cause of a rejection.
     pub fn odometry(
         &mut self,
         sample: &OdometrySample,
@@ -67,17 +67,18 @@ impl Clocks {
         }
         self.last_odometry = Some(*sample);
         if let (Some(_), None) = (step, self.arrival_s) {
-            // Without arrival times the clocks are taken as one.
+            // Without arrival times, all sources are assumed to share one clock.
             self.angles = TimeBase::with_offset(self.odometry.offset_s);
         }
         let time_s = self.odometry.inside(sample.time_s);
         Ok((OdometrySample { time_s, ..*sample }, step))
     }
 
-    /// Validates the time of a burst by the clock of angles or samples, and returns the pipeline's.
+    /// Validates the time of a burst by the clock of angles or samples, and returns the time of the
+    /// pipeline.
     ///
     /// # Errors
-    /// The cause of a rejection.
+    /// Cause of a rejection.
     fn burst(&mut self, time_s: f64) -> Result<f64, TimeDefect> {
         let last_s = self.angles.last_s();
         let is_late = |last_s: f64| (0.0..=MAX_ANGLE_DELAY_S).contains(&(last_s - time_s));
@@ -90,7 +91,8 @@ impl Clocks {
         Ok(self.angles.inside(time_s))
     }
 
-    /// Validates the time of a burst and its agreement with the newest odometry, and returns the pipeline's time.
+    /// Validates the time of a burst and its agreement with the newest odometry, and returns the
+    /// time of the pipeline.
     ///
     /// # Errors
     /// [`LiveError::Time`] or [`LiveError::AngleAhead`].
@@ -107,13 +109,13 @@ impl Clocks {
         }
     }
 
-    /// The step of the clock of angles or samples that was found since this was called last.
+    /// Returns the step of the angles' or samples' clock since the previous call.
     pub const fn take_angle_step(&mut self) -> Option<ClockStep> {
         self.step.take()
     }
 
-    /// Compares a burst's time with the newest odometry's, both of the pipeline. Returns by how much it is ahead, in
-    /// seconds, where that is more than allowed.
+    /// Compares the time of a burst with that of the newest odometry, both in the time of the
+    /// pipeline. Returns the lead of the burst in seconds if it exceeds the maximum.
     fn compare(&mut self, time_s: f64, newest: Option<&OdometrySample>) -> Option<f64> {
         let odometry_s = newest?.time_s;
         let waited_s = self.odometry.waited_s(self.arrival_s);
@@ -137,24 +139,25 @@ impl Clocks {
         (offset_s > lead_s && waited_s.is_some()).then_some(offset_s)
     }
 
-    /// Whether the last burst was at a time that agrees with the odometry's.
+    /// Whether the last burst had a time that agrees with that of the odometry.
     pub const fn agree(&self) -> bool {
         self.disagreement.is_none()
     }
 
-    /// Time of angles minus that of odometry, in seconds, where the last bursts show that their clocks differ.
+    /// Returns the time of angles minus that of odometry in seconds, if the last bursts show
+    /// different clocks.
     pub fn disagreement_s(&self, newest: &OdometrySample) -> Option<f64> {
         let found = self.disagreement?;
         let is_recent = newest.time_s - found.odometry_s <= EXPIRY_S;
         (found.bursts >= DISAGREEING_BURSTS && is_recent).then_some(found.offset_s)
     }
 
-    /// Whether the last odometry had a distance.
+    /// Whether the last odometry contained a distance.
     pub fn has_distance(&self) -> bool {
         (self.last_odometry).is_some_and(|it| !it.distance_m.is_nan())
     }
 
-    /// Forgets all times; the arrival time is kept.
+    /// Removes all times except the arrival time.
     pub fn reset(&mut self) {
         *self = Self {
             arrival_s: self.arrival_s,
@@ -163,7 +166,7 @@ impl Clocks {
     }
 }
 
-/// Whether two messages are equal in all values; unknown distances are.
+/// Whether two messages have equal values; unknown distances are equal.
 fn is_copy(a: &OdometrySample, b: &OdometrySample) -> bool {
     let bits = |it: &OdometrySample| [it.time_s, it.distance_m, it.speed_mps].map(f64::to_bits);
     bits(a) == bits(b) && a.yaw_rate_radps == b.yaw_rate_radps

@@ -1,4 +1,4 @@
-//! What a live pipeline refuses. Its state is kept.
+//! Errors of a live pipeline, which leave its state unchanged.
 
 use super::time_check::{MAX_ANGLE_LEAD_S, TimeDefect};
 use crate::BoxError;
@@ -6,36 +6,36 @@ use crate::pipeline::OdometryDefect;
 use crate::receive::ReceiveError;
 use crate::settings::SettingsError;
 
-/// What a live pipeline refuses; its state is then as before.
+/// Rejection of an input by a live pipeline; the state is unchanged.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LiveError {
-    /// Site, vehicle and platform do not go together.
+    /// Site, vehicle and platform are incompatible.
     #[error(transparent)]
     Settings(#[from] SettingsError),
-    /// Rate or frequency of the samples do not suit the SSB, their lengths differ, or they are of another
-    /// number of antennas.
+    /// The rate or frequency of the samples does not match the SSB, their lengths differ, or the
+    /// number of antennas is wrong.
     #[error(transparent)]
     Receive(#[from] ReceiveError),
-    /// Samples, where none were announced.
+    /// Samples were passed without a configured stream.
     #[error("samples, but no stream of samples was configured")]
     NoStream,
-    /// A value that is not possible.
+    /// Invalid value.
     #[error("{what} is {value}; {allowed}")]
     Value {
-        /// What it is of.
+        /// Name of the quantity.
         what: &'static str,
-        /// The value.
+        /// Invalid value.
         value: f64,
-        /// What is allowed.
+        /// Allowed values.
         allowed: &'static str,
     },
-    /// A time stamp that is not plausible.
+    /// Implausible time stamp.
     #[error("{what}: {defect}")]
     Time {
         /// Kind of the input.
         what: &'static str,
-        /// Cause.
+        /// Cause of the rejection.
         defect: TimeDefect,
     },
     /// An angle whose time is ahead of the odometry.
@@ -55,22 +55,22 @@ pub enum LiveError {
     /// Odometry that cannot be used.
     #[error("odometry: {0}")]
     Odometry(#[from] OdometryDefect),
-    /// A cell that the vehicle does not listen to.
+    /// Cell that the vehicle does not receive.
     #[error("no radio head with PCI {pci} at this site that the vehicle listens to")]
     UnknownCell {
         /// Physical cell identity.
         pci: u16,
     },
-    /// A localizer of the user's own, which is to be told by its maker.
+    /// Custom localizer, which this operation does not support.
     #[error("the localizer is not the built-in one: a pose or a reset is for its maker to give it")]
     OwnLocalizer,
-    /// Whatever a user's own estimator, policy or localizer failed with.
+    /// Error of a custom estimator, policy or localizer.
     #[error("{0}")]
     Custom(BoxError),
 }
 
 impl LiveError {
-    /// Short name of the cause, for counters and to group events.
+    /// Returns a short name of the cause, for counters and to group events.
     pub const fn cause(&self) -> &'static str {
         match self {
             Self::Time { defect, .. } => defect.name(),

@@ -1,4 +1,4 @@
-//! The live pipeline.
+//! Live pipeline.
 
 mod commands;
 mod condition;
@@ -29,16 +29,16 @@ use crate::receive::ReceiverConfig;
 use crate::settings::{Boundary, Extent, Platform, Site, Vehicle};
 use crate::sight::Sight;
 
-/// Outcomes kept until they are asked for.
+/// Maximum number of stored outcomes.
 const OUTCOMES: usize = 256;
 
-/// Angles of a burst at most.
+/// Maximum number of angles of a burst.
 const ANGLES: usize = 64;
 
-/// SNR (dB) of an angle of which none is stated: good enough for any policy.
+/// SNR (dB) of an angle without one: sufficient for every policy.
 const UNSTATED_SNR_DB: f64 = 20.0;
 
-/// An angle that was estimated elsewhere.
+/// Angle that was estimated elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngleObservation {
     /// Array that measured the angle.
@@ -52,32 +52,32 @@ pub struct AngleObservation {
     /// Electrical angle ω = 2π(d/λ)·cos θ between neighbours in a row, or azimuth from the axis of any
     /// other array, in radians; measured at a radio head, the azimuth in the frame of its array.
     pub phase_rad: f64,
-    /// Its standard deviation in radians.
+    /// Standard deviation of `phase_rad`, in radians.
     pub sigma_rad: f64,
-    /// SNR per antenna in dB, where known.
+    /// SNR per antenna in dB, if known.
     pub snr_db: Option<f64>,
-    /// Whether the estimator vouches for it: that it is Gaussian with this standard deviation.
+    /// Whether the error is Gaussian with this standard deviation, according to the estimator.
     pub resolved: bool,
 }
 
-/// What was done since the start, and the energy of it.
+/// Activity since the start, and its energy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LiveEnergy {
-    /// Time since the first that came in, in seconds.
+    /// Time since the first input, in seconds.
     pub duration_s: f64,
-    /// Angles estimated.
+    /// Number of estimated angles.
     pub executions: usize,
-    /// Bursts listened to.
+    /// Number of received bursts.
     pub listened: usize,
-    /// How long the receiver was to be on for those, as the platform's file has it, in seconds.
+    /// Receiver on-time for these bursts according to the platform file, in seconds.
     pub on_time_s: f64,
-    /// The energy; `None` where the platform says nothing of the vehicle's method.
+    /// Energy; `None` if the platform has no value for the vehicle's method.
     pub energy: Option<Energy>,
-    /// What its sum counts.
+    /// Components that the total includes.
     pub boundary: Option<Boundary>,
 }
 
-/// The pipeline on a vehicle, fed as things come in.
+/// Pipeline on a vehicle, which processes inputs as they arrive.
 pub struct Live {
     site: Site,
     vehicle: Vehicle,
@@ -85,40 +85,41 @@ pub struct Live {
     has_own_localizer: bool,
     sight: Sight,
     stream: Option<SampleStream>,
-    /// Angles of a burst that is not yet complete.
+    /// Angles of an incomplete burst.
     angles: Vec<(SensedSsb, AngleMeasurement)>,
     outcomes: VecDeque<Outcome>,
     heads: Vec<HeadStatus>,
-    /// Clocks of the sources; all other times here are of the pipeline, but those of `heads` of the odometry's clock.
+    /// Clocks of the sources. All other times are those of the pipeline, except those of `heads`,
+    /// which are of the odometry's clock.
     clocks: Clocks,
     odometry_step: Option<ClockStep>,
     refused_burst: Option<LiveError>,
     confirmation: Confirmation,
-    /// When the localizer found its pose again last.
+    /// Time of the localizer's last recovery.
     recovered_s: Option<f64>,
     last_angle_s: Option<f64>,
-    /// The first SSB of the last burst: its sample time and its index.
+    /// First SSB of the last burst: sample time and index.
     last_burst: Option<(f64, u8)>,
-    /// Whether samples have come since the last SSB or the end of the last stretch.
+    /// Whether samples have arrived since the last SSB or the end of the last segment.
     has_samples: bool,
-    /// Stretches of samples without an SSB since the last SSB.
+    /// Number of sample segments without an SSB since the last SSB.
     empty_stretches: u32,
-    /// Whether samples were interrupted for an unknown time, and no SSB has come since.
+    /// Whether samples were interrupted for an unknown time, and no SSB was received since.
     is_resuming: bool,
     energy: Option<EnergyModel>,
     executions: usize,
     listened: usize,
-    /// First and newest of all times.
+    /// Minimum and maximum of all times.
     interval_s: Option<[f64; 2]>,
 }
 
 impl Live {
-    /// The pipeline of a vehicle at a site, at `start`, else where the vehicle's settings say, else in
-    /// search of its start. Without `stream` it takes angles only.
+    /// Creates the pipeline of a vehicle at a site. It starts at `start`, otherwise at the pose of
+    /// the vehicle's settings, otherwise with a search. Without `stream` it accepts angles only.
     ///
     /// # Errors
-    /// [`LiveError`] when site, vehicle, platform and stream do not go together, or a start is
-    /// missing and cannot be found.
+    /// [`LiveError`] if site, vehicle, platform and stream are incompatible, or a start is missing
+    /// and a search is impossible.
     pub fn new(
         site: &Site,
         vehicle: &Vehicle,
@@ -160,19 +161,19 @@ impl Live {
         })
     }
 
-    /// Sets when the inputs that follow have arrived, in seconds by a monotonic clock, so that their time stamps are
-    /// validated against it; without, only against their predecessors.
+    /// Sets the arrival time of the next inputs by a monotonic clock in seconds. Time stamps are
+    /// validated against it; without it, against their predecessors only.
     pub const fn set_arrival(&mut self, arrival_s: Option<f64>) {
         self.clocks.arrival_s = arrival_s;
     }
 
-    /// Takes in the next samples of every antenna, of any length, the first of which was received at
-    /// `time_s` by the sample clock; what became of the SSBs in them is then among the
-    /// [`outcomes`](Self::next_outcome). Samples that are missing, there twice, or of a stream that began
-    /// anew, are told by that time.
+    /// Processes the next samples of every antenna, of any length. `time_s` is the reception time
+    /// of the first sample by the sample clock. The results of the SSBs are in the
+    /// [`outcomes`](Self::next_outcome). The time reveals missing and repeated samples, and a
+    /// restarted stream.
     ///
     /// # Errors
-    /// [`LiveError`] for another number of antennas, unequal lengths or a time that is not plausible.
+    /// [`LiveError`] for a wrong number of antennas, unequal lengths or an implausible time.
     pub fn samples(
         &mut self,
         time_s: f64,
@@ -183,11 +184,12 @@ impl Live {
         Ok(continuity)
     }
 
-    /// As [`samples`](Self::samples), but nothing is heard before [`hear_before`](Self::hear_before) says so: for
-    /// recordings, whose odometry is known before it is its turn.
+    /// Like [`samples`](Self::samples), but bursts are processed only when
+    /// [`hear_before`](Self::hear_before) is called: for recordings, whose odometry is read in
+    /// advance.
     ///
     /// # Errors
-    /// As [`samples`](Self::samples).
+    /// Those of [`samples`](Self::samples).
     pub fn receive(
         &mut self,
         time_s: f64,
@@ -203,10 +205,10 @@ impl Live {
         Ok(continuity)
     }
 
-    /// Hears the bursts that are complete and began before `time_s`.
+    /// Processes the complete bursts that began before `time_s`.
     ///
     /// # Errors
-    /// [`LiveError::Custom`] where the user's own code fails.
+    /// [`LiveError::Custom`] for errors of user code.
     pub fn hear_before(&mut self, time_s: f64) -> Result<(), LiveError> {
         while let Some(stream) = &mut self.stream {
             let burst = stream.burst();
@@ -237,7 +239,8 @@ impl Live {
         Ok(())
     }
 
-    /// Ends a stretch of samples after which some will be missing, so that its last SSBs are found at once.
+    /// Ends a segment of samples before a deliberate gap, so that its last SSBs are detected at
+    /// once.
     ///
     /// # Errors
     /// [`LiveError::Receive`].
@@ -249,12 +252,14 @@ impl Live {
         }
     }
 
-    /// Takes in odometry, and returns the localizer's verdict on it. Its speed alone is enough: see
-    /// [`OdometrySample::of_speed`]. A message that establishes a new time base resumes the pose, whose covariance grows
-    /// by the odometry's error over the elapsed time and distance: see [`take_odometry_step`](Self::take_odometry_step).
+    /// Processes odometry, and returns the localizer's verdict. The speed alone is sufficient: see
+    /// [`OdometrySample::of_speed`]. A message that establishes a new time base resumes the pose,
+    /// with a covariance that includes the odometry's error over the elapsed time and distance: see
+    /// [`take_odometry_step`](Self::take_odometry_step).
     ///
     /// # Errors
-    /// [`LiveError::Time`] for a time that is not plausible, [`LiveError::Odometry`] for a value that is not finite.
+    /// [`LiveError::Time`] for an implausible time, [`LiveError::Odometry`] for a value that is not
+    /// finite.
     pub fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, LiveError> {
         let is_infinite = |value: f64| value.is_infinite();
         if !sample.speed_mps.is_finite()
@@ -284,7 +289,7 @@ impl Live {
         Ok(verdict)
     }
 
-    /// The odometry's clock has stepped: its times that were given out are those of the new clock from now on.
+    /// Converts stored times of the odometry to its new clock after a step.
     fn resumed(&mut self, step: &ClockStep) {
         for head in &mut self.heads {
             for time_s in [&mut head.last_heard_s, &mut head.last_accepted_s] {
@@ -294,39 +299,41 @@ impl Live {
         self.confirmation.restart();
     }
 
-    /// Time of the newest odometry by its clock, in seconds.
+    /// Returns the time of the newest odometry by its clock, in seconds.
     pub fn newest_odometry_s(&self) -> Option<f64> {
         let newest = self.onboard.newest_odometry()?;
         Some(self.clocks.odometry.outside(newest.time_s))
     }
 
-    /// Step of the odometry's clock that was recognized since this was called last; the pose was resumed then.
+    /// Returns the step of the odometry's clock since the previous call; the pose was resumed at
+    /// the step.
     pub const fn take_odometry_step(&mut self) -> Option<ClockStep> {
         self.odometry_step.take()
     }
 
-    /// Step of the clock of samples or angles that was recognized since this was called last.
+    /// Returns the step of the samples' or angles' clock since the previous call.
     pub const fn take_angle_step(&mut self) -> Option<ClockStep> {
         self.clocks.take_angle_step()
     }
 
-    /// Cause of the last burst of SSBs whose time was rejected since this was called last.
+    /// Returns the cause of the last rejected burst of SSBs since the previous call.
     pub const fn take_refused_burst(&mut self) -> Option<LiveError> {
         self.refused_burst.take()
     }
 
-    /// Time of angles minus that of odometry, in seconds, where their clocks differ.
+    /// Returns the time of angles minus that of odometry in seconds, if their clocks differ.
     pub fn clock_disagreement_s(&self) -> Option<f64> {
         let newest = self.onboard.newest_odometry()?;
         self.clocks.disagreement_s(newest)
     }
 
-    /// Takes in an angle that was estimated elsewhere. Those of a burst, of SSBs within half a frame, are
-    /// heard together: once odometry, a later angle or [`settle`](Self::settle) says that it is complete.
+    /// Processes an angle that was estimated elsewhere. The angles of a burst (SSBs within half a
+    /// frame) are processed together: as soon as odometry, a later angle or
+    /// [`settle`](Self::settle) completes the burst.
     ///
     /// # Errors
-    /// [`LiveError::Value`] for a value that is not possible, [`LiveError::Time`], [`LiveError::AngleAhead`] and
-    /// [`LiveError::AngleRepeated`] for a time that is not plausible.
+    /// [`LiveError::Value`] for an invalid value; [`LiveError::Time`], [`LiveError::AngleAhead`]
+    /// and [`LiveError::AngleRepeated`] for an implausible time.
     pub fn angle(&mut self, angle: &AngleObservation) -> Result<(), LiveError> {
         finite("an angle", angle.phase_rad)?;
         finite("the SNR of an angle", angle.snr_db.unwrap_or_default())?;
@@ -371,7 +378,8 @@ impl Live {
         Ok(())
     }
 
-    /// Whether an angle is a copy of the last one of its radio head; `time_s` is its time of the pipeline.
+    /// Whether an angle is a copy of the last one of its radio head; `time_s` is its time in the
+    /// pipeline.
     fn is_repeated(&self, angle: &AngleObservation, time_s: f64) -> bool {
         let is_same = |(ssb, measured): &(SensedSsb, AngleMeasurement)| {
             (ssb.pci, ssb.ssb_index, ssb.time_s) == (angle.pci, angle.ssb_index, time_s)
@@ -383,49 +391,51 @@ impl Live {
                 .any(|it| it.head.sends(angle.pci, angle.ssb_index) && it.last_heard_s == heard_s)
     }
 
-    /// Hears what has come of a burst without waiting for more of it, as at the end of a drive.
+    /// Processes an incomplete burst without waiting for further angles, for example at the end of
+    /// a drive.
     ///
     /// # Errors
-    /// [`LiveError::Custom`] where the user's own code fails.
+    /// [`LiveError::Custom`] for errors of user code.
     pub fn settle(&mut self) -> Result<(), LiveError> {
         self.end_stretch()?;
         self.hear_before(f64::INFINITY)?;
         self.hear_angles()
     }
 
-    /// What became of the angles since this was asked last, oldest first; beyond 256 the oldest are
-    /// forgotten.
+    /// Returns the next outcome of an angle, oldest first. Of more than 256 outcomes, the oldest
+    /// are lost.
     pub fn next_outcome(&mut self) -> Option<Outcome> {
         self.outcomes.pop_front()
     }
 
-    /// The vehicle by its settings.
+    /// Returns the vehicle's settings.
     pub(super) const fn vehicle(&self) -> &Vehicle {
         &self.vehicle
     }
 
-    /// Whether the odometry counts the distance.
+    /// Whether the odometry contains a distance.
     pub(super) fn has_distance(&self) -> bool {
         self.clocks.has_distance()
     }
 
-    /// What is known of each radio head that the vehicle listens to.
+    /// Returns the status of each radio head that the vehicle receives.
     pub fn heads(&self) -> &[HeadStatus] {
         &self.heads
     }
 
-    /// What has come of the samples.
+    /// Returns the counts of the samples.
     pub fn stream_counts(&self) -> StreamCounts {
         let counts = self.stream.as_ref().map(SampleStream::counts);
         counts.unwrap_or_default()
     }
 
-    /// The pipeline, to ask it for calibration and findings.
+    /// Returns the pipeline, for its calibration and findings.
     pub const fn onboard(&self) -> &Onboard {
         &self.onboard
     }
 
-    /// What was done since the start or the last reset, and the energy of it by the platform's model.
+    /// Returns the activity since the start or the last reset, and its energy according to the
+    /// platform.
     pub fn energy(&self) -> LiveEnergy {
         let duration_s = self
             .interval_s
@@ -442,13 +452,13 @@ impl Live {
         }
     }
 
-    /// Notes a time that came in.
+    /// Records the time of an input.
     fn see(&mut self, time_s: f64) {
         let [first_s, last_s] = self.interval_s.unwrap_or([time_s; 2]);
         self.interval_s = Some([first_s.min(time_s), last_s.max(time_s)]);
     }
 
-    /// A sample whose distance is not known drives on by its speed.
+    /// Integrates the speed of a sample without a distance.
     fn with_distance(&self, sample: &OdometrySample) -> OdometrySample {
         if !sample.distance_m.is_nan() {
             return *sample;
@@ -472,7 +482,7 @@ impl Live {
         self.book(heard)
     }
 
-    /// Writes down what became of a burst.
+    /// Stores the outcomes of a burst.
     fn book(&mut self, heard: Result<Heard, BoxError>) -> Result<(), LiveError> {
         let Heard {
             time_s,
@@ -549,7 +559,7 @@ impl Live {
     }
 }
 
-/// Time and index of a burst's first SSB, and whether it was listened to.
+/// Time and index of a burst's first SSB, and whether the burst was received.
 struct Heard {
     time_s: f64,
     ssb_index: u8,
@@ -579,7 +589,7 @@ fn finite(what: &'static str, value: f64) -> Result<(), LiveError> {
     })
 }
 
-/// Checks a time stamp that has no predecessors.
+/// Validates a time stamp without predecessors.
 fn plausible(what: &'static str, time_s: f64) -> Result<(), LiveError> {
     TimeCheck::range(time_s).map_err(|defect| LiveError::Time { what, defect })
 }

@@ -1,9 +1,9 @@
-//! The pipeline as a program on a vehicle uses it: samples, odometry and angles in as they come, status
-//! out at any time.
+//! Pipeline for a program on a vehicle: inputs are samples, odometry and angles in order of
+//! arrival; the status is available at any time.
 //!
-//! [`Live`] joins receiver and pipeline and keeps the books: which samples are missing, what was heard
-//! of each radio head, when, and what it cost. It has no clock of its own, no threads, and allocates
-//! nothing once warm; a new pose or a reset does.
+//! [`Live`] combines receiver and pipeline, and records missing samples, the reception of each
+//! radio head and the energy. It has no clock and no threads, and allocates nothing after
+//! initialisation, except for a new pose or a reset.
 //!
 //! ```
 //! use onboard::live::{AngleObservation, State};

@@ -1,8 +1,8 @@
-//! Interleaved samples, as radios and files have them, as complex numbers of full scale one.
+//! Conversion of interleaved samples of radios and files to complex numbers of full scale one.
 
 use num_complex::Complex32;
 
-/// Appends interleaved `i8` (I, Q, I, …); a last I without Q is left out.
+/// Appends interleaved `i8` (I, Q, I, …); a final I without Q is ignored.
 pub fn ci8(interleaved: &[i8], samples: &mut Vec<Complex32>) {
     let (pairs, _) = interleaved.as_chunks::<2>();
     let part = |value: i8| f32::from(value) / 128.0;
@@ -13,7 +13,7 @@ pub fn ci8(interleaved: &[i8], samples: &mut Vec<Complex32>) {
     );
 }
 
-/// Appends interleaved `i16` (I, Q, I, …); a last I without Q is left out.
+/// Appends interleaved `i16` (I, Q, I, …); a final I without Q is ignored.
 pub fn ci16(interleaved: &[i16], samples: &mut Vec<Complex32>) {
     let (pairs, _) = interleaved.as_chunks::<2>();
     let part = |value: i16| f32::from(value) / 32768.0;
@@ -24,7 +24,7 @@ pub fn ci16(interleaved: &[i16], samples: &mut Vec<Complex32>) {
     );
 }
 
-/// Appends interleaved `f32` (I, Q, I, …); a last I without Q is left out.
+/// Appends interleaved `f32` (I, Q, I, …); a final I without Q is ignored.
 pub fn cf32(interleaved: &[f32], samples: &mut Vec<Complex32>) {
     let (pairs, _) = interleaved.as_chunks::<2>();
     samples.extend(pairs.iter().map(|[i, q]| Complex32::new(*i, *q)));

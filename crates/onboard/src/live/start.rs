@@ -1,13 +1,13 @@
-//! Where a drive begins.
+//! Start of a drive.
 
 use crate::geometry::Pose;
 use crate::settings::{Check, LocalizerSettings, SettingsError, Site, Vehicle};
 
-/// The vehicle with the start of a drive, and that start: `start`, else where its settings say, else
-/// anywhere that it can be found.
+/// Returns the vehicle with the start of a drive, and that start: `start`, otherwise that of its
+/// settings, otherwise unknown.
 ///
 /// # Errors
-/// [`SettingsError`] when the start is not known, and not what finding the vehicle takes.
+/// [`SettingsError`] if the start is unknown and a search is impossible.
 pub fn starting_at(
     site: &Site,
     vehicle: &Vehicle,

@@ -1,4 +1,4 @@
-//! How the vehicle stands: pose, what it can be relied on for, why, and what to do.
+//! Status of the vehicle: pose, integrity, reason, and recommended action.
 
 use std::fmt;
 
@@ -7,23 +7,23 @@ use nr_ssb::Tone;
 use crate::geometry::Pose;
 use crate::monitor::{ActiveFaults, Fault};
 
-/// What the pose can be relied on for.
+/// State of the pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum State {
-    /// No odometry has come: nothing is known yet.
+    /// No odometry has arrived.
     Waiting,
-    /// The first pose is searched for; until it is found the pose is the mean of where it may be.
+    /// Search for the initial pose; the pose is the mean of the hypotheses.
     Searching,
-    /// Angles come from elsewhere than predicted: it is searched for again.
+    /// The angles contradict the prediction; a search for the pose is active.
     Lost,
-    /// Several sources disagree, there is no odometry any more, or no angles have confirmed a given pose: not to be
-    /// relied on.
+    /// Several sources contradict each other, the odometry is absent, or no angles have confirmed a
+    /// given pose: the pose must not be used.
     Unavailable,
-    /// The protection level is above the alert limit, or a fault is suspected.
+    /// The protection level exceeds the alert limit, or a fault is suspected.
     Degraded,
-    /// The protection level holds and is within the alert limit.
+    /// The protection level is valid and within the alert limit.
     Ok,
-    /// There is a pose and nothing that monitors it (`integrity.enabled = false`).
+    /// There is a pose without integrity monitoring (`integrity.enabled = false`).
     Unmonitored,
 }
 
@@ -39,7 +39,7 @@ impl State {
         Self::Unmonitored,
     ];
 
-    /// Name for files and messages.
+    /// Returns the name for files and messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Waiting => "waiting",
@@ -52,52 +52,52 @@ impl State {
         }
     }
 
-    /// Whether the pose is one place that was found, and not refuted.
+    /// Whether the pose is a single position that is not refuted.
     pub const fn is_localized(self) -> bool {
         matches!(self, Self::Degraded | Self::Ok | Self::Unmonitored)
     }
 }
 
-/// Why the state is what it is; a sentence by its [`Display`](fmt::Display).
+/// Reason of the state; [`Display`](fmt::Display) yields a sentence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Reason {
-    /// No odometry has come.
+    /// No odometry has arrived.
     NoOdometry,
-    /// No odometry for so long.
+    /// The odometry is too old.
     OdometrySilent {
         /// For how long, in seconds.
         age_s: f64,
     },
     /// No angle has been accepted yet.
     NoAngle,
-    /// No angle has been accepted for so long.
+    /// No angle has been accepted for some time.
     AnglesSilent {
         /// For how long, in seconds.
         age_s: f64,
     },
-    /// Several places fit what was heard.
+    /// Several positions are consistent with the angles.
     SeveralPlaces {
-        /// How many.
+        /// Number of positions.
         places: usize,
     },
-    /// Angles come from elsewhere than predicted.
+    /// The angles contradict the prediction.
     AnglesElsewhere,
-    /// Half of the radio heads or more disagree with the others.
+    /// At least half of the radio heads contradict the others.
     SourcesDisagree,
-    /// Radio heads are at fault and left out.
+    /// Radio heads are faulty and excluded.
     FaultyHeads {
-        /// How many.
+        /// Number of radio heads.
         heads: usize,
     },
-    /// The protection level is above the alert limit.
+    /// The protection level exceeds the alert limit.
     LevelAboveLimit {
         /// Protection level in metres.
         level_m: f64,
         /// Alert limit in metres.
         limit_m: f64,
     },
-    /// A fault of odometer, array or site is likelier than none, or was a moment ago.
+    /// A fault of odometer, array or site is more probable than none, or was recently.
     FaultSuspected,
     /// A fault of the odometry or of a receive channel is active.
     SensorFault(Fault),
@@ -108,14 +108,14 @@ pub enum Reason {
         /// Time of the angles minus that of the odometry, in seconds.
         offset_s: f64,
     },
-    /// Nothing is wrong.
+    /// No fault detected.
     Nominal,
-    /// Nothing is wrong as far as anybody looks: there is no integrity monitor.
+    /// No fault detected, because there is no integrity monitor.
     NotMonitored,
 }
 
 impl Reason {
-    /// What to do about it.
+    /// Returns the recommended action.
     pub const fn what_to_do(&self) -> &'static str {
         match self {
             Self::NoOdometry | Self::OdometrySilent { .. } => {
@@ -208,35 +208,35 @@ impl fmt::Display for Reason {
 /// Number of tones in a status.
 pub const TONES: usize = 4;
 
-/// How the vehicle stands at a time.
+/// Status of the vehicle at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Status {
-    /// Time of the pose in seconds: the time asked for, or the last one that odometry vouches for.
+    /// Time of the pose in seconds: the requested time, or the last one with valid odometry.
     pub time_s: f64,
-    /// Position and heading in (−π, π]; while the first pose is searched for, the mean of the possible poses.
-    /// `None` before any odometry.
+    /// Position and heading in (−π, π]; during the search for the initial pose, the mean of the
+    /// hypotheses. `None` before any odometry.
     pub pose: Option<Pose>,
     /// Covariance of (x, y, heading), row-major, in m², m·rad and rad².
     pub covariance: Option<[[f64; 3]; 3]>,
-    /// Speed by the odometer, in m/s ...
+    /// Speed measured by the odometer, in m/s ...
     pub speed_mps: f64,
-    /// ... and yaw rate, counter-clockwise in rad/s, where something tells it.
+    /// ... and yaw rate, counter-clockwise in rad/s, if it is measured.
     pub yaw_rate_radps: Option<f64>,
-    /// What the pose can be relied on for.
+    /// State of the pose.
     pub state: State,
-    /// Why.
+    /// Reason of the state.
     pub reason: Reason,
-    /// Horizontal protection level in metres, where the vehicle is monitored and has a pose.
+    /// Horizontal protection level in metres, if the vehicle is monitored and has a pose.
     pub protection_level_m: Option<f64>,
-    /// Radio heads found faulty; which they are, [`Live::heads`](super::Live::heads) says.
+    /// Number of radio heads identified as faulty; [`Live::heads`](super::Live::heads) lists them.
     pub faulty: usize,
-    /// Time of the last angle accepted, in seconds.
+    /// Time of the last accepted angle, in seconds.
     pub last_angle_s: Option<f64>,
     /// Age of the newest odometry in seconds.
     pub odometry_age_s: Option<f64>,
     /// Age of the newest sample in seconds.
     pub samples_age_s: Option<f64>,
-    /// SSBs that the receiver keeps to.
+    /// Number of tracked SSBs.
     pub tracked: usize,
     /// Strongest tones that are subtracted from the samples, at absolute frequencies: DC offset of the receiver,
     /// spurious tones, other carriers.

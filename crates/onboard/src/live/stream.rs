@@ -1,4 +1,4 @@
-//! The samples of a stream as bursts of SSBs.
+//! Bursts of SSBs from a stream of samples.
 
 use nr_ssb::Tone;
 use nr_ssb::front_end::FrontEndError;
@@ -11,61 +11,64 @@ use crate::burst::first_burst;
 use crate::observation::{BURST_S, MAX_ELEMENTS, SsbObservation};
 use crate::receive::{ReceiveError, ReceiverConfig, StreamReceiver};
 
-/// What a stream of samples is.
+/// Configuration of a sample stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StreamConfig {
-    /// Samples per second and antenna.
+    /// Sample rate, in samples per second and antenna.
     pub rate_hz: f64,
-    /// Absolute frequency that stands at 0 Hz in the samples, Hz.
+    /// Absolute frequency at 0 Hz of the samples, in Hz.
     pub centre_hz: f64,
 }
 
-/// What has come of a stream of samples since its start.
+/// Counts of a sample stream since its start.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StreamCounts {
-    /// Samples taken in, in seconds.
+    /// Duration of the processed samples, in seconds.
     pub taken_s: f64,
-    /// Gaps by the times of the blocks, except those after a stretch that the caller ended ...
+    /// Number of gaps according to the times of the blocks, except after a segment that the caller
+    /// ended ...
     pub gaps: u64,
-    /// ... and their length together, in seconds.
+    /// ... and their total duration, in seconds.
     pub lost_s: f64,
-    /// Gaps that the blocks' times do not tell of, by the times of the SSBs ...
+    /// Number of gaps that the times of the blocks do not report, according to the times of the
+    /// SSBs ...
     pub untold_gaps: u64,
-    /// ... and their length together, but for whole periods of the SSB, in seconds. The times of all
-    /// that follows are later by it.
+    /// ... and their total duration modulo the SSB period, in seconds. Subsequent times are
+    /// corrected by it.
     pub untold_s: f64,
-    /// Blocks that began before the last one ended.
+    /// Number of blocks that began before the end of the previous one.
     pub overlaps: u64,
-    /// Streams that began anew.
+    /// Number of restarted streams.
     pub restarts: u64,
-    /// SSBs that a search has found; all others came where they were expected.
+    /// Number of SSBs detected by a search; all others were received at their expected time.
     pub found: u64,
 }
 
-/// Receiver of a stream, and the observations that are not yet of a whole burst.
+/// Receiver of a stream, with the observations of an incomplete burst.
 pub struct SampleStream {
     clock: StreamClock,
     receiver: StreamReceiver,
     elements: usize,
     bursts: Bursts,
     counts: StreamCounts,
-    /// Whether the caller ended the last stretch: the gap that follows it is deliberate.
+    /// Whether the caller ended the last segment, so that the following gap is deliberate.
     is_stretch_ended: bool,
 }
 
-/// Observations in order of time; the first of them are `held`, the others are memory.
+/// Observations in order of time; the first `held` are valid, the others are reusable memory.
 #[derive(Default)]
 struct Bursts {
     observations: Vec<SsbObservation>,
     held: usize,
-    /// Samples (s) that were missing untold before the newest.
+    /// Duration of unreported missing samples before the newest, in seconds.
     untold_s: f64,
     untold_gaps: u64,
-    /// Time minus sample time in seconds, if the caller measures it; `untold_s` is not applied then.
+    /// Time minus sample time in seconds, if the caller measures it; `untold_s` is not applied
+    /// then.
     offset_s: Option<f64>,
     /// Interruptions that the caller reported, in seconds.
     interrupted_s: f64,
-    /// Until when all SSBs have come; infinite where a stretch of samples has ended.
+    /// Time before which all SSBs are complete; infinite after the end of a segment.
     heard_until_s: f64,
 }
 
@@ -85,17 +88,17 @@ impl Bursts {
         self.held += 1;
     }
 
-    /// Time minus sample time, in seconds.
+    /// Returns time minus sample time, in seconds.
     fn correction_s(&self) -> f64 {
         self.offset_s.unwrap_or(self.untold_s + self.interrupted_s)
     }
 }
 
 impl SampleStream {
-    /// Before the first sample.
+    /// Creates a stream without samples.
     ///
     /// # Errors
-    /// [`LiveError::Receive`] for a rate, frequency or array that is not possible.
+    /// [`LiveError::Receive`] for an invalid rate, frequency or array.
     pub fn new(config: StreamConfig, receiver: ReceiverConfig) -> Result<Self, LiveError> {
         let StreamConfig { rate_hz, centre_hz } = config;
         Ok(Self {
@@ -108,7 +111,7 @@ impl SampleStream {
         })
     }
 
-    /// SSBs that are tracked.
+    /// Returns the number of tracked SSBs.
     pub fn tracked(&self) -> usize {
         self.receiver.tracked()
     }
@@ -118,7 +121,7 @@ impl SampleStream {
         self.receiver.tone(index)
     }
 
-    /// What has come.
+    /// Returns the counts.
     pub fn counts(&self) -> StreamCounts {
         StreamCounts {
             untold_gaps: self.bursts.untold_gaps,
@@ -128,32 +131,34 @@ impl SampleStream {
         }
     }
 
-    /// Time of the first sample that has not come.
+    /// Returns the time of the next expected sample.
     pub fn next_s(&self) -> Option<f64> {
         let next_s = || self.clock.time_s(self.clock.next() as f64) + self.correction_s();
         (self.counts.taken_s > 0.0).then(next_s)
     }
 
-    /// Time minus sample time, in seconds: the offset that the caller measured, else the unreported gaps.
+    /// Returns time minus sample time in seconds: the offset measured by the caller, otherwise the
+    /// unreported gaps.
     pub fn correction_s(&self) -> f64 {
         self.bursts.correction_s()
     }
 
-    /// Sets time minus sample time, in seconds, for a caller that counts samples and measures when they
-    /// arrive. It replaces the unreported gaps, which are known but for whole periods of the SSB.
+    /// Sets time minus sample time in seconds, for a caller that counts samples and measures their
+    /// arrival. It replaces the unreported gaps, which are known modulo the SSB period only.
     pub const fn set_offset_s(&mut self, offset_s: Option<f64>) {
         self.bursts.offset_s = offset_s;
     }
 
-    /// Adds an interruption, in seconds, that the times of the samples do not report.
+    /// Adds an interruption in seconds that the times of the samples do not report.
     pub fn add_interruption(&mut self, lost_s: f64) {
         self.bursts.interrupted_s += lost_s;
     }
 
-    /// Takes in the next samples of every antenna, the first of them received at `time_s`.
+    /// Processes the next samples of every antenna; `time_s` is the reception time of the first
+    /// one.
     ///
     /// # Errors
-    /// [`LiveError::Receive`] for another number of antennas or unequal lengths.
+    /// [`LiveError::Receive`] for a wrong number of antennas or unequal lengths.
     pub fn push(
         &mut self,
         time_s: f64,
@@ -206,10 +211,10 @@ impl SampleStream {
         Ok(continuity)
     }
 
-    /// Looks at all that is held back: nothing follows it without a gap.
+    /// Processes all pending samples before a gap.
     ///
     /// # Errors
-    /// None that [`push`](Self::push) has not.
+    /// Those of [`push`](Self::push).
     pub fn break_off(&mut self) -> Result<(), LiveError> {
         self.gap_to(self.clock.next(), &self.clock.clone())?;
         self.bursts.heard_until_s = f64::INFINITY;
@@ -226,7 +231,7 @@ impl SampleStream {
         Ok(())
     }
 
-    /// SSBs of the first burst, if no more of it can come.
+    /// Returns the SSBs of the first burst, if it is complete.
     pub fn burst(&self) -> &[SsbObservation] {
         let held = self.bursts.observations.get(..self.bursts.held);
         let held = held.unwrap_or_default();
@@ -241,7 +246,7 @@ impl SampleStream {
         }
     }
 
-    /// The first SSBs.
+    /// Returns the first SSBs.
     pub fn first(&self, number: usize) -> &[SsbObservation] {
         let number = number.min(self.bursts.held);
         self.bursts.observations.get(..number).unwrap_or_default()
@@ -255,7 +260,7 @@ impl SampleStream {
         }
     }
 
-    /// Forgets the first SSBs.
+    /// Removes the first SSBs.
     pub fn forget(&mut self, number: usize) {
         let number = number.min(self.bursts.held);
         if let Some(held) = self.bursts.observations.get_mut(..self.bursts.held) {

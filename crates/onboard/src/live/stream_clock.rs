@@ -1,49 +1,49 @@
-//! Which samples of a stream are missing, by the times of its blocks.
+//! Detection of missing samples in a stream, from the times of its blocks.
 
-/// Largest error of a sample rate beside the clock that gives the times, relative.
+/// Maximum relative error of a sample rate with respect to the clock of the times.
 const RATE_ERROR: f64 = 1e-4;
 
-/// A block that begins so much before the end of the last one (s) is of a stream that began anew.
+/// Minimum time by which a block of a restarted stream precedes the end of the last block (s).
 const RESTART_S: f64 = 1.0;
 
-/// How a block of samples goes on from the one before.
+/// Relation of a block of samples to the previous one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Continuity {
-    /// The first of all.
+    /// First block.
     First,
-    /// Where the last one ended.
+    /// Contiguous with the previous block.
     Contiguous,
-    /// After so many seconds of which there are no samples.
+    /// After a gap.
     Gap {
-        /// Length of the gap in seconds.
+        /// Duration of the gap in seconds.
         lost_s: f64,
     },
-    /// So many of its first seconds were there already and are left out.
+    /// The first samples are repetitions, and are ignored.
     Overlap {
-        /// Length of what is left out in seconds.
+        /// Duration of the repetition in seconds.
         again_s: f64,
     },
-    /// It is of another stream, or of the same that began anew: from more than a second before.
+    /// Block of another or restarted stream: it begins more than a second before.
     Restart,
 }
 
-/// Counts a stream's samples and knows the time of each.
+/// Counter of a stream's samples, with the time of each sample.
 ///
-/// The times of blocks are those of the sample clock: by counting, or a radio's own. They may drift by
-/// 100 ppm against the stated rate; a step beyond that is samples that are missing, or there twice.
+/// The times of the blocks are those of the sample clock, counted or from the radio. They may drift
+/// by 100 ppm relative to the configured rate; a larger step means missing or repeated samples.
 #[derive(Debug, Clone)]
 pub struct StreamClock {
     rate_hz: f64,
-    /// Number and time of a sample.
+    /// Index and time of a sample.
     anchor: (u64, f64),
-    /// Number of the next one; `None` before the first.
+    /// Index of the next sample; `None` before the first.
     next: Option<u64>,
     /// Length of the last block.
     last_length: usize,
 }
 
 impl StreamClock {
-    /// Before the first block of a stream of this rate.
+    /// Creates a clock for a stream of this rate.
     pub const fn new(rate_hz: f64) -> Self {
         Self {
             rate_hz,
@@ -53,24 +53,24 @@ impl StreamClock {
         }
     }
 
-    /// Samples per second.
+    /// Returns the sample rate in samples per second.
     pub const fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
-    /// Time of a sample, which need not be a whole number.
+    /// Returns the time of a sample, which need not be an integer.
     pub fn time_s(&self, sample: f64) -> f64 {
         let (number, time_s) = self.anchor;
         time_s + (sample - number as f64) / self.rate_hz
     }
 
-    /// Number of the next sample; the first of all is 0.
+    /// Returns the index of the next sample; the first one is 0.
     pub fn next(&self) -> u64 {
         self.next.unwrap_or(0)
     }
 
-    /// Takes in a block that begins at `time_s`: how it goes on, and how many of its samples are to be
-    /// left out. Those that are missing are counted as if they had come.
+    /// Processes a block that begins at `time_s`. Returns its relation to the previous one, and the
+    /// number of samples to ignore. Missing samples are counted like received ones.
     pub fn block(&mut self, time_s: f64, length: usize) -> (Continuity, usize) {
         let Some(next) = self.next else {
             *self = Self {
@@ -82,7 +82,7 @@ impl StreamClock {
             return (Continuity::First, 0);
         };
         let late_s = time_s - self.time_s(next as f64);
-        // What the time's own digits and a sample leave open.
+        // Resolution of the time stamp and of one sample.
         let resolution_s = (2.0 * time_s.abs() * f64::EPSILON).max(1.0 / self.rate_hz);
         let drift_s = RATE_ERROR * self.last_length as f64 / self.rate_hz;
         let (continuity, left_out) = if late_s.abs() <= 2.0 * resolution_s + drift_s {
@@ -96,7 +96,7 @@ impl StreamClock {
         } else if late_s > -RESTART_S {
             let again = (-late_s * self.rate_hz).round() as usize;
             let left_out = again.min(length);
-            // The first that is new comes where it is expected.
+            // The first new sample is at its expected time.
             self.anchor = (next, time_s + again as f64 / self.rate_hz);
             let again_s = left_out as f64 / self.rate_hz;
             (Continuity::Overlap { again_s }, left_out)
@@ -110,7 +110,7 @@ impl StreamClock {
         (continuity, left_out)
     }
 
-    /// Counts from this sample on, unless its time is what counting says.
+    /// Sets the anchor to this sample, unless its time agrees with the count.
     fn keep_to(&mut self, sample: u64, time_s: f64, resolution_s: f64) {
         if (time_s - self.time_s(sample as f64)).abs() > resolution_s {
             self.anchor = (sample, time_s);
@@ -168,7 +168,7 @@ mod tests {
         );
         assert_eq!((left_out, clock.next()), (1920, 3840 + 1920));
         assert!((clock.time_s(5760.0) - 5.0015).abs() < 1e-9);
-        // All of it.
+        // The whole block.
         assert_eq!(clock.block(5.0, 3840).1, 3840);
         assert_eq!(clock.next(), 5760);
         assert!((clock.time_s(5760.0) - 5.0015).abs() < 1e-9);

@@ -1,11 +1,11 @@
-//! The clock of a source, expressed in the time of the pipeline, which never goes back.
+//! Clock of a source, converted to the time of the pipeline, which never decreases.
 
 use super::time_check::{TimeCheck, TimeDefect, TimeVerdict};
 
-/// Step of a source's clock that was recognized and compensated.
+/// Detected and compensated step of a source's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClockStep {
-    /// New time minus the time that the earlier clock would show, in seconds.
+    /// New time minus the time of the previous clock, in seconds.
     pub step_s: f64,
     /// Time since the last accepted message, in seconds.
     pub elapsed_s: f64,
@@ -20,7 +20,7 @@ pub struct TimeBase {
 }
 
 impl TimeBase {
-    /// The clock of a source without messages yet, whose offset is known.
+    /// Creates the clock of a source without messages, with a known offset.
     pub fn with_offset(offset_s: f64) -> Self {
         Self {
             check: TimeCheck::default(),
@@ -28,30 +28,31 @@ impl TimeBase {
         }
     }
 
-    /// Time of the pipeline for a time of the source, in seconds.
+    /// Returns the time of the pipeline for a time of the source, in seconds.
     pub fn inside(&self, time_s: f64) -> f64 {
         time_s - self.offset_s
     }
 
-    /// Time of the source for a time of the pipeline, in seconds.
+    /// Returns the time of the source for a time of the pipeline, in seconds.
     pub fn outside(&self, time_s: f64) -> f64 {
         time_s + self.offset_s
     }
 
-    /// Time of the last accepted message by the source's clock, in seconds.
+    /// Returns the time of the last accepted message by the source's clock, in seconds.
     pub fn last_s(&self) -> Option<f64> {
         self.check.last_s()
     }
 
-    /// Time since the last accepted message by the arrivals, in seconds.
+    /// Returns the time since the last accepted message by arrival times, in seconds.
     pub fn waited_s(&self, arrival_s: Option<f64>) -> Option<f64> {
         self.check.waited_s(arrival_s)
     }
 
-    /// Validates the time of the next message, as [`TimeCheck::next`]; a step of the clock is compensated.
+    /// Validates the time of the next message like [`TimeCheck::next`], and compensates a step of
+    /// the clock.
     ///
     /// # Errors
-    /// The cause of a rejection.
+    /// Cause of a rejection.
     pub fn next(
         &mut self,
         time_s: f64,

@@ -1,4 +1,4 @@
-//! Commands of the user: a new pose, a new start, and radio heads to be ignored.
+//! User commands: new pose, new start, excluded radio heads.
 
 use super::{Live, finite, plausible};
 use crate::geometry::Pose;
@@ -9,12 +9,12 @@ use crate::monitor::Confirmation;
 use crate::settings::Vehicle;
 
 impl Live {
-    /// The pose is this at `time_s`, with the covariance of (x, y, heading), or as uncertain as the
-    /// vehicle's settings say of a start. What was learnt while driving is forgotten.
+    /// Sets the pose at `time_s`, with a covariance of (x, y, heading), or with the start
+    /// uncertainty of the vehicle's settings. Calibration learned while driving is discarded.
     ///
     /// # Errors
-    /// [`LiveError`] for values that are not possible, for a time more than half a second from the
-    /// newest odometry, and where the localizer is the user's own.
+    /// [`LiveError`] for invalid values, for a time more than half a second from the newest
+    /// odometry, and for a custom localizer.
     pub fn set_pose(
         &mut self,
         time_s: f64,
@@ -52,12 +52,12 @@ impl Live {
         self.begin_at(&vehicle, now)
     }
 
-    /// Forgets pose, odometry and all that was learnt, and searches for the pose as from the start of a
-    /// drive; times may be earlier than before from now on.
+    /// Discards pose, odometry and learned calibration, and searches for the pose as at the start
+    /// of a drive. Subsequent times may be earlier than before.
     ///
     /// # Errors
-    /// [`LiveError::Settings`] where the vehicle cannot be found by searching
-    /// ([`set_pose`](Self::set_pose) then), [`LiveError::OwnLocalizer`].
+    /// [`LiveError::Settings`] if a search is impossible for the vehicle (use
+    /// [`set_pose`](Self::set_pose)), [`LiveError::OwnLocalizer`].
     pub fn reset(&mut self) -> Result<(), LiveError> {
         if self.has_own_localizer {
             return Err(LiveError::OwnLocalizer);
@@ -89,7 +89,7 @@ impl Live {
             .map_err(LiveError::Custom)
     }
 
-    /// Leaves a cell out from now on.
+    /// Excludes a cell from now on.
     ///
     /// # Errors
     /// [`LiveError::UnknownCell`].
@@ -97,7 +97,7 @@ impl Live {
         self.set_excluded(pci, true)
     }
 
-    /// Takes a cell in again that was left out.
+    /// Includes an excluded cell again.
     ///
     /// # Errors
     /// [`LiveError::UnknownCell`].
@@ -116,7 +116,8 @@ impl Live {
     }
 }
 
-/// Standard deviations of place, the larger of its axes (m), and heading (rad).
+/// Returns the standard deviations of the position, along its major axis (m), and of the heading
+/// (rad).
 fn deviations(covariance: &[[f64; 3]; 3]) -> Result<(f64, f64), LiveError> {
     let variances = PoseEstimate {
         time_s: 0.0,

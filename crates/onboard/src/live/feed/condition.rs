@@ -1,19 +1,19 @@
-//! State of the vehicle at a time, with its reason.
+//! Status of the vehicle at a time, with its reason.
 
 use super::{Live, finite};
 use crate::geometry::{Pose, wrap_angle};
 use crate::live::{LiveError, Reason, SampleStream, State, Status};
 use crate::localize::{IntegrityState, PoseEstimate};
 
-/// Odometry that is older does not vouch for a pose (s).
+/// Maximum odometry age for a valid pose (s).
 const SILENT_S: f64 = 0.5;
 
-/// Time without an accepted angle that is a reason of its own (s).
+/// Time without an accepted angle above which this is the reported reason (s).
 const NO_ANGLE_S: f64 = 5.0;
 
 impl Live {
-    /// How the vehicle stands at `now_s`. A pose is told for half a second beyond the newest odometry at
-    /// most.
+    /// Returns the status of the vehicle at `now_s`. The pose is extrapolated for at most half a
+    /// second after the newest odometry.
     ///
     /// # Errors
     /// [`LiveError::Value`] for a time that is not finite, [`LiveError::Custom`].
@@ -27,7 +27,7 @@ impl Live {
         Ok(status)
     }
 
-    /// The status at a time of the pipeline, with times of the pipeline.
+    /// Returns the status at a time of the pipeline, with times of the pipeline.
     fn status_inside(&self, now_s: f64) -> Result<Status, LiveError> {
         let newest = self.onboard.newest_odometry();
         let age_s = newest.map(|it| now_s - it.time_s);
@@ -60,7 +60,7 @@ impl Live {
             .onboard
             .pose(status.time_s)
             .map_err(LiveError::Custom)?;
-        // The filter's heading is continuous over several turns.
+        // The heading of the filter is continuous over several turns.
         status.pose = Some(Pose {
             heading_rad: wrap_angle(estimate.pose.heading_rad),
             ..estimate.pose
@@ -79,7 +79,7 @@ impl Live {
         Ok(status)
     }
 
-    /// State and reason of a pose with odometry behind it.
+    /// Returns state and reason of a pose with valid odometry.
     fn judge(&self, estimate: &PoseEstimate, now_s: f64) -> (State, Reason) {
         if let Some(places) = self.onboard.searching() {
             let reason = match self.last_angle_s {

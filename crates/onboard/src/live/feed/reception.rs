@@ -3,32 +3,32 @@
 use super::{Live, finite};
 use crate::live::{LiveError, SampleStream};
 
-/// How far ahead the next wake-up is looked for (s).
+/// Look-ahead of the next wake-up (s).
 const LOOK_AHEAD_S: f64 = 1.0;
 
-/// Maximum time since the last SSB, in seconds, for which windows are placed by the time of that SSB. A
-/// stretch of samples without an SSB, later than this, means that the windows may be misplaced.
+/// Maximum time since the last SSB for which its time determines the reception windows, in seconds.
+/// A segment of samples without an SSB after this time means that the windows may be misplaced.
 const SSB_SILENT_S: f64 = 1.0;
 
 impl Live {
-    /// Whether the burst at `time_s` is wanted, as things stand now.
+    /// Whether the current policy and monitors request the burst at `time_s`.
     ///
     /// # Errors
-    /// [`LiveError::Custom`] where the user's own policy fails.
+    /// [`LiveError::Custom`] for errors of a custom policy.
     pub fn listens(&mut self, time_s: f64) -> Result<bool, LiveError> {
         finite("the time of a burst", time_s)?;
         let time_s = self.clocks.angles.inside(time_s);
         self.onboard.listens(time_s).map_err(LiveError::Custom)
     }
 
-    /// When the receiver has to be on next, after `now_s`: at the beginning of the next burst that is
-    /// wanted if the vehicle drives on as it does. Where none is within a second, when to ask again. `now_s`
-    /// itself while no SSB is known, while the place is searched for, after
-    /// [`samples_resumed`](Self::samples_resumed), and where stretches of samples had no SSB for a second.
-    /// Both are times of the samples, without [`time_offset_s`](Self::time_offset_s).
+    /// Returns the next time after `now_s` at which the receiver must be on: the start of the next
+    /// requested burst, for constant motion. If none is within a second, it is the time of the next
+    /// query. It is `now_s` itself while no SSB is known, during a search, after
+    /// [`samples_resumed`](Self::samples_resumed), and after a second of samples without an SSB.
+    /// Both are sample times, without [`time_offset_s`](Self::time_offset_s).
     ///
     /// # Errors
-    /// As [`listens`](Self::listens).
+    /// Those of [`listens`](Self::listens).
     pub fn next_wake_up_s(&mut self, now_s: f64) -> Result<f64, LiveError> {
         finite("the time of a wake-up", now_s)?;
         let untracked = self.stream.as_ref().is_some_and(|it| it.tracked() == 0);
@@ -53,37 +53,38 @@ impl Live {
         Ok(burst_s)
     }
 
-    /// Time minus sample time, in seconds: as set by [`set_time_offset_s`](Self::set_time_offset_s), else the
-    /// gaps that the sample times did not report.
+    /// Returns time minus sample time in seconds: as set by
+    /// [`set_time_offset_s`](Self::set_time_offset_s), otherwise the unreported gaps of the
+    /// samples.
     pub fn time_offset_s(&self) -> f64 {
         (self.stream.as_ref()).map_or(0.0, SampleStream::correction_s)
     }
 
-    /// Sets time minus sample time, in seconds, where samples are counted and their arrival is measured:
-    /// counting keeps the times of SSBs exact while the offset may drift or step. `None` derives it from
-    /// the SSBs.
+    /// Sets time minus sample time in seconds, for a caller that counts samples and measures their
+    /// arrival: the count keeps the times of SSBs exact while the offset may drift or step. With
+    /// `None`, the SSBs determine it.
     pub const fn set_time_offset_s(&mut self, offset_s: Option<f64>) {
         if let Some(stream) = &mut self.stream {
             stream.set_offset_s(offset_s);
         }
     }
 
-    /// Adds an interruption of the samples, in seconds, that their times do not report: whole periods of the
-    /// SSB, because the SSBs tell the rest.
+    /// Adds an interruption of the samples in seconds that their times do not report: whole SSB
+    /// periods, because the SSBs determine the rest.
     pub fn add_interruption(&mut self, lost_s: f64) {
         if let Some(stream) = &mut self.stream {
             stream.add_interruption(lost_s);
         }
     }
 
-    /// Notes that samples resumed after an interruption of unknown length:
-    /// [`next_wake_up_s`](Self::next_wake_up_s) wants every sample until an SSB is received.
+    /// Records that samples resumed after an interruption of unknown length:
+    /// [`next_wake_up_s`](Self::next_wake_up_s) requests every sample until an SSB is received.
     pub const fn samples_resumed(&mut self) {
         self.is_resuming = true;
     }
 
-    /// Index of the first SSB of the last burst, whose times [`next_wake_up_s`](Self::next_wake_up_s) goes
-    /// on from.
+    /// Returns the index of the first SSB of the last burst, the reference of
+    /// [`next_wake_up_s`](Self::next_wake_up_s).
     pub fn last_ssb_index(&self) -> Option<u8> {
         self.last_burst.map(|(_, ssb_index)| ssb_index)
     }
