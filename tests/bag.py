@@ -1,4 +1,4 @@
-"""Drives as rosbag2 folders, written by `rosbags`: not by this project's own code."""
+"""Drives as rosbag2 folders, written by the independent library `rosbags`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ODOMETRY, IMU = "nav_msgs/msg/Odometry", "sensor_msgs/msg/Imu"
 
 
 def made(name: str, *values: Any) -> Any:
-    """A message, by its fields in order."""
+    """Returns a message from its fields in order."""
     return STORE.types[name](*values)
 
 
@@ -34,7 +34,7 @@ def header(time_s: float) -> Any:
 
 @dataclass
 class Message:
-    """What is written, and when it was logged."""
+    """Content of a message, and its log time."""
 
     topic: str
     type: str
@@ -54,7 +54,7 @@ def odometry(
     quaternion: tuple[float, float, float, float] | None = None,
     topic: str = "/odom",
 ) -> Message:
-    """One `nav_msgs/msg/Odometry`; without heading and quaternion its orientation is not set."""
+    """One `nav_msgs/msg/Odometry`; without heading and quaternion, the orientation is not set."""
     if quaternion is None:
         half = 0.5 * (heading_rad or 0.0)
         quaternion = (0.0, 0.0, math.sin(half), math.cos(half))
@@ -81,7 +81,7 @@ def odometry(
 def imu(
     time_s: float, yaw_rate_radps: float, *, known: bool = True, topic: str = "/imu/data"
 ) -> Message:
-    """One `sensor_msgs/msg/Imu` without orientation; what is not known has a covariance of −1."""
+    """One `sensor_msgs/msg/Imu` without orientation; unknown quantities have a covariance of −1."""
     unknown = np.array([-1.0, *[0.0] * 8])
     whole = made(
         IMU,
@@ -99,7 +99,7 @@ def imu(
 def write(
     folder: Path, messages: Iterable[Message], *, storage: StoragePlugin = StoragePlugin.MCAP
 ) -> Path:
-    """Write a folder with one file, in order of time."""
+    """Writes a folder with one file, in order of time."""
     with Writer(folder, version=9, storage_plugin=storage) as bag:
         connections: dict[str, Any] = {}
         for it in sorted(messages, key=lambda it: it.time_s):
@@ -110,6 +110,6 @@ def write(
 
 
 def file_of(folder: Path) -> Path:
-    """The only file of a bag."""
+    """Returns the only file of a bag."""
     (file,) = folder.glob("*.mcap")
     return file

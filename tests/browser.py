@@ -1,4 +1,4 @@
-"""A headless Chromium, spoken to by the DevTools protocol."""
+"""A headless Chromium, controlled by the DevTools protocol."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Browser:
                 return dict(answer["result"])
 
     def evaluate(self, expression: str) -> Any:
-        """The value of a JavaScript expression, awaited if it is a promise."""
+        """Returns the value of a JavaScript expression; a promise is awaited."""
         answer = self.call(
             "Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True
         )
@@ -78,11 +78,11 @@ class Browser:
         assert found, f"{expression}: not within {seconds} s: {self.text()}"
 
     def text(self) -> str:
-        """What the page says."""
+        """Text of the page."""
         return str(self.evaluate("document.body.innerText"))
 
     def resize(self, width: int, height: int, *, look: str = "light") -> None:
-        """Another size of the window; in ``light`` or ``dark`` colours, or as in ``print``."""
+        """Sets the size of the window, and the scheme ``light`` or ``dark``, or ``print``."""
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.call("Emulation.setDeviceMetricsOverride", **metrics)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if look == "dark" else "light"}
@@ -95,7 +95,7 @@ class Browser:
         file.write_bytes(base64.b64decode(answer["data"]))
 
     def close(self) -> None:
-        """Ends the browser."""
+        """Closes the browser."""
         self.socket.close()
         self.process.terminate()
         self.process.communicate(timeout=10.0)

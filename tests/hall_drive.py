@@ -1,4 +1,4 @@
-"""A drive through a hall as its files would tell it, of docs/locate.md alone; a textbook filter."""
+"""Simulated log files of a drive through a hall, from docs/locate.md only; a textbook filter."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ START_STD = (0.3, 0.05)  # metres, radians
 
 @dataclass
 class World:
-    """What is so, and not told: ``stays`` in seconds or metres, half of the variance."""
+    """Simulated conditions; ``stays``: correlation of half of the angle variance (s or m)."""
 
     seed: int = 1
     outliers: float = 0.03
@@ -30,7 +30,7 @@ class World:
 
 @dataclass
 class HallDrive:
-    """Columns as the files have them; angles are rows of time, radio head and electrical angle."""
+    """Columns of the files; angles are rows of time, radio head and electrical angle."""
 
     time_s: np.ndarray
     truth: np.ndarray
@@ -41,19 +41,19 @@ class HallDrive:
 
 
 def phase_rad(pose: np.ndarray, head: tuple[float, float, float]) -> float:
-    """Electrical angle of an array along the vehicle's axis, at height 0."""
+    """Electrical angle (rad) of an array along the vehicle's axis, at height 0."""
     dx, dy = head[0] - pose[0], head[1] - pose[1]
     along = dx * math.cos(pose[2]) + dy * math.sin(pose[2])
     return math.pi * along / math.hypot(dx, dy, head[2])
 
 
 def simulate(world: World) -> HallDrive:
-    """One way through the hall: two bends, a stop, a lane kept to within decimetres."""
+    """One drive through the hall: two bends, a stop, lane keeping within decimetres."""
     rng = np.random.default_rng(world.seed)
     time_s = np.arange(0.0, LAP_S, STEP_S)
     speed = 3.0 + 0.5 * np.sin(0.2 * time_s) - 3.0 * np.exp(-(((time_s - 45.0) / 3.0) ** 4))
     speed = np.maximum(speed, 0.0) * np.minimum(time_s / 3.0, 1.0)
-    along = np.cumsum(speed) * STEP_S  # in the middle of the road, beside which the lane swings
+    along = np.cumsum(speed) * STEP_S  # along the centre line of the road
     ends = np.cumsum([0.0, *(length for length, _ in LEGS_M_RAD)])
     turns = np.cumsum([0.0, *(turn for _, turn in LEGS_M_RAD)])
     fine = np.arange(0.0, along[-1] + 1.0, 1e-3)
@@ -91,7 +91,7 @@ def simulate(world: World) -> HallDrive:
 
 
 def textbook(drive: HallDrive) -> tuple[np.ndarray, np.ndarray]:
-    """A Kalman filter over pose, odometer scale, bias and mounting: poses and covariances."""
+    """Kalman filter over pose, odometer scale, bias and mounting: poses and covariances."""
     state = np.array([*drive.start, 1.0, 0.0, 0.0])
     stds = [START_STD[0], START_STD[0], START_STD[1], SCALE_STD, BIAS_STD_RADPS, MOUNTING_STD_RAD]
     covariance, heard = np.diag(stds) ** 2, 0

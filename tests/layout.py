@@ -1,4 +1,4 @@
-"""Measures the boxes of a page in a browser: what overlaps, what is cut, what is wider than it."""
+"""Measures the boxes of a page in a browser: overlaps, cut text, and excess width."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from browser import Browser
 
-# Inside the page: text that lies over other text, text cut by its box or by the drawing it is part
+# Script in the page: text over other text, text cut by its box or by the drawing it is part
 # of, and a page wider than its window.
 MEASURE = """
 (() => {
@@ -66,12 +66,12 @@ axe.run(document, { resultTypes: ["violations"] }).then((it) => it.violations
 
 
 def chromium() -> str | None:
-    """The browser, where there is one."""
+    """Returns the browser, or skips without one."""
     return shutil.which("chromium") or shutil.which("chromium-browser")
 
 
 def measure(browser: Browser, width: int, look: str) -> dict[str, Any]:
-    """What a browser finds of its page in a window of some width, light, dark or printed."""
+    """Returns the layout faults of a page at a window width, light, dark or printed."""
     browser.resize(width, HEIGHT_PX, look="dark" if look == "dark" else "light")
     browser.evaluate("window.isBefore = true")
     browser.call("Page.reload")  # a page is laid out for the window in which it is opened
@@ -83,7 +83,7 @@ def measure(browser: Browser, width: int, look: str) -> dict[str, Any]:
 
 
 def hindrances(browser: Browser) -> list[str]:
-    """Serious and critical findings of axe, where ``ACCESS_AV_AXE`` names its ``axe.min.js``."""
+    """Serious and critical findings of axe, if ``ACCESS_AV_AXE`` is the path of ``axe.min.js``."""
     browser.evaluate(Path(os.environ["ACCESS_AV_AXE"]).read_text("utf-8") + ";0")
     found: list[str] = browser.evaluate(AXE)
     return found

@@ -21,13 +21,13 @@ NODE = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-node
 
 
 def command(drive: Path, settings: Path, *options: str) -> list[str]:
-    """How it is started for a drive that was written by `access-av synth`."""
+    """Returns the node's command for a drive that `access-av synth` wrote."""
     believed = ["--site", str(drive / "site.toml"), "--vehicle", str(drive / "vehicle.toml")]
     return [str(NODE), *believed, *options, str(settings)]
 
 
 def wake_up_every(drive: Path, interval_s: float) -> None:
-    """Has the drive's vehicle wake up at a fixed interval."""
+    """Sets a fixed wake-up interval of the drive's vehicle."""
     file = drive / "vehicle.toml"
     fixed = {"wake_up.policy": "fixed", "wake_up.interval_ms": 1e3 * interval_s}
     vehicle = access_av.Vehicle.load(str(file)).with_overrides(fixed)
@@ -54,7 +54,7 @@ class Broker:
         assert self.process.stdout.readline().strip() == "ready"
 
     def heard(self) -> list[dict[str, Any]]:
-        """Ends the broker and returns the messages."""
+        """Stops the broker and returns the received messages."""
         self.process.terminate()
         heard, _ = self.process.communicate(timeout=10.0)
         return [json.loads(line) for line in heard.splitlines() if line.startswith("{")]

@@ -1,4 +1,4 @@
-"""A small robot on two driven wheels among six radio heads: a drive as its files would tell it."""
+"""Simulated log files of a small differential-drive robot among six radio heads."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ start = { position_std_m = 0.05, heading_std_rad = 0.05 }
 
 @dataclass
 class Robot:
-    """What its files hold; a test spoils them before it locates the drive."""
+    """Content of the files of a drive; a test may change it before it locates the drive."""
 
     odometry: pl.DataFrame
     angles: pl.DataFrame
@@ -58,7 +58,7 @@ class Robot:
         return f"{self.sheet}[array]\nmounting_rad = {self.mounting_rad}\nmounting_std_rad = 0.02\n"
 
     def write(self, place: Path) -> list[object]:
-        """Write the files; gives the arguments of ``locate``."""
+        """Writes the files; returns the arguments of ``locate``."""
         self.odometry.write_csv(place / "odometry.csv")
         self.angles.write_csv(place / "angles.csv")
         (place / "site.toml").write_text(self.site())
@@ -75,7 +75,7 @@ class Robot:
         ]  # fmt: skip
 
     def locate(self, place: Path, *, smooth: bool = False) -> drives.Drive:
-        """Locate it as told, by its files."""
+        """Locates the drive from its files."""
         self.write(place)
         return drives.locate(
             access_av.Site.from_toml(self.site()),
@@ -96,9 +96,9 @@ def robot(
     seed: int = 1,
     speed_mps: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
 ) -> Robot:
-    """Winds through the hall, forwards and backwards, and turns on the spot now and then.
+    """A drive through the hall, forwards and backwards, with turns on the spot.
 
-    ``speed_mps`` gives the speed at each time (s) in place of that.
+    ``speed_mps`` replaces the default speed; it is a function of the time (s).
     """
     rng = np.random.default_rng(seed)
     step_s = 1 / RATE_HZ

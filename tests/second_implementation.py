@@ -1,6 +1,6 @@
-"""The paper's simulation a second time: NumPy alone, from the paper's text, nothing of the product.
+"""Independent implementation of the paper's simulation: NumPy only, from the paper's text.
 
-Equations and line numbers are the paper's; what it leaves open is as the shipped scenario has it.
+Equations and line numbers are those of the paper; other choices are those of the shipped scenario.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ KP, KI, KD, W_SNR, W_VELOCITY, T_MAX_S = 0.75, 0.08, 0.195, 0.6, 0.4, 0.24
 NOISE_DBM = 10.0 * np.log10(1.38e-23 * 290.0 * 3.6e6 * 1e3) + 5.0
 # Chosen: transmit power, carrier, Rician K, set point and scale of the SNR error; u is in seconds.
 POWER_DBM, CARRIER_HZ, RICIAN_K, OFFSET_DB, SCALE_DB = -27.3, 3.5e9, 1e4, 3.0, 10.0
-# Number of the SSB, its SNR, the SNR expected at the estimated place: whether to take its angle.
+# Whether to use an SSB's angle, by SSB number, SNR (dB) and expected SNR (dB) at the estimate.
 Wanted = Callable[[int, np.ndarray, np.ndarray], np.ndarray]
 
 
 def friis_db(xy_m: np.ndarray) -> np.ndarray:
-    """SNR by the link budget at places of shape (2, ...)."""
+    """SNR (dB) by the link budget at positions of shape (2, ...)."""
     loss_db = 20.0 * np.log10(4.0 * np.pi * np.hypot(*(HEAD_M - xy_m)) * CARRIER_HZ / 299792458.0)
     return np.asarray(POWER_DBM + TX_RX_GAIN_DB - loss_db - NOISE_DBM)
 
 
 class Trip:
-    """Many vehicles on the paper's track: what each receives of every SSB."""
+    """Many vehicles on the paper's track: the received signal of every SSB."""
 
     def __init__(self, runs: int, seed: int) -> None:
         rng, ramp_s = np.random.default_rng(seed), TOP_MPS / RAMP_MPS2
@@ -50,11 +50,11 @@ class Trip:
             gain = amplitude * (np.sqrt(RICIAN_K) * line[..., None] + scatter)
             received = gain * 1j ** rng.integers(4, size=(len(self.t), 1, SNAPSHOTS)) + noise
             covariance = received @ received.conj().swapaxes(1, 2)
-            self.signal[run] = np.linalg.eigh(covariance)[1][..., -1]  # of the largest eigenvalue
+            self.signal[run] = np.linalg.eigh(covariance)[1][..., -1]  # largest eigenvalue
             self.snr_db[run] = 10.0 * np.log10(np.mean(abs(gain[..., 0]) ** 2, axis=1))
 
     def music(self, points: int = 16384) -> np.ndarray:
-        """AoA at the peak of the pseudospectrum, coarse over the circle and then by ever less."""
+        """AoA (rad) at the maximum of the pseudospectrum, by stepwise refinement of a grid."""
         n, coarse = np.arange(ANTENNAS), 2.0 * np.pi * (np.arange(64) + 0.5) / 64
         steering, step = np.exp(-1j * np.outer(n, coarse)), (coarse[1] - coarse[0]) / 3.0
         omega = coarse[np.array([abs(e @ steering).argmax(axis=1) for e in self.signal])]
@@ -66,12 +66,12 @@ class Trip:
         return np.asarray(np.arccos(np.angle(np.exp(1j * omega)) / np.pi))
 
     def esprit(self) -> np.ndarray:
-        """AoA by the rotation from the first three antennas to the last three."""
+        """AoA (rad) by the rotation from the first three antennas to the last three."""
         rotation = np.sum(self.signal[..., 1:] * self.signal[..., :-1].conj(), axis=-1)
         return np.asarray(np.arccos(np.angle(rotation) / np.pi))
 
     def drive(self, aoa: np.ndarray, wanted: Wanted) -> tuple[float, np.ndarray]:
-        """Mean executions, and errors of shape (2, runs, SSBs): AoA → AoH → position."""
+        """Mean executions, and errors (m) of shape (2, runs, SSBs): AoA → AoH → position."""
         anchor, heading, since_m = np.zeros((2, len(aoa))), np.zeros(len(aoa)), np.zeros(len(aoa))
         errors, count = np.empty((2, *aoa.shape)), 0
         for k, step_m in enumerate(np.diff(self.s, prepend=0.0)):
@@ -81,7 +81,7 @@ class Trip:
             aois = np.arctan2(*(HEAD_M - here)[::-1])  # equation 1
             turned = aois - np.copysign(aoa[:, k], np.sin(aois - heading)) - heading  # equation 2
             turned = np.where(now, np.angle(np.exp(1j * turned)), 0.0)
-            mean = heading + 0.5 * turned  # of the way since the last estimate (chosen)
+            mean = heading + 0.5 * turned  # mean heading since the last estimate (chosen)
             here = anchor + since_m * np.array([np.cos(mean), np.sin(mean)])
             anchor, since_m = np.where(now, here, anchor), np.where(now, 0.0, since_m)
             heading, count = heading + turned, count + np.count_nonzero(now)
@@ -89,13 +89,13 @@ class Trip:
         return count / len(aoa), errors
 
     def fixed(self, interval_s: float) -> Wanted:
-        """The first SSB that comes so long after the last one."""
+        """Selects the first SSB after each interval."""
         every = int(np.ceil(interval_s / PERIOD_S - 1e-9))
         return lambda k, snr_db, _: np.full(len(snr_db), k % every == 0)
 
     def algorithm_1(self, t_base_s: float, *, asleep: bool = False, clamp: float = np.inf,
                     gate_db: float = -np.inf) -> Wanted:  # fmt: skip
-        """Algorithm 1, computed at every SSB or at wake-ups; gate and clamp are not the paper's."""
+        """Algorithm 1 at every SSB or at wake-ups; gate and clamp are not from the paper."""
         before, integral, wt_s, sensed = np.zeros((4, len(self.snr_db)))
         last = np.full(len(self.snr_db), -np.inf)
 

@@ -1,4 +1,4 @@
-"""Generated plans of plants: a known road, radio heads and walls as drawings and as maps."""
+"""Generated plans of plants with a known road, radio heads and walls: drawings and maps."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class Drawing:
 
     @classmethod
     def new(cls, unit: int, unit_m: float, *, down: bool, version: str = "R2010") -> Drawing:
-        """An empty drawing."""
+        """Returns an empty drawing."""
         import ezdxf
 
         made = ezdxf.new(version)
@@ -132,7 +132,7 @@ class Drawing:
         return {"layer": layer, **extrusion, **more}
 
     def bulge(self, turn_rad: float) -> float:
-        """Bulge of an arc that turns so much to the left in the world."""
+        """Returns the bulge of an arc with a given turn to the left."""
         return (-1.0 if self.down else 1.0) * math.tan(0.25 * turn_rad)
 
 
@@ -252,7 +252,7 @@ UNITS = ((4, 1e-3), (6, 1.0), (1, 0.0254), (14, 0.1), (21, 1200.0 / 3937.0), (0,
 
 
 def add_heads_and_wall(drawing: Drawing) -> None:
-    """A point, a block, a mirrored block; a wall in two entities, and a text beside it."""
+    """Adds a point, a block, a mirrored block; a wall of two entities, and a text next to it."""
     model = drawing.model
     block = drawing.document.blocks.new("MAST")
     block.add_circle((0.0, 0.0), 1.0)
@@ -282,7 +282,7 @@ def write_map(
     *,
     kind: str,
 ) -> None:
-    """The plant as GeoJSON in a reference system, by `pyproj`.
+    """Writes the plant as GeoJSON in a reference system, by `pyproj`.
 
     ``kind`` is one of ``features``, ``multi``, ``collection``.
     """

@@ -1,4 +1,4 @@
-"""An evaluation made up of smooth curves, for tests of what comes after the simulation."""
+"""Synthetic evaluation of smooth curves, for tests of the steps after the simulation."""
 
 from __future__ import annotations
 

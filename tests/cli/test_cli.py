@@ -85,7 +85,7 @@ def test_run_writes_what_it_promises(access_av: Cli, tmp_path: Path) -> None:
     manifest = json.loads((tmp_path / "r/manifest.json").read_text())
     assert manifest["seed"] == 3
     assert access_av("scenario", "check", tmp_path / "r/scenario.toml").code == 0
-    # What the scenario leaves to the platform is written out.
+    # The platform's default value is written out.
     assert "base_ms = 80.0" in (tmp_path / "r/scenario.toml").read_text()
     assert not (tmp_path / "results").exists()
     for name in ("trajectory.tum", "truth.tum"):

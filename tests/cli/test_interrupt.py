@@ -19,7 +19,7 @@ from access_av.cli.main import app
 if TYPE_CHECKING:
     from pathlib import Path
 
-# What each command has to do for longer than the latest interruption.
+# Arguments with which each command runs longer than the latest interruption.
 LONG: dict[str, list[str]] = {
     "run": ["run", "paper-real-odometry-4", "--runs", "400", "--out", "out"],
     "evaluate": ["evaluate", "--out", "out"],
@@ -66,7 +66,7 @@ LONG: dict[str, list[str]] = {
     "export": ["export", "yard", "exported.geojson"],
 }  # fmt: skip
 LATEST_S = 2.0
-# What is over so soon was over when the signal was sent.
+# A process that ends this soon (s) had finished when the signal was sent.
 LATE_S = 0.1
 # The interpreter starts before the program does; what Ctrl-C does then is Python's own.
 PYTHON_S = 0.15

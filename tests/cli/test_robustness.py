@@ -1,15 +1,15 @@
-"""What a user may type, plug in or feed: refused with a message, or done right; never worse.
+"""Invalid user input, plug-ins and files are rejected with a message, or processed correctly.
 
-One test for each kind of harm that an attack by hand found once, in the order of this list. What is
-random is in ``attack/``, Ctrl-C in ``test_interrupt.py``.
+One test for each kind of defect that a manual test has found, in the order of this list. Random
+tests are in ``attack/``, those of Ctrl-C in ``test_interrupt.py``.
 
 ====  ==============================================  ==============================================
-kind  what went wrong                                 test
+kind  defect                                          test
 ====  ==============================================  ==============================================
 1     a tracker kilometres off                        test_a_short_wander_does_not_lead_far_away
 2     negative variances                              test_covariances_are_positive
 3     NaN in tables                                   test_tables_hold_no_nan
-4     start times and answers that cannot be          test_start_times_that_cannot_be, test_plug_ins
+4     impossible start times and answers              test_start_times_that_cannot_be, test_plug_ins
 5     finite nonsense                                 test_numbers_beyond_physics
 6     drives of any size                              test_drives_too_large
 7     threads, runs and seeds of any size             test_counts_too_large, test_threads_…
@@ -101,7 +101,7 @@ def test_a_short_wander_does_not_lead_far_away() -> None:
     )
     found = access_av.simulate(scenario, runs=4, seed=108, keep_trajectories=True)
     assert found.trajectories is not None
-    # The stretch that nobody surveyed, which an odometer alone does not see bend, and no more.
+    # Errors are limited to the part without survey, where the odometer does not measure the bend.
     surveyed = found.trajectories.filter(pl.col("time_s") < 114.0)
     error_m = (pl.col("error_x_m") ** 2 + pl.col("error_y_m") ** 2).sqrt()
     assert surveyed.select(error_m.max()).item() < 5.0
@@ -123,7 +123,7 @@ def test_covariances_are_positive(seed: int) -> None:
 
 
 def test_a_heading_that_is_given_exactly_has_a_positive_variance() -> None:
-    # In a bend it tells of the place too: rounding took its variance below zero.
+    # In a bend, heading and position are correlated: rounding made the variance negative.
     scenario = access_av.Scenario.load("yard").with_overrides(
         {
             "site.road": {"segments": [{"length_m": 90.0, "turn_rad": 1.5}]},

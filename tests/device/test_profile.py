@@ -82,7 +82,7 @@ def labels(sysfs: Path) -> list[str]:
     return [each.label for each in (*found.rails, *found.zones)]
 
 
-# What is read, and what is not.
+# Sensors.
 
 
 def test_jetpack_5_adds_rails_and_leaves_out_what_is_none(tmp_path: Path) -> None:
@@ -147,7 +147,7 @@ def test_no_sensor_is_none(tmp_path: Path) -> None:
     assert counters.find(tmp_path) is None
 
 
-# What is put in lies in the interval.
+# Intervals contain the true value.
 
 
 class Bench:
@@ -389,7 +389,7 @@ def test_profile_of_a_board_with_modes(jetson: Path, monkeypatch: pytest.MonkeyP
         assert each.energy_j is not None, each.why_not
         above_w = 10.0 if each.workload == "music" else 20.0
         true_j = above_w * each.busy.duration_s / each.timing.executions
-        # What lies between two windows is fed as part of the second.
+        # The time between two windows is part of the second.
         assert each.energy_j.value == pytest.approx(true_j, rel=0.1)
     platform = Platform(found.platform("jetson"))
     assert [mode.cpu_hz for mode in platform.modes] == [2201.6e6, 1200e6]

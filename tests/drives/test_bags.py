@@ -1,4 +1,4 @@
-"""rosbag2 folders: odometry, and yaw rates of whatever tells them."""
+"""rosbag2 folders: odometry, and yaw rates from all sources."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ IMU_HZ = 100.0
 
 @pytest.fixture(scope="module")
 def driven() -> Robot:
-    """By a clock that counts from 1970, as a robot's does."""
+    """Times since 1970, as in a robot's log."""
     made = robot(DURATION_S)
     for table in ("odometry", "angles", "truth"):
         rows = getattr(made, table)
@@ -85,7 +85,7 @@ def source(drive: Any) -> str:
 
 
 def test_the_yaw_rate_is_of_what_tells_it(driven: Robot, tmp_path: Path) -> None:
-    """By an IMU or the orientation a drive is located as by a yaw rate in the odometry."""
+    """Yaw rates of an IMU, of the orientation and of the odometry give similar positions."""
     told = locate(driven, tmp_path, tmp_path / "odometry.csv")
     as_told_m = driven.rms_error_m(told)
     cases = {
@@ -214,7 +214,7 @@ def test_what_is_no_mcap_is_refused_with_what_to_do(driven: Robot, tmp_path: Pat
 
 
 def test_messages_that_cannot_be_are_left_out(driven: Robot, tmp_path: Path) -> None:
-    """Quaternions that are no turn tell no yaw rate; messages cut off are named or counted."""
+    """Invalid quaternions give no yaw rate; truncated messages are reported or counted."""
     messages = odometry(driven, heading=True)
     for k, wrong in ((100, (0.0,) * 4), (200, (float("nan"),) * 4), (300, (1e300,) * 4)):
         row = driven.truth.row(k, named=True)
@@ -227,7 +227,7 @@ def test_messages_that_cannot_be_are_left_out(driven: Robot, tmp_path: Path) -> 
     drive = locate(driven, tmp_path, bag.write(tmp_path / "bag", messages))
     assert drive.poses.height == driven.truth.height - 2
     assert sum("no complete nav_msgs/msg/Odometry" in it for it in drive.remarks) >= 1
-    # Each tells nothing of the step to it and of the step from it.
+    # An invalid quaternion leaves the steps before and after it without a yaw rate.
     assert any("yaw_rate_radps is empty in 6 of 798 samples" in it for it in drive.remarks)
     gyroscope = imu(driven)
     gyroscope[7].data = gyroscope[7].data[:-8]

@@ -269,7 +269,7 @@ def test_smoothing_writes_a_second_trajectory(access_av: Cli, drive: Path, tmp_p
         pl.read_parquet(tmp_path / f"{name}.parquet") for name in ("poses", "smoothed")
     )
     assert smoothed["time_s"].equals(poses["time_s"])
-    # What comes later can only add information.
+    # Later measurements can only add information.
     variance_m2 = pl.col("covariance_xx_m2") + pl.col("covariance_yy_m2")
     before, after = (table.select(variance_m2).to_series() for table in (poses, smoothed))
     assert (after <= before * (1 + 1e-9)).all()

@@ -252,7 +252,7 @@ def test_a_truth_of_another_time_is_refused(access_av: Cli, tmp_path: Path) -> N
 
 
 def test_one_radio_head_elsewhere_is_named(tmp_path: Path) -> None:
-    """Of six one is not missed: it is named, and the drive can be relied on."""
+    """One of six radio heads at a wrong position is reported with its estimated position."""
     spoilt = robot()
     x, y = HEADS_M[13]
     spoilt.heads_m[13] = (x + 6.0, y - 8.0)

@@ -94,7 +94,7 @@ def in_map(it: Fields) -> Fields:
 
 
 def turned(it: Fields, by_rad: float) -> Fields:
-    """The same drive in an odometry frame that is turned against the site's."""
+    """Returns the drive in an odometry frame that is rotated against the site frame."""
     cos, sin = math.cos(by_rad), math.sin(by_rad)
     heading_rad = None if it.heading_rad is None else it.heading_rad + by_rad
     x_m, y_m = cos * it.x_m - sin * it.y_m, sin * it.x_m + cos * it.y_m

@@ -42,7 +42,7 @@ def converted(bench: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     def write(name: str, *columns: Any) -> None:
         np.savetxt(dataset / name, np.column_stack(columns), fmt="%.6f", header="a comment")
 
-    # A command holds until the next one: what is told at the end of a step is of its beginning.
+    # A command is valid until the next one: the value at the end of a step is from its start.
     speed, yaw = (told.odometry[name].to_numpy() for name in ("speed_mps", "yaw_rate_radps"))
     write("Robot1_Odometry.dat", times[:-1], speed[1:], yaw[1:])
     x, y, heading = (told.truth[name].to_numpy() for name in ("x_m", "y_m", "heading_rad"))

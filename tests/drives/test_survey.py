@@ -29,16 +29,16 @@ if TYPE_CHECKING:
 
 GATE_OFF_M = (1.2, -1.6)
 MOUNTING_OFF_RAD = 0.0175
-# Of χ² with ten degrees of freedom, which one survey in 10,000 exceeds.
+# 99.99 % quantile of χ² with ten degrees of freedom.
 CHI2_10 = 35.56
 
 
 @pytest.fixture(scope="module")
 def logged(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two drives of 40 s past the yard's first radio head, which stands elsewhere than believed."""
+    """Two drives of 40 s past the yard's first radio head, whose nominal position is wrong."""
     scenario = Scenario.load("yard").with_overrides(
         {
-            # Of what is to be surveyed nothing is stated, and nothing else is off.
+            # The surveyed quantities have no σ, and all other quantities are exact.
             **{f"site.radio_heads[{head}].position_std_m": 0.0 for head in range(4)},
             "vehicle.array": {},
             "vehicle.start": {"position_std_m": 0.0, "heading_std_rad": 0.0},
@@ -78,7 +78,7 @@ def test_a_head_and_an_array_that_are_elsewhere_are_found(logged: Path) -> None:
     heads = json.loads(found.site.to_json())["radio_heads"]
     assert heads[2]["position_m"] == [310.0, 85.0, 7.0]
     assert heads[0]["position_m"][0] == by_key["radio_heads[0].position_m[0]"].found
-    # Noise is stated with care: the innovations are no larger than believed.
+    # The specified noise is conservative: the innovations are within the model.
     assert 0.3 < found.nis < 1.1
 
 

@@ -25,7 +25,7 @@ CRATES = {
     "access-av-node": {"recording", "onboard", "nr-ssb"},
     "access-av-python": {"simulate", "recording", "onboard", "aoa-array", "nr-ssb"},
 }
-# What runs on the vehicle draws no random numbers, starts no threads, opens no MCAP.
+# Crates that on-vehicle code must not use: random numbers, threads, MCAP.
 NOT_ON_BOARD = {"rand", "rand_chacha", "rand_distr", "rayon", "mcap", "polars", "pyo3", "sha2"}
 
 

@@ -18,7 +18,7 @@ FILES = {
     for path in (PACKAGE / "access_av").rglob("*.py")
 }
 CORE = "access_av._core"
-# What puts the general part and the paper's together.
+# Modules that may import the general part and the paper's part.
 TOP = {"access_av", "access_av.cli.main", "access_av.cli.paper_tables", "access_av.__main__"}
 TOP |= {"access_av.cli.paper", "access_av.cli.codesign"}
 PAPERS = ("access_av.paper", "access_av.report.paper")

@@ -137,6 +137,15 @@ PLAIN = [
     "python/access_av/signal/*.py",
     "python/access_av/site_files/*.py",
     "python/access_av/tables/**/*.py",
+    "tests/bag.py",
+    "tests/browser.py",
+    "tests/hall_drive.py",
+    "tests/layout.py",
+    "tests/node.py",
+    "tests/robot.py",
+    "tests/second_implementation.py",
+    "tests/site_plans.py",
+    "tests/synthetic.py",
     "tests/house/test_language.py",
 ]
 

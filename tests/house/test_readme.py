@@ -53,7 +53,7 @@ def test_command_line_examples(tmp_path: Path, quick_study: Path) -> None:
             text=True,
             check=False,
         )
-        # Of so few runs nothing may qualify, which is an answer too.
+        # With so few runs, no operating point may qualify; this is a valid answer.
         missed = "No operating point" in done.stdout
         assert done.returncode == (3 if missed else 0), done.stderr
     assert (tmp_path / "results/first/trajectories.parquet").is_file()

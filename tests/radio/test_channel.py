@@ -256,7 +256,7 @@ def test_the_street_can_be_driven(tmp_path: Path, data: Path) -> None:
     )
     result = simulate(str(tmp_path / "drive.toml"), runs=2, seed=1, keep_trajectories=True)
     assert 0.02 < result.rms_error_m < 1.0
-    # The road goes on where nothing was traced: nothing is heard there, and the vehicle not lost.
+    # Beyond the traced part of the road no SSB is received, and the position remains known.
     assert result.executions is not None
     assert result.executions["snr_db"].is_finite().all()
     every = Scenario.load(str(tmp_path / "drive.toml")).with_overrides(

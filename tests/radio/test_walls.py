@@ -56,7 +56,7 @@ def test_no_angle_is_taken_through_a_wall(walled: Scenario) -> None:
 
 
 def test_the_channel_loses_the_direct_wave_behind_it() -> None:
-    """Where nobody told the vehicle of the wall, it hears the radio head weakly, and errs."""
+    """A vehicle without the wall in its site receives the radio head weakly, and has errors."""
     as_told = {"truth.draw": "none", "site.rician_k_db": 60.0}
     open_air = trip(**as_told)
     behind = trip(**as_told, **{"truth.site.walls": [WALL]})

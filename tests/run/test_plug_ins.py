@@ -109,7 +109,7 @@ def test_an_estimator_is_billed_what_it_states_and_never_what_another_takes() ->
     assert joules("energy_j")[0] is None
     energy_j, executions = joules("energy_executions_j", energy_per_execution_j=0.01)
     assert energy_j == pytest.approx(0.01 * executions)
-    # So much a second as a busy core draws: twice the time, twice the energy.
+    # The energy is proportional to the processor time.
     one, two = (
         joules("energy_executions_j", time_per_execution_s=time_s)[0] for time_s in (1e-3, 2e-3)
     )
@@ -339,7 +339,7 @@ def test_a_function_that_keeps_state_is_rejected() -> None:
 
 
 class Standing:
-    """A localizer that believes to stand."""
+    """A localizer that always returns the start pose."""
 
     answer: Any = None
 

@@ -1,4 +1,4 @@
-"""What a campaign shows where the world is as believed, and where it is not."""
+"""Results of a campaign with exact models, and with model errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
-# What nobody can know is believed to be exact.
+# Settings without uncertainty.
 EXACT = {
     "vehicle.array": {},
     "vehicle.start": {"position_std_m": 0.0, "heading_std_rad": 0.0},

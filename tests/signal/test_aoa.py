@@ -354,7 +354,7 @@ CIRCLE = 0.425 * np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)
 
 
 def towards(azimuth_rad: Any, elevation_rad: Any) -> Any:
-    """What the circle receives: `(batch, 5, 1)`."""
+    """Snapshots of the circle: `(batch, 5, 1)`."""
     flat = np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad)], axis=-1)
     return np.exp(2j * np.pi * np.cos(elevation_rad)[:, None] * (flat @ CIRCLE.T))[:, :, None]
 
@@ -481,7 +481,7 @@ def test_a_measured_manifold_and_several_sources() -> None:
     assert np.abs(found.azimuth_rad - truth).max() < 6 * found.azimuth_sigma_rad.max()
     batch = aoa.direction(np.stack([received] * 3), table, elevations_rad=(0, 0), sources=2)
     assert batch.azimuth_rad.shape == (3, 2)
-    # Who leaves the coupling out is told so.
+    # A manifold without coupling is reported as a misfit.
     assert not aoa.direction(received, CIRCLE, elevations_rad=(0, 0), sources=2).reliable.any()
     with pytest.raises(ValueError, match="5 sources requested; allowed are 1 to 4"):
         aoa.direction(received, table, elevations_rad=(0, 0), sources=5)

@@ -77,7 +77,7 @@ def test_a_kept_searcher_finds_what_a_new_search_does() -> None:
         expected = values(nr.search(samples, RATE_HZ, **there))
         assert [value["sfn"] for value in expected] == [sfn, sfn]
         assert values(kept.search(samples)) == expected
-    # What does not lie row by row, or is not complex64, is brought there.
+    # Samples of another memory order or type are converted.
     assert values(kept.search(np.asfortranarray(samples))) == expected
     assert values(kept.search(samples.astype(np.complex128))) == expected
     # Searched where it lies, and left as it was.

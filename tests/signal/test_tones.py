@@ -64,7 +64,7 @@ def test_the_index_of_an_ssb_without_its_pbch_is_a_guess() -> None:
     [cell] = nr.search(samples, RATE_HZ, scs_khz=30, **CARRIER)
     rng = np.random.default_rng(5)
     # Noise 20 dB above the signal in the symbols of the PBCH, 8 dB in that of the SSS: the cell is
-    # identified, but 96 elements of the PBCH beside the SSS are not enough.
+    # identified, but 96 elements of the PBCH next to the SSS are not enough.
     for symbol, scale in ((1, 10), (2, 2.5), (3, 10)):
         first = round(cell.sample_start) + 274 * symbol
         noise = rng.normal(size=(2, 274, 2)) @ [1, 1j] / np.sqrt(2)

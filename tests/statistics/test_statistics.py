@@ -266,7 +266,7 @@ def test_exceedances_are_known_by_runs_not_by_epochs() -> None:
     found = Integrity.of(pl.concat([*good, bad]))
     assert found is not None
     assert found.exceedance_share == 0.05
-    # By epochs it would be 3.7 to 6.5 %; one run of twenty leaves 0 to 15 % open.
+    # Interval over epochs: 3.7 to 6.5 %. Interval over runs: 0 to 15 %.
     low, high = found.exceedance_interval
     assert low == 0.0
     assert high in (0.1, 0.15, 0.2)
@@ -316,7 +316,7 @@ def test_alarms_by_hand() -> None:
 
 @pytest.mark.parametrize("shape", [0.0, 0.15, 0.3])
 def test_peaks_over_a_threshold_find_known_tails(shape: float) -> None:
-    """Of 20 samples of 5000 the estimate is right on average, far beyond what can be counted."""
+    """The mean estimate from 20 samples of 5000 is correct far beyond the empirical range."""
     rng = np.random.default_rng(3)
     truth = 1e-6
     exponential = rng.exponential(size=(20, 5000))
@@ -356,7 +356,7 @@ def test_obtained_risk_is_that_of_a_gaussian() -> None:
     low, high = found.interval
     assert low < asked < high
     assert high < 100.0 * asked
-    # A level that is never vouched for is not held to anything.
+    # Without ``ok`` epochs there is no integrity risk.
     assert ObtainedRisk.of(steps.with_columns(integrity=pl.lit("degraded")), 10.0) is None
 
 
@@ -364,7 +364,7 @@ def test_obtained_risk_is_that_of_a_gaussian() -> None:
 
 
 def test_percentiles_are_those_of_all_and_their_intervals_of_whole_runs() -> None:
-    """Against the definition, run by run; one run is not heard for half of its time."""
+    """Compares with the definition, run by run; one run has no values in its second half."""
     rng = np.random.default_rng(3)
     errors = np.abs(rng.standard_normal((7, 60))) * rng.lognormal(0.0, 0.5, (7, 1))
     errors[2, 30:] = np.nan
@@ -395,14 +395,14 @@ def test_intervals_of_percentiles_hold_what_they_are_of() -> None:
             assert each.low is not None
             assert each.high is not None
             held[each.percent] += each.low <= true[each.percent] <= each.high
-    # Of 150 intervals of 95 %, 142.5 ± 2.7 hold.
+    # Expected number of 150 intervals of 95 % that contain the true value: 142.5 ± 2.7.
     assert min(held.values()) >= 142.5 - 4.0 * 2.7
 
 
 def test_what_was_seen_too_seldom_has_no_high_end() -> None:
     errors = np.abs(np.random.default_rng(2).standard_normal((20, 100)))
     few, enough = (percentiles(errors, [99.0], independent=it)[0] for it in (300, 2000))
-    # 367 errors that are all within tell with 97.5 % that 99 % are: 0.99**367 < 0.025.
+    # 367 errors within a limit show with 97.5 % confidence that 99 % are: 0.99**367 < 0.025.
     assert few.high == np.inf
     assert enough.high is not None
     assert few.value == enough.value < enough.high < np.inf

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Of the same road: a centimetre.
+# Maximum distance between two descriptions of one road (m).
 SAME_M = 0.01
 
 
@@ -346,7 +346,7 @@ def test_a_picture_lies_under_a_site_where_two_points_and_a_length_say(
     assert (placed.left_m, placed.right_m) == (0.0, 600.0)
     assert (placed.low_m, placed.high_m) == (0.0, 400.0)
     assert base64.b64decode(placed.url.removeprefix("data:image/png;base64,")) == picture(300, 200)
-    # What was resolved stands anywhere: its path is whole.
+    # The path of a resolved site is absolute, so that the file can be moved.
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "again.toml").write_text(site.to_toml(), "utf-8")
     monkeypatch.chdir(tmp_path / "elsewhere")

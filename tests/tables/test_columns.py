@@ -122,7 +122,7 @@ def test_located_drives(tmp_path: Path) -> None:
     check("located_errors", drives.error_m(drive.poses, tmp_path / "truth.tum"))
     without_gyroscope = pl.read_csv(odometry).columns
     assert without_gyroscope == list(columns.TABLES["odometry"].columns[:3])
-    # What is written can be read: the log of angles has the columns that its table says.
+    # The angle log has the columns of its table, and can be read.
     log = tmp_path / "angles.csv"
     drive.angles.select(columns.TABLES["angles"].columns[:7]).drop_nulls().write_csv(log)
     assert drives.locate(site, odometry, log, vehicle=vehicle).angles.height > 0

@@ -18,7 +18,7 @@ EMULATED_NODE = ROOT / "target/aarch64-unknown-linux-gnu/debug/access-av-node"
 EMULATOR = shutil.which("qemu-aarch64")
 # Where the other processor's libraries are: Debian's cross compiler, or a system of both.
 LIBRARIES = next(it for it in ("/usr/aarch64-linux-gnu", "/") if Path(it).exists())
-# What samples of single precision leave, multiplied and added in another order.
+# Tolerance (m) for single-precision samples that are processed in another order.
 SAMPLES_M = 2e-8
 
 pytestmark = pytest.mark.skipif(

@@ -26,7 +26,7 @@ EVERY_SSB = {"wake_up": {"policy": "fixed", "interval_ms": 1.0}}
 
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A second of all samples, on a vehicle of one clock, without monitor; it hears every SSB."""
+    """One second of samples: a vehicle with one clock, without monitor, receives every SSB."""
     out = tmp_path_factory.mktemp("live")
     scenario = access_av.Scenario.load("paper-real-odometry-2").with_overrides(
         {"vehicle.integrity.enabled": False, "vehicle.receiver.lateness_std_s": 0.0}

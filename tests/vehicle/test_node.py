@@ -39,7 +39,7 @@ from transmitter import Drive, Transmitter, Wheels, node_toml, odometry_of, sett
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DURATION_S = 5.0
-# Of MCAP, by its writer: a file is measured once a chunk is complete.
+# Chunk size of the MCAP writer: the size of a file is checked after each chunk.
 CHUNK_BYTES = 768 << 10
 
 pytestmark = pytest.mark.skipif(
@@ -50,7 +50,7 @@ pytestmark = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("drive")
-    # Of a log two clocks are searched for, live not.
+    # Only the evaluation of a log estimates a time offset; live operation does not.
     one_clock = {"vehicle.receiver.lateness_std_s": 0.0}
     scenario = access_av.Scenario.load("yard").with_overrides(one_clock)
     access_av.synthesize(scenario, folder, duration_s=DURATION_S)
@@ -204,7 +204,7 @@ def test_a_recording_in_real_time_is_not_read_where_nothing_is_wanted(tmp_path: 
 
 
 class Live:
-    """A node that hears a transmitter, and everything that it said meanwhile."""
+    """A node that receives from a transmitter, and all of its output."""
 
     def __init__(self, drive: Path, folder: Path) -> None:
         self.drive = drive
@@ -257,7 +257,7 @@ localized_after_s = 0.5
         self.records = lines(folder / "node.jsonl")
 
     def browse(self, address: str) -> None:
-        """What the page says, and at some sizes how wide it is and how wide the window."""
+        """Text of the page, and its width and that of the window at some sizes."""
         assert CHROMIUM is not None
         with Browser(CHROMIUM, f"{address}/") as browser:
             browser.wait_for("document.querySelectorAll('#rows tr').length === 4")
@@ -396,7 +396,7 @@ def test_the_page_shows_the_drive_in_a_browser(live: Live) -> None:
 
 @contextmanager
 def driven_by_udp(drive: Path, folder: Path, page: int, broker: Broker) -> Iterator[None]:
-    """A node that gets odometry alone, and tells a broker in the words of VDA 5050 2.1."""
+    """A node that receives only odometry, and publishes VDA 5050 2.1 messages to a broker."""
     messages = free_port(socket.SOCK_DGRAM)
     settings = folder / "node.toml"
     settings.write_text(
