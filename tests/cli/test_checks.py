@@ -124,7 +124,8 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
         {"site.road": {"polyline_m": [[8.68, 50.11], [8.685, 50.11], [8.686, 50.113]]}},
         "road", "specify metres"),
     "heights above the sea": (
-        {"site.radio_heads[0].position_m": [30.0, 25.0, 412.0]}, "position_m[2]", "above sea level"),
+        {"site.radio_heads[0].position_m": [30.0, 25.0, 412.0]},
+        "position_m[2]", "above sea level"),
     "radio heads of a flat drawing": (
         heads([30.0, 25.0, 0.0], [170.0, -10.0, 0.0], [300.0, 40.0, 0.0]),
         "array.position_m[2]", "height of each radio head above the ground"),

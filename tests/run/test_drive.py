@@ -106,7 +106,11 @@ def test_run_tells_percentiles_and_integrity(
     )  # fmt: skip
     assert done.code == 0, done.err
     told = " ".join(done.out.split())
-    for text in ("50th percentile of the error", "protection level / error", "The position is available"):
+    for text in (
+        "50th percentile of the error",
+        "protection level / error",
+        "The position is available",
+    ):
         assert text in told
     page = (tmp_path / "report.html").read_text()
     assert "stanford" in page
