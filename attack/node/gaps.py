@@ -53,7 +53,7 @@ def ends_s() -> list[float]:
 
 
 def run(condition: Condition, folder: Path, recorded: Path) -> tuple[list[float | None], float]:
-    """Time to the first SSB after each gap (s), `None` without one, and the delay of sending (s)."""
+    """Time to the first SSB after each gap (s), `None` if absent, and the sending delay (s)."""
     ends = ends_s()
 
     def is_withheld(now_s: float) -> bool:
