@@ -2,12 +2,14 @@
 //!
 //! Columns: `time_s`, `pci` and either `phase_rad` (electrical angle ω = 2π(d/λ)·cos θ) with its
 //! standard deviation `phase_sigma_rad`, or `angle_rad` (θ from the array's axis) with
-//! `angle_sigma_rad`; where both are given the former counts. `ssb_index` (0 without) and `snr_db`
-//! need not be there, nor `resolved` (1, or 0 of an angle that is in doubt; 1 without). The deviation is taken for all of the angle's error.
+//! `angle_sigma_rad`. If both are given, the former is used. Optional columns are `ssb_index`
+//! (default 0), `snr_db` and `resolved` (1, or 0 for an unreliable angle; default 1). The standard
+//! deviation is assumed to be the total error of the angle.
 //!
-//! `at_head` is 1 for an angle that the array of the radio head has measured, and 0 (default) for one measured on the
-//! vehicle. Measured at the radio head, `angle_rad` and `phase_rad` are both the azimuth of the vehicle in the frame of the
-//! head's array, whose direction is `radio_heads.array.azimuth_rad` of the site.
+//! `at_head` is 1 for an angle that was measured by the array of the radio head, and 0 (default) for
+//! an angle that was measured on the vehicle. For an angle measured at the radio head, `angle_rad`
+//! and `phase_rad` are both the azimuth of the vehicle in the frame of the radio head's array, whose
+//! direction is `radio_heads.array.azimuth_rad` of the site.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -38,6 +40,7 @@ const COLUMNS: [&str; 9] = [
 
 /// Columns that every log must have.
 const REQUIRED: [&str; 2] = ["time_s", "pci"];
+/// Optional columns, of which some combinations are required.
 const OPTIONAL: [&str; 8] = [
     "ssb_index",
     "phase_rad",
@@ -262,7 +265,8 @@ pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     };
     let resolved = flag(resolved, "resolved", true)?;
     let kind = MeasurementKind::of_angle(flag(at_head, "at_head", false)?);
-    // Without a phase the deviation is that of the angle, until the array's spacing is known.
+    // Without a phase, the standard deviation is that of the angle until the array's spacing is
+    // known.
     let deviation = |value: Option<f64>, name: &str| match needed(value, name)? {
         value if value > 0.0 && value < MOST_SIGMA_RAD => Ok(value),
         value if value > 0.0 => Err(format!(

@@ -182,7 +182,7 @@ impl OdometryRemark {
         !self.issue.used() || matches!(self.issue, OdometryIssue::Truncated(_))
     }
 
-    /// A remark on the file itself, of items of a kind.
+    /// Creates a remark on the file itself.
     pub(crate) fn of_file(kind: &'static str, issue: OdometryIssue) -> Self {
         Self {
             item: 1,

@@ -1,28 +1,30 @@
-//! Whether the model, so many plane waves in white noise, explains what was received.
+//! Tests whether the model, `K` plane waves in white noise, explains the received snapshots.
 //!
 //! With `R` the covariance of `L` snapshots of `N` antennas, `A` the steering vectors of the `K` sources,
-//! `P` the projection on their complement and `y = A^+ x` the waveforms, what `P x` holds is regressed on
-//! `y`. If the model holds, the two parts are independent:
+//! `P` the projection on their orthogonal complement and `y = A^+ x` the waveforms, the residual `P x` is
+//! regressed on `y`. If the model holds, the two parts of its power are independent:
 //!
-//! - what hangs together with the waveforms, `tr P R A (A^H R A)^-1 A^H R P`, less the part that is taken
-//!   away by choosing the directions: `sigma^2 / (2 L) chi^2` of `2 K (N - K) - p` degrees of freedom, `p`
-//!   being the parameters of the directions;
-//! - the rest `E = R - R A (A^H R A)^-1 A^H R`, whose trace is `sigma^2 / (2 L) chi^2` of
-//!   `2 (L - K) (N - K)`. It has no preferred direction.
+//! - the coherent part, which is correlated with the waveforms: `tr P R A (A^H R A)^-1 A^H R P`. It is
+//!   distributed as `sigma^2 / (2 L) chi^2` with `2 K (N - K) - p` degrees of freedom, because the fit of
+//!   the `p` parameters of the directions removes `p` of them;
+//! - the rest `E = R - R A (A^H R A)^-1 A^H R`, whose trace is distributed as
+//!   `sigma^2 / (2 L) chi^2` with `2 (L - K) (N - K)` degrees of freedom. It has no preferred direction.
 //!
-//! Their ratio is F distributed whatever the waveforms are, random or not (Anderson 2003, 8.4: regression
-//! with complex observations). Reflections, and antennas that are not as described, are in the first
-//! part. A further source is in the second: where the noise is not known, its form is tested by John's
-//! statistic (1971), `(m tr E^2 / (tr E)^2 - 1) ((L - K) m + 1) / (m^2 - 1)` with `m = N - K`: 1 in the
-//! mean, and about a chi^2 of `m^2 - 1` degrees of freedom over them. Where it is known, the trace is.
+//! The ratio of the two is F distributed for any waveforms, random or deterministic (Anderson 2003, 8.4:
+//! regression with complex observations). Reflections and errors of the array model increase the first
+//! part. Another source increases the second. If the noise is unknown, the shape of `E` is tested by John's
+//! statistic (1971), `(m tr E^2 / (tr E)^2 - 1) ((L - K) m + 1) / (m^2 - 1)` with `m = N - K`. Its
+//! mean is 1, and it is approximately a reduced chi^2 with `m^2 - 1` degrees of freedom. If the noise is
+//! known, the trace of `E` is tested.
 
 use super::verdict::Reason;
 use crate::simd::math::select;
 
-/// Either test finds fault with a model that holds with this probability: one in a hundred for both.
+/// Standard normal deviate of the limit of each test: the false-alarm probability is 0.5 % per test and 1 % for
+/// both.
 const FALSE_ALARM_DEVIATE: f64 = 2.575_829_303_548_901;
 
-/// Degrees of freedom of an estimated noise variance from which on it counts as known: its error then adds less
+/// Minimum degrees of freedom of an estimated noise variance that is treated as known: its error then adds less
 /// than 1.6 % to a standard deviation.
 const MANY_FREEDOMS: f64 = 100.0;
 /// Minimum degrees of freedom of an estimated noise variance for a reliable angle. With fewer the ratio of error
@@ -36,7 +38,7 @@ const FREEDOMS_AT_TWICE_THE_SNR: f64 = 10.0;
 /// that are reliable in one fifth of the trials or more have a z-RMS from 0.9 to 1.15.
 const INCREASE_AT_THRESHOLD: f64 = 0.6;
 
-/// How well the sources and white noise explain what was received.
+/// Goodness of fit of the sources and white noise to the received snapshots.
 ///
 /// ```
 /// use aoa::{Array, Reason, maximum_likelihood_pilots};
@@ -52,41 +54,41 @@ const INCREASE_AT_THRESHOLD: f64 = 0.6;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GoodnessOfFit {
-    /// Power beside the plane waves that hangs together with their waveforms, over that of noise there: a
-    /// reduced chi-squared, 1 in the mean if the model holds.
+    /// Residual power that is correlated with the waveforms, relative to the noise power in the same
+    /// dimensions: a reduced chi-squared with mean 1 if the model holds.
     pub coherent: f64,
-    /// What else is left: where the noise is known, its power over that of noise; elsewhere a measure of
-    /// how much it prefers some directions. 1 in the mean if the model holds.
+    /// Rest of the residual: its power relative to the noise power if the noise is known, otherwise a
+    /// measure of its anisotropy (John's statistic). The mean is 1 if the model holds.
     pub noise: f64,
     model: Model,
 }
 
-/// What was fitted to what.
+/// Dimensions of the fitted model and of the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Model {
     pub(crate) antennas: u8,
     pub(crate) sources: u8,
-    /// Parameters of all directions together.
+    /// Total number of parameters of the directions.
     pub(crate) parameters: u8,
     pub(crate) noise_is_known: bool,
     pub(crate) snapshots: u32,
 }
 
-/// What the sources leave, summed over the snapshots.
+/// Residual of the sources, summed over the snapshots.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Residual {
-    /// Power that hangs together with the waveforms.
+    /// Power that is correlated with the waveforms.
     pub(crate) coherent: f64,
     /// `tr E` and `tr E^2`.
     pub(crate) rest: f64,
     pub(crate) rest_squared: f64,
 }
 
-/// The tests of a model, with what they need of it.
+/// Tests of a model with their precomputed constants.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tests {
     model: Model,
-    /// Degrees of freedom of both parts; one where there are none.
+    /// Degrees of freedom of each part, at least 1.
     coherent_freedom: f64,
     rest_freedom: f64,
     dimensions_left: f64,
@@ -96,26 +98,27 @@ pub(crate) struct Tests {
     /// Factor on the threshold SNR.
     needed: f64,
     is_noise_determined: bool,
-    /// John's statistic is this times `m tr E^2 / (tr E)^2 - 1`; without a meaning in one dimension.
+    /// Factor on `m tr E^2 / (tr E)^2 - 1` in John's statistic; `None` in one dimension, where the statistic is
+    /// undefined.
     shape: Option<f64>,
-    /// The largest ratios that are still called a fit.
+    /// Maximum ratios of a model that fits.
     coherent_limit: f64,
     noise_limit: f64,
 }
 
-/// What the tests say of a residual.
+/// Results of the tests of a residual.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tested {
     pub(crate) coherent: f64,
     pub(crate) noise: f64,
-    /// By what factor the variance of an angle is larger than noise makes it: 1 if the model fits.
-    /// Otherwise what hangs together with the waveforms is taken to displace the angle as it does
-    /// everything else: the square of Birge's ratio (1932).
+    /// Factor on the variance of an angle due to noise: 1 if the model fits. Otherwise, the residual that is
+    /// correlated with the waveforms is assumed to affect the angle like the other dimensions, and the factor is
+    /// the square of Birge's ratio (1932).
     pub(crate) inflation: f64,
 }
 
 impl Model {
-    /// One source in electrical angle.
+    /// Creates the model of one source with one parameter, the electrical angle.
     pub(crate) fn one<const N: usize>(snapshots: usize, noise_is_known: bool) -> Self {
         Self::new::<N>([1, 1], snapshots, noise_is_known)
     }
@@ -151,17 +154,17 @@ impl Model {
         2.0 * self.snapshots_left() * self.dimensions_left()
     }
 
-    /// Degrees of freedom of the noise variance of one source, from all that the source does not explain.
+    /// Degrees of freedom of the noise variance that is estimated from the whole residual of one source.
     fn noise_freedom(self) -> f64 {
         self.residual_dimensions() - f64::from(self.parameters)
     }
 
-    /// Real dimensions that the source leaves in all snapshots.
+    /// Number of real dimensions of the residual in all snapshots.
     fn residual_dimensions(self) -> f64 {
         2.0 * f64::from(self.snapshots) * self.dimensions_left()
     }
 
-    /// Whether the noise is known, or as good as known. Several sources keep their asymptotic variance.
+    /// Whether the noise is treated as known. Several sources use the asymptotic variance.
     fn has_known_noise(self) -> bool {
         self.noise_is_known || self.sources != 1 || self.noise_freedom() >= MANY_FREEDOMS
     }
@@ -188,7 +191,7 @@ impl Model {
         self.unknown_noise() * (1.0 + FREEDOMS_AT_TWICE_THE_SNR / self.noise_freedom().max(1.0))
     }
 
-    /// Degrees of freedom of each ratio, above and below the line.
+    /// Degrees of freedom of the numerator and the denominator of each ratio.
     fn freedoms(self) -> [[f64; 2]; 2] {
         let shape = self.dimensions_left().powi(2) - 1.0;
         if self.noise_is_known {
@@ -228,7 +231,7 @@ impl Model {
 }
 
 impl Tested {
-    /// No residual, and no misfit.
+    /// Result without a residual and without a misfit.
     pub(crate) const NOTHING: Self = Self {
         coherent: 1.0,
         noise: 1.0,
@@ -241,15 +244,16 @@ impl Tested {
 }
 
 impl Tests {
-    /// `noise_power` is the noise variance per antenna, `power` that of all antennas, both summed over
-    /// the snapshots: relative to the latter rounding is told from noise.
+    /// Applies the tests to a residual. `noise_power` is the noise variance per antenna, and `power` is the
+    /// received power of all antennas; both are summed over the snapshots. Residuals below the rounding errors
+    /// of `power` are not tested.
     #[inline(always)]
     pub(crate) fn of(&self, left: &Residual, noise_power: f64, power: f64) -> Tested {
         const ROUNDING: f64 = 1e-13;
         let larger = |a: f64, b: f64| if a > b { a } else { b };
         let least = power * ROUNDING;
         let rest = larger(left.rest, least);
-        // The variance of noise in one real dimension, as stated or estimated and as the rest has it.
+        // Noise variance in one real dimension: given or estimated, from the rest, and from the coherent part.
         let of_noise = 0.5 * noise_power / f64::from(self.model.snapshots);
         let of_rest = rest / self.rest_freedom;
         let of_coherent = left.coherent / self.coherent_freedom;
@@ -271,7 +275,7 @@ impl Tests {
         }
     }
 
-    /// That as it is told.
+    /// Converts the result to its public form.
     #[inline(always)]
     pub(crate) const fn fit(&self, tested: &Tested) -> GoodnessOfFit {
         GoodnessOfFit {
@@ -281,13 +285,13 @@ impl Tests {
         }
     }
 
-    /// SNR needed to exclude a wholly wrong direction, where `with_known_noise` is the one for known noise.
+    /// SNR needed to exclude a wholly wrong direction; `with_known_noise` is the needed SNR for known noise.
     pub(crate) const fn needed_snr(&self, with_known_noise: f64) -> f64 {
         self.needed * with_known_noise
     }
 
-    /// Factor on the variance of an angle, because the noise variance is estimated. `needed_snr` is that of
-    /// [`Self::needed_snr`].
+    /// Factor on the variance of an angle, because the noise variance is estimated. `needed_snr` is the
+    /// result of [`Self::needed_snr`].
     #[inline(always)]
     pub(crate) fn variance_factor(&self, snr: f64, needed_snr: f64) -> f64 {
         let ratio = needed_snr / snr;
@@ -301,7 +305,7 @@ impl Tests {
         (!self.is_noise_determined).then_some(Reason::TooFewSnapshots)
     }
 
-    /// What is wrong with the model, if something is.
+    /// Reason of a misfit, if a ratio exceeds its limit.
     #[inline(always)]
     pub(crate) fn misfit(&self, [coherent, noise]: [f64; 2]) -> Option<Reason> {
         if noise > self.noise_limit {
@@ -315,17 +319,17 @@ impl Tests {
 }
 
 impl GoodnessOfFit {
-    /// What is wrong with the model, if one of the tests finds fault with it: [`Reason::Multipath`] or
-    /// [`Reason::MoreSources`]. Of a model that holds it is said once in a hundred times.
+    /// Reason of a misfit, if a test rejects the model: [`Reason::Multipath`] or [`Reason::MoreSources`]. A model
+    /// that holds is rejected with a probability of 1 %.
     pub fn misfit(&self) -> Option<Reason> {
         self.model.tests().misfit([self.coherent, self.noise])
     }
 
-    /// The probability that a model that holds fits as badly as this or worse, from the worse of both
-    /// ratios. 1 where nothing is left to test: a single snapshot, unless the noise is known.
+    /// Probability that a model that holds has an equal or worse fit, from the worse of both ratios. It is 1 if
+    /// there is nothing to test: a single snapshot with unknown noise.
     ///
-    /// By Paulson's approximation of the F distribution (1942): within a tenth down to 1e-3, and never
-    /// much too small.
+    /// The F distribution is approximated by Paulson (1942). The relative error is below 10 % down to a
+    /// probability of 1e-3, and the result is never much too small.
     pub fn p_value(&self) -> f64 {
         let ratios = [self.coherent, self.noise];
         let freedoms = self.model.freedoms();
@@ -337,12 +341,12 @@ impl GoodnessOfFit {
             .zip(freedoms)
             .map(tail)
             .fold(1.0, f64::min);
-        // They are independent.
+        // Minimum of two independent p-values: 1 - (1 - p)^2.
         less * (2.0 - less)
     }
 }
 
-/// Nothing was tested.
+/// Result without any test.
 impl Default for GoodnessOfFit {
     fn default() -> Self {
         Self {
@@ -353,9 +357,9 @@ impl Default for GoodnessOfFit {
     }
 }
 
-/// A ratio of variances as a standard normal deviate: with `a = 2 / (9 n1)`, `b = 2 / (9 n2)`
-/// `((1 - b) F^(1/3) - (1 - a)) / sqrt(b F^(2/3) + a)` (Paulson 1942). Minus infinity if there is
-/// nothing to compare.
+/// Converts a ratio of variances to a standard normal deviate: with `a = 2 / (9 n1)`, `b = 2 / (9 n2)`
+/// `((1 - b) F^(1/3) - (1 - a)) / sqrt(b F^(2/3) + a)` (Paulson 1942). Minus infinity without
+/// degrees of freedom.
 fn deviate(ratio: f64, freedom: [f64; 2]) -> f64 {
     if freedom.iter().any(|it| *it < 1.0) {
         return f64::NEG_INFINITY;
@@ -365,14 +369,14 @@ fn deviate(ratio: f64, freedom: [f64; 2]) -> f64 {
     ((1.0 - b) * root - (1.0 - a)) / (b * root * root + a).sqrt()
 }
 
-/// The ratio whose [`deviate`] is that of a false alarm; infinite if no ratio is so large.
+/// Ratio with the [`deviate`] [`FALSE_ALARM_DEVIATE`]; infinite if no ratio reaches it.
 fn largest_ratio(freedom: [f64; 2]) -> f64 {
     if freedom.iter().any(|it| *it < 1.0) {
         return f64::INFINITY;
     }
     let [a, b] = freedom.map(|it| 2.0 / (9.0 * it));
     let squared = FALSE_ALARM_DEVIATE * FALSE_ALARM_DEVIATE;
-    // A quadratic equation for the cube root, its larger solution.
+    // Larger solution of a quadratic equation for the cube root.
     let quadratic = (1.0 - b) * (1.0 - b) - squared * b;
     if quadratic <= 0.0 {
         return f64::INFINITY;
@@ -388,8 +392,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ratios_are_those_of_the_tables() {
-        // Upper 0.5 % points of the F distribution, and of chi-squared over its freedom.
+    fn limits_match_published_tables() {
+        // Upper 0.5 % points of the F distribution and of the reduced chi-squared distribution.
         for (freedom, expected) in [
             ([5.0, 10.0], 6.87),
             ([5.0, 60.0], 3.76),

@@ -9,10 +9,10 @@ use super::reader::stamp_s;
 use crate::angle_log::{AngleLog, angle};
 use crate::error::RecordingError;
 
-/// Reads the angles that `access_av_msgs/msg/AngleVerdict` messages of an MCAP file or a rosbag2 folder tell, of
-/// one topic where it is named: those that a node or `access-av locate` has recorded. Verdicts without an angle
-/// are passed over. Files written before the messages had `resolved` and `at_head` hold angles that are resolved and measured on
-/// the vehicle.
+/// Reads the angles of the `access_av_msgs/msg/AngleVerdict` messages of an MCAP file or a rosbag2
+/// folder, optionally of one topic. A node or `access-av locate` records these messages. Verdicts
+/// without an angle are skipped. In files that were written before the messages had `resolved` and
+/// `at_head`, all angles are resolved and measured on the vehicle.
 ///
 /// # Errors
 /// [`RecordingError`] if a file is not MCAP or is damaged, or if there is no such message. Invalid
@@ -52,7 +52,7 @@ pub fn read_angles_mcap(bag: &Path, topic: Option<&str>) -> Result<AngleLog, Rec
     Ok(log)
 }
 
-/// The phase, which is not a number where there is no angle, and all columns of an angle log.
+/// Decodes a verdict to the phase, which is NaN without an angle, and all columns of an angle log.
 fn decode(message: &[u8]) -> Option<(f64, [Option<f64>; 10])> {
     let mut decoder = Decoder::new(message)?;
     let time_s = stamp_s(&mut decoder)?;

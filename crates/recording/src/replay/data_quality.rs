@@ -158,7 +158,7 @@ fn without_array<'a>(
     })
 }
 
-/// Distances that the speeds contradict.
+/// Detects distances that contradict the speeds.
 fn of_odometry(odometry: &OdometryLog) -> Option<(f64, String)> {
     let (mut by_speed_m, mut by_distance_m) = (0.0, 0.0);
     for pair in odometry.samples.windows(2) {

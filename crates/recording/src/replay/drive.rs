@@ -30,9 +30,9 @@ pub struct Replay<'a> {
     was_lost: bool,
     /// Last recovery of the localizer.
     recovered: Option<Recovered>,
-    /// Active faults of the sensors that were remarked on.
+    /// Active faults of the sensors that were reported.
     faults: ActiveFaults,
-    /// Whether the odometry before told of the end of the road.
+    /// Whether the previous odometry was beyond the end of the road.
     beyond_map: bool,
     /// Start positions of the reported gaps of the road (m).
     gaps_m: Vec<f64>,
@@ -214,7 +214,7 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// Takes in the rest of the odometry.
+    /// Processes the remaining odometry.
     ///
     /// # Errors
     /// [`ReplayError::Custom`].

@@ -38,8 +38,8 @@ pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
     (site, vehicle)
 }
 
-/// The electrical angle of a row for one that was logged as the angle from the array's axis; of any
-/// other array, and at a radio head, both are the same azimuth.
+/// Returns the angle with its electrical angle, computed from the angle from the array's axis for a
+/// linear array. For any other array, and at a radio head, both are the azimuth.
 pub fn with_phase(logged: &LoggedAngle, measurand: &Measurand) -> LoggedAngle {
     let mut logged = *logged;
     let measured = &mut logged.measured;
