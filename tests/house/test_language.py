@@ -86,6 +86,7 @@ PLAIN = [
     "crates/simulate/**/*.rs",
     "crates/onboard/src/estimator/*.rs",
     "crates/onboard/src/gaussian/*.rs",
+    "crates/onboard/src/localize/**/*.rs",
     "crates/onboard/src/plausible/*.rs",
     "crates/onboard/src/receive/*.rs",
     "crates/onboard/src/road/*.rs",

@@ -1,4 +1,4 @@
-//! The localizer that a vehicle's settings choose.
+//! Construction of the localizer from the settings.
 
 use std::sync::Arc;
 
@@ -11,11 +11,11 @@ use crate::geometry::Pose;
 use crate::radio_head::RadioHead;
 use crate::settings::{LocalizerSettings, SettingsError, Site, Vehicle};
 
-/// The localizer of a vehicle at a site: at `start`, or in search of it along the road where the
-/// vehicle's settings say that it is not known.
+/// Returns the localizer of a vehicle at a site: at `start`, or with a search along the road if the
+/// settings specify an unknown start.
 ///
 /// # Errors
-/// [`SettingsError`] when the site's road cannot be built.
+/// [`SettingsError`] if the road of the site is invalid.
 pub fn built_in(
     site: &Site,
     vehicle: &Vehicle,

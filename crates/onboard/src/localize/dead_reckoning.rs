@@ -1,4 +1,4 @@
-//! The paper's localizer: angle of arrival → angle of heading → dead reckoning (section "Track,
+//! Localizer of the paper: angle of arrival → angle of heading → dead reckoning (section "Track,
 //! Infrastructure, and Vehicle Trajectory Model").
 
 use super::localizer::{Localizer, copy_into};
@@ -10,18 +10,18 @@ use crate::observation::{AngleMeasurement, MeasurementKind, OdometrySample};
 use crate::radio_head::RadioHead;
 use crate::settings::HeadingBetween;
 
-/// Adds up odometer distances along the heading that the last angle of arrival gave.
+/// Integrates odometer distances along the heading of the last angle of arrival.
 ///
-/// Nothing corrects the position itself: errors of the heading add up in it.
+/// No measurement corrects the position, so that heading errors accumulate in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeadReckoning {
-    /// How far it has been moved ...
+    /// Time of the current pose ...
     time_s: f64,
-    /// ... and the odometer's distance there.
+    /// ... and the odometer's distance at that time.
     distance_m: f64,
     odometry: Option<OdometrySample>,
     pose: Pose,
-    /// Where the last angle was taken.
+    /// Position of the last angle.
     anchor: Point,
     heading_between: HeadingBetween,
     mounting_rad: f64,
@@ -29,7 +29,8 @@ pub struct DeadReckoning {
 }
 
 impl DeadReckoning {
-    /// Begins at a known pose, with an array whose axis points `mounting_rad` from forward.
+    /// Creates a localizer at a known pose, with an array axis at `mounting_rad` from the forward
+    /// axis.
     pub const fn new(start: Pose, heading_between: HeadingBetween, mounting_rad: f64) -> Self {
         Self {
             time_s: 0.0,
@@ -43,15 +44,15 @@ impl DeadReckoning {
         }
     }
 
-    /// With antennas that are not in a row, whose angles are azimuths.
+    /// Sets a non-linear array, whose angles are azimuths.
     #[must_use]
     pub const fn by_azimuth(mut self) -> Self {
         self.in_a_row = false;
         self
     }
 
-    /// Moves on to `time_s`, along the heading held since the last angle; beyond the newest
-    /// odometry at its speed.
+    /// Predicts to `time_s`, with the heading of the last angle; after the newest odometry with its
+    /// speed.
     fn advance_to(&mut self, time_s: f64) {
         let Some(sample) = self.odometry.filter(|_| time_s > self.time_s) else {
             return;
@@ -65,11 +66,12 @@ impl DeadReckoning {
         (self.time_s, self.distance_m) = (time_s, distance_m);
     }
 
-    /// Takes over the heading that an angle of arrival gives.
+    /// Updates the heading with an angle of arrival.
     fn take_heading(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         // Equation 3: AoIS = tan⁻¹(Δy/Δx), from the estimated position to the radio head.
         let aois_rad = self.pose.point().bearing_rad(head.position);
-        // Antennas in a row do not tell left from right; the estimated pose does.
+        // A uniform linear array is ambiguous between left and right; the estimated pose resolves
+        // the ambiguity.
         let axis_rad = self.pose.heading_rad + self.mounting_rad;
         let side = 1f64.copysign(wrap_angle(aois_rad - axis_rad));
         let aoa_rad = if self.in_a_row {
@@ -100,7 +102,7 @@ impl DeadReckoning {
         }
     }
 
-    /// Lays the stretch driven since the last angle along a heading turned by `turn_rad`.
+    /// Rotates the stretch driven since the last angle by `turn_rad`.
     fn turn_about_anchor(&mut self, turn_rad: f64) {
         let (sin, cos) = turn_rad.sin_cos();
         let (dx_m, dy_m) = (
@@ -159,10 +161,10 @@ mod tests {
     use super::*;
     use crate::road::{Road, Segment};
 
-    /// Duration of the paper's trip (s): 300 m at 0.5 m/s² up to 15 km/h and down again.
+    /// Duration of the paper's trip (s): 300 m with 0.5 m/s² up to 15 km/h and down again.
     const TRIP_S: f64 = 80.333;
 
-    /// Place and speed on it.
+    /// Returns the position and speed on it.
     fn trip(time_s: f64) -> (f64, f64) {
         let (top_mps, ramp_s) = (15.0 / 3.6, 15.0 / 3.6 / 0.5);
         let left_s = TRIP_S - time_s;
@@ -175,7 +177,7 @@ mod tests {
         }
     }
 
-    /// Worst distance from the truth on the paper's trip with perfect angles every `period_s`.
+    /// Returns the maximum error on the paper's trip with exact angles every `period_s`.
     fn worst_error_m(
         between: HeadingBetween,
         turn_rad: f64,
@@ -245,7 +247,8 @@ mod tests {
     #[test]
     fn in_a_bend_only_the_held_heading_remains() {
         let head = Point::new(205.0, 100.0);
-        // Held over a step, the heading lags by half of the step's turn: first order in the step.
+        // With the heading of the first angle, the heading lags by half of a step's turn: first
+        // order in the step.
         let coarse_m = worst_error_m(HeadingBetween::Held, 0.25, head, 0.02, 0.0);
         let fine_m = worst_error_m(HeadingBetween::Held, 0.25, head, 0.002, 0.0);
         assert!(coarse_m < 0.011, "{coarse_m}");

@@ -1,4 +1,4 @@
-//! The door for localizers.
+//! Interface of localizers.
 
 use std::any::Any;
 
@@ -10,82 +10,82 @@ use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 
-/// How a localizer that was lost came back.
+/// Recovery of a lost localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Recovered {
-    /// When, in seconds.
+    /// Time of the recovery, in seconds.
     pub time_s: f64,
-    /// By how far its place changed, in metres ...
+    /// Change of the position, in metres ...
     pub moved_m: f64,
-    /// ... and its heading, counter-clockwise in radians.
+    /// ... and of the heading, counter-clockwise in radians.
     pub turned_rad: f64,
 }
 
-/// What turns odometry and angles into a pose.
+/// Estimator of a pose from odometry and angles.
 ///
-/// Odometry comes in order of time, with finite values. Angles are no older than the newest
-/// odometry: a [`History`](super::History) in front goes back in time for those that come late, if
-/// the localizer can be copied.
+/// Odometry arrives in order of time, with finite values. Angles are not older than the newest
+/// odometry: a [`History`](super::History) in front of the localizer replays late angles, if the
+/// localizer can be copied.
 pub trait Localizer: Any + Send {
-    /// Moves on by an odometry sample; the first one is where distances are counted from.
+    /// Predicts with an odometry sample; the first sample defines the origin of the distance.
     ///
     /// # Errors
-    /// Whatever a user's localizer fails with; it ends the drive.
+    /// Errors of the localizer; an error ends the drive.
     fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError>;
 
-    /// Takes in an angle to a radio head.
+    /// Updates with an angle to a radio head.
     ///
     /// # Errors
-    /// Whatever a user's localizer fails with; it ends the drive.
+    /// Errors of the localizer; an error ends the drive.
     fn update(
         &mut self,
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> Result<UpdateVerdict, BoxError>;
 
-    /// Where it believes the vehicle to be at `time_s`, not before the newest odometry.
+    /// Returns the estimated pose at `time_s`, which is not before the newest odometry.
     ///
     /// # Errors
-    /// Whatever a user's localizer fails with; it ends the drive.
+    /// Errors of the localizer; an error ends the drive.
     fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError>;
 
-    /// Copies itself into `slot`, reusing what is there; `false` if it cannot be copied. The usual
-    /// body is [`copy_into`].
+    /// Copies the localizer to `slot`, reusing its memory; returns `false` if it cannot be copied.
+    /// The usual implementation is [`copy_into`].
     fn copy_to(&self, slot: &mut Option<Box<dyn Localizer>>) -> bool;
 
-    /// Number of places the vehicle may be at, as long as its first pose is searched for.
+    /// Returns the number of hypotheses during the search for the initial pose.
     fn hypotheses(&self) -> Option<usize> {
         None
     }
 
-    /// Whether the angles come from elsewhere than expected, so that the pose is not to be relied on
-    /// and every further angle helps.
+    /// Whether most angles contradict the prediction, so that the pose must not be used and every
+    /// further angle helps.
     fn is_lost(&self) -> bool {
         false
     }
 
-    /// How it came back when it was lost last.
+    /// Returns the last recovery of a lost localizer.
     fn recovered(&self) -> Option<Recovered> {
         None
     }
 
-    /// The filter in it, if it is one and knows where it is.
+    /// Returns the filter, if the localizer has one and its position is known.
     fn ekf(&self) -> Option<&Ekf> {
         None
     }
 
-    /// The filter by whose uncertainty to listen: that of the fault that nothing speaks against yet, if
-    /// there is one.
+    /// Returns the filter that determines the wake-ups: that of the fault hypothesis that
+    /// contributes most to the protection level, if there is one.
     fn worst_case(&self) -> Option<&Ekf> {
         self.ekf()
     }
 
-    /// Keeps from now on what smoothing takes, if it can be smoothed.
+    /// Keeps a journal for smoothing from now on, if smoothing is supported.
     fn keep_journal(&mut self) {}
 }
 
-/// Copies a localizer into a slot, without allocation where one of its kind is there already and
-/// [`Clone::clone_from`] needs none.
+/// Copies a localizer to a slot, without allocation if the slot contains one of the same type whose
+/// [`Clone::clone_from`] does not allocate.
 pub fn copy_into<L: Localizer + Clone>(
     localizer: &L,
     slot: &mut Option<Box<dyn Localizer>>,
@@ -98,7 +98,7 @@ pub fn copy_into<L: Localizer + Clone>(
     true
 }
 
-/// The filter by itself: it neither searches nor monitors its sources.
+/// Filter without search and monitoring.
 impl Localizer for Ekf {
     fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
         Ok(Self::odometry(self, sample))

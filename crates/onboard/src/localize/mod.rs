@@ -1,10 +1,10 @@
-//! From odometry and angles to a pose. [`Localizer`] is the door for others; [`DeadReckoning`] is
-//! the smallest one to copy from.
+//! Pose estimation from odometry and angles. [`Localizer`] is the interface for plug-ins;
+//! [`DeadReckoning`] is the smallest example.
 //!
-//! The built-in one, from the inside out: an extended Kalman filter ([`ekf`]) that may estimate a time-correlated
-//! bias of the angles ([`bias`]); a bank of such filters, one for each fault mode ([`modes`]); protection level and
-//! integrity state from their separation ([`integrity`]); acquisition of the first pose and relocalization
-//! ([`acquire`]); and measurements that come out of sequence ([`History`]).
+//! Layers of the built-in localizer: an extended Kalman filter ([`ekf`]) that may estimate a
+//! time-correlated bias of the angles ([`bias`]); a bank of such filters, one for each fault mode
+//! ([`modes`]); protection level and integrity state ([`integrity`]); search for the initial pose
+//! and relocalization ([`acquire`]); and out-of-sequence measurements ([`History`]).
 
 pub mod acquire;
 pub mod bias;

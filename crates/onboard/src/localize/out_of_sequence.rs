@@ -1,10 +1,10 @@
-//! Going back in time for angles that come late.
+//! Out-of-sequence measurements: replay of late angles.
 //!
-//! An SSB has its own time, and arrives after newer odometry: on a vehicle always. So copies of the
-//! localizer are kept at intervals, with everything it was given since. A late angle is put where it
-//! belongs: the newest copy from before it is taken, and what came after is given to it again, once
-//! for all angles of a burst. The result is that of angles in time, to the last bit. Once warm nothing
-//! is allocated.
+//! On a vehicle, the angle of an SSB always arrives after newer odometry. Copies of the localizer
+//! are therefore stored at intervals, with all subsequent inputs. For a late angle, the newest copy
+//! before it is restored, and the subsequent inputs are repeated, once for all angles of a burst.
+//! The result is bit-identical to that of angles in order. After initialisation nothing is
+//! allocated.
 
 use std::collections::VecDeque;
 
@@ -15,54 +15,54 @@ use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 
-/// How late an angle may come, at least, in seconds.
+/// Guaranteed maximum delay of an angle, in seconds.
 pub const HISTORY_S: f64 = 0.5;
 
-/// Copies kept.
+/// Number of stored copies.
 const COPIES: usize = 8;
 
-/// Time between two copies in seconds: the oldest of them is at least [`HISTORY_S`] old.
+/// Time between two copies in seconds: the oldest one is at least [`HISTORY_S`] old.
 const SPACING_S: f64 = HISTORY_S / (COPIES - 2) as f64;
 
-/// What is usually remembered of what came in ...
+/// Usual number of stored inputs ...
 const USUAL_EVENTS: usize = 256;
 
-/// ... and the most; with more, the oldest copies are given up early.
+/// ... and its maximum; above it, the oldest copies are removed early.
 const MOST_EVENTS: usize = 4096;
 
-/// A localizer that can go back in time.
+/// Localizer with replay of late angles.
 pub struct History {
     localizer: Box<dyn Localizer>,
-    /// What came in since the oldest copy, as if none had been late.
+    /// Inputs since the oldest copy, in order of their times.
     events: VecDeque<Event>,
-    /// Copies in order of time; the ones beyond `copies` are there for reuse.
+    /// Copies in order of time; those beyond `copies` are unused and kept for reuse.
     kept: [Checkpoint; COPIES],
     copies: usize,
-    /// What the localizer is swapped with when it goes back, so that its memory serves again.
+    /// Memory that is exchanged with the localizer's in a replay, so that it can be reused.
     spare: Option<Box<dyn Localizer>>,
     /// Time of the newest odometry ...
     now_s: f64,
-    /// ... and of the newest of all that came in.
+    /// ... and of the newest input.
     newest_s: f64,
 }
 
-/// An angle, and what the localizer did with it.
+/// Angle and the result of its update.
 #[derive(Debug, Clone, Copy)]
 pub struct AngleUpdate {
-    /// Number by which its giver knows it.
+    /// Identifier set by the caller.
     pub number: usize,
-    /// The radio head it is to.
+    /// Radio head of the angle.
     pub head: RadioHead,
-    /// The angle.
+    /// Measured angle.
     pub measured: AngleMeasurement,
-    /// What the localizer did with it.
+    /// Result of the update.
     pub verdict: UpdateVerdict,
 }
 
 #[derive(Clone, Copy)]
 enum Event {
     Odometry(OdometrySample),
-    /// An angle, and its number in its burst as long as that waits to hear what became of it.
+    /// Angle, and its index in its burst while the burst is processed.
     Angle(RadioHead, AngleMeasurement, Option<usize>),
 }
 
@@ -79,12 +79,12 @@ impl Event {
 struct Checkpoint {
     localizer: Option<Box<dyn Localizer>>,
     time_s: f64,
-    /// Number of the `events` that it has taken in.
+    /// Number of the `events` that the copy contains.
     events: usize,
 }
 
 impl History {
-    /// A history that begins with this localizer.
+    /// Creates a history with this localizer.
     pub fn new(localizer: Box<dyn Localizer>) -> Self {
         let mut made = Self {
             localizer,
@@ -99,40 +99,39 @@ impl History {
         made
     }
 
-    /// The localizer as it is now.
+    /// Returns the current localizer.
     pub fn localizer(&self) -> &dyn Localizer {
         self.localizer.as_ref()
     }
 
-    /// Keeps from now on what smoothing takes, and no copies any more: a late angle is refused.
+    /// Keeps a journal for smoothing from now on, and no copies: late angles are rejected.
     pub fn keep_journal(&mut self) {
         self.localizer.keep_journal();
         self.copies = 0;
     }
 
-    /// Moves on by an odometry sample, later than the one before.
+    /// Predicts with an odometry sample that is later than the previous one.
     ///
     /// # Errors
-    /// Whatever the localizer fails with.
+    /// Errors of the localizer.
     pub fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
         let verdict = self.localizer.odometry(sample)?;
         self.remember(Event::Odometry(*sample));
         Ok(verdict)
     }
 
-    /// Takes in the angles of a burst, wherever in time they belong, and writes down what it did with
-    /// each.
+    /// Updates with the angles of a burst at their own times, and stores the result of each.
     ///
     /// # Errors
-    /// Whatever the localizer fails with.
+    /// Errors of the localizer.
     pub fn update(&mut self, burst: &mut [AngleUpdate]) -> Result<(), BoxError> {
         for number in 0..burst.len() {
             let (_, rest) = burst.split_at_mut(number);
             let Some(update) = rest.first_mut() else {
                 break;
             };
-            // Between the same odometry samples angles can be taken in any order, if need be. A time
-            // that is no number is for the localizer to refuse.
+            // Between the same two odometry samples, the order of angles does not matter. The
+            // localizer rejects a time that is NaN.
             let time_s = update.measured.time_s;
             if time_s < self.now_s || (self.copies > 0 && time_s < self.newest_s) {
                 return self.update_late(rest);
@@ -169,7 +168,7 @@ impl History {
             std::mem::swap(spare, &mut self.localizer);
         }
         for (number, update) in burst.iter().enumerate().filter(|(_, it)| in_memory(it)) {
-            // In time it would have come before the first that is later.
+            // In order, it would precede the first later event.
             let is_later = |event: &Event| event.time_s() > update.measured.time_s;
             let place = (self.events.iter().skip(taken_in))
                 .position(is_later)
@@ -177,7 +176,7 @@ impl History {
             let event = Event::Angle(update.head, update.measured, Some(number));
             self.events.insert(place, event);
         }
-        // Copies made after it have not heard it.
+        // Copies after it do not contain it.
         self.copies = from;
         for index in taken_in..self.events.len() {
             match self.events.get_mut(index) {
@@ -222,7 +221,8 @@ impl History {
         if last.is_none_or(|last| time_s - last.time_s < SPACING_S) {
             return;
         }
-        // Going back, copies come at the times they came at before: there is room for them.
+        // In a replay, copies are stored at the same times as before, so that there is space for
+        // them.
         if self.copies == COPIES && events == self.events.len() {
             self.drop_oldest();
         }
@@ -238,11 +238,11 @@ impl History {
         }
     }
 
-    /// Gives up the oldest copies where too much has come in since.
+    /// Removes the oldest copies if there are too many inputs since.
     fn forget(&mut self) {
         while self.events.len() > MOST_EVENTS && self.copies > 0 {
             if self.copies == 1 {
-                // A single moment holds more than can be remembered: begin anew from here.
+                // More inputs at one time than can be stored: restart the history here.
                 self.events.clear();
                 self.copies = 0;
                 self.keep_copy(self.newest_s, 0);

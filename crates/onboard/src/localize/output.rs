@@ -1,24 +1,24 @@
-//! What a localizer answers: verdicts on odometry and angles, and the pose with its integrity.
+//! Outputs of a localizer: verdicts on odometry and angles, and the pose with its integrity.
 
 use crate::gaussian;
 use crate::geometry::Pose;
 
-/// Where a localizer believes the vehicle to be.
+/// Estimated pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseEstimate {
     /// Time in seconds.
     pub time_s: f64,
-    /// Place and heading.
+    /// Position and heading.
     pub pose: Pose,
-    /// Covariance of (x, y, heading), row-major, in m², m·rad and rad²; `None` where the
-    /// localizer does not know its own error.
+    /// Covariance of (x, y, heading), row-major, in m², m·rad and rad²; `None` if the localizer
+    /// does not estimate it.
     pub covariance: Option<[[f64; 3]; 3]>,
-    /// Protection level and state, where the localizer is guarded.
+    /// Protection level and state, if the localizer is monitored.
     pub integrity: Option<Integrity>,
 }
 
 impl PoseEstimate {
-    /// The covariance about this estimate where one of several others is right, each with a probability.
+    /// Extends the covariance by other estimates, each correct with a given probability.
     pub fn mix(&mut self, others: impl Iterator<Item = (f64, Self)>) {
         let mut mixed = [[0.0; 3]; 3];
         for (probability, other) in others {
@@ -27,14 +27,14 @@ impl PoseEstimate {
         self.covariance = Some(mixed);
     }
 
-    /// Widens the covariance by another estimate that may be the right one.
+    /// Extends the covariance by another estimate that may be the correct one.
     pub fn cover(&mut self, other: &Self) {
         if let Some(own) = &mut self.covariance {
             other.add_about(self.pose, 1.0, own);
         }
     }
 
-    /// Adds its second moments about a pose to a covariance, by a weight.
+    /// Adds its second moments about a pose to a covariance, with a weight.
     pub(super) fn add_about(&self, pose: Pose, weight: f64, covariance: &mut [[f64; 3]; 3]) {
         let (Some(own), apart) = (self.covariance, pose.offset_of(self.pose)) else {
             return;
@@ -46,8 +46,8 @@ impl PoseEstimate {
         }
     }
 
-    /// Variances of the horizontal error along its principal axes, larger first, in m²; infinite
-    /// where the localizer does not know them.
+    /// Returns the variances of the horizontal error along its principal axes, larger first, in m²;
+    /// infinite if there is no covariance.
     pub fn principal_variances(&self) -> [f64; 2] {
         let Some([[xx, xy, _], [_, yy, _], _]) = self.covariance else {
             return [f64::INFINITY; 2];
@@ -56,30 +56,30 @@ impl PoseEstimate {
     }
 }
 
-/// Where the vehicle is said to be at first.
+/// Given initial pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InitialPose {
     /// The pose.
     pub pose: Pose,
-    /// Standard deviation in each of x and y (m).
+    /// Standard deviation of x and y, each (m).
     pub position_std_m: f64,
     /// Standard deviation of the heading (rad).
     pub heading_std_rad: f64,
 }
 
-/// Whether the position can be relied on.
+/// Integrity state: whether the position may be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum IntegrityState {
-    /// The protection level holds and is below the alert limit.
+    /// The protection level is valid and below the alert limit.
     Ok,
-    /// The protection level is above the alert limit, or a fault cannot be pinned down.
+    /// The protection level exceeds the alert limit, or a fault is not identified.
     Degraded,
-    /// Several sources disagree at once, as when the array itself is at fault.
+    /// Several sources contradict each other, for example with an array fault.
     Unavailable,
 }
 
 impl IntegrityState {
-    /// Name for files and messages.
+    /// Returns the name for files and messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ok => "ok",
@@ -98,14 +98,14 @@ pub struct Integrity {
     pub protection_level_along_m: f64,
     /// Protection level across it (m).
     pub protection_level_across_m: f64,
-    /// What it amounts to.
+    /// State that follows from the protection level and the faults.
     pub state: IntegrityState,
-    /// Radio heads found faulty.
+    /// Number of radio heads identified as faulty.
     pub faulty: usize,
 }
 
 impl Integrity {
-    /// Unavailable, with one level in every direction.
+    /// Creates the state `unavailable` with one level in every direction.
     pub const fn unavailable(level_m: f64) -> Self {
         Self {
             protection_level_m: level_m,
@@ -116,7 +116,7 @@ impl Integrity {
         }
     }
 
-    /// Raises every level to `least_m`.
+    /// Raises every level to a minimum of `least_m`.
     pub const fn raise(&mut self, least_m: f64) {
         self.protection_level_m = self.protection_level_m.max(least_m);
         self.protection_level_along_m = self.protection_level_along_m.max(least_m);
@@ -124,21 +124,21 @@ impl Integrity {
     }
 }
 
-/// What a localizer did with an angle.
+/// Result of an update with an angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UpdateVerdict {
     /// Whether the angle changed the pose.
     pub accepted: bool,
-    /// Why, or why not.
+    /// Reason for acceptance or rejection.
     pub reason: UpdateReason,
-    /// Squared Mahalanobis distance of the innovation, where the localizer has a covariance.
+    /// Squared Mahalanobis distance of the innovation, if the localizer has a covariance.
     pub mahalanobis_squared: Option<f64>,
-    /// The largest it may be.
+    /// Gate of the squared Mahalanobis distance.
     pub threshold: Option<f64>,
 }
 
 impl UpdateVerdict {
-    /// An angle that never met the localizer's covariance.
+    /// Creates the verdict on an angle without an innovation.
     pub const fn unused(reason: UpdateReason) -> Self {
         Self {
             accepted: false,
@@ -149,27 +149,27 @@ impl UpdateVerdict {
     }
 }
 
-/// Why an angle was taken or left.
+/// Reason for the acceptance or rejection of an angle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum UpdateReason {
-    /// It agrees with the prediction, or there is none to compare it with.
+    /// The angle agrees with the prediction, or there is no prediction.
     Consistent,
-    /// It lies too far from the prediction.
+    /// The innovation exceeds the gate.
     Outlier,
-    /// It carries no angle: no number, no valid standard deviation, no resolved source, or a radio
-    /// head within a metre of the array.
+    /// The measurement contains no angle: not finite, no valid standard deviation, no resolved
+    /// source, or a radio head within a metre of the array.
     Unusable,
-    /// No radio head with this PCI and SSB index is on the map.
+    /// The site has no radio head with this PCI and SSB index.
     UnknownRadioHead,
-    /// It is older than what the localizer can go back to.
+    /// The angle is older than the stored history.
     TooLate,
-    /// Its radio head is excluded, by the user or as faulty.
+    /// The radio head is excluded, by the user or as faulty.
     Excluded,
 }
 
 impl UpdateReason {
-    /// Short name for logs and tables.
+    /// Returns the short name for logs and tables.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Consistent => "consistent",
@@ -182,50 +182,52 @@ impl UpdateReason {
     }
 }
 
-/// What became of one odometry sample.
+/// Result of the processing of an odometry sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OdometryVerdict {
-    /// Used.
+    /// The sample was used.
     Accepted,
-    /// The first one: it sets the origin of the distance.
+    /// First sample: it defines the origin of the distance.
     First,
-    /// Used, after this many seconds without odometry.
+    /// The sample was used after a gap in the odometry.
     AfterGap {
-        /// Length of the gap in seconds.
+        /// Duration of the gap in seconds.
         gap_s: f64,
     },
-    /// Used, as in the plane: the vehicle has certainly driven off the end of the map.
+    /// The sample was used without the map, because the vehicle is certainly beyond the end of the
+    /// road.
     BeyondMap {
-        /// How far from its end, in metres.
+        /// Distance beyond the end, in metres.
         by_m: f64,
     },
-    /// Used, as in the plane: the vehicle may be where the road was not surveyed.
+    /// The sample was used without the map, because the vehicle may be on an unsurveyed stretch.
     InMapGap {
-        /// Where that stretch begins, along the road in metres.
+        /// Start of the stretch, along the road in metres.
         from_m: f64,
-        /// Where it ends.
+        /// End of the stretch.
         to_m: f64,
     },
     /// The distance jumped; the speed was used instead, with its uncertainty.
     DistanceJump {
-        /// By how much, in metres.
+        /// Size of the jump, in metres.
         jump_m: f64,
     },
-    /// Used, but for its yaw rate, by which no vehicle turns: it turned on as before.
+    /// The sample was used without its physically impossible yaw rate; the previous rate was
+    /// continued.
     YawRateRefused {
-        /// What was read, in rad/s.
+        /// Measured yaw rate, in rad/s.
         radps: f64,
     },
-    /// Refused: the same time as the one before.
+    /// Rejected: equal time to the previous sample.
     Duplicate,
-    /// Refused: older than the one before.
+    /// Rejected: older than the previous sample.
     TimeBackwards,
-    /// Refused: a value that is not a number.
+    /// Rejected: a value is not finite.
     NotFinite,
 }
 
 impl OdometryVerdict {
-    /// Whether the sample moved the state.
+    /// Whether the sample changed the state.
     pub const fn accepted(&self) -> bool {
         !matches!(
             self,

@@ -1,4 +1,4 @@
-//! Whether the innovations of most radio heads are consistent with the filter.
+//! Consistency of the innovations of most radio heads with the filter.
 
 use crate::clone_in_place::clone_in_place;
 use crate::localize::output::{UpdateReason, UpdateVerdict};
@@ -7,24 +7,26 @@ use crate::radio_head::RadioHead;
 /// Weight of the newest angle of a radio head.
 const WEIGHT: f64 = 1.0 / 8.0;
 
-/// Angles before anything is said.
+/// Minimum number of angles for a decision.
 const LEAST: u32 = 5;
 
-/// Angles, of all radio heads, within which one must have been heard to count.
+/// Number of angles, of all radio heads, within which a radio head must have been received to
+/// count.
 const RECENT: u32 = 32;
 
-/// Share of refused angles above which a radio head is not where it is expected, and below which it
-/// is.
+/// Fraction of rejected angles above which a radio head is inconsistent with the filter, and below
+/// which it is consistent.
 const LOST: f64 = 0.5;
 const SURE: f64 = 0.2;
 
-/// Mean squared Mahalanobis distance, capped at the gate, above which it is not as well; it is 1
-/// where the belief is right.
+/// Mean squared Mahalanobis distance, limited by the gate, above which a radio head is
+/// inconsistent. Its expected value is 1.
 const SURPRISED: f64 = 5.0;
 
 clone_in_place! {
-    /// Exponentially weighted statistics of the innovations of each radio head, of which the majority decides: one that
-    /// is seen by a reflection is off for metres, whatever the number of its angles.
+    /// Exponentially weighted statistics of the innovations of each radio head, with a decision by
+    /// majority: a radio head that is received by a reflection is inconsistent for metres, whatever
+    /// the number of its angles.
     #[derive(Debug, PartialEq)]
     pub struct ConsistencyMonitor {
         heads: Vec<HeadStatistics>,
@@ -32,7 +34,7 @@ clone_in_place! {
     }
 }
 
-/// Those of a radio head: share of refused angles, mean squared Mahalanobis distance.
+/// Statistics of a radio head: fraction of rejected angles, mean squared Mahalanobis distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct HeadStatistics {
     pci: u16,
@@ -40,12 +42,12 @@ struct HeadStatistics {
     refused: f64,
     surprise: f64,
     heard: u32,
-    /// Number of the last one among all angles.
+    /// Index of its last angle among all angles.
     last: u32,
 }
 
 impl ConsistencyMonitor {
-    /// Nothing is known yet of these radio heads.
+    /// Creates the statistics of these radio heads.
     pub fn new(heads: &[RadioHead]) -> Self {
         let head = |head: &RadioHead| HeadStatistics {
             pci: head.pci,
@@ -61,8 +63,8 @@ impl ConsistencyMonitor {
         }
     }
 
-    /// Takes in what became of an angle to a radio head, of so many times the variance that is stated;
-    /// such that met no expectation say nothing.
+    /// Adds the result of an angle with `noise_ratio` times its specified variance. Angles without
+    /// an innovation are ignored.
     pub fn see(&mut self, head: &RadioHead, verdict: &UpdateVerdict, noise_ratio: f64) {
         let refused = match verdict.reason {
             UpdateReason::Consistent => 0.0,
@@ -85,7 +87,7 @@ impl ConsistencyMonitor {
         head.surprise += weight * (capped - head.surprise);
     }
 
-    /// Forgets all that was seen.
+    /// Resets all statistics.
     pub fn reset(&mut self) {
         for head in &mut self.heads {
             head.heard = 0;
@@ -93,7 +95,8 @@ impl ConsistencyMonitor {
         self.angles = 0;
     }
 
-    /// Share of the radio heads heard lately that are off; `None` before enough angles.
+    /// Returns the fraction of recently received radio heads that are inconsistent; `None` before
+    /// enough angles.
     fn off(&self, refused: f64) -> Option<f64> {
         let is_recent =
             |it: &&HeadStatistics| it.heard > 0 && self.angles.saturating_sub(it.last) < RECENT;
@@ -102,12 +105,12 @@ impl ConsistencyMonitor {
         (self.angles >= LEAST).then(|| off.count() as f64 / recent().count().max(1) as f64)
     }
 
-    /// Whether the angles come from elsewhere than expected.
+    /// Whether most radio heads are inconsistent with the filter.
     pub fn is_lost(&self) -> bool {
         self.off(LOST).is_some_and(|share| share > 0.5)
     }
 
-    /// Whether they come from where they are expected.
+    /// Whether most radio heads are consistent with the filter.
     pub fn is_sure(&self) -> bool {
         self.off(SURE).is_some_and(|share| share < 0.5)
     }

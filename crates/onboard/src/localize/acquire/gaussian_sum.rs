@@ -1,10 +1,11 @@
-//! A start from scratch: the vehicle hears radio heads, but does not know where it is.
+//! Search for an unknown initial pose.
 //!
-//! One filter for each metre of the road, and for each direction in which it may be driven; without
-//! a road, one for each square of the plane and each of twelve headings: a sum of
-//! Gaussians (Sorenson and Alspach 1971), each weighed by the likelihood of the angles. Those
-//! that fall far behind or leave the road are given up, those that meet become one. The vehicle is
-//! found when all that are left, taken as one Gaussian, know its place.
+//! On a road, there is one hypothesis (filter) for each metre and each permitted direction of
+//! travel; without a road, one for each cell of a grid and each of twelve headings. The hypotheses
+//! form a Gaussian sum (Sorenson and Alspach 1971), weighted by the likelihoods of the angles.
+//! Hypotheses with a low likelihood, or off the road, are removed; hypotheses that meet are merged.
+//! The vehicle is located when the remaining hypotheses, merged to one Gaussian, have a small
+//! covariance.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -22,35 +23,36 @@ use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
 
-/// Distance between the first hypotheses (m): within it an angle is linear enough to be followed,
-/// also into a narrow bend and out of it.
+/// Distance between initial hypotheses (m). Within it, an angle is sufficiently linear for the
+/// filter, also at the ends of a narrow bend.
 const SPACING_M: f64 = 1.0;
 
-/// Log-likelihood by which a hypothesis may fall behind the best; e^−25 is one in 10¹¹.
+/// Maximum difference of log-likelihoods from the best hypothesis; e^−25 is one in 10¹¹.
 const BEHIND: f64 = 25.0;
 
-/// Standard deviation of the position, along its ellipse's longer axis, at which it is found (m).
-/// Another place 100 m away then has a probability of less than 2 in 100 000.
+/// Maximum standard deviation of the position, along the longer axis of its ellipse, for a located
+/// vehicle (m). Another position 100 m away then has a probability below 2 in 100 000.
 const FOUND_STD_M: f64 = 0.4;
 
-/// Probability of the other direction of travel at which it is ruled out.
+/// Maximum probability of the opposite direction of travel for a located vehicle.
 const OTHER_WAY: f64 = 1e-5;
 
-/// Standard deviation of the heading at which it is found in the plane (rad).
+/// Maximum standard deviation of the heading for a located vehicle without a road (rad).
 const FOUND_STD_RAD: f64 = 0.2;
 
-/// Radio heads without which a place in the plane cannot be told from others.
+/// Minimum number of radio heads that determine a position without a road.
 pub(super) const LEAST_HEADS: usize = 3;
 
-/// Headings of the first hypotheses in each square of the plane, and the most hypotheses.
+/// Number of initial headings in each grid cell, and maximum number of hypotheses.
 const HEADINGS: u32 = 12;
 const MOST_HYPOTHESES: f64 = 4000.0;
 
-/// Least weight beside the best, in the covariance that is reported, of a hypothesis that is left: the next
-/// angles may make it the best, and where it is is then five deviations away at most.
+/// Minimum weight of a remaining hypothesis relative to the best, in the reported covariance. The
+/// next angles may make it the best one, and its position is then at most five standard deviations
+/// away.
 const LEAST_WEIGHT: f64 = 0.05;
 
-/// Where the vehicle may be.
+/// Region of the search.
 #[derive(Clone, Debug)]
 enum Ground {
     Roads(Vec<Arc<Road>>),
@@ -58,10 +60,10 @@ enum Ground {
 }
 
 clone_in_place! {
-    /// A hypothesis of where the vehicle is.
+    /// Hypothesis of the pose.
     #[derive(Debug)]
     struct Hypothesis {
-        /// Number of the road it drives on; 0 in the plane.
+        /// Index of its road; 0 without a road.
         road: usize,
         ekf: Ekf,
         log_likelihood: f64,
@@ -69,7 +71,7 @@ clone_in_place! {
 }
 
 impl Hypothesis {
-    /// Distance along its road, and the standard deviation of that (m).
+    /// Returns the distance along its road, and the standard deviation of that distance (m).
     fn along_m(&self) -> (f64, f64) {
         let belief = self.ekf.belief();
         (
@@ -78,7 +80,7 @@ impl Hypothesis {
         )
     }
 
-    /// How far another one is from its own in one state.
+    /// Returns the difference of one state from that of another hypothesis.
     fn apart(&self, other: &Self, state: usize) -> f64 {
         self.apart_of(&other.ekf, state)
     }
@@ -92,8 +94,8 @@ impl Hypothesis {
         }
     }
 
-    /// Whether another one in the plane is within a deviation of it in each direction. Of all pairs: most
-    /// are told apart by the first.
+    /// Whether another hypothesis without a road is within one standard deviation in every
+    /// direction. The first component decides for most pairs.
     fn meets(&self, other: &Self) -> bool {
         let covariance = &self.ekf.belief().covariance;
         [ALONG, ACROSS, HEADING].into_iter().all(|state| {
@@ -102,8 +104,8 @@ impl Hypothesis {
         })
     }
 
-    /// Takes in another hypothesis on the same road: the Gaussian of the same mean and covariance
-    /// as both together.
+    /// Merges another hypothesis on the same road: the Gaussian with the mean and covariance of
+    /// their sum.
     fn absorb(&mut self, other: &Self) {
         let ratio = (other.log_likelihood - self.log_likelihood).exp();
         let weight = ratio / (1.0 + ratio);
@@ -123,25 +125,25 @@ impl Hypothesis {
 }
 
 clone_in_place! {
-    /// The search for the first pose.
+    /// Search for the initial pose.
     #[derive(Debug)]
     pub struct GaussianSum {
         config: EkfConfig,
         ground: Ground,
         heads: Vec<RadioHead>,
         hypotheses: Vec<Hypothesis>,
-        /// How many there were at first.
+        /// Initial number of hypotheses.
         places: usize,
-        /// Whether a vague place is penalised for what it does not know.
+        /// Whether an uncertain hypothesis is penalised for its uncertainty.
         is_as_stated: bool,
-        /// Prior probability of a bias that the filter of the found place estimates.
+        /// Prior probability of a bias, for the filter of the located vehicle.
         bias_probability: f64,
     }
 }
 
 impl GaussianSum {
-    /// The vehicle may be anywhere on `road`, driving along it or, where `either_direction`, also against it; without a
-    /// road anywhere about the radio heads.
+    /// Creates a search along `road`, in its direction or, with `either_direction`, in both;
+    /// without a road, in the area of the radio heads.
     pub fn new(
         config: EkfConfig,
         road: Option<Road>,
@@ -156,8 +158,8 @@ impl GaussianSum {
         Self::on(&config, Ground::Roads(roads), heads)
     }
 
-    /// The search for a first pose that nothing is known of: in the plane, unless all of it is searched finely or too few
-    /// radio heads tell places apart, as [`Self::as_stated`].
+    /// Creates the search for an unknown initial pose without a road. It uses [`Self::as_stated`]
+    /// unless the whole area has a fine grid, or the number of radio heads is too small.
     pub fn from_scratch(
         config: EkfConfig,
         road: Option<Road>,
@@ -173,8 +175,8 @@ impl GaussianSum {
         }
     }
 
-    /// In the plane, where places are judged by what is stated alone: what a place does not know well counts against it, and
-    /// no bias is estimated before it is found.
+    /// Creates a search without a road with the specified noise only: the uncertainty of a
+    /// hypothesis reduces its likelihood, and no bias is estimated before the vehicle is located.
     pub(super) fn as_stated(config: &EkfConfig, heads: &[RadioHead]) -> Self {
         Self {
             is_as_stated: true,
@@ -183,27 +185,27 @@ impl GaussianSum {
         }
     }
 
-    /// Whether these radio heads tell places apart by what is stated alone.
+    /// Whether these radio heads determine a position with the specified noise only.
     pub(super) fn serves_as_stated(heads: &[RadioHead]) -> bool {
         heads.len() >= LEAST_HEADS && !Self::is_small(heads)
     }
 
-    /// Where the vehicle is without a road.
+    /// Returns the area of a search without a road.
     fn about(heads: &[RadioHead]) -> Area {
         Area::about(heads.iter().map(|head| head.position))
     }
 
-    /// The vehicle may be anywhere in an area, heading anywhere.
+    /// Creates a search in an area, with any heading.
     pub fn in_plane(config: EkfConfig, area: Area, heads: &[RadioHead]) -> Self {
         Self::on(&config, Ground::Plane(area), heads)
     }
 
-    /// Whether all about these radio heads is searched as finely as is useful.
+    /// Whether the whole area of these radio heads can be searched with a fine grid.
     pub fn is_small(heads: &[RadioHead]) -> bool {
         Self::about(heads).spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
     }
 
-    /// Whether its filters have the states that a filter has which they are compared with.
+    /// Whether its filters have the same states as a filter that they are compared with.
     pub fn is_of_the_model_of(&self, ekf: &Ekf) -> bool {
         self.config.estimates_bias() == ekf.is_with_bias()
     }
@@ -222,7 +224,7 @@ impl GaussianSum {
         made
     }
 
-    /// Counts distances on from where another filter of the same vehicle does.
+    /// Continues the distance of another filter of the same vehicle.
     pub(super) fn resume(&mut self, other: &Ekf) {
         for hypothesis in &mut self.hypotheses {
             hypothesis.ekf.resume(other);
@@ -274,7 +276,7 @@ impl GaussianSum {
         self.places = self.hypotheses.len();
     }
 
-    /// Moves every hypothesis.
+    /// Predicts every hypothesis.
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
         let ekfs = self.hypotheses.iter_mut();
         ekfs.fold(OdometryVerdict::NotFinite, |_, hypothesis| {
@@ -282,7 +284,7 @@ impl GaussianSum {
         })
     }
 
-    /// Judges every hypothesis by an angle. The verdict is that of the likeliest.
+    /// Updates every hypothesis with an angle. The verdict is that of the most probable one.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         let mut first = UpdateVerdict::unused(UpdateReason::Unusable);
         let log_likelihood = if self.is_as_stated {
@@ -299,7 +301,8 @@ impl GaussianSum {
             }
         }
         self.prune();
-        // Angles are those of one receiver: were they worth more at one place than at another, neither were the likelier.
+        // All hypotheses use the noise of the best one, because they share one receiver; otherwise
+        // their likelihoods would not be comparable.
         if let Some((best, others)) = self.hypotheses.split_first_mut() {
             for it in others {
                 it.ekf.hear_as(&best.ekf);
@@ -308,7 +311,7 @@ impl GaussianSum {
         first
     }
 
-    /// A filter beside it hears as its own do.
+    /// Sets the noise model of another filter to that of the hypotheses.
     pub(super) fn teach(&self, ekf: &mut Ekf) {
         if let Some(best) = self.hypotheses.first() {
             ekf.hear_as(&best.ekf);
@@ -359,29 +362,29 @@ impl GaussianSum {
         }
         self.hypotheses.truncate(kept);
         if self.hypotheses.is_empty() {
-            // What seemed right has driven off the road.
+            // The best hypothesis has left the road.
             self.restart();
         }
     }
 
-    /// The radio heads it listens to.
+    /// Returns the radio heads.
     pub fn heads(&self) -> &[RadioHead] {
         &self.heads
     }
 
-    /// Number of hypotheses left.
+    /// Returns the number of remaining hypotheses.
     pub fn left(&self) -> usize {
         self.hypotheses.len()
     }
 
-    /// Log-likelihood of the best hypothesis.
+    /// Returns the log-likelihood of the best hypothesis.
     pub(super) fn best(&self) -> f64 {
         self.hypotheses
             .first()
             .map_or(f64::NEG_INFINITY, |best| best.log_likelihood)
     }
 
-    /// Log-likelihood of the angles if the vehicle began at any of the places, all as probable.
+    /// Returns the log-likelihood of the angles for a uniform prior over the initial hypotheses.
     pub(super) fn evidence(&self) -> f64 {
         let best = self.best();
         let all = self
@@ -391,7 +394,8 @@ impl GaussianSum {
         best + (all.sum::<f64>() / self.places.max(1) as f64).ln()
     }
 
-    /// Whether every hypothesis that is left knows its place, and a filter's is within what is certain of it.
+    /// Whether every remaining hypothesis has a small covariance, and the position of `ekf` is
+    /// within its confidence region.
     pub(super) fn is_at(&self, ekf: &Ekf) -> bool {
         self.hypotheses.iter().all(|it| {
             let [most_m2, _] = Ekf::principal_variances(it.ekf.belief());
@@ -405,7 +409,7 @@ impl GaussianSum {
         })
     }
 
-    /// One filter for all hypotheses that are left, once they know the position.
+    /// Returns one filter for all remaining hypotheses once they determine the position.
     pub fn found(&self) -> Option<Ekf> {
         let all = self.mixture(f64::NEG_INFINITY, 0.0);
         let is_placed = all.principal_variances()[0] < FOUND_STD_M * FOUND_STD_M;
@@ -416,7 +420,8 @@ impl GaussianSum {
                 variance < FOUND_STD_RAD * FOUND_STD_RAD
             }
         };
-        // As stated, any other place is less probable than one in 10¹¹, however far the one that is left is known.
+        // With the specified noise only, any other position has a probability below one in 10¹¹, so
+        // that the covariance of the remaining hypothesis need not be small.
         let is_only = self.is_as_stated && self.hypotheses.len() == 1;
         if !((is_placed || is_only) && heading_known) {
             return None;
@@ -437,14 +442,15 @@ impl GaussianSum {
         (other_way < OTHER_WAY).then_some(one.ekf)
     }
 
-    /// Mean over all hypotheses, each weighed by its likelihood, and a covariance that covers what each of
-    /// them may come to: where the vehicle may be, which is far from Gaussian as long as several are left.
+    /// Returns the mean over all hypotheses, weighted by their likelihoods, and a covariance that
+    /// covers every hypothesis that may become the best one. The distribution is far from Gaussian
+    /// while several hypotheses remain.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
         self.mixture(time_s, LEAST_WEIGHT)
     }
 
-    /// Mean and covariance over all hypotheses, none of them weighing less than so much of the best in the
-    /// latter.
+    /// Returns mean and covariance over all hypotheses. In the covariance, the weight of a
+    /// hypothesis is at least `least_weight` times the weight of the best.
     fn mixture(&self, time_s: f64, least_weight: f64) -> PoseEstimate {
         let best = self
             .hypotheses
@@ -498,7 +504,7 @@ mod tests {
     use crate::observation::MeasurementKind;
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
 
-    /// Drives from `start_m` until found; the error then, in metres and in standard deviations.
+    /// Drives from `start_m` until located; returns the error in metres and in standard deviations.
     fn search(seed: u64) -> Option<(f64, f64)> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let site = Site::from_library("trip-2", &Shipped).unwrap();

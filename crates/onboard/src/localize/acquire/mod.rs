@@ -1,4 +1,4 @@
-//! The first pose, and the pose after the vehicle was lost.
+//! Search for the initial pose, and relocalization of a lost vehicle.
 
 mod consistency;
 mod gaussian_sum;

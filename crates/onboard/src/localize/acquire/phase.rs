@@ -1,67 +1,69 @@
-//! What the localizer is at, and what follows from the evidence: the state machine of its searches.
+//! State machine of the searches: phases, and transitions that follow from the evidence.
 
 use std::cmp::Ordering;
 
-/// What the localizer is at.
+/// Phase of the localizer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Phase {
-    /// It searches for the first pose.
+    /// Searching for the initial pose.
     Searching,
-    /// It tracks from a given pose in the plane, which the first angle begins to confirm.
+    /// Tracking from a given pose without a road, which the first angle begins to confirm.
     Given,
-    /// It tracks.
+    /// Tracking.
     Tracking,
-    /// It tracks; a search runs beside it.
+    /// Tracking, with a search in parallel.
     Confirming,
-    /// It is lost; a search runs beside it, nearby or wide.
+    /// Lost, with a search in parallel, nearby or wide.
     Relocalizing { wide: bool },
 }
 
-/// What the next phase depends on.
+/// Evidence for the next phase.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is a fact of its own; the phases are the state machine"
 )]
 pub(super) struct Evidence {
-    /// Most radio heads' angles come from elsewhere than predicted.
+    /// Whether the angles of most radio heads contradict the prediction.
     pub is_lost: bool,
-    /// They come from where they are predicted.
+    /// Whether the angles of most radio heads agree with the prediction.
     pub is_consistent: bool,
-    /// They may come from elsewhere without the vehicle being lost.
+    /// Whether the selected hypothesis explains contradicting angles without a lost vehicle.
     pub may_mislead: bool,
-    /// The last search is long enough ago.
+    /// Whether the minimum time since the last search has elapsed.
     pub is_rested: bool,
-    /// Whether the angles are likelier at the best place searched, or at the filter's.
+    /// Comparison of the likelihoods at the best position of the search and at the filter's
+    /// position.
     pub search: Ordering,
-    /// The search is of one place.
+    /// Whether the search has determined one position.
     pub is_found: bool,
-    /// It is of a start that was given,
+    /// Whether the search verifies a given start.
     pub is_of_start: bool,
-    /// which is less probable than another start,
+    /// Whether another start is more probable than the given one.
     pub doubts_start: bool,
-    /// or of which the search has found the reported position.
+    /// Whether the search of a given start has found the reported position.
     pub agrees: bool,
-    /// No odometry since the search is reported: before anything moves the covariance covers both.
+    /// Whether no odometry has arrived since the search was reported; the covariance then covers
+    /// both solutions.
     pub is_just_reported: bool,
-    /// Enough way was driven for a find; a long one.
+    /// Whether the minimum distance for a result has been driven; whether a long distance has.
     pub has_moved: bool,
     pub has_moved_far: bool,
-    /// Angles were heard for long.
+    /// Whether angles were received for the maximum duration of a search.
     pub is_patient: bool,
 }
 
-/// What is done between two phases.
+/// Action between two phases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Transition {
     Stay,
-    /// A search begins.
+    /// Start a search.
     Begin(Phase),
-    /// The search is reported.
+    /// Report the result of the search.
     Report,
-    /// Its find takes over.
+    /// The result of the search replaces the filter.
     TakeOver,
-    /// It ends, and the next may have to wait.
+    /// End the search; the next one may have to wait.
     End {
         rests: bool,
     },
@@ -70,7 +72,8 @@ pub(super) enum Transition {
 impl Phase {
     pub fn next(self, by: &Evidence) -> Transition {
         let is_ahead = by.search == Ordering::Greater;
-        // A diverged filter can become self-consistent: every other place must be less likely, too.
+        // A diverged filter can be consistent with the angles, so that every other position must
+        // also be less probable.
         let is_confirmed = by.search == Ordering::Less && by.is_consistent;
         match self {
             Self::Tracking => match (by.is_lost && by.is_rested, by.may_mislead) {
@@ -81,8 +84,8 @@ impl Phase {
             Self::Confirming => {
                 let is_long = by.is_patient || (by.may_mislead && by.has_moved_far);
                 let is_over = if by.is_of_start {
-                    // Until one place is left another may yet be the right one; what takes long is not worth its cost,
-                    // unless the angles speak for another.
+                    // Until one position remains, another one may still be correct. A long search
+                    // ends, unless the angles favour another position.
                     by.search == Ordering::Less
                         && (by.is_found
                             || (!by.doubts_start && (by.is_patient || by.has_moved_far)))
@@ -100,11 +103,11 @@ impl Phase {
                 }
             }
             Self::Relocalizing { .. } if by.is_just_reported => Transition::Stay,
-            // Filter and search may have come to the same position, whatever the angles were by which they did.
+            // Filter and search may have reached the same position with different angles.
             Self::Relocalizing { .. } if by.agrees => Transition::End { rests: true },
             Self::Relocalizing { .. } if is_ahead && !by.has_moved => Transition::Stay,
             Self::Relocalizing { .. } if is_ahead && by.is_found => Transition::TakeOver,
-            // A start that is in doubt has its search go on until either is certain.
+            // The search of a doubtful start continues until one of both is decided.
             Self::Relocalizing { .. }
                 if is_confirmed || (!is_ahead && by.is_found && !by.doubts_start) =>
             {
@@ -122,7 +125,7 @@ impl Phase {
 mod tests {
     use super::*;
 
-    /// Nothing speaks for anything.
+    /// No evidence.
     const NONE: Evidence = Evidence {
         is_lost: false,
         is_consistent: false,

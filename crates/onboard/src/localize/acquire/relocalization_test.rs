@@ -1,5 +1,5 @@
-//! A sequential probability ratio test (Wald 1945) between the place of a filter and the best place of a search beside
-//! it.
+//! Sequential probability ratio test (Wald 1945) between the position of a filter and the best
+//! position of a parallel search.
 
 use std::cmp::Ordering;
 
@@ -10,42 +10,46 @@ use crate::localize::modes::{CERTAIN, log_likelihood, log_likelihood_as_stated};
 use crate::observation::{AngleMeasurement, OdometrySample};
 use crate::radio_head::RadioHead;
 
-/// Way to be driven before a find is believed (m): a vehicle that stands hears the same errors again and again.
+/// Minimum distance driven before a result of the search is accepted (m): at standstill, the same
+/// errors repeat.
 const LEAST_WAY_M: f64 = 0.5;
 
-/// Angles of one radio head within this way share their errors: clusters keep an angle wrong for so long (m).
+/// Distance within which angles of one radio head are dependent (m): a cluster of scatterers biases
+/// the angle over this distance.
 const INDEPENDENT_M: f64 = 10.0;
 
-/// Probability that a start which is given is another one, anywhere about the radio heads: as that of a fault of a radio
-/// head.
+/// Probability that a given start is wrong, and is anywhere in the area of the radio heads: equal
+/// to that of a radio head fault.
 const WRONG_START: f64 = 0.01;
 
-/// Longer silences do not count as time with angles (s).
+/// Maximum interval between angles that counts as time with angles (s).
 const SILENCE_S: f64 = 1.0;
 
 clone_in_place! {
-    /// A search beside a filter, and the likelihoods of both.
+    /// Parallel search, with the log-likelihoods of search and filter.
     #[derive(Debug)]
     pub(super) struct RelocalizationTest {
         pub search: GaussianSum,
-        /// The filter of a start that is given, as it is stated: what the bank's filters learn from angles that contradict
-        /// them explains those away. None where the vehicle is lost later.
+        /// Filter of the given start, with the specified noise only. The filters of the bank would
+        /// explain contradicting angles by learned noise. `None` if the vehicle was lost later.
         given: Option<Box<Ekf>>,
-        /// Time of the newest odometry when it began to be reported (s).
+        /// Time of the newest odometry when the search was first reported (s).
         pub reported_s: f64,
-        /// Whether the filter is refuted, so that its place is not reported any more beside the search's.
+        /// Whether the filter is refuted, so that its position is no longer part of the reported
+        /// covariance.
         pub refutes: bool,
-        /// Whether angles may be off as if the vehicle were lost.
+        /// Whether the selected hypothesis explains contradicting angles without a lost vehicle.
         may_mislead: bool,
-        /// Log-likelihood of the angles by the filter.
+        /// Log-likelihood of the angles for the filter.
         of_filter: f64,
-        /// Distance driven when it began, and driven since (m).
+        /// Distance driven at the start of the search, and since then (m).
         since_m: f64,
         pub way_m: f64,
-        /// When the last angle was heard, and for how long with angles (s).
+        /// Time of the last angle, and duration of reception (s).
         heard_s: f64,
         pub listened_s: f64,
-        /// Angles, how many of them are independent, and after which way each radio head had its last such one (m).
+        /// Number of angles, number of independent ones, and distance driven at the last
+        /// independent angle of each radio head (m).
         angles: u32,
         independent: u32,
         independent_m: Vec<f64>,
@@ -53,7 +57,7 @@ clone_in_place! {
 }
 
 impl RelocalizationTest {
-    /// One that begins now.
+    /// Creates a test that starts now.
     pub fn new(search: GaussianSum, ekf: &Ekf, may_mislead: bool) -> Self {
         let heads = search.heads().len();
         Self {
@@ -73,7 +77,7 @@ impl RelocalizationTest {
         }
     }
 
-    /// Of a start that is given, with a search wherever else it may be.
+    /// Creates the test of a given start against a search everywhere else.
     pub fn of_start(search: GaussianSum, given: &Ekf) -> Self {
         Self {
             given: Some(Box::new(given.as_stated())),
@@ -81,22 +85,22 @@ impl RelocalizationTest {
         }
     }
 
-    /// Whether the search has found that the start is where it is said to be.
+    /// Whether the search has confirmed the given start.
     pub fn confirms_start(&self) -> bool {
         (self.given.as_ref()).is_some_and(|given| self.search.is_at(given))
     }
 
-    /// Whether the search of a given start has found the position of the filter that is reported.
+    /// Whether the search of a given start has found the reported position.
     pub fn agrees_with(&self, reported: &Ekf) -> bool {
         self.is_of_start() && self.search.is_at(reported)
     }
 
-    /// Whether it is of a start that is given.
+    /// Whether the test is that of a given start.
     pub const fn is_of_start(&self) -> bool {
         self.given.is_some()
     }
 
-    /// Moves all places.
+    /// Predicts all hypotheses.
     pub fn odometry(&mut self, sample: &OdometrySample) {
         if let Some(given) = &mut self.given {
             given.odometry(sample);
@@ -104,7 +108,7 @@ impl RelocalizationTest {
         self.search.odometry(sample);
     }
 
-    /// Takes in an angle, before the filter does.
+    /// Processes an angle, before the filter does.
     pub fn update(&mut self, ekf: &Ekf, head: &RadioHead, measured: &AngleMeasurement) {
         self.way_m = ekf.driven_m() - self.since_m;
         let silence_s = measured.time_s - self.heard_s;
@@ -134,9 +138,10 @@ impl RelocalizationTest {
         }
     }
 
-    /// Greater where the angles are certainly likelier at the search's best place, less where they are at the
-    /// filter's. A filter that is only to be confirmed, or whose angles may mislead, is compared by independent
-    /// angles. A start that is given stands until it is refuted: less as soon as it is the more probable.
+    /// Returns `Greater` if the angles are with certainty more probable at the best position of the
+    /// search, `Less` if they are at that of the filter. Independent angles are compared if the
+    /// filter is only to be confirmed, or its hypothesis may mislead. A given start is valid until
+    /// refuted: the result is `Less` once it is the more probable start.
     pub fn compare(&self, is_confirming: bool) -> Ordering {
         let (ratio, less) = if self.is_of_start() {
             (self.log_odds(), 0.0)
@@ -158,13 +163,14 @@ impl RelocalizationTest {
         }
     }
 
-    /// Logarithm of the odds that the vehicle began elsewhere than given.
+    /// Returns the log odds of another start to the given start.
     fn log_odds(&self) -> f64 {
         (WRONG_START / (1.0 - WRONG_START)).ln() + self.against_start()
     }
 
-    /// Log-likelihood ratio of all other places to the given start. A ratio for other places is tempered: it counts by
-    /// independent angles, and by the misfit of the best place, so that angles that fit nowhere are no evidence.
+    /// Returns the log-likelihood ratio of all other positions to the given start. A ratio in
+    /// favour of other positions is reduced to the number of independent angles, and divided by the
+    /// misfit of the best position, so that angles without any consistent position are no evidence.
     fn against_start(&self) -> f64 {
         let ratio = self.search.evidence() - self.of_filter;
         if ratio > 0.0 {
@@ -174,7 +180,7 @@ impl RelocalizationTest {
         }
     }
 
-    /// Mean squared normalised residual of the angles at the best place of the search, at least 1.
+    /// Returns the mean squared normalised residual at the best position of the search, at least 1.
     fn misfit(&self) -> f64 {
         (-2.0 * self.search.best() / f64::from(self.angles.max(1))).max(1.0)
     }
@@ -188,7 +194,7 @@ impl RelocalizationTest {
         self.is_of_start() && self.log_odds() > 0.0
     }
 
-    /// The least way to be driven before a find is believed (m).
+    /// Returns the minimum distance driven before a result is accepted (m).
     pub const fn least_way_m(&self) -> f64 {
         if self.may_mislead {
             INDEPENDENT_M
@@ -197,7 +203,7 @@ impl RelocalizationTest {
         }
     }
 
-    /// It is reported from the newest odometry on, and begins to be patient anew.
+    /// Starts reporting the search at the newest odometry, and restarts its maximum duration.
     pub const fn report(&mut self, odometry_s: f64) {
         (self.reported_s, self.listened_s) = (odometry_s, 0.0);
     }

@@ -1,15 +1,17 @@
-//! The state machine about the filter: it searches for the first pose, tracks, and searches again where it is lost.
+//! Built-in localizer: searches for the initial pose, tracks, and searches again if the vehicle is
+//! lost.
 //!
-//! As long as angles come from where the filter predicts them, this only watches. When most of them
-//! do not, the position is declared unavailable, and a search runs beside the filter: about where it
-//! believes to be first, then wherever radio heads are, or along all of the road where there is one.
-//! Where angles may be off as if the vehicle were lost, the filter is only confirmed: the position stays what it is
-//! until the search finds a better place. A given place in the plane is a hypothesis like others, and is confirmed from
-//! the first angle on.
-//! What the search finds takes over only if the same angles are likelier there than at the filter's place: a restart
-//! that would be worse than what it replaces never happens. Meanwhile the covariance
-//! covers both; where the filter is refuted, a search nearby alone is reported. A bank that has begun anew
-//! by itself meanwhile is not searched for any more.
+//! While the angles agree with the filter's prediction, no search runs. If most radio heads
+//! contradict it, the position becomes unavailable and a search runs in parallel to the filter:
+//! first around the filter's position, then in the area of the radio heads, or along the whole
+//! road. If the selected hypothesis may explain the contradiction, the filter is only confirmed:
+//! the position is unchanged until the search finds a better one. A given start without a road is
+//! one hypothesis of several, and is confirmed from the first angle on.
+//!
+//! A result of the search replaces the filter only if the same angles are more probable there, so
+//! that a restart never makes the position worse. Meanwhile the covariance covers both; if the
+//! filter is refuted, only the nearby search is reported. If the bank restarts by itself meanwhile,
+//! the search ends.
 
 use std::cmp::Ordering;
 use std::sync::Arc;
@@ -33,22 +35,23 @@ use crate::radio_head::RadioHead;
 use crate::road::Road;
 use crate::settings::IntegritySettings;
 
-/// How far about the believed place is searched first (m), beyond three of its deviations.
+/// Distance around the filter's position that is searched first, in addition to three standard
+/// deviations (m).
 const NEARBY_M: f64 = 2.0;
 
-/// Most of three deviations that count as nearby (m).
+/// Maximum of three standard deviations for a nearby search (m).
 const MOST_NEARBY_M: f64 = 10.0;
 
-/// After a search that found no better place the next one waits so long (s).
+/// Minimum time between a search without a better position and the next search (s).
 const REST_S: f64 = 10.0;
 
-/// After this time with angles and without a find a search is patient no more (s).
+/// Maximum duration of a search with angles and without a result (s).
 const PATIENCE_S: f64 = 20.0;
 
-/// After this way a confirmation by few angles has taken long (m).
+/// Distance after which a confirmation with few angles ends (m).
 const LONG_WAY_M: f64 = 100.0;
 
-/// What does not change on the way.
+/// Configuration that is constant during a drive.
 #[derive(Debug)]
 struct Setup {
     road: Option<Road>,
@@ -57,7 +60,7 @@ struct Setup {
     quantile: RadialQuantile,
 }
 
-/// One filter, or a monitored bank of them.
+/// One filter, or a monitored bank of filters.
 #[derive(Debug)]
 enum Solution {
     Bare(Box<Ekf>),
@@ -82,7 +85,7 @@ impl Clone for Solution {
 }
 
 impl Solution {
-    /// Of a filter that was given its place, or found it at a time (s).
+    /// Creates the solution of a filter whose position was given, or found at `found_s`.
     fn new(ekf: Ekf, setup: &Setup, found_s: Option<f64>) -> Self {
         match setup.integrity {
             Some(settings) => Self::Monitored(Box::new(IntegrityMonitor::new(
@@ -102,7 +105,7 @@ impl Solution {
         }
     }
 
-    /// The filter that uses every sound source.
+    /// Returns the filter that uses every fault-free source.
     fn ekf(&self) -> &Ekf {
         match self {
             Self::Bare(ekf) => ekf,
@@ -110,17 +113,17 @@ impl Solution {
         }
     }
 
-    /// When it began anew last by itself (s), if ever.
+    /// Returns the time of its last restart (s).
     fn begun_s(&self) -> f64 {
         (self.monitor()).map_or(f64::NEG_INFINITY, IntegrityMonitor::begun_s)
     }
 
-    /// Whether angles may be off as if the vehicle were lost.
+    /// Whether the selected hypothesis explains contradicting angles without a lost vehicle.
     fn may_mislead(&self) -> bool {
         (self.monitor()).is_some_and(|it| it.bank().may_mislead())
     }
 
-    /// How much more the angles vary than stated, as far as anybody listens to that.
+    /// Returns the ratio of the angles' measured variance to the specified one, if it is estimated.
     fn noise_ratio(&self) -> f64 {
         (self.monitor()).map_or(1.0, |it| it.bank().noise_ratio())
     }
@@ -146,7 +149,7 @@ impl Solution {
         }
     }
 
-    /// Keeps a journal, where there is no bank, whose filters take each other's place.
+    /// Keeps a journal if there is no bank; the filters of a bank replace each other.
     fn keep_journal(&mut self) {
         if let Self::Bare(ekf) = self {
             ekf.keep_journal();
@@ -155,17 +158,17 @@ impl Solution {
 }
 
 clone_in_place! {
-    /// The built-in localizer.
+    /// Built-in localizer.
     #[derive(Debug)]
     pub struct Relocalizer {
         setup: Arc<Setup>,
         phase: Phase,
-        /// Of the first pose; `None` once that is found.
+        /// Search for the initial pose; `None` once the pose is known.
         search: Option<GaussianSum>,
-        /// `None` until then.
+        /// Solution; `None` during the search for the initial pose.
         solution: Option<Solution>,
         consistency: ConsistencyMonitor,
-        /// Between the solution and a search, as long as that runs.
+        /// Test between the solution and a search in parallel, while it runs.
         test: Option<RelocalizationTest>,
         rests_until_s: f64,
         recovered: Option<Recovered>,
@@ -174,7 +177,8 @@ clone_in_place! {
 }
 
 impl Relocalizer {
-    /// Tracks on from a filter of these radio heads; `road` is where the vehicle is searched for if it is lost.
+    /// Creates a localizer that tracks with a filter of these radio heads; `road` is the region of
+    /// a search if the vehicle is lost.
     pub fn tracking(
         ekf: Ekf,
         road: Option<Road>,
@@ -191,7 +195,7 @@ impl Relocalizer {
         made
     }
 
-    /// Searches for the first pose.
+    /// Creates a localizer that searches for the initial pose.
     pub fn searching(
         search: GaussianSum,
         road: Option<Road>,
@@ -226,7 +230,7 @@ impl Relocalizer {
         }
     }
 
-    /// Tracks from now on what was found at a time (s).
+    /// Tracks with the result of a search at time `now_s`.
     fn track(&mut self, found: Ekf, now_s: f64) {
         let mut solution = Solution::new(found, &self.setup, Some(now_s));
         if self.keeps_journal {
@@ -241,8 +245,8 @@ impl Relocalizer {
         (self.phase, self.test) = (Phase::Tracking, None);
     }
 
-    /// Begins a search wherever else the vehicle may have begun than where it is said to have; where that is all nearby,
-    /// one as later.
+    /// Starts the search of all starts other than the given one; if all of them are nearby, the
+    /// usual search.
     fn begin_of_start(&mut self, now_s: f64) {
         let heads = self.setup.heads.as_slice();
         let (true, Some(solution)) = (self.setup.road.is_none(), &self.solution) else {
@@ -258,21 +262,21 @@ impl Relocalizer {
         self.phase = Phase::Confirming;
     }
 
-    /// Whether a search is of the start that was given.
+    /// Whether a search verifies the given start.
     fn is_of_start(&self) -> bool {
         self.test
             .as_ref()
             .is_some_and(RelocalizationTest::is_of_start)
     }
 
-    /// Whether the angles speak against that.
+    /// Whether another start is more probable than the given one.
     fn doubts_start(&self) -> bool {
         self.test
             .as_ref()
             .is_some_and(RelocalizationTest::doubts_start)
     }
 
-    /// Begins a search beside the solution.
+    /// Starts a search in parallel to the solution.
     fn begin(&mut self, phase: Phase, now_s: f64) {
         let is_wide = phase == Phase::Relocalizing { wide: true };
         let test = (self.solution.as_ref()).and_then(|solution| {
@@ -288,7 +292,8 @@ impl Relocalizer {
         self.test = test;
     }
 
-    /// A search nearby, or wherever radio heads are: at once where that is no more to look at.
+    /// Returns a nearby search, or one in the area of the radio heads. It is wide immediately if
+    /// both regions are equal.
     fn search_about(&self, solution: &Solution, now_s: f64, is_wide: bool) -> Option<GaussianSum> {
         let (ekf, heads) = (solution.ekf(), self.setup.heads.as_slice());
         let mut config = *ekf.config();
@@ -326,7 +331,7 @@ impl Relocalizer {
             may_mislead: solution.may_mislead(),
             is_rested: now_s >= self.rests_until_s,
             search,
-            // A start stands where that is the place that is found.
+            // A given start is confirmed if the search finds its position.
             is_found: is(&|it| match (it.is_of_start(), search) {
                 (true, Ordering::Less) => it.confirms_start(),
                 _ => it.search.found().is_some(),
@@ -341,7 +346,7 @@ impl Relocalizer {
         }
     }
 
-    /// Goes on to the next phase.
+    /// Advances to the next phase.
     fn advance(&mut self, now_s: f64) {
         let Some(solution) = &self.solution else {
             return;
@@ -411,7 +416,8 @@ impl Localizer for Relocalizer {
             }
             return Ok(verdict);
         }
-        // A search is of places as the filter that it is compared with predicts angles there.
+        // The hypotheses of a search predict angles with the states of the filter that they are
+        // compared with.
         let is_of_other_model = |test: &RelocalizationTest| {
             (self.solution.as_ref()).is_some_and(|it| !test.search.is_of_the_model_of(it.ekf()))
         };
@@ -430,7 +436,7 @@ impl Localizer for Relocalizer {
         let verdict = solution.update(head, measured);
         let (has_begun_anew, noise_ratio) = (solution.begun_s() > begun_s, solution.noise_ratio());
         if has_begun_anew && self.is_lost() && !self.is_of_start() {
-            // The filter that was lost is no more.
+            // The filter that was lost has been replaced.
             self.end_search();
             self.consistency.reset();
         }
@@ -450,7 +456,8 @@ impl Localizer for Relocalizer {
         let mut estimate = solution.pose(time_s);
         if let (true, Some(test)) = (self.is_lost(), &self.test) {
             let searched = test.search.pose(time_s);
-            // Along all of a road, or far about, its best place may be anywhere.
+            // In a search along the whole road or in the whole area, the best position may be far
+            // away.
             let is_near =
                 self.setup.road.is_none() && self.phase == Phase::Relocalizing { wide: false };
             if is_near && test.refutes {

@@ -1,10 +1,11 @@
-//! The time-correlated biases of all radio heads' angles, estimated together with the state.
+//! Time-correlated biases of all radio heads' angles, estimated together with the state.
 //!
-//! State and biases stay one Gaussian, of the mean and covariance of the mixture over the jump hypotheses of an
-//! angle (generalised pseudo-Bayes of first order, Bar-Shalom, Li and Kirubarajan 2001,
-//! 11.6). With the state's covariance P, and the row H of an angle by state and value, the hypothesis of a
-//! value kept moves everything along `P Hᵀ`, that of a value drawn anew along the part of it that is the
-//! state's. So every covariance after an angle is a form of these two vectors.
+//! State and biases remain one Gaussian, with the mean and covariance of the mixture over the jump
+//! hypotheses of an angle (generalised pseudo-Bayes of first order, Bar-Shalom, Li and Kirubarajan
+//! 2001, 11.6). With the state covariance P and the row H of an angle for state and bias, the
+//! hypothesis of a retained bias changes everything along `P Hᵀ`; that of a new bias along the
+//! state's part of it. Every covariance after an angle is therefore a bilinear form of these two
+//! vectors.
 
 use super::jump_process::{JumpHypotheses, JumpProcess, MOST_VARIANCE};
 use crate::clone_in_place::clone_in_place;
@@ -12,31 +13,32 @@ use crate::gaussian::smoother::Journal;
 use crate::gaussian::{Innovation, Matrix, dot};
 use crate::localize::ekf::state::{Belief, STATES};
 
-/// Covariance of something with an angle: with the bias of its radio head, and without.
+/// Covariance of a quantity with an angle: with the bias of its radio head, and without.
 pub(super) type CrossCovariance = [f64; 2];
 
-/// The update of means and covariances by the mixture over the jump hypotheses of an angle.
+/// Update of means and covariances by the mixture over the jump hypotheses of an angle.
 pub(super) struct MixtureUpdate<'a> {
     hypotheses: &'a JumpHypotheses,
-    /// By how much each past moves what varies with the angle, and both on average.
+    /// Steps of the mean along both vectors, averaged over the hypotheses.
     steps: [f64; 2],
     means: [f64; 2],
-    /// What covariances grow by, by both vectors: the squares, and the product.
+    /// Change of covariances along both vectors: the squares, and the product.
     squares: [f64; 2],
     product: f64,
-    /// How the value varies with the angle, what it is where it is kept, and by how much it is another one
-    /// where it is not.
+    /// Covariance of the bias with the angle, its mean if it is retained, and the difference of the
+    /// means if it is new.
     cross_with_angle: f64,
     kept_rad: f64,
     apart_rad: f64,
 }
 
 impl<'a> MixtureUpdate<'a> {
-    /// By an angle that may have come about so, which the value, until then of this mean, varies with so.
+    /// Creates the update for the hypotheses of an angle, given the previous mean of the bias and
+    /// its covariance with the angle.
     pub fn new(hypotheses: &'a JumpHypotheses, value_rad: f64, cross_with_angle: f64) -> Self {
         let all = [&hypotheses.kept, &hypotheses.anew];
         let steps = all.map(|hypothesis| hypothesis.residual * hypothesis.gain);
-        // The mixture's covariance is that of its parts and of their means.
+        // The covariance of a mixture is the mean covariance plus the covariance of the means.
         let both = hypotheses.kept.share * hypotheses.anew.share;
         let square = |of: usize| both * steps[of] * steps[of] - all[of].share * all[of].narrowing;
         let kept_rad = value_rad + steps[0] * cross_with_angle;
@@ -52,19 +54,20 @@ impl<'a> MixtureUpdate<'a> {
         }
     }
 
-    /// By how much the mean moves of what varies so with the angle.
+    /// Returns the change in the mean of a quantity, given its covariance with the angle.
     pub fn step(&self, with: CrossCovariance) -> f64 {
         self.means[0] * with[0] + self.means[1] * with[1]
     }
 
-    /// By how much the covariance grows of what varies so and so with the angle.
+    /// Returns the change in the covariance of two quantities, given their covariances with the
+    /// angle.
     pub fn more(&self, one: CrossCovariance, other: CrossCovariance) -> f64 {
         self.squares[0] * one[0] * other[0]
             + self.squares[1] * one[1] * other[1]
             + self.product * (one[0] * other[1] + one[1] * other[0])
     }
 
-    /// The covariance of the value with anything else.
+    /// Returns the covariance of the bias with another quantity.
     pub fn value_covariance(&self, before: f64, with: CrossCovariance) -> f64 {
         let (kept, anew) = (&self.hypotheses.kept, &self.hypotheses.anew);
         kept.share * (before - kept.narrowing * self.cross_with_angle * with[0])
@@ -75,13 +78,13 @@ impl<'a> MixtureUpdate<'a> {
                 * (self.steps[0] * with[0] - self.steps[1] * with[1])
     }
 
-    /// The mean of the value.
+    /// Returns the mean of the bias.
     pub fn value_mean(&self) -> f64 {
         self.hypotheses.kept.share * self.kept_rad
             + self.hypotheses.anew.share * self.hypotheses.mean_rad
     }
 
-    /// The variance of the value, which was `before`.
+    /// Returns the variance of the bias, which was `before`.
     pub fn value_variance(&self, before: f64) -> f64 {
         let (kept, anew) = (&self.hypotheses.kept, &self.hypotheses.anew);
         kept.share * (before - kept.narrowing * self.cross_with_angle * self.cross_with_angle)
@@ -90,14 +93,14 @@ impl<'a> MixtureUpdate<'a> {
     }
 }
 
-/// The bias of one radio head.
+/// Bias of one radio head.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct HeadBias {
     size: JumpProcess,
-    /// The value (rad), and its covariance with the state.
+    /// Mean of the bias (rad), and its covariance with the state.
     mean_rad: f64,
     state_covariance: [f64; STATES],
-    /// And with the newest measurement.
+    /// Covariance with the newest measurement.
     cross_with_angle: CrossCovariance,
 }
 
@@ -108,17 +111,17 @@ impl HeadBias {
 }
 
 clone_in_place! {
-    /// The biases of all radio heads; none where they are not estimated.
+    /// Biases of all radio heads; empty if they are not estimated.
     #[derive(Debug, PartialEq)]
     pub struct CorrelatedBias {
         heads: Vec<HeadBias>,
-        /// Covariance of the values with each other, row by row (rad²).
+        /// Covariance matrix of the biases, row by row (rad²).
         among: Vec<f64>,
     }
 }
 
 impl CorrelatedBias {
-    /// Those of so many radio heads, of which nothing is known but their probability; none where that is 0.
+    /// Creates the biases of a number of radio heads with a prior probability; empty if it is 0.
     pub fn new(radio_heads: usize, probability: f64) -> Self {
         let count = if probability > 0.0 { radio_heads } else { 0 };
         let unknown = HeadBias {
@@ -133,26 +136,27 @@ impl CorrelatedBias {
         }
     }
 
-    /// Whether none is estimated.
+    /// Whether no bias is estimated.
     pub const fn is_empty(&self) -> bool {
         self.heads.is_empty()
     }
 
-    /// Drops the covariances with the state, which has been replaced.
+    /// Removes the covariances with the state, which was replaced.
     pub fn decorrelate(&mut self) {
         for head in &mut self.heads {
             head.state_covariance = [0.0; STATES];
         }
     }
 
-    /// Whether a radio head's error is probably so large that it says next to nothing.
+    /// Whether the bias of a radio head is probably so large that its angles contain almost no
+    /// information.
     pub fn is_large(&self, head: usize) -> bool {
         self.heads.get(head).is_some_and(|error| {
             error.size.is_large() || error.mean_rad * error.mean_rad > MOST_VARIANCE
         })
     }
 
-    /// What errors are expected to add to the variance of an angle; see [`JumpProcess::variance`].
+    /// Returns the expected variance that biases add to an angle; see [`JumpProcess::variance`].
     pub fn variance(&self, head: usize, travelled_m: f64, predicted_levels: f64) -> f64 {
         let error = self.heads.get(head);
         error.map_or(0.0, |error| {
@@ -165,7 +169,7 @@ impl CorrelatedBias {
         self.among.get(place).copied().unwrap_or_default()
     }
 
-    /// The state moves with this Jacobian.
+    /// Predicts with the Jacobian of the state.
     pub fn moved(&mut self, jacobian: &Matrix<STATES>) {
         for head in &mut self.heads {
             let before = head.state_covariance;
@@ -175,8 +179,8 @@ impl CorrelatedBias {
         }
     }
 
-    /// How an angle to a radio head may have come about; see [`JumpProcess::weigh`]. `None` of a radio
-    /// head whose error is not found.
+    /// Returns the jump hypotheses of an angle to a radio head; see [`JumpProcess::weigh`]. `None`
+    /// if its bias is not estimated.
     pub fn weigh(
         &self,
         head: usize,
@@ -189,7 +193,7 @@ impl CorrelatedBias {
         Some((error.size).weigh(travelled_m, seen, error.mean_rad, known))
     }
 
-    /// Corrects state and errors by an angle to a radio head that may have come about so.
+    /// Updates state and biases with an angle to a radio head and its jump hypotheses.
     pub fn take(
         &mut self,
         belief: &mut Belief,
@@ -261,12 +265,12 @@ impl CorrelatedBias {
         }
     }
 
-    /// Logs for the smoother a Gaussian upper bound of the mixture update: a measurement of state and
-    /// value with as much of its information as the value is likely to have been kept, one of the state
-    /// alone with the rest of it, and a value that is so much what it was, and so much what the angle
-    /// leaves for it beside the state. The mixture's covariance is never below that of these, as
-    /// `T M⁻¹ Tᵀ` is convex in `T` and `M` together (Boyd and Vandenberghe, Convex Optimization, 3.1.7),
-    /// so that what is between them is noise.
+    /// Records a Gaussian upper bound of the mixture update for the smoother: a measurement of
+    /// state and bias with the information of a retained bias, a measurement of the state with the
+    /// remaining information, and a transition of the bias to its posterior. The covariance of the
+    /// mixture is at least that of these measurements, because `T M⁻¹ Tᵀ` is jointly convex in `T`
+    /// and `M` (Boyd and Vandenberghe, Convex Optimization, 3.1.7). The difference is process
+    /// noise.
     fn tell(
         &self,
         journal: &mut Journal<STATES>,
@@ -289,8 +293,8 @@ impl CorrelatedBias {
                 .chain(self.heads.iter().map(|it| it.cross_with_angle))
         };
         let (kept, anew) = (&hypotheses.kept, &hypotheses.anew);
-        // Of the first measurement: by how much it corrects the second, and by how much that is the less
-        // uncertain.
+        // Effect of the first measurement on the second: correction of its residual and reduction
+        // of its variance.
         let (mut less, mut corrected) = (0.0, 0.0);
         if kept.share > 0.0 && kept.narrowing > 0.0 {
             let once = with_measured + error.cross_with_angle[0];
@@ -315,7 +319,8 @@ impl CorrelatedBias {
         journal.redrawn(head, kept.share, &by_state);
     }
 
-    /// Covariance of each value with a measurement of the state, and of the value of a radio head.
+    /// Computes the covariance of each bias with a measurement of the state and of one radio head's
+    /// bias.
     fn set_cross_covariances(&mut self, row: &[f64; STATES], of: Option<usize>) {
         for head in 0..self.heads.len() {
             let value_covariance = of.map_or(0.0, |of| self.covariance(head, of));
@@ -326,8 +331,8 @@ impl CorrelatedBias {
         }
     }
 
-    /// Corrects the errors by a scalar measurement of the state, which `belief` is about to be corrected by:
-    /// the rest of a Kalman update.
+    /// Updates the biases with a scalar measurement of the state, before the state itself is
+    /// updated: the bias part of a Kalman update.
     pub fn update(&mut self, belief: &Belief, residual: f64, row: &[f64; STATES], variance: f64) {
         if self.is_empty() {
             return;
@@ -356,14 +361,15 @@ impl CorrelatedBias {
         }
     }
 
-    /// Gains of the values in the newest [`update`](Self::update), whose innovation had this variance.
+    /// Returns the gains of the biases in the newest [`update`](Self::update), whose innovation
+    /// variance is `total`.
     pub fn gains(&self, total: f64) -> impl Iterator<Item = f64> {
         self.heads
             .iter()
             .map(move |head| head.cross_with_angle[1] / total)
     }
 
-    /// Covariances of each value with the state.
+    /// Returns the covariance of each bias with the state.
     pub fn state_covariance(&self) -> impl Iterator<Item = [f64; STATES]> {
         self.heads.iter().map(|head| head.state_covariance)
     }
@@ -381,10 +387,11 @@ mod tests {
 
     const OWN_VARIANCE: f64 = 1e-4;
 
-    /// With this probability of any, every level is as probable as another.
+    /// With this prior probability, all levels are equally probable.
     const EVEN: f64 = 0.75;
 
-    /// A state of which angles tell the first component, known to one radian.
+    /// A state with a standard deviation of one radian, whose first component is measured by
+    /// angles.
     fn unknown() -> Belief {
         let mut sigma = [0.0; STATES];
         (sigma[0], sigma[1]) = (1.0, 0.5);
@@ -397,7 +404,7 @@ mod tests {
         row
     }
 
-    /// Takes in an angle of a radio head, as the filter does.
+    /// Processes an angle of a radio head like the filter.
     fn take(errors: &mut CorrelatedBias, belief: &mut Belief, head: usize, way_m: f64, rad: f64) {
         let seen = belief.innovation(rad - belief.mean[0], &row(), OWN_VARIANCE);
         let hypotheses = errors.weigh(head, way_m, &seen, &row()).unwrap();
@@ -406,7 +413,7 @@ mod tests {
 
     const ALL: usize = STATES + 2;
 
-    /// State and errors as one.
+    /// State and biases as one Gaussian.
     fn whole(belief: &Belief, errors: &CorrelatedBias) -> Gaussian<ALL> {
         let mut whole = Gaussian::<ALL>::independent([0.0; ALL], [0.0; ALL]);
         for i in 0..STATES {
@@ -436,7 +443,7 @@ mod tests {
         }
     }
 
-    /// The mixture of all that an angle may have come about by, each updated by itself.
+    /// Mixture over all hypotheses of an angle, each updated separately.
     fn mixture(
         before: &Gaussian<ALL>,
         levels: [f64; LEVELS],
@@ -505,7 +512,7 @@ mod tests {
             let expected = mixture(&whole(&belief, &errors), levels, head, way_m, rad);
             take(&mut errors, &mut belief, head, way_m, rad);
             assert_same(&whole(&belief, &errors), &expected);
-            // What moves the state, and what is measured of it alone.
+            // A motion of the state, and a measurement of the state alone.
             let mut expected = whole(&belief, &errors);
             expected.spread(&whole_motion, &[[0.0; ALL]; ALL]);
             belief.spread(&motion, &[[0.0; STATES]; STATES]);
@@ -524,7 +531,7 @@ mod tests {
         }
     }
 
-    /// Angles of a radio head whose error is drawn as is assumed of it.
+    /// Angles of a radio head whose bias is drawn from the model.
     struct Drawn {
         level: f64,
         value_rad: f64,
@@ -550,7 +557,8 @@ mod tests {
     #[test]
     fn the_state_is_as_uncertain_as_it_says_where_errors_are_as_assumed() {
         const RUNS: u32 = 400;
-        // Two radio heads, an angle of each every 0.3 m: what is soon forgotten is forgotten in between.
+        // Two radio heads, with an angle of each every 0.3 m: the short-lived error is independent
+        // between angles.
         let mut random = ChaCha8Rng::seed_from_u64(5);
         for (way_m, bound_m) in [(2.0, 0.3), (20.0, 0.1)] {
             let (mut nees, mut square, mut within) = (0.0, 0.0, 0);
@@ -581,7 +589,7 @@ mod tests {
                 square += off * off;
             }
             let runs = f64::from(RUNS);
-            // A mixture is no Gaussian: its tails are heavier than they are told.
+            // A mixture is not Gaussian: its tails are heavier than those of its covariance.
             let within = f64::from(within) / runs;
             assert!(within > 0.87, "{way_m} m: {within}");
             assert!(nees / runs < 2.0, "{way_m} m: {}", nees / runs);
@@ -605,7 +613,7 @@ mod tests {
             take(&mut errors, &mut belief, 0, 0.1, error_rad);
         }
         assert!(errors.is_large(0));
-        // What is made of such angles hardly moves the belief.
+        // These angles hardly change the state.
         assert!(belief.mean[0].abs() < 3e-3, "{}", belief.mean[0]);
     }
 

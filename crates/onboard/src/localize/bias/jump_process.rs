@@ -1,97 +1,101 @@
-//! The time-correlated bias of a radio head's angles, and how large it is: a jump process.
+//! Time-correlated bias of a radio head's angles, and its level: a jump process.
 //!
-//! What reflections add to an angle stays much the same for about a metre and is another one then; how
-//! large it is differs from radio head to radio head and along the way. So it is a jump process: a value
-//! that is kept, or drawn anew from one of a few levels, and the level is another one after some way (a
-//! hidden Markov model). Besides, each angle has an error of the same size that is soon forgotten. By way and not by
-//! time: a vehicle that stands sees the same error again. The value is estimated with the state, see
-//! [`CorrelatedBias`](super::correlated_bias::CorrelatedBias); here it is weighed which of the jump hypotheses an angle
-//! speaks for, by Bayes.
+//! The bias due to reflections is almost constant over about a metre, and then changes. Its size
+//! depends on the radio head and on the position. The model is a jump process (hidden Markov
+//! model): the bias is retained, or drawn again from one of a few levels, and the level itself
+//! changes after some distance. Each angle also has a short-lived error of the same level. The
+//! process depends on distance, not on time, because the error is constant at standstill. The bias
+//! is estimated together with the state, see
+//! [`CorrelatedBias`](super::correlated_bias::CorrelatedBias); this module weights the jump
+//! hypotheses of an angle by Bayes' rule.
 
 use crate::gaussian::Innovation;
 
-/// How many levels there are, and their variances (rad²): from what calibration leaves to no more than a side.
+/// Number of levels, and their variances (rad²): from a calibration residual to an almost unknown
+/// direction.
 pub(super) const LEVELS: usize = 4;
 pub(super) const VARIANCES: [f64; LEVELS] = [0.02 * 0.02, 0.1 * 0.1, 0.3 * 0.3, 1.0];
 
-/// From this level on a radio head says next to nothing, and an angle beyond it is an outlier.
+/// From this level on, a radio head contributes almost no information, and a larger deviation is an
+/// outlier.
 const LARGE: usize = 2;
 pub const MOST_VARIANCE: f64 = VARIANCES[LARGE];
 
-/// Way over which the value, and the level, is kept (m).
+/// Correlation distance of bias and level (m).
 pub(super) const VALUE_M: f64 = 1.0;
 pub(super) const LEVEL_M: f64 = 20.0;
 
-/// Way that the other part of it stays (m).
+/// Correlation distance of the short-lived error (m).
 pub(super) const SOON_M: f64 = 0.3;
 
-/// The least way between two angles, as a share of that in which they repeat each other: a vehicle that stands learns
-/// nothing, but a variance must stay a number.
+/// Minimum distance between two angles, as a fraction of the correlation distance. At standstill
+/// there is no new information, but the variance must remain finite.
 const LEAST_SHARE: f64 = 1e-5;
 
-/// Share of an angle that is independent of the last one, `travelled_m` after it: independent is one in twice
-/// the way that a value is kept.
+/// Returns the independent fraction of an angle `travelled_m` after the previous one: one
+/// independent angle in twice the correlation distance.
 pub fn independent(travelled_m: f64) -> f64 {
     (0.5 * travelled_m / VALUE_M).clamp(0.0, 1.0)
 }
 
-/// Probability that the value is the same one so much further on.
+/// Returns the probability that the bias is unchanged after a distance.
 pub(super) fn kept(travelled_m: f64) -> f64 {
     (-travelled_m / VALUE_M).exp()
 }
 
-/// Whether the value is rather the same one so much further on than another.
+/// Whether the bias is more probably unchanged than new after a distance.
 pub fn repeats(travelled_m: f64) -> bool {
     kept(travelled_m) > 0.5
 }
 
-/// The share that is independent of what is soon forgotten.
+/// Returns the independent fraction of the short-lived error.
 pub(super) fn share(travelled_m: f64) -> f64 {
     (travelled_m / SOON_M).clamp(LEAST_SHARE, 1.0)
 }
 
-/// How large a radio head's bias is: the probability of each level, now and before anything is heard.
+/// Level of a radio head's bias: the probability of each level, now and a priori.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JumpProcess {
     pub(super) levels: [f64; LEVELS],
     first: [f64; LEVELS],
 }
 
-/// A hypothesis of how an angle came about: with the value kept, or drawn anew (a jump).
+/// Hypothesis for an angle: the bias is retained, or drawn again (a jump).
 #[derive(Clone, Copy, Debug)]
 pub struct JumpHypothesis {
-    /// Its probability.
+    /// Probability of the hypothesis.
     pub share: f64,
-    /// Residual `r` (rad), and over the levels `E 1/S` and `E 1/S − r² Var 1/S` of the variance of that
-    /// (1/rad²): the gain is `P Hᵀ E 1/S`, and `P − P Hᵀ (E 1/S − r² Var 1/S) H P` is the covariance.
+    /// Residual `r` (rad), and `E 1/S` and `E 1/S − r² Var 1/S` over the levels for its variance S
+    /// (1/rad²). The gain is `P Hᵀ E 1/S`, and the covariance is
+    /// `P − P Hᵀ (E 1/S − r² Var 1/S) H P`.
     pub residual: f64,
     pub gain: f64,
     pub narrowing: f64,
 }
 
-/// Both hypotheses of how an angle's bias came about.
+/// Both hypotheses for the bias of an angle.
 pub struct JumpHypotheses {
     /// Probability density of the angle (1/rad).
     pub density: f64,
     pub kept: JumpHypothesis,
     pub anew: JumpHypothesis,
-    /// Probability of each level by this angle, and by the way alone.
+    /// Probability of each level given this angle, and given the distance alone.
     levels: [f64; LEVELS],
     predicted_levels: [f64; LEVELS],
-    /// A value drawn anew: its mean (rad), its variance (rad²), and how it varies with the state by the
+    /// New bias: mean (rad), variance (rad²), and its covariance with the state relative to the
     /// state's covariance with the angle.
     pub mean_rad: f64,
     pub variance: f64,
     pub narrowing: f64,
 }
 
-/// Mean and variance over the levels.
+/// Returns mean and variance over the levels.
 fn moments(weights: &[f64; LEVELS], values: &[f64; LEVELS]) -> (f64, f64) {
     let mean = covariance(weights, values, &[1.0; LEVELS]).1;
     (mean, covariance(weights, values, values).0)
 }
 
-/// Covariance of two values over the levels, and the mean of their product.
+/// Returns the covariance of two quantities over the levels, and the mean of their product.
 fn covariance(weights: &[f64; LEVELS], one: &[f64; LEVELS], other: &[f64; LEVELS]) -> (f64, f64) {
     let (mut total, mut means, mut product) = (0.0, [0.0; 2], 0.0);
     for ((weight, one), other) in weights.iter().zip(one).zip(other) {
@@ -102,14 +106,14 @@ fn covariance(weights: &[f64; LEVELS], one: &[f64; LEVELS], other: &[f64; LEVELS
     if total <= 0.0 {
         return (0.0, 0.0);
     }
-    // However little they weigh together, as a value does that was kept for long.
+    // Normalised, because the weights of a bias retained over a long distance are small.
     product /= total;
     (product - means[0] / total * (means[1] / total), product)
 }
 
 impl JumpProcess {
-    /// One of which nothing is known but how probable it is; where there is one, any size is as likely as
-    /// another.
+    /// Creates a process with a prior probability of a bias; given a bias, all levels are equally
+    /// probable.
     pub fn new(probability: f64) -> Self {
         let mut first = [probability / (LEVELS - 1) as f64; LEVELS];
         first[0] = 1.0 - probability;
@@ -119,7 +123,7 @@ impl JumpProcess {
         }
     }
 
-    /// The probabilities of the levels, so much further on.
+    /// Returns the probabilities of the levels after a distance.
     fn predicted_levels(&self, travelled_m: f64) -> [f64; LEVELS] {
         let changes = -(-travelled_m / LEVEL_M).exp_m1();
         let levels = self.levels.into_iter().zip(self.first);
@@ -130,14 +134,14 @@ impl JumpProcess {
         predicted_levels
     }
 
-    /// Whether it is probably so large that the radio head says next to nothing.
+    /// Whether the bias is probably so large that the angles contain almost no information.
     pub fn is_large(&self) -> bool {
         self.levels.iter().skip(LARGE).sum::<f64>() > 0.5
     }
 
-    /// How an angle may have come about, `travelled_m` after the one before, whose innovation would be
-    /// `seen` without the error. The value's mean was `value_rad`, and `known` is what its variance and its
-    /// covariance with the rest add to the innovation's.
+    /// Returns the jump hypotheses of an angle, `travelled_m` after the previous one, with the
+    /// innovation `seen` without bias. `value_rad` is the mean of the bias, and `known` is the
+    /// contribution of its variance and covariance to the variance of the innovation.
     pub fn weigh(
         &self,
         travelled_m: f64,
@@ -150,7 +154,7 @@ impl JumpProcess {
         let repetition = share(travelled_m).recip();
         let (kept_residual, anew_residual) = (seen.residual - value_rad, seen.residual);
         let mut weights = [[0.0; LEVELS]; 2];
-        // One over the variance of an angle, and what of that is of a value drawn anew.
+        // Inverse of the variance of an angle, and the part of a new bias in it.
         let (mut inverse, mut of_value) = ([[0.0; LEVELS]; 2], [0.0; LEVELS]);
         let mut left = [0.0; LEVELS];
         for (level, value) in VARIANCES.into_iter().enumerate() {
@@ -203,7 +207,8 @@ impl JumpProcess {
         }
     }
 
-    /// Learns from an angle that may have come about so, `travelled_m` after the one before.
+    /// Updates the probabilities of the levels with an angle and its hypotheses, `travelled_m`
+    /// after the previous one.
     pub fn learn(&mut self, travelled_m: f64, hypotheses: &JumpHypotheses) {
         let by_way_and_angle = hypotheses
             .predicted_levels
@@ -214,8 +219,9 @@ impl JumpProcess {
         }
     }
 
-    /// Variance of an angle so far after the radio head's last one (rad²), which it does not repeat, that
-    /// tells as much of the state as is to be expected, where the state predicts it with a variance.
+    /// Returns the variance (rad²) of an independent angle with the expected information about the
+    /// state, after a distance since the previous angle of the radio head, for a given variance of
+    /// the prediction.
     pub fn variance(&self, travelled_m: f64, predicted_levels: f64) -> f64 {
         let levels = self
             .predicted_levels(travelled_m)

@@ -1,5 +1,5 @@
-//! The time-correlated (multipath) bias of each radio head's angles, estimated together with the state: a jump process
-//! whose value and size are hypotheses, mixed into one Gaussian after each angle.
+//! Time-correlated (multipath) bias of each radio head's angles, estimated together with the state:
+//! a jump process, whose hypotheses of value and level are merged to one Gaussian after each angle.
 
 mod correlated_bias;
 mod jump_process;

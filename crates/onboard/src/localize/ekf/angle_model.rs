@@ -1,5 +1,5 @@
-//! The measurement model: the electrical angle at which a radio head appears, and its Jacobian and second-order
-//! correction by the state.
+//! Measurement model: the electrical angle of a radio head, with its Jacobian and second-order
+//! correction.
 
 use super::state::{ACROSS, ALONG, CURVATURE, DATUM, HEADING, MOUNTING, PHASE, STATES};
 use crate::gaussian::{Matrix, dot};
@@ -9,58 +9,59 @@ use crate::observation::MeasurementKind;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
 
-/// Distance below which a radio head has no direction (m).
+/// Distance below which the direction of a radio head is undefined (m).
 const NEAREST_M: f64 = 0.05;
 
-/// What the array turns an angle into.
+/// Measurement model of the array.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArrayModel {
-    /// What is measured with it.
+    /// Angle that the array measures.
     pub measurand: Measurand,
     /// Wavelength λ in metres.
     pub wavelength_m: f64,
-    /// Place of its middle from the odometer's point `[forward, left, up]`, in metres.
+    /// Position of the array's centre relative to the odometer's reference point
+    /// `[forward, left, up]`, in metres.
     pub position_m: [f64; 3],
-    /// Standard deviation of that in each of forward and left, in metres.
+    /// Standard deviation of the forward and left position, each in metres.
     pub position_std_m: f64,
 }
 
 impl ArrayModel {
-    /// How much of an angle's scatter stays when angles are averaged that lie `travelled_m` apart, as
-    /// a multiple of what independent ones would leave.
+    /// Returns the factor of the scatter variance that remains when angles at a distance of
+    /// `travelled_m` are averaged, relative to independent angles.
     ///
-    /// Scatter that arrives from all directions of space has a flat spectrum over the distance
-    /// travelled, one wave per wavelength to either side; the line of sight is a line in it, at
-    /// the cosine `toward` of the angle between it and the direction of travel. Sampling folds the
-    /// spectrum at multiples of 1/Δ, and what falls on the line is what an average cannot remove:
-    /// `λ/(2Δ)` times the number of whole m with `|m λ/Δ − toward| < 1`. Up to half a wavelength
-    /// this is one angle per half wavelength; far apart it tends to 1.
+    /// Scatter from all directions has a flat spectrum over the distance travelled, of one cycle
+    /// per wavelength to either side. The line of sight is a line in it, at the cosine `toward` of
+    /// the angle between the line of sight and the direction of travel. Sampling folds the spectrum
+    /// at multiples of 1/Δ. The average cannot remove the part that is folded onto the line:
+    /// `λ/(2Δ)` times the number of integers m with `|m λ/Δ − toward| < 1`. Up to half a wavelength
+    /// this is one independent angle per half wavelength; for large distances it tends to 1.
     pub fn correlation(&self, travelled_m: f64, toward: f64) -> f64 {
         if !travelled_m.is_finite() {
             return 1.0;
         }
-        // Standing still nothing new is learnt, but the variance must stay a number.
+        // At standstill there is no new information, but the variance must remain finite.
         let spacing = (travelled_m.abs() / self.wavelength_m).max(5e-10);
         let (first, last) = (spacing * (toward - 1.0), spacing * (toward + 1.0));
-        // The line itself, m = 0, is in the band, if only at its edge.
+        // The line itself, m = 0, is within the band.
         let copies = (last.ceil() - first.floor() - 1.0).max(1.0);
         copies / (2.0 * spacing)
     }
 }
 
-/// The road under the vehicle, as the Jacobian needs it.
+/// Road at the vehicle's position, for the Jacobian.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoadFrame {
-    /// Direction in which the first state grows (rad); the second grows to its left.
+    /// Direction of the first state (rad); the second state is to its left.
     pub direction_rad: f64,
-    /// Metres travelled in the plane per metre of the first state, `1 − κ d`.
+    /// Distance travelled in the plane per metre of the first state, `1 − κ d`.
     pub stretch: f64,
-    /// Turn of the vehicle per metre of the first state with the others kept, κ.
+    /// Heading change per metre of the first state with the other states constant, κ.
     pub curvature_per_m: f64,
 }
 
 impl RoadFrame {
-    /// No road: the first two states are x and y.
+    /// Without a road: the first two states are x and y.
     pub const PLANE: Self = Self {
         direction_rad: 0.0,
         stretch: 1.0,
@@ -68,7 +69,7 @@ impl RoadFrame {
     };
 }
 
-/// The pose `ahead_m` further on than the state says, and the road under it.
+/// Returns the pose `ahead_m` after that of the state, and the road at that position.
 pub fn locate(mean: &[f64; STATES], ahead_m: f64, map: Option<&Road>) -> (Pose, RoadFrame) {
     let Some(map) = map else {
         let pose = Pose {
@@ -95,41 +96,42 @@ pub fn locate(mean: &[f64; STATES], ahead_m: f64, map: Option<&Road>) -> (Pose, 
     (pose, frame)
 }
 
-/// Predicted electrical angle `ω = 2π (d/λ) cos ε cos α + ω₀`, or azimuth α, `α = β − φ − μ`, and how
-/// it changes with the state, for bearing β and elevation ε of the radio head as the array sees it,
+/// Predicted electrical angle `ω = 2π (d/λ) cos ε cos α + ω₀`, or azimuth α, with its derivatives.
+/// `α = β − φ − μ` for the bearing β and elevation ε of the radio head relative to the array,
 /// heading φ, mounting angle μ and phase offset ω₀.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AngleModel {
-    /// Electrical angle, not wrapped, or azimuth (rad).
+    /// Electrical angle without wrapping, or azimuth (rad).
     pub phase_rad: f64,
-    /// Its derivative by each state.
+    /// Derivative by each state.
     pub row: [f64; STATES],
     /// Distance of the radio head from the array (m).
     pub range_m: f64,
     /// Cosine of the angle between the line of sight and the direction of travel.
     pub toward: f64,
-    /// Variance (rad²) of the electrical angle by the surveys of radio head and array; it stays
-    /// for as long as the radio head is seen from the same side.
+    /// Variance (rad²) of the angle due to the surveyed positions of radio head and array. It is
+    /// constant while the radio head is received from the same side.
     pub survey_variance: f64,
     /// `A` of the Cramér–Rao bound `1/(2ρA)`; see [`Measurand::aperture`].
     pub aperture: f64,
     /// Derivative of α by each state.
     turn: [f64; STATES],
-    /// Steps of the place by each state towards the radio head and to the left of it.
+    /// Derivative of the position by each state, towards the radio head and to the left of that
+    /// direction.
     steps: [[f64; STATES]; 2],
     /// Horizontal distance of the radio head (m).
     ground_m: f64,
-    /// First and second derivative by α, both negated: `2π (d/λ) cos ε` times sine and cosine of α
-    /// in a row.
+    /// First and second derivative by α, both negated; for a uniform linear array `2π (d/λ) cos ε`
+    /// times sine and cosine of α.
     slopes: [f64; 2],
 }
 
-/// The second-order correction of a predicted angle over the width of a belief.
+/// Second-order correction of a predicted angle for the state covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SecondOrder {
-    /// Shift of the expected electrical angle (rad).
+    /// Bias of the expected angle (rad).
     pub shift_rad: f64,
-    /// Variance (rad²) that it adds.
+    /// Additional variance (rad²).
     pub variance: f64,
 }
 
@@ -168,7 +170,7 @@ impl LineOfSight {
         }
         let bearing_rad = eye.bearing_rad(place);
         let (left, ahead) = (bearing_rad - frame.direction_rad).sin_cos();
-        // Turning on the spot moves the array.
+        // A turn on the spot moves the array.
         let (aside, along) = (bearing_rad - pose.heading_rad).sin_cos();
         let mut steps = [[0.0; STATES]; 2];
         steps[0][ALONG] = ahead * frame.stretch;
@@ -178,10 +180,10 @@ impl LineOfSight {
         steps[1][ACROSS] = ahead;
         steps[1][HEADING] = along * forward_m + aside * left_m;
         for step in &mut steps {
-            // Along a bend the vehicle turns as it goes.
+            // In a bend the heading changes with the distance.
             step[ALONG] += frame.curvature_per_m * step[HEADING];
         }
-        // A step to the left of the line of sight turns the bearing to the right.
+        // A step to the left of the line of sight decreases the bearing.
         let mut bearing_row = steps[1].map(|step| -step / ground_m);
         // A step of the radio head east or north.
         let (north, east) = bearing_rad.sin_cos();
@@ -220,9 +222,9 @@ impl AngleModel {
         }
     }
 
-    /// A radio head seen from `pose` by an array whose mounting and phase are those of the state
-    /// `mean`; `None` when it is as good as above or in the array, where its direction is any. What
-    /// nearness leaves of an angle is for [`bend`](Self::bend) to say.
+    /// Creates the model for a radio head and a `pose`, with the mounting angle and phase of the
+    /// state `mean`; `None` if the radio head is practically above or in the array, where its
+    /// direction is undefined. [`bend`](Self::bend) returns the correction for small distances.
     pub fn new(
         head: &RadioHead,
         pose: Pose,
@@ -234,7 +236,7 @@ impl AngleModel {
         let level = sight.level();
         let azimuth = sight.bearing_rad - pose.heading_rad - mean[MOUNTING];
         let value = array.measurand.value_rad(azimuth, level);
-        // By the azimuth twice, by cos ε and by the phase.
+        // Derivatives by the azimuth (first and second), by cos ε and by the phase.
         let (slopes, by_level, by_phase) = match array.measurand {
             Measurand::ElectricalAngle {
                 spacing_wavelengths,
@@ -251,13 +253,13 @@ impl AngleModel {
         turn[HEADING] -= 1.0;
         turn[MOUNTING] = -1.0;
         let mut row = turn.map(|turn| -slopes[0] * turn);
-        // A step towards the radio head raises it: d cos ε = −sin² ε dρ/R.
+        // A step towards the radio head increases its elevation: d cos ε = −sin² ε dρ/R.
         let climb = by_level * (1.0 - level * level) / sight.range_m;
         for (value, step) in row.iter_mut().zip(sight.steps[0]) {
             *value -= climb * step;
         }
         row[PHASE] = by_phase;
-        // The radio head's own step east, and north, is the vehicle's back.
+        // A displacement of the radio head is the opposite displacement of the vehicle.
         let (north, east) = sight.bearing_rad.sin_cos();
         row[DATUM[0]] += climb * east;
         row[DATUM[1]] += climb * north;
@@ -305,12 +307,13 @@ impl AngleModel {
         })
     }
 
-    /// What the second derivative `D` of ω means for a Gaussian belief of covariance P: ω is
-    /// `½ tr(D P)` from its value at the mean on average, and has `½ tr(D P D P)` more variance
-    /// (Jazwinski, Stochastic Processes and Filtering Theory, 9.3). With g the derivative of α, r
-    /// and t the steps along and across the line of sight and R its length,
-    /// `D = −2π (d/λ) (cos α · g gᵀ − sin α / R² · (r tᵀ + t rᵀ))` in a row, `−(r tᵀ + t rᵀ) / R²` of
-    /// an azimuth. That is the plane's; of the elevation only its cosine is taken.
+    /// Returns the effect of the second derivative `D` of ω for a state covariance P: the mean of ω
+    /// differs by `½ tr(D P)` from its value at the mean state, and its variance is larger by
+    /// `½ tr(D P D P)` (Jazwinski, Stochastic Processes and Filtering Theory, 9.3). With g the
+    /// derivative of α, r and t the steps along and across the line of sight and R its length,
+    /// `D = −2π (d/λ) (cos α · g gᵀ − sin α / R² · (r tᵀ + t rᵀ))` for a uniform linear array, and
+    /// `−(r tᵀ + t rᵀ) / R²` for an azimuth. These terms are those of the plane; of the elevation,
+    /// only its cosine is included.
     pub fn bend(&self, covariance: &Matrix<STATES>) -> SecondOrder {
         const BENT: [usize; 4] = [ALONG, ACROSS, HEADING, MOUNTING];
         let bent = |row: &[f64; STATES]| BENT.map(|state| row[state]);
@@ -374,7 +377,7 @@ mod tests {
         position_std_m: 0.0,
     };
 
-    /// State (s, d, ψ) on a circle of radius 1/κ through the origin, heading +x.
+    /// State (s, d, ψ) on a circle of radius 1/κ through the origin, with heading +x.
     fn on_circle(s: f64, d: f64, psi: f64, kappa: f64) -> (Pose, RoadFrame) {
         let lane = Pose::default().along_arc(s, kappa);
         let pose = lane.offset_left(d);
@@ -497,7 +500,7 @@ mod tests {
             )
             .unwrap()
         };
-        // A covariance without symmetry but its own.
+        // A covariance without any symmetry of its own.
         let factor = [
             [2.0, 0.0, 0.0, 0.0],
             [0.7, 1.5, 0.0, 0.0],
@@ -556,7 +559,7 @@ mod tests {
         let ahead = see(head(50.0, 0.0, 0.0)).phase_rad;
         assert!((ahead - std::f64::consts::PI).abs() < 1e-12);
         assert!(see(head(0.0, 9.0, 0.0)).phase_rad.abs() < 1e-12);
-        // Half as high as far: cos 45°.
+        // Elevation of 45°.
         let above = see(head(50.0, 0.0, 50.0)).phase_rad;
         assert!((above - std::f64::consts::PI / 2f64.sqrt()).abs() < 1e-12);
     }
@@ -565,14 +568,15 @@ mod tests {
     fn scatter_leaves_a_tenth_over_k_and_a_little() {
         let (row, aperture) = (ARRAY.measurand, ARRAY.measurand.mean_aperture());
         assert!((row.scatter_variance(1000.0, aperture) * 10.0 * 1000.0 - 1.0).abs() < 4e-4);
-        // The mean of two million estimates at K = 10 by an independent simulation: 1.0346(11).
+        // Mean of two million estimates at K = 10 in an independent simulation: 1.0346(11).
         let at_10 = row.scatter_variance(10.0, aperture) / scatter_bound(10.0, aperture);
         assert!((at_10 - 1.0346).abs() < 3.0 * 0.0011, "{at_10}");
     }
 
     #[test]
     fn the_wrong_lobe_is_as_frequent_as_simulated() {
-        // Errors of more than a quarter turn among 40,000 estimates of an independent simulation.
+        // Fraction of errors above a quarter turn among 40,000 estimates of an independent
+        // simulation.
         for (k_db, share) in [(0.0, 0.1199), (3.0, 0.0270), (5.0, 0.0040)] {
             let k = 10f64.powf(0.1 * k_db);
             let ratio = ARRAY.measurand.wrong_lobe_probability(k) / share;
@@ -583,7 +587,8 @@ mod tests {
 
     #[test]
     fn correlation_is_the_sum_of_the_scatters_autocorrelation() {
-        // sin(x)/x over the distance, turned by the line of sight's own Doppler; Cesàro's sum.
+        // Autocorrelation sin(x)/x over the distance, times the Doppler phase of the line of sight;
+        // Cesàro sum.
         let summed = |wavelengths: f64, toward: f64| {
             let count = 4000;
             let terms = (1..count).map(|n| {

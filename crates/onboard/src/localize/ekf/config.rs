@@ -1,4 +1,4 @@
-//! What the filter assumes of vehicle, road and radio.
+//! Filter configuration: models of vehicle, road and radio.
 
 use super::angle_model::{AngleModel, ArrayModel};
 use super::motion::{MotionNoise, PathBend, Yaw};
@@ -6,128 +6,129 @@ use crate::gaussian::normal_quantile;
 use crate::road::LaneKeeping;
 use crate::settings::{DriveKind, LocalizerSettings, RoadSettings, Site, TrackerSettings, Vehicle};
 
-/// The best lane keeping that the filter takes for granted, whatever is said (m).
+/// Minimum lateral standard deviation of the lane keeping, whatever is configured (m).
 const LEAST_LANE_RMS_M: f64 = 0.02;
 
-/// It turns back to the middle of the lane with a yaw rate within so many deviations.
+/// Maximum yaw rate of the lane keeping, in standard deviations.
 const SIGMAS_OF_SWING: f64 = 5.0;
 
-/// Wavelength along the road of the errors of its survey, of points every few metres (m).
+/// Wavelength along the road of its survey errors, for points every few metres (m).
 const SURVEY_WAVELENGTH_M: f64 = 15.0;
 
-/// Assumptions of the filter, SI and radians: what site and vehicle state.
+/// Filter configuration in SI units and radians, from site and vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EkfConfig {
-    /// What the vehicle's kinematics allow.
+    /// Drive type.
     pub drive: DriveKind,
-    /// The array.
+    /// Antenna array.
     pub array: ArrayModel,
-    /// Rician K of the channel as a power ratio: what scatter adds to each angle's variance.
+    /// Rician K of the channel as a power ratio, which determines the scatter variance of each
+    /// angle.
     pub rician_k: f64,
-    /// Probability that an angle is any, as scatter made another lobe the highest; none where the gate
-    /// refuses so many anyway.
+    /// Probability that the angle is arbitrary because scatter makes another lobe the maximum;
+    /// `None` if the gate rejects more angles anyway.
     pub wrong_lobe: Option<f64>,
-    /// How many sound angles the gate refuses, as a share.
+    /// Fraction of correct angles that the gate rejects.
     pub outlier_probability: f64,
-    /// Measured variance of the angles over what is stated, where that is believed.
+    /// Ratio of the measured variance of the angles to the specified one, if it is used.
     pub heard_noise_ratio: Option<f64>,
-    /// How the vehicle keeps to its lane; used with a map.
+    /// Lane keeping model, with a map.
     pub lane_keeping: LaneKeeping,
-    /// How the path bends; used without a map.
+    /// Curvature model of the path, without a map.
     pub path_bend: PathBend,
-    /// Noise of the motion.
+    /// Process noise of the motion.
     pub noise: MotionNoise,
-    /// Metres that the odometer reads per metre driven, by its data sheet.
+    /// Odometer scale according to the data sheet: distance measured per distance driven.
     pub odometer_scale: f64,
-    /// Standard deviation of that at the start.
+    /// Initial standard deviation of the odometer scale.
     pub odometer_scale_std: f64,
-    /// Surveyed direction of the array's axis from the vehicle's forward axis (rad).
+    /// Surveyed direction of the array axis relative to the vehicle's forward axis (rad).
     pub mounting_rad: f64,
     /// Angle random walk of the gyroscope (rad/√s).
     pub yaw_noise_rad_per_sqrt_s: f64,
-    /// Its bias by the data sheet (rad/s).
+    /// Yaw rate bias according to the data sheet (rad/s).
     pub yaw_rate_bias_radps: f64,
-    /// Standard deviation of that at the start (rad/s); 0 takes it as calibrated.
+    /// Initial standard deviation of the yaw rate bias (rad/s); 0 means calibrated.
     pub yaw_rate_bias_std_radps: f64,
-    /// Standard deviation of the yaw rate's scale at the start: where two wheels tell the turn,
-    /// that of their distance.
+    /// Initial standard deviation of the yaw rate scale: that of the track width if two wheels
+    /// measure the yaw rate.
     pub yaw_rate_scale_std: f64,
-    /// Standard deviation of the array's mounting angle at the start (rad); 0 takes it as known.
+    /// Initial standard deviation of the mounting angle (rad); 0 means known.
     pub mounting_std_rad: f64,
-    /// Phase offset that calibration is known to have left (rad per element).
+    /// Residual phase offset after calibration (rad per element).
     pub phase_rad: f64,
-    /// Standard deviation of that at the start (rad per element); 0 takes the array
-    /// as calibrated.
+    /// Initial standard deviation of the phase offset (rad per element); 0 means calibrated.
     pub phase_std_rad: f64,
-    /// What mounting angle (rad) and phase (rad per element) may be off by that are taken as exact only because
-    /// nothing is stated: standard deviations.
+    /// Standard deviations of mounting angle (rad) and phase (rad per element) that are treated as
+    /// exact only because none is specified.
     pub unstated_array_std_rad: [f64; 2],
-    /// Standard deviation of how far the site plan as a whole is off, in x and y (m); 0 takes it as exact.
+    /// Standard deviation of the displacement of the whole site plan in x and y (m); 0 means exact.
     pub datum_std_m: f64,
-    /// Largest squared Mahalanobis distance of an innovation that is used (χ², one degree).
+    /// Gate of the squared Mahalanobis distance of an innovation (χ², one degree of freedom).
     pub gate: f64,
-    /// Acceleration to reckon with where odometry is missing (m/s²).
+    /// Acceleration during gaps of the odometry (m/s²).
     pub acceleration_mps2: f64,
-    /// Acceleration that the vehicle cannot do: the odometer slipped (m/s²).
+    /// Acceleration above which the odometer has slipped (m/s²).
     pub slip_acceleration_mps2: f64,
     /// Whether the odometer may slip without a jump of the speed.
     pub may_slip: bool,
-    /// Standard deviation of a reading of the speed (m/s).
+    /// Standard deviation of a speed measurement (m/s).
     pub speed_noise_mps: f64,
-    /// Yaw rate that no sample can exceed (rad/s), nor the vehicle as it keeps its lane.
+    /// Maximum yaw rate of a sample, and of the lane keeping (rad/s).
     pub top_yaw_rate_radps: f64,
-    /// Random walk of the heading by what tells the yaw rate, per distance (rad/√m) and per angle
-    /// turned (rad/√rad).
+    /// Random walk of the heading due to the yaw rate sensor, per distance (rad/√m) and per heading
+    /// change (rad/√rad).
     pub yaw_noise_rad_per_sqrt_m: f64,
-    /// See there.
+    /// See `yaw_noise_rad_per_sqrt_m`.
     pub yaw_noise_rad_per_sqrt_rad: f64,
-    /// Standard deviation of the angles' lateness (s); 0 takes their times as exact.
+    /// Standard deviation of the angles' time offset (s); 0 means exact times.
     pub lateness_std_s: f64,
-    /// The bias of the angles that is stated.
+    /// Specified time-correlated noise of the angles.
     pub phase_bias: PhaseBias,
     /// Prior probability that the angles of a radio head have a time-correlated (multipath) bias; 0 if the filter
     /// estimates no bias.
     pub bias_probability: f64,
-    /// Time between odometry samples above which they are reported as a gap (s).
+    /// Minimum interval between odometry samples that is reported as a gap (s).
     pub gap_s: f64,
-    /// Speed that no odometry sample can exceed (m/s).
+    /// Maximum speed of an odometry sample (m/s).
     pub top_speed_mps: f64,
 }
 
-/// Turn over which an error of the angles is forgotten (rad).
+/// Heading change over which an error of the angles decorrelates (rad).
 const FORGETTING_TURN_RAD: f64 = 0.5;
 
-/// A stated bias of the electrical angle, each radio head's its own: a
+/// Specified time-correlated noise of the electrical angle, independent for each radio head: a
 /// first-order Gauss–Markov process over time and distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhaseBias {
-    /// Stationary deviation (rad).
+    /// Stationary standard deviation (rad).
     pub std_rad: f64,
-    /// Share of each angle's own variance that is of this kind, at most.
+    /// Maximum time-correlated fraction of each angle's own variance.
     pub share: f64,
-    /// Whether it is found while driving how much of that is. Where likelihoods are compared it is not: by what each finds,
-    /// one angle would count for more here than there.
+    /// Whether this fraction is estimated while driving. It is not where likelihoods are compared,
+    /// because different estimates would weight the same angle differently.
     pub is_found: bool,
-    /// Time over which it is forgotten (s).
+    /// Correlation time (s).
     pub correlation_s: f64,
-    /// Distance over which it is forgotten (m).
+    /// Correlation distance (m).
     pub correlation_m: f64,
 }
 
 impl PhaseBias {
-    /// How much it has been forgotten so long and so far after (s; m, rad), in time constants. Neither time nor way alone
-    /// forgets: a vehicle that stands sees the same error, and one that drives on is not another's sensor. Turning shows the
-    /// radio head to another part of it.
+    /// Returns the decorrelation after a time (s) and a motion (m, rad), in correlation lengths.
+    /// Neither time nor distance alone decorrelates the noise: at standstill the error is constant,
+    /// and over distance the sensor is the same. A turn exposes another part of the array to the
+    /// radio head.
     pub(super) fn steps(&self, elapsed_s: f64, (travelled_m, turned_rad): (f64, f64)) -> f64 {
         let by_way =
             travelled_m.abs() / self.correlation_m + turned_rad.abs() / FORGETTING_TURN_RAD;
         (elapsed_s.abs() / self.correlation_s).min(by_way)
     }
 
-    /// Variance (rad²) of an angle of the stated deviation, so long and so far after the radio head's
-    /// last one, as if angles were independent: with the correlation `ρ = e^{−Δ}` between neighbours
-    /// the mean of many angles has `(1 + ρ)/(1 − ρ) = coth Δ/2` times the variance that independent
-    /// ones would leave it.
+    /// Returns the equivalent independent variance (rad²) of an angle with the specified standard
+    /// deviation, after a time and motion since the previous angle of the radio head. With the
+    /// correlation `ρ = e^{−Δ}` between successive angles, the mean of many angles has
+    /// `(1 + ρ)/(1 − ρ) = coth Δ/2` times the variance of independent ones.
     pub fn variance(&self, sigma_rad: f64, elapsed_s: f64, moved: (f64, f64)) -> f64 {
         let own = sigma_rad * sigma_rad;
         let (stays, shared) = (self.std_rad * self.std_rad, self.share * own);
@@ -135,39 +136,40 @@ impl PhaseBias {
             return own;
         }
         let steps = self.steps(elapsed_s, moved);
-        // At the same instant nothing new is learnt, but the variance must stay a number.
+        // At equal times there is no new information, but the variance must remain finite.
         own - shared + (stays + shared) / (0.5 * steps.max(1e-4)).tanh()
     }
 }
 
-/// How a vehicle with differential drive turns where no yaw rate tells, per metre driven and per second: by half a
-/// radian (rad²).
+/// Variance of the heading change of a differential drive without a yaw rate, per metre and per
+/// second: half a radian (rad²).
 const UNKNOWN_TURN_RAD2: f64 = 0.25;
 
-/// Angle random walk (rad/√s) and bias (rad/s) of a yaw rate that nothing is stated of: a gyroscope's, and that of two
-/// wheels.
+/// Angle random walk (rad/√s) and bias (rad/s) of an unspecified yaw rate: of a gyroscope, and of
+/// two wheels.
 const USUAL_GYROSCOPE: [f64; 2] = [1e-3, 1e-3];
 const USUAL_WHEELS_TURN: [f64; 2] = [0.05, 0.01];
 
-/// An array of which nothing is stated: mounting angle (rad) and phase (rad per element).
+/// Standard deviations of an unspecified array: mounting angle (rad) and phase (rad per element).
 const UNSTATED_ARRAY_STD_RAD: [f64; 2] = [0.005, 0.02];
 
-/// What is assumed where nothing is stated, which a zero is, too.
+/// Default noise of a drive type, for unspecified values and zeros.
 struct Usual {
     odometer_scale_std: f64,
     odometer_m_per_sqrt_m: f64,
-    /// Not only over the way: wheels start late, creep, and what they read as they stand is not always zero.
+    /// Wheels start late, creep, and have a non-zero output at standstill, so that the noise also
+    /// depends on time.
     odometer_m_per_sqrt_s: f64,
-    /// Wheels grip as the floor lets them.
+    /// Wheel grip varies with the floor.
     scale_per_sqrt_m: f64,
     mounting_std_rad: f64,
-    /// At walking pace turns show it.
+    /// At walking pace, turns reveal a time offset.
     lateness_std_s: f64,
     /// Prior probability of a time-correlated (multipath) bias of a radio head's angles.
     bias_probability: f64,
 }
 
-/// On a road, and the best that is taken for granted of any odometer.
+/// Road vehicle, and the minimum noise of any odometer.
 const ROAD: Usual = Usual {
     odometer_scale_std: 0.001,
     odometer_m_per_sqrt_m: 0.003,
@@ -175,11 +177,12 @@ const ROAD: Usual = Usual {
     scale_per_sqrt_m: 0.0,
     mounting_std_rad: 0.0,
     lateness_std_s: 0.0,
-    // Each of the four sizes of a bias, the smallest of which is what calibration leaves, is equally probable.
+    // Each of the four levels of a bias, the smallest of which is a calibration residual, is
+    // equally probable.
     bias_probability: 0.75,
 };
 
-/// With differential drive.
+/// Differential drive.
 const DIFFERENTIAL: Usual = Usual {
     odometer_scale_std: 0.05,
     odometer_m_per_sqrt_m: 0.05,
@@ -187,12 +190,12 @@ const DIFFERENTIAL: Usual = Usual {
     scale_per_sqrt_m: 0.03,
     mounting_std_rad: 0.02,
     lateness_std_s: 0.1,
-    // A wheel slip or a wrong heading shifts the angles of a small robot like a bias does.
+    // Wheel slip or a wrong heading shifts the angles of a small robot like a bias does.
     bias_probability: 0.0,
 };
 
 impl EkfConfig {
-    /// What a filter on a vehicle assumes at a site.
+    /// Creates the configuration of a vehicle at a site.
     pub fn new(site: &Site, vehicle: &Vehicle) -> Self {
         let settings = match vehicle.localizer {
             LocalizerSettings::Tracker(settings) => settings,
@@ -229,14 +232,15 @@ impl EkfConfig {
             }
         };
         let odometer_scale_std = or_usual(odometer.scale_std, |it| it.odometer_scale_std);
-        // A data sheet that tells scale and noise tells all; one of them alone does not make the rest exact.
+        // A data sheet with scale and noise is complete; one of them alone does not make the rest
+        // exact.
         let is_told = odometer.scale_std > 0.0 && odometer.noise_m_per_sqrt_m > 0.0;
         let walk: fn(&Usual) -> f64 = if is_told {
             |_| 0.0
         } else {
             |it| it.scale_per_sqrt_m
         };
-        // A track that is wider than stated turns less.
+        // A wider track than specified measures a smaller heading change.
         let track_share = |width_m| odometer.track_width_std_m / width_m;
         let track_share = odometer.track_width_m.map_or(0.0, track_share);
         let mounting_is_unstated = array.mounting_std_rad.is_none() && !wheels;
@@ -247,7 +251,8 @@ impl EkfConfig {
         ]
         .map(|(is_unstated, std_rad)| if is_unstated { std_rad } else { 0.0 });
         let receiver = &vehicle.receiver;
-        // A vehicle without integrity monitoring trusts its sources, unless a probability is given.
+        // A vehicle without integrity monitoring trusts its sources, unless a probability is
+        // specified.
         let is_monitored = vehicle.integrity_monitor().is_some();
         let usual_bias_probability = if is_monitored {
             usual.bias_probability
@@ -303,7 +308,7 @@ impl EkfConfig {
             slip_acceleration_mps2: 10.0 * vehicle.acceleration_mps2,
             may_slip: false,
             speed_noise_mps: odometer.speed_noise_mps,
-            // A vehicle that is said to swing fast does so, whatever else it is said not to exceed.
+            // A fast lane keeping oscillation is possible, whatever maximum yaw rate is configured.
             top_yaw_rate_radps: (vehicle.top_yaw_rate_radps)
                 .max(SIGMAS_OF_SWING * keeping.pull_per_m() * vehicle.top_speed_mps()),
             yaw_noise_rad_per_sqrt_m: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_m),
@@ -324,13 +329,13 @@ impl EkfConfig {
         config
     }
 
-    /// How many times the variance that is stated the angles are taken to have.
+    /// Returns the assumed ratio of the angles' variance to the specified one.
     pub fn noise_ratio(&self) -> f64 {
         self.heard_noise_ratio.unwrap_or(1.0)
     }
 
-    /// Believes that the angles have so many times the variance that is stated, as of less Rician K; or what is
-    /// stated.
+    /// Sets the ratio of the angles' variance to the specified one, as with a lower Rician K;
+    /// `None` for the specified variance.
     pub fn set_noise_ratio(&mut self, ratio: Option<f64>) {
         self.heard_noise_ratio = ratio;
         let rician_k = self.rician_k / self.noise_ratio();
@@ -338,8 +343,9 @@ impl EkfConfig {
         self.wrong_lobe = Some(wrong_lobe).filter(|&it| it > self.outlier_probability);
     }
 
-    /// How many times the stated variance noise may have: until scatter is as strong as the direct wave (a Rician K of
-    /// 0 dB). What strays farther does not scatter about a line of sight, and is not averaged out.
+    /// Returns the maximum ratio of the variance: that of scatter as strong as the direct wave (a
+    /// Rician K of 0 dB). Larger deviations are not scatter around a line of sight, and averaging
+    /// does not remove them.
     pub const fn most_noise_ratio(&self) -> f64 {
         self.rician_k.max(1.0)
     }
@@ -357,42 +363,41 @@ impl EkfConfig {
         self.bias_probability > 0.0
     }
 
-    /// How many times the variance that it expects angles have that are heard to have so many times what is stated.
+    /// Returns the measured ratio of the variance relative to the ratio that the filter assumes.
     pub fn unexpected_noise(&self, heard: f64) -> f64 {
         let expects = self.heard_noise_ratio.is_some() || self.estimates_bias();
         if expects { 1.0 } else { heard }
     }
 
-    /// Variance (rad²) by scatter of an angle `travelled_m` after the radio head's last one, see
-    /// [`ArrayModel::correlation`]. An angle never counts for more than one: where successive errors
-    /// cancel, they do so at one spacing and for a moment.
-    /// [`AngleModel`] tells the aperture and the cosine `toward`.
+    /// Returns the scatter variance (rad²) of an angle `travelled_m` after the previous one of the
+    /// radio head, see [`ArrayModel::correlation`]. It is at least that of one angle: cancelling
+    /// errors occur at one spacing and briefly. [`AngleModel`] contains the aperture and the cosine
+    /// `toward`.
     pub fn scatter_variance(&self, travelled_m: f64, aperture: f64, toward: f64) -> f64 {
         let scatter = (self.array.measurand).scatter_variance(self.rician_k, aperture);
         let correlation = self.array.correlation(travelled_m, toward);
         self.noise_ratio() * scatter * correlation.max(1.0)
     }
 
-    /// The same by all that several angles share: scatter and the surveys, whose errors stay until
-    /// the radio head is seen from another side, after about its distance.
+    /// Returns the variance that several angles share: scatter, and the survey errors, which are
+    /// constant until the radio head is received from another side, after about its distance.
     pub fn shared_variance(&self, travelled_m: f64, angle_model: &AngleModel) -> f64 {
         let mut variance =
             self.scatter_variance(travelled_m, angle_model.aperture, angle_model.toward);
         if angle_model.survey_variance > 0.0 {
-            // Standing still nothing new is learnt, but the variance must stay a number.
+            // At standstill there is no new information, but the variance must remain finite.
             let same_side = angle_model.range_m / travelled_m.abs().max(1e-9);
             variance += angle_model.survey_variance * same_side.max(1.0);
         }
         variance
     }
 
-    /// Variance of the curvature of the path (1/m²) where no map tells: it bends with the road, and
-    /// back to the middle of the lane.
+    /// Returns the variance of the path curvature (1/m²) without a map, including the lane keeping.
     pub fn curvature_variance(&self) -> f64 {
         self.path_bend.curvature_per_m.powi(2) + self.lane_keeping.pull_per_m().powi(2)
     }
 
-    /// The turn of a vehicle with differential drive of which no yaw rate tells: any.
+    /// Returns the unknown heading change of a differential drive without a yaw rate.
     pub fn unknown_turn(&self, length_m: f64, duration_s: f64) -> Yaw {
         Yaw {
             turn_rad: self.yaw_rate_bias_radps * duration_s,
@@ -402,7 +407,7 @@ impl EkfConfig {
         }
     }
 
-    /// Variance of the distance (m²) driven during `duration_s` without odometry.
+    /// Returns the variance of the distance (m²) driven during `duration_s` without odometry.
     pub fn coasting_variance(&self, duration_s: f64) -> f64 {
         let error_m = 0.5 * self.acceleration_mps2 * duration_s * duration_s;
         error_m * error_m

@@ -1,4 +1,4 @@
-//! The filter itself: what it holds, and what is known by it.
+//! Extended Kalman filter: members and accessors.
 
 use std::sync::Arc;
 
@@ -17,15 +17,15 @@ use crate::observation::{MeasurementKind, OdometrySample};
 use crate::radio_head::RadioHead;
 use crate::road::{Gap, Road};
 
-/// Where the vehicle is off the map.
+/// Position off the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum OffMap {
-    /// Certainly beyond one of its ends, this far (m).
+    /// Certainly beyond an end of the road.
     Beyond {
-        /// Distance from the end.
+        /// Distance from the end (m).
         by_m: f64,
     },
-    /// Not certainly outside of this gap.
+    /// Possibly within this gap.
     Gap(Gap),
 }
 
@@ -35,13 +35,13 @@ pub(super) struct Head {
     pub excluded: bool,
     /// Kind of its last angle that was used.
     pub kind: MeasurementKind,
-    /// Distance driven when its last angle was used (m) ...
+    /// Distance driven at the last used angle (m) ...
     pub last_update_m: f64,
-    /// ... the time then (s) ...
+    /// ... its time (s) ...
     pub last_update_s: f64,
-    /// ... the angle turned (rad) ...
+    /// ... the heading (rad) ...
     pub last_update_rad: f64,
-    /// ... and what that is off by since.
+    /// ... and the residual after the update.
     pub last_residual: Option<Residual>,
 }
 
@@ -52,32 +52,33 @@ impl Head {
 }
 
 clone_in_place! {
-    /// The filter. With a map it works along and across the road, without in the plane.
+    /// Extended Kalman filter. With a map its coordinates are along and across the road, otherwise
+    /// Cartesian.
     #[derive(Debug, PartialEq)]
     pub struct Ekf {
         pub(super) config: EkfConfig,
         pub(super) map: Option<Arc<Road>>,
         pub(super) heads: Vec<Head>,
         pub(super) belief: Belief,
-        /// What the radio heads' angles are off by over metres.
+        /// Biases of the radio heads' angles, correlated over metres.
         pub(super) bias: CorrelatedBias,
         pub(super) odometry: Option<OdometrySample>,
         pub(super) driven_m: f64,
         pub(super) turned_rad: f64,
-        /// Where the vehicle is that the map does not tell how the road goes on.
+        /// Position off the map, where the road is unknown.
         pub(super) off_map: Option<OffMap>,
         pub(super) journal: Option<Journal<STATES>>,
         pub(super) sample_interval: SampleInterval,
         pub(super) speed_jumps: SpeedJumps,
-        /// What the speeds say was driven (m) since the odometer last moved.
+        /// Distance by the speeds (m) since the odometer's distance last changed.
         pub(super) unread_m: f64,
-        /// What of the angles' errors does not stay.
+        /// White fraction of the angles' noise.
         pub(super) white: WhiteShare,
     }
 }
 
 impl Ekf {
-    /// A filter that starts from a given pose. `map` is the course of the road, if known.
+    /// Creates a filter at a given pose. `map` is the road, if known.
     pub fn new(
         config: EkfConfig,
         map: Option<Arc<Road>>,
@@ -127,44 +128,44 @@ impl Ekf {
         }
     }
 
-    /// Time of the newest odometry (s).
+    /// Returns the time of the newest odometry (s).
     pub fn time_s(&self) -> f64 {
         self.odometry
             .map_or(f64::NEG_INFINITY, |sample| sample.time_s)
     }
 
-    /// The state and its covariance.
+    /// Returns the state and its covariance.
     pub const fn belief(&self) -> &Belief {
         &self.belief
     }
 
-    /// Replaces the state and its covariance, where several filters become one.
+    /// Replaces the state and its covariance when filters are merged.
     pub(in crate::localize) fn set_belief(&mut self, belief: &Belief) {
         self.belief = *belief;
         self.bias.decorrelate();
     }
 
-    /// What the filter assumes.
+    /// Returns the configuration.
     pub const fn config(&self) -> &EkfConfig {
         &self.config
     }
 
-    /// Constants of the vehicle as estimated by now.
+    /// Returns the estimated constants of the vehicle.
     pub fn constants(&self) -> EstimatedConstants {
         EstimatedConstants::new(&self.config, &self.belief)
     }
 
-    /// Whether it estimates a time-correlated bias of the angles.
+    /// Whether the filter estimates a time-correlated bias of the angles.
     pub(in crate::localize) const fn is_with_bias(&self) -> bool {
         !self.bias.is_empty()
     }
 
-    /// Whether a map tells how the road goes.
+    /// Whether the filter has a map.
     pub(in crate::localize) const fn has_map(&self) -> bool {
         self.map.is_some()
     }
 
-    /// Whether the odometer's scale is certainly not what is stated.
+    /// Whether the odometer scale certainly differs from the specified one.
     pub(in crate::localize) fn odometer_departs(&self) -> bool {
         let mut scale = self.constants().odometer_scale;
         let walked = self.config.noise.scale_per_sqrt_m * self.driven_m.sqrt();
@@ -172,32 +173,34 @@ impl Ekf {
         scale.departs()
     }
 
-    /// Whether the angles tell more of the odometer's scale than what is stated.
+    /// Whether the angles determine the odometer scale better than its specification.
     pub(in crate::localize) fn knows_odometer(&self) -> bool {
         self.belief.covariance[SCALE][SCALE] < 0.5 * self.config.odometer_scale_std.powi(2)
     }
 
-    /// Expects angles of so many times the variance that is stated, or what is stated.
+    /// Sets the ratio of the angles' variance to the specified one; `None` for the specified
+    /// variance.
     pub(in crate::localize) fn set_noise_ratio(&mut self, ratio: Option<f64>) {
         self.config.set_noise_ratio(ratio);
     }
 
-    /// Distance driven since the start (m).
+    /// Returns the distance driven since the start (m).
     pub const fn driven_m(&self) -> f64 {
         self.driven_m
     }
 
-    /// Sets the largest squared Mahalanobis distance of an angle that is used.
+    /// Sets the gate of the squared Mahalanobis distance.
     pub fn set_gate(&mut self, gate: f64) {
         self.config.gate = gate;
     }
 
-    /// Share by which the speed jumped with the newest odometry, as no vehicle can do; 0 otherwise.
+    /// Returns the relative, physically impossible jump of the speed at the newest odometry; 0 if
+    /// there is none.
     pub(in crate::localize) const fn speed_jump(&self) -> f64 {
         self.speed_jumps.speed_jump
     }
 
-    /// Leaves the angles of a radio head unused, or uses them again.
+    /// Excludes the angles of a radio head, or includes them again.
     pub fn set_excluded(&mut self, head: &RadioHead, excluded: bool) {
         for mine in self.heads.iter_mut().filter(|mine| mine.is(head)) {
             mine.excluded = excluded;
@@ -205,52 +208,53 @@ impl Ekf {
     }
 }
 
-/// A constant as stated, and as found while driving.
+/// Constant: specified and estimated value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatedConstant {
-    /// What is stated ...
+    /// Specified value ...
     pub stated: f64,
     /// ... and its standard deviation.
     pub stated_std: f64,
-    /// What was found ...
+    /// Estimated value ...
     pub found: f64,
     /// ... and its standard deviation.
     pub std: f64,
 }
 
 impl EstimatedConstant {
-    /// How far it is from what is stated.
+    /// Returns the difference from the specified value.
     pub fn departure(&self) -> f64 {
         self.found - self.stated
     }
 
-    /// Whether it is off by more than `least`, and certainly so.
+    /// Whether the difference exceeds `least` with certainty.
     pub fn is_remarkable(&self, least: f64) -> bool {
         let by = self.departure().abs();
         by > least && by > 2.0 * self.std
     }
 
-    /// Whether it is certainly not what it was stated to be: its departure is beyond three standard deviations of what
-    /// is stated by three of its own. Of what is stated rightly, fewer than 0.27 % of the drives see this.
+    /// Whether the value certainly contradicts its specification: the difference exceeds three
+    /// specified standard deviations by three estimated ones. Fewer than 0.27 % of
+    /// the drives with a correct specification exceed it.
     pub fn departs(&self) -> bool {
         self.departure().abs() > CERTAIN_SIGMAS * (self.stated_std + self.std)
     }
 }
 
-/// Constants of the vehicle, as found while driving.
+/// Constants of the vehicle, estimated while driving.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatedConstants {
-    /// Metres that the odometer reads per metre driven.
+    /// Odometer scale: distance measured per distance driven.
     pub odometer_scale: EstimatedConstant,
     /// Bias of the yaw rate (rad/s).
     pub yaw_rate_bias_radps: EstimatedConstant,
-    /// Radians that the yaw rate, summed up, reads per radian turned.
+    /// Scale of the yaw rate: heading change measured per heading change.
     pub yaw_rate_scale: EstimatedConstant,
-    /// Direction of the array's axis (rad).
+    /// Direction of the array axis (rad).
     pub mounting_rad: EstimatedConstant,
-    /// Phase per antenna left by calibration (rad).
+    /// Residual phase per antenna after calibration (rad).
     pub phase_rad: EstimatedConstant,
-    /// How much later angles come than their setting says (s).
+    /// Time offset of the angles in addition to the specified one (s).
     pub lateness_s: EstimatedConstant,
 }
 
@@ -281,7 +285,7 @@ impl EstimatedConstants {
         }
     }
 
-    /// Whether mounting or phase calibration of the array no longer hold.
+    /// Whether mounting or phase calibration of the array are no longer valid.
     pub fn array_departs(&self) -> bool {
         self.mounting_rad.departs() || self.phase_rad.departs()
     }

@@ -1,5 +1,5 @@
-//! What comes out: the pose in the map frame at any time, the belief predicted ahead and updated with angles not yet
-//! heard, and the smoothed poses.
+//! Outputs of the filter: pose in the map frame at any time, predicted covariances with future
+//! angles, and smoothed poses.
 
 use super::angle_model::{AngleModel, locate};
 use super::config::PhaseBias;
@@ -16,22 +16,22 @@ use crate::localize::output::PoseEstimate;
 use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
 
-/// Longest step of a forecast (m), where millimetres do not matter.
+/// Maximum step of a forecast (m), for which millimetres are irrelevant.
 const FORECAST_STEP_M: f64 = 5.0;
 
-/// An angle to a radio head that is not used.
+/// Innovation of an angle that is not used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::localize) struct ExcludedInnovation {
-    /// The innovation; of the angle's variance only its noise, biases being the
-    /// belief's.
+    /// Innovation; the angle's variance contains its noise only, because biases are part of the
+    /// state.
     pub innovation: Innovation,
-    /// Variance of the noise, had nothing been heard before (rad²).
+    /// Variance of the noise for a first angle of the radio head (rad²).
     pub first_variance: f64,
     /// Distance driven, in wavelengths.
     pub place_wavelengths: f64,
 }
 
-/// How driving on, nothing being heard, makes a covariance `Φ P Φᵀ + Q`.
+/// Propagation of a covariance without measurements, `Φ P Φᵀ + Q`.
 #[derive(Clone, Debug)]
 pub struct Transition {
     jacobian: Matrix<STATES>,
@@ -39,7 +39,8 @@ pub struct Transition {
 }
 
 impl Transition {
-    /// Variances of a belief's horizontal error after it, along the principal axes, larger first (m²).
+    /// Returns the variances of the predicted horizontal error along its principal axes, larger
+    /// first (m²).
     pub fn principal_variances(&self, belief: &Belief) -> [f64; 2] {
         let [first, second] = [self.jacobian[0], self.jacobian[1]];
         let with_second = belief.cross(&second);
@@ -52,7 +53,7 @@ impl Transition {
 }
 
 impl Ekf {
-    /// The innovation that an angle would bring; `None` where it would bring none.
+    /// Returns the innovation of an angle; `None` if there is none.
     pub fn innovation(&self, head: &RadioHead, measured: &AngleMeasurement) -> Option<Innovation> {
         self.predict_measurement(head, measured)
             .ok()
@@ -60,9 +61,9 @@ impl Ekf {
             .map(|predicted| predicted.innovation)
     }
 
-    /// The innovation that an angle to an excluded radio head would bring; it counts as an update. Where a
-    /// time-correlated bias is estimated there is nothing to test: a radio head that is off has a
-    /// large one, and counts little.
+    /// Returns the innovation of an angle to an excluded radio head; it counts as an update. With
+    /// an estimated time-correlated bias there is nothing to test: an inconsistent radio head has a
+    /// large bias and little weight.
     pub(in crate::localize) fn innovation_of_excluded(
         &mut self,
         head: &RadioHead,
@@ -87,7 +88,7 @@ impl Ekf {
         let (aperture, toward) = (predicted.aperture, predicted.toward);
         let noise = unbiased.variance(sigma, predicted.elapsed_s, predicted.moved)
             + (self.config).scatter_variance(travelled_m, aperture, toward);
-        // What is off by as much in many angles counts once.
+        // A common error of many angles counts once.
         let lasting = self.systematic_variance(&predicted);
         Some(ExcludedInnovation {
             innovation: Innovation {
@@ -100,7 +101,7 @@ impl Ekf {
         })
     }
 
-    /// The belief at `time_s`, had the vehicle driven on at its speed and heard nothing.
+    /// Returns the predicted state at `time_s`, with constant speed and without measurements.
     pub fn forecast(&self, time_s: f64) -> Belief {
         let lag_s = (time_s - self.time_s()).max(0.0);
         let speed_mps = self.odometry.map_or(0.0, |sample| sample.speed_mps);
@@ -110,12 +111,12 @@ impl Ekf {
         self.carry(self.belief, speed_mps * lag_s)
     }
 
-    /// A belief carried on by what the odometer would read, nothing being heard.
+    /// Returns a state predicted over an odometer distance without measurements.
     pub fn carry(&self, belief: Belief, reading_m: f64) -> Belief {
         self.carry_by(belief, reading_m, |_| ())
     }
 
-    /// The same, step by step.
+    /// Predicts a state step by step.
     fn carry_by(&self, mut belief: Belief, reading_m: f64, mut by: impl FnMut(&Step)) -> Belief {
         let steps = (reading_m.abs() / FORECAST_STEP_M).ceil().min(MOST_STEPS);
         for _ in 0..steps as usize {
@@ -126,7 +127,7 @@ impl Ekf {
         belief
     }
 
-    /// What carrying a belief on by what the odometer would read makes of covariances near its own.
+    /// Returns the propagation of covariances over an odometer distance, linearised at a state.
     pub fn transition(&self, belief: &Belief, reading_m: f64) -> Transition {
         let mut jacobian = identity();
         let mut noise = Belief::independent(belief.mean, [0.0; STATES]);
@@ -140,9 +141,9 @@ impl Ekf {
         }
     }
 
-    /// What an angle of thermal variance `thermal(distance)` to `head` would make of a belief
-    /// `ahead_m` further on than the newest odometry; `None` of a radio head that is not used, or would
-    /// rather repeat itself.
+    /// Returns the state after an angle with the thermal variance `thermal(distance)` to `head`, at
+    /// a state `ahead_m` after the newest odometry; `None` if the radio head is not used, or its
+    /// angle would repeat the previous one.
     pub fn predicted_update(
         &self,
         belief: &Belief,
@@ -175,25 +176,26 @@ impl Ekf {
         Some(updated)
     }
 
-    /// Variances of a belief's horizontal error along its principal axes, larger first (m²).
+    /// Returns the variances of a state's horizontal error along its principal axes, larger first
+    /// (m²).
     pub fn principal_variances(belief: &Belief) -> [f64; 2] {
         let [[aa, ab, ..], [_, bb, ..], ..] = belief.covariance;
         principal_variances(aa, ab, bb)
     }
 }
 
-/// Nothing is known better than to a nanometre and a nanoradian: so much the covariance says at
-/// least, though a belief that began exactly has no width.
+/// Minimum variance of the reported covariance, of a nanometre and a nanoradian, for states with an
+/// exact start.
 const LEAST_VARIANCE: f64 = 1e-18;
 
 impl Ekf {
-    /// The pose at `time_s`, carried on from the newest odometry at its speed.
+    /// Returns the pose at `time_s`, extrapolated from the newest odometry with its speed.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
         let (_, lag_variance) = self.coasting(time_s);
         self.pose_of(&self.forecast(time_s), time_s, lag_variance)
     }
 
-    /// Distance driven since the newest odometry, and its variance.
+    /// Returns the distance driven since the newest odometry, and its variance.
     pub(super) fn coasting(&self, time_s: f64) -> (f64, f64) {
         let Some(sample) = self.odometry else {
             return (0.0, 0.0);
@@ -205,13 +207,13 @@ impl Ekf {
         )
     }
 
-    /// Speed along the heading (m/s).
+    /// Returns the speed along the heading (m/s).
     pub fn speed_mps(&self) -> f64 {
         let reading = self.odometry.map_or(0.0, |sample| sample.speed_mps);
         reading / (1.0 + self.belief.mean[SCALE])
     }
 
-    /// The pose of a belief whose place along the way has so much more variance than it says.
+    /// Returns the pose of a state with an additional variance along its path.
     pub(super) fn pose_of(&self, belief: &Belief, time_s: f64, lag_variance: f64) -> PoseEstimate {
         let map = self.map.as_deref();
         let (pose, frame) = locate(&belief.mean, 0.0, map);
@@ -243,14 +245,13 @@ impl Ekf {
 }
 
 impl Ekf {
-    /// Keeps a journal from now on, from which the drive can be smoothed; it grows by about 2 kB
-    /// with each odometry sample.
+    /// Keeps a journal for smoothing from now on, which grows by about 2 kB per odometry sample.
     pub fn keep_journal(&mut self) {
         self.journal.get_or_insert_default();
     }
 
-    /// The poses at the odometry samples since the journal was begun, by everything that is known
-    /// now; none without a journal.
+    /// Returns the smoothed poses at the odometry samples since the start of the journal; empty
+    /// without a journal.
     pub fn smoothed(&self) -> Vec<PoseEstimate> {
         let journal = self.journal.iter();
         let beliefs = journal.flat_map(Journal::smoothed);

@@ -1,15 +1,16 @@
-//! Whether the vehicle is in a lane of the map: beyond its ends and in its gaps it is not.
+//! Lane constraint of the map, which does not apply beyond the ends of the road and in its gaps.
 
 use super::filter::{Ekf, OffMap};
 use super::state::{ACROSS, ALONG, CURVATURE, HEADING, STATES};
 use crate::gaussian::{CERTAIN_SIGMAS, identity};
 
-/// Least deviation from the lane, in metres or radians, of a vehicle said to keep it exactly.
+/// Minimum standard deviation of the lane position, in metres or radians, for an exactly kept lane.
 const LEAST_LANE_STD: f64 = 1e-6;
 
 impl Ekf {
-    /// Where the vehicle is now. Beyond an end the map goes on straight, and so may the road; in a
-    /// gap it surely does not follow the guess: there the doubt is on the gap's side.
+    /// Returns the current position off the map. Beyond an end, the road probably continues
+    /// straight, as the map does. In a gap it certainly does not follow the guess, so that a
+    /// doubtful position counts as in the gap.
     fn off_map(&self) -> Option<OffMap> {
         let map = self.map.as_deref()?;
         let along_m = self.belief.mean[ALONG];
@@ -22,8 +23,8 @@ impl Ekf {
             .map(OffMap::Gap)
     }
 
-    /// Off the map the path bends as it does without one; along, across and heading stay what they
-    /// are. Back on it the vehicle keeps to its lane again.
+    /// Off the map, the curvature model without a map applies; along, across and heading are
+    /// unchanged. Back on the map, the lane constraint applies again.
     pub(super) fn update_off_map(&mut self) {
         let off_map = self.off_map();
         let (was_off, is_off) = (self.off_map.is_some(), off_map.is_some());
@@ -43,7 +44,8 @@ impl Ekf {
         }
     }
 
-    /// Whether it may be in its lane, as sure as an angle must be to be used.
+    /// Whether the vehicle may be in its lane, with the probability required for the use of an
+    /// angle.
     fn is_in_lane(&self) -> bool {
         let lane = self.config.lane_keeping.stationary();
         ([ACROSS, HEADING].into_iter().zip(lane)).all(|(state, lane_variance)| {
@@ -63,9 +65,10 @@ impl Ekf {
         self.bias.moved(&forget);
     }
 
-    /// Takes in that the vehicle is in its lane. What the belief knows already may come from the
-    /// same lane, a short way back: together they count no more than the better of the two, in each
-    /// of the directions, in units of the lane's own deviations, in which the belief is independent.
+    /// Applies the lane constraint as a measurement. The state may contain information from the
+    /// same lane, a short distance before: in each direction, in units of the lane's standard
+    /// deviations, in which the state is independent, the combination is at most the better of
+    /// both.
     fn take_the_lane(&mut self) {
         let lane = self.config.lane_keeping.stationary();
         let [offset_m, heading_rad] = lane.map(|variance| variance.sqrt().max(LEAST_LANE_STD));
@@ -84,7 +87,7 @@ impl Ekf {
             if known > 1.0 {
                 let found = row[ACROSS] * self.belief.mean[ACROSS]
                     + row[HEADING] * self.belief.mean[HEADING];
-                // 1/R = 1 − 1/P leaves a variance of one.
+                // 1/R = 1 − 1/P yields a variance of one.
                 self.measure(-found, &row, known / (known - 1.0));
             }
         }

@@ -1,10 +1,10 @@
-//! The extended Kalman filter over pose, odometer scale and array calibration, predicted by odometry and updated by
-//! electrical angles.
+//! Extended Kalman filter for pose, odometer scale and array calibration, with odometry as the
+//! prediction and electrical angles as the measurements.
 //!
-//! The electrical angle `ω = 2π (d/λ) cos θ` has Gaussian noise whose size does not depend on the
-//! direction; the angle θ has neither property near end-fire, and a filter that takes θ believes
-//! itself far too much there. Scatter is a second noise, the same for every measurement within half a
-//! wavelength of travel, and is counted once per half wavelength.
+//! The noise of the electrical angle `ω = 2π (d/λ) cos θ` is Gaussian, with a variance independent
+//! of the direction. The angle θ has neither property near end-fire, where a filter of θ would be
+//! overconfident. Scatter is a second noise, identical for all measurements within half a
+//! wavelength of travel, and counted once per half wavelength.
 
 pub mod angle_model;
 mod config;

@@ -1,14 +1,15 @@
-//! How the state moves with the distance the odometer reads.
+//! Motion model: propagation of the state with the odometer distance.
 //!
-//! **With a map** (curvilinear coordinates). The vehicle follows its lane as [`LaneKeeping`] says.
+//! **With a map** (curvilinear coordinates). The vehicle follows its lane with the model
+//! [`LaneKeeping`].
 //!
 //! **Without a map** (Cartesian). The curvature of the path is a first-order Gauss–Markov process
 //! over the distance travelled; heading and position are its integrals.
 //!
-//! **With differential drive** (Cartesian). The vehicle turns as the yaw rate says, on the spot too;
-//! no prior of its path stands against that.
+//! **Differential drive** (Cartesian). The heading follows the yaw rate, on the spot too, without a
+//! prior of the path.
 //!
-//! Noise in the odometer is a random walk over distance in all of them.
+//! The odometer noise is a random walk over distance in all of them.
 
 use super::state::{
     ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
@@ -18,27 +19,27 @@ use crate::gaussian::{Matrix, identity};
 use crate::geometry::Pose;
 use crate::road::{Bending, LaneKeeping};
 
-/// How the path bends where no map tells.
+/// Curvature model of the path without a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathBend {
-    /// Stationary deviation of the curvature (1/m).
+    /// Stationary standard deviation of the curvature (1/m).
     pub curvature_per_m: f64,
-    /// Distance over which the curvature is forgotten (m).
+    /// Correlation distance of the curvature (m).
     pub correlation_m: f64,
-    /// Random walk of the heading by steering (rad per √m), quicker than any bend of the road.
+    /// Random walk of the heading due to steering (rad per √m), faster than any bend of the road.
     pub steering_rad_per_sqrt_m: f64,
 }
 
-/// Noise of the motion that the odometer does not see or gets wrong.
+/// Process noise of the motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MotionNoise {
-    /// Random walk of the odometer (m per √m).
+    /// Random walk of the odometer over distance (m per √m).
     pub odometer_m_per_sqrt_m: f64,
-    /// The same over time, unless it stands (m per √s).
+    /// Random walk of the odometer over time, except at standstill (m per √s).
     pub odometer_m_per_sqrt_s: f64,
-    /// Random walk of the odometer's scale (1 per √m).
+    /// Random walk of the odometer scale (1 per √m).
     pub scale_per_sqrt_m: f64,
-    /// Random walk of the yaw rate's bias (rad/s per √s).
+    /// Random walk of the yaw rate bias (rad/s per √s).
     pub yaw_bias_radps_per_sqrt_s: f64,
     /// Random walk of the mounting angle (rad per √m).
     pub mounting_rad_per_sqrt_m: f64,
@@ -46,17 +47,17 @@ pub struct MotionNoise {
     pub phase_rad_per_sqrt_m: f64,
 }
 
-/// What the odometer reads of a step.
+/// Odometer measurement of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
-    /// Distance that it reads (m).
+    /// Measured distance (m).
     pub read_m: f64,
-    /// What was driven, of which its noise is (m).
+    /// Distance by the speeds, which determines the noise (m).
     pub driven_m: f64,
 }
 
 impl Reading {
-    /// One that is as long as the way driven.
+    /// Creates a measurement whose noise is that of its distance.
     pub const fn exact(read_m: f64) -> Self {
         Self {
             read_m,
@@ -64,7 +65,7 @@ impl Reading {
         }
     }
 
-    /// The same of a share of the step.
+    /// Returns the measurement of a fraction of the step.
     #[must_use]
     pub fn share(&self, by: f64) -> Self {
         Self {
@@ -74,41 +75,41 @@ impl Reading {
     }
 }
 
-/// One step of the motion, linearised at the mean it starts from.
+/// One step of the motion, linearised at its initial mean.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     /// Mean after the step.
     pub mean: [f64; STATES],
     /// Jacobian of the step.
     pub jacobian: Matrix<STATES>,
-    /// Covariance of what the step adds.
+    /// Covariance of the step's noise.
     pub noise: Matrix<STATES>,
-    /// By how much the vehicle turns (rad) ...
+    /// Heading change (rad) ...
     pub turn_rad: f64,
-    /// ... how that depends on the state before the step ...
+    /// ... its derivative by the state before the step ...
     pub turn_row: [f64; STATES],
-    /// ... how it varies together with what the step adds ...
+    /// ... its covariance with the noise of the step ...
     pub turn_shared: [f64; STATES],
-    /// ... and its variance by that (rad²).
+    /// ... and its variance due to that noise (rad²).
     pub turn_variance: f64,
 }
 
-/// What a gyroscope read during a step.
+/// Gyroscope measurement of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Yaw {
     /// Yaw rate times duration (rad).
     pub turn_rad: f64,
     /// Duration (s).
     pub duration_s: f64,
-    /// Variance of the reading (rad²).
+    /// Variance of the measurement (rad²).
     pub variance: f64,
-    /// Whether a reading tells of it; else it is guessed.
+    /// Whether a sample measured the turn; otherwise it is a guess.
     pub is_told: bool,
 }
 
 impl Step {
-    /// The step along a lane that bends as the road does, for what the odometer read. A heading known to a variance P takes from the way along the
-    /// lane: `E cos ψ = e^{−P/2} cos E ψ`.
+    /// Returns the step along a lane with the curvature of the road, for an odometer measurement. A
+    /// heading with variance P reduces the distance along the lane: `E cos ψ = e^{−P/2} cos E ψ`.
     pub fn along_lane(
         start: &[f64; STATES],
         heading_variance: f64,
@@ -127,8 +128,8 @@ impl Step {
         let phi = keeping.transition(driven);
 
         let mut f = identity();
-        // What was driven, too: a reading's noise is in what the yaw rate is compared with, and must
-        // not be in what that is weighed by.
+        // With the distance by the speeds: the noise of an odometer measurement is part of the
+        // residual to the yaw rate, and must not be part of its weight.
         f[ALONG][ACROSS] = driven * cos * curvature_per_m * stretch * stretch;
         f[ALONG][HEADING] = -driven * sin * stretch;
         f[ALONG][SCALE] = -driven * cos * stretch / scale;
@@ -159,7 +160,7 @@ impl Step {
         }
         turn_row[HEADING] -= 1.0;
         turn_row[ALONG] = road.slope_per_m2 * driven * cos * stretch;
-        // The road turns by as much further as the odometer read too little.
+        // The road turns farther by the part that the odometer did not measure.
         let turn_shared = std::array::from_fn(|i| q[HEADING][i] + curvature_per_m * q[ALONG][i]);
         Self {
             turn_rad: curvature_per_m * (mean[ALONG] - start[ALONG]) + mean[HEADING]
@@ -175,10 +176,10 @@ impl Step {
         }
     }
 
-    /// The step in the plane, for what the odometer read: in Cartesian coordinates, or in those of
-    /// a road of curvature κ that the vehicle does not keep to. There
+    /// Returns the step in the plane, for an odometer measurement, in Cartesian coordinates or in
+    /// those of a road with curvature κ that the vehicle does not follow. There
     /// `ds = dl cos ψ / (1 − κ d)`, `dd = dl sin ψ` and `dψ = c dl − κ ds`, for the curvature c of
-    /// the path driven; κ = 0 is the Cartesian case.
+    /// the path; κ = 0 is the Cartesian case.
     pub fn in_plane(
         start: &[f64; STATES],
         reading_m: f64,
@@ -190,8 +191,8 @@ impl Step {
         let length = reading_m / scale;
         let kappa = road_curvature_per_m;
         let (sin_at_start, cos_at_start) = start[HEADING].sin_cos();
-        // Offset, stretch of the road beside it and heading halfway, and how they depend on the
-        // state: the midpoint rule.
+        // Midpoint rule: lateral offset, stretch of the road and heading at half the step, with
+        // their derivatives by the state.
         let half_m = 0.5 * length;
         let mut offset_row = [0.0; STATES];
         offset_row[ACROSS] = 1.0;
@@ -225,7 +226,7 @@ impl Step {
         f[CURVATURE][CURVATURE] = kept;
 
         let mut q = [[0.0; STATES]; STATES];
-        // Curvature noise and its integral, the heading (a step is short against both).
+        // Noise of the curvature and its integral, the heading (a step is short relative to both).
         let fresh = bend.curvature_per_m.powi(2) * (1.0 - kept * kept);
         q[CURVATURE][CURVATURE] = fresh;
         q[HEADING][CURVATURE] = fresh * length / 2.0;
@@ -234,7 +235,7 @@ impl Step {
             fresh * length * length / 3.0 + bend.steering_rad_per_sqrt_m.powi(2) * distance;
         let mut turn_shared = q[HEADING];
         let mut turn_variance = q[HEADING][HEADING];
-        // A metre that the odometer did not read goes the same way, and turns as the path does.
+        // Distance that the odometer did not measure has the same direction and curvature.
         let spread = walk.odometer_m_per_sqrt_m.powi(2) * distance;
         let by_metre = [
             (ALONG, cos * stretch),
@@ -267,10 +268,9 @@ impl Step {
         }
     }
 
-    /// The step of a vehicle that turns as its yaw rate says, wherever that leads:
-    /// `ψ⁺ = ψ + τ`, `p⁺ = p + l sinc(τ/2) (cos, sin)(ψ + τ/2)`, for the length l and the turn
-    /// `τ = (∫ yaw rate dt − b Δt) / (1 + κ)`, b being the yaw rate's bias and κ the error of its
-    /// scale.
+    /// Returns the step of a vehicle that turns with its measured yaw rate: `ψ⁺ = ψ + τ`,
+    /// `p⁺ = p + l sinc(τ/2) (cos, sin)(ψ + τ/2)`, for the length l and the heading change
+    /// `τ = (∫ yaw rate dt − b Δt) / (1 + κ)`, with the yaw rate bias b and the scale error κ.
     pub fn turning(start: &[f64; STATES], reading_m: f64, yaw: &Yaw, walk: &MotionNoise) -> Self {
         let scale = 1.0 + start[SCALE];
         let length = reading_m / scale;
@@ -283,8 +283,8 @@ impl Step {
         };
         let after = before.along_chord(length, turn_rad);
         let step = [after.x_m - before.x_m, after.y_m - before.y_m];
-        // By a turn the chord turns by half of it; what it gains or loses in length is of the
-        // second order.
+        // A heading change rotates the chord by half of it; the change of its length is of second
+        // order.
         let by_turn = [-0.5 * step[1], 0.5 * step[0]];
 
         let mut f = identity();
@@ -327,7 +327,7 @@ impl Step {
         }
     }
 
-    /// No step: the vehicle stands, and nothing becomes less certain.
+    /// Returns the step of a vehicle at standstill, without noise.
     pub fn standing(start: &[f64; STATES]) -> Self {
         Self {
             mean: *start,
@@ -340,14 +340,14 @@ impl Step {
         }
     }
 
-    /// Moves a belief by this step.
+    /// Applies the step to a state and its covariance.
     pub fn apply(&self, belief: &mut Belief) {
         belief.mean = self.mean;
         belief.spread(&self.jacobian, &self.noise);
     }
 
-    /// What is seen after this step, by the state before it: the row, and the variance that the step
-    /// adds.
+    /// Returns a measurement after this step as a measurement of the state before it: the row, and
+    /// the additional variance.
     pub fn seen_before(&self, row: &[f64; STATES]) -> ([f64; STATES], f64) {
         let (mut before, mut variance) = ([0.0; STATES], 0.0);
         for i in 0..STATES {
@@ -359,7 +359,8 @@ impl Step {
         (before, variance)
     }
 
-    /// What a gyroscope says of the state `start` before this step: residual, row and variance.
+    /// Returns the gyroscope measurement of the state `start` before this step: residual, row and
+    /// variance.
     pub fn turn_seen(&self, start: &[f64; STATES], yaw: &Yaw) -> (f64, [f64; STATES], f64) {
         let mut row = self.turn_row;
         row[YAW_RATE_BIAS] = yaw.duration_s;
@@ -368,8 +369,9 @@ impl Step {
         (yaw.turn_rad - self.turn_rad - bias, row, variance)
     }
 
-    /// This step, its noise known in part from a gyroscope: measurement and motion share the
-    /// noise of the turn, so it is decorrelated (Anderson & Moore, Optimal Filtering, 5.5).
+    /// Returns the step with its noise conditioned on a gyroscope measurement. Measurement and
+    /// motion share the noise of the turn, so that it is decorrelated (Anderson & Moore, Optimal
+    /// Filtering, 5.5).
     #[must_use]
     pub fn informed(mut self, start: &[f64; STATES], yaw: &Yaw) -> Self {
         let (surprise, row, total) = self.turn_seen(start, yaw);
@@ -405,7 +407,7 @@ mod tests {
         steering_rad_per_sqrt_m: 0.0,
     };
 
-    /// Along, across, heading against the road, curvature of the path, odometer scale.
+    /// Along, across, heading relative to the road, curvature of the path, odometer scale.
     fn state(values: [f64; 5]) -> [f64; STATES] {
         let mut state = [0.0; STATES];
         for (index, value) in [ALONG, ACROSS, HEADING, CURVATURE, SCALE]

@@ -1,24 +1,25 @@
-//! Plausibility of the odometer: jumps of its speed that are slip and not noise, and samples that were lost.
+//! Plausibility of the odometer: jumps of its speed due to slip, and lost samples.
 
-/// Share of the newest step in the mean square: a larger one is learnt soon, and forgotten slowly.
+/// Weight of the newest step in the mean square: a larger step is learned fast and forgotten
+/// slowly.
 const RISE: f64 = 0.2;
 const FALL: f64 = 0.01;
 
-/// A step this many times the usual one is not of the usual kind.
+/// Ratio to the usual step above which a step is unusual.
 const UNUSUAL: f64 = 5.0;
 
-/// The usual step of the speed between two samples.
+/// Usual change of the speed between two samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct SpeedJumps {
-    /// Mean square of the steps (m²/s²).
+    /// Mean square of the changes (m²/s²).
     mean_square: f64,
-    /// By which share of the speed the newest one jumped, where it was above the least that jumps and none of the usual
-    /// ones; 0 otherwise.
+    /// Relative jump of the speed at the newest sample, if it exceeds the minimum and is unusual;
+    /// otherwise 0.
     pub speed_jump: f64,
 }
 
 impl SpeedJumps {
-    /// Takes a step, which jumps where it is above `least_mps` and none of the usual ones.
+    /// Adds a change of the speed, which is a jump if it exceeds `least_mps` and is unusual.
     pub fn step(&mut self, from_mps: f64, to_mps: f64, least_mps: f64) {
         self.speed_jump = 0.0;
         let fastest_mps = from_mps.abs().max(to_mps.abs());
@@ -40,25 +41,25 @@ impl SpeedJumps {
     }
 }
 
-/// Share of the intervals that are shorter than the usual one: enough that most samples may be lost.
+/// Fraction of intervals below the usual one, small enough for recordings that lost most samples.
 const QUANTILE: f64 = 0.25;
 
-/// Share by which an interval changes the usual one.
+/// Relative change of the usual interval per sample.
 const GAIN: f64 = 0.05;
 
-/// Multiple of the usual interval from which on samples were lost.
+/// Ratio to the usual interval above which samples were lost.
 const LOST: f64 = 1.5;
 
-/// The usual time between two samples, learnt from the samples themselves.
+/// Usual interval between two samples, learned from the samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct SampleInterval {
-    /// None yet if zero (s).
+    /// Usual interval (s); zero before the first one.
     usual_s: f64,
 }
 
 impl SampleInterval {
-    /// How much of the time since the last sample a new one tells of, in seconds: all of it, unless
-    /// samples between them were lost.
+    /// Returns the part of the time since the previous sample that a new sample describes, in
+    /// seconds: all of it, unless samples in between were lost.
     pub fn told_s(&mut self, duration_s: f64) -> f64 {
         if self.usual_s == 0.0 {
             self.usual_s = duration_s;
@@ -70,7 +71,7 @@ impl SampleInterval {
         };
         let longer = f64::from(u8::from(duration_s > self.usual_s));
         let shorter = f64::from(u8::from(duration_s < self.usual_s));
-        // A quantile is where those above and below it pull alike.
+        // At a quantile, the weights above and below balance.
         self.usual_s *= 1.0 + GAIN * (QUANTILE * longer - (1.0 - QUANTILE) * shorter);
         told_s
     }

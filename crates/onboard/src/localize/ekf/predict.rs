@@ -1,4 +1,4 @@
-//! The time update: what an odometry sample is worth, and how it moves the belief.
+//! Prediction with an odometry sample.
 
 use super::filter::{Ekf, OffMap};
 use super::motion::{Reading, Step, Yaw};
@@ -9,43 +9,43 @@ use crate::observation::OdometrySample;
 use crate::road::Gap;
 use crate::settings::DriveKind;
 
-/// Longest step over which the road's curvature is taken as constant (m).
+/// Maximum step with constant curvature of the road (m).
 const STEP_M: f64 = 1.0;
 
-/// Most steps at a time: over a kilometre without odometry nothing is known of bends.
+/// Maximum number of steps: after a kilometre without odometry, nothing is known of bends.
 pub(super) const MOST_STEPS: f64 = 1000.0;
 
-/// A speed of so many times the vehicle's is none, whatever was stated; it is read as that.
+/// Speeds above this multiple of the vehicle's top speed are replaced by it.
 const WILD: f64 = 10.0;
 
-/// Deviations of the speed's reading from which on a step of it is slip, and the most that slip
-/// adds to the deviation of the odometer's scale.
+/// Minimum change of the speed for slip, in standard deviations of a speed measurement, and maximum
+/// increase of the odometer scale's standard deviation by slip.
 const SIGMAS_OF_SLIP: f64 = 5.0;
 pub(in crate::localize) const MOST_SLIP: f64 = 0.3;
 
-/// What was driven is taken from the speeds where it is within these shares of what is read.
+/// Range of the ratio of distance by the speeds to measured distance in which the former is used.
 const DRIVEN_BY_READ: [f64; 2] = [0.5, 1e3];
 
-/// How far the scale walks of an odometer that may slip without a jump of the speed (per √m).
+/// Random walk of the odometer scale if slip without a jump of the speed is possible (per √m).
 const SLIP_WALK_PER_SQRT_M: f64 = 0.1;
 
-/// Standard deviation of where along the road the vehicle takes up a new curvature (m): no vehicle does
-/// at a point, as maps of arcs draw it, but over about its own length.
+/// Standard deviation of the position at which the vehicle adopts a new curvature (m). A real
+/// vehicle does so over about its own length, not at a point as in maps of arcs.
 const TRANSITION_M: f64 = 0.5;
 
-/// Squared Mahalanobis distance up to which the yaw rate on a road is taken at its word: 6σ.
+/// Gate of the yaw rate's squared Mahalanobis distance on a road: 6σ.
 const TURN_GATE: f64 = 36.0;
 
-/// What a refused yaw rate may have hidden: that the vehicle turned by this much faster or slower
-/// than before (rad/s, a standard deviation).
+/// Standard deviation of the change of the yaw rate that a rejected yaw rate may have hidden
+/// (rad/s).
 const REFUSED_RADPS: f64 = 0.5;
 
-/// How the yaw rate wanders while no sample tells of it: the density of a white angular acceleration
-/// (rad²/s³), by which it changes by 0.5 rad/s within half a second.
+/// Random walk of the yaw rate during lost samples: spectral density of a white angular
+/// acceleration (rad²/s³), a change of 0.5 rad/s within half a second.
 const UNTOLD_TURN: f64 = 0.5;
 
 impl Ekf {
-    /// Moves the state by one odometry sample.
+    /// Predicts the state with one odometry sample.
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
         if !sample.is_finite() {
             return OdometryVerdict::NotFinite;
@@ -70,7 +70,7 @@ impl Ekf {
         self.odometry = Some(*sample);
         self.detect_slip(&previous, sample, duration_s);
         let moved_m = sample.distance_m - previous.distance_m;
-        // A counter that was reset or overflowed says nothing of the distance: the speeds do.
+        // After a reset or overflow of the counter, the speeds determine the distance.
         let jumped = moved_m.abs() > self.config.top_speed_mps * duration_s + 0.1;
         let reading_m = if jumped {
             0.5 * (previous.speed_mps + sample.speed_mps) * duration_s
@@ -82,11 +82,11 @@ impl Ekf {
         let read_radps = sample.yaw_rate_radps;
         let credible = |rate: &f64| rate.abs() <= self.config.top_yaw_rate_radps;
         let refused = read_radps.filter(|rate| !credible(rate));
-        // The vehicle turns on as before, or by anything that a moment allows.
+        // The vehicle continues its turn, or changes it within physical limits.
         let rate = read_radps.filter(credible);
         let before = previous.yaw_rate_radps.filter(credible);
         let rate = rate.or(before.filter(|_| refused.is_some()));
-        // Where samples were lost, nothing tells of the turn until the last of them was due.
+        // If samples were lost, the turn is unknown until the last of them was due.
         let told_s = self.sample_interval.told_s(duration_s);
         let untold_s = duration_s - told_s;
         let mut told = reading;
@@ -102,7 +102,7 @@ impl Ekf {
             if refused.is_some() {
                 yaw.variance += (REFUSED_RADPS * told_s).powi(2);
             } else if self.turns_as_told() {
-                // When between two samples the rate changed nobody knows: evenly distributed.
+                // The time of the rate's change between two samples is uniformly distributed.
                 yaw.variance += change_rad * change_rad / 12.0;
             }
             yaw
@@ -130,8 +130,9 @@ impl Ekf {
         }
     }
 
-    /// Expects slip where the speed jumps as no vehicle can, which is a jump of the odometer's scale, or where the vehicle
-    /// sets off and may slip unseen. A differential drive's wheels may obey at once.
+    /// Models slip if the speed jumps beyond physical limits, as a jump of the odometer scale, or
+    /// if the vehicle starts to move and may slip without a jump. The wheels of a differential
+    /// drive may follow a command immediately.
     fn detect_slip(&mut self, previous: &OdometrySample, sample: &OdometrySample, duration_s: f64) {
         if self.config.drive != DriveKind::Road {
             return;
@@ -152,9 +153,10 @@ impl Ekf {
         });
     }
 
-    /// What is read, and what was driven of it by the speeds. A reading that is short by chance, or by the steps in
-    /// which wheels count, is no better for that: were its noise taken for less, the odometer would win
-    /// against the yaw rate wherever it reads too little, and lose wherever it reads too much.
+    /// Returns the measured distance, and the distance by the speeds. A measurement that is short
+    /// by chance, or by the increments of the wheel counter, is not more precise. With noise in
+    /// proportion to it, the odometer would be preferred to the yaw rate whenever it measures too
+    /// little.
     fn reading(&mut self, read_m: f64, driven_m: f64) -> Reading {
         self.unread_m += driven_m;
         if read_m == 0.0 {
@@ -169,7 +171,8 @@ impl Ekf {
         Reading { read_m, driven_m }
     }
 
-    /// By how much a bend that begins or ends here changes the speed: its inner side is the shorter.
+    /// Returns the change of the speed due to the start or end of a bend, whose inner side is
+    /// shorter.
     fn bend_mps(&self, speed_mps: f64, duration_s: f64) -> f64 {
         let Some(map) = &self.map else {
             return 0.0;
@@ -182,13 +185,13 @@ impl Ekf {
         (after - before).abs() * aside_m * speed_mps.abs()
     }
 
-    /// The odometer's scale may have changed by a share.
+    /// Adds the variance of a relative change of the odometer scale.
     fn slip(&mut self, by: f64) {
         let variance = &mut self.belief.covariance[SCALE][SCALE];
         *variance = variance.max((*variance + by * by).min(MOST_SLIP * MOST_SLIP));
     }
 
-    /// What the yaw rate says of a step.
+    /// Returns the yaw rate measurement of a step.
     fn yaw(&self, rate_radps: f64, reading_m: f64, duration_s: f64) -> Yaw {
         let config = &self.config;
         let turn_rad = rate_radps * duration_s;
@@ -202,8 +205,8 @@ impl Ekf {
         }
     }
 
-    /// What is to be made of a turn between two yaw rates whose samples were lost: the mean of both,
-    /// and a Brownian bridge about it.
+    /// Returns the heading change between two yaw rates with lost samples in between: the mean of
+    /// both, and a Brownian bridge.
     fn guessed_yaw(&self, from_radps: f64, to_radps: f64, duration_s: f64) -> Yaw {
         let change_rad = (to_radps - from_radps) * duration_s;
         let wander = UNTOLD_TURN * duration_s.powi(3);
@@ -216,7 +219,7 @@ impl Ekf {
         }
     }
 
-    /// Whether the yaw rate alone, if there is one, says how the vehicle turns.
+    /// Whether the yaw rate alone determines the heading.
     fn turns_as_told(&self) -> bool {
         self.config.drive == DriveKind::Differential || self.map.is_none()
     }
@@ -245,7 +248,7 @@ impl Ekf {
         self.update_off_map();
     }
 
-    /// The step that odometry tells of; a gyroscope's word on the present state is taken in.
+    /// Returns the step of an odometry sample, and updates the current state with the gyroscope.
     fn next_step(&mut self, reading: Reading, duration_s: f64, yaw: Option<Yaw>) -> Step {
         let read_m = reading.read_m;
         if self.config.drive == DriveKind::Differential {
@@ -259,7 +262,8 @@ impl Ekf {
             if read_m != 0.0 {
                 return Step::turning(&self.belief.mean, read_m, &yaw, &self.config.noise);
             }
-            // Steered wheels that stand do not turn: what is read is the bias.
+            // Steered wheels at standstill do not turn the vehicle: the measured yaw rate is the
+            // bias.
             let mut row = [0.0; STATES];
             row[YAW_RATE_BIAS] = yaw.duration_s;
             let expected = self.belief.mean[YAW_RATE_BIAS] * yaw.duration_s;
@@ -271,7 +275,7 @@ impl Ekf {
             return step;
         };
         let (residual, row, mut variance) = step.turn_seen(&self.belief.mean, &yaw);
-        // What hardly can be counts as much as keeps it at the gate (Huber).
+        // The weight of an improbable measurement is reduced to that at the gate (Huber).
         let surprise = self.belief.innovation(residual, &row, variance);
         if surprise.mahalanobis2() > TURN_GATE {
             variance += residual * residual / TURN_GATE - surprise.variance;
@@ -281,7 +285,7 @@ impl Ekf {
             .informed(&self.belief.mean, &yaw)
     }
 
-    /// The step that is to be expected over what the odometer would read.
+    /// Returns the expected step for an odometer measurement.
     pub(super) fn step(&self, belief: &Belief, reading: &Reading) -> Step {
         let (mean, config, read_m) = (&belief.mean, &self.config, reading.read_m);
         if config.drive == DriveKind::Differential {
@@ -322,9 +326,9 @@ impl Ekf {
         }
     }
 
-    /// Expects slip from now on: by so much at once, anew whenever the vehicle sets off, when nothing
-    /// tells it from the speed, with every jump of the speed that is more than it accelerates, and with every
-    /// metre of a differential drive, whose speed may jump.
+    /// Models slip from now on: a change of the scale at once and whenever the vehicle starts to
+    /// move (if the speed does not reveal it), with every jump of the speed beyond its
+    /// acceleration, and with every metre of a differential drive, whose speed may jump.
     pub(in crate::localize) fn expect_slip(&mut self, by: f64) {
         let config = &mut self.config;
         config.may_slip = true;

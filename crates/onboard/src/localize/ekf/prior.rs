@@ -1,4 +1,4 @@
-//! What the filter believes before any measurement.
+//! Prior of the filter.
 
 use std::sync::Arc;
 
@@ -15,12 +15,12 @@ use crate::localize::output::InitialPose;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
 
-/// An exact start is known to a micrometre and a microradian: what is taken as exact leaves a variance
-/// of rounding, of either sign.
+/// Minimum variance of an exact start, of a micrometre and a microradian: with zero, rounding
+/// errors of either sign would remain.
 const LEAST_VARIANCE: f64 = 1e-12;
 
 impl Ekf {
-    /// The belief before any measurement.
+    /// Returns the prior of the state.
     pub fn prior(config: &EkfConfig, map: Option<&Road>, start: &InitialPose) -> Belief {
         let mut sigma = [0.0; STATES];
         sigma[SCALE] = config.odometer_scale_std;
@@ -52,7 +52,7 @@ impl Ekf {
         });
         sigma[ALONG] = start.position_std_m;
         let Some(map) = lane else {
-            // No lane to keep to: what is given is all there is.
+            // Without a lane, only the given pose determines the prior.
             for (state, value) in [ALONG, ACROSS, HEADING].into_iter().zip(given) {
                 mean[state] = value;
             }
@@ -69,8 +69,8 @@ impl Ekf {
         sigma[ACROSS] = offset_variance.sqrt();
         sigma[HEADING] = heading_variance.sqrt();
         let mut belief = Belief::independent(mean, sigma);
-        // The given pose is a measurement beside what lane keeping already says. Where the road
-        // bends, the heading tells of the place along it.
+        // The given pose is a measurement in addition to the lane keeping. In a bend, the heading
+        // also determines the position along the road.
         let curvature_per_m = map.curvature_per_m(along_m);
         for (state, value, std, by_along) in [
             (ACROSS, lateral_m, start.position_std_m, 0.0),
@@ -85,14 +85,14 @@ impl Ekf {
         belief
     }
 
-    /// Counts distances on from where another filter of the same vehicle does, which knows its angles.
+    /// Continues the distance of another filter of the same vehicle, and its memory of the angles.
     pub(in crate::localize) fn resume(&mut self, other: &Self) {
         self.odometry = other.odometry;
         self.driven_m = other.driven_m;
         self.hear_as(other);
     }
 
-    /// Knows of what stays of the angles' errors what another filter of the same receiver does.
+    /// Sets the white fraction of the angles' noise to that of another filter of the same receiver.
     pub(in crate::localize) const fn hear_as(&mut self, other: &Self) {
         self.white = other.white;
     }
@@ -117,7 +117,7 @@ impl Ekf {
         self.bias = CorrelatedBias::new(self.heads.len(), probability);
     }
 
-    /// Takes nothing of the array as exact that is not stated.
+    /// Removes the assumption of exactness from unspecified constants of the array.
     pub(in crate::localize) fn uncalibrate_array(&mut self) {
         let config = &mut self.config;
         let stds_rad = std::mem::take(&mut config.unstated_array_std_rad);
@@ -133,7 +133,7 @@ impl Ekf {
         }
     }
 
-    /// The site plan may be off as a whole, by `std_m` in x and y.
+    /// Adds a displacement of the whole site plan with a standard deviation of `std_m` in x and y.
     pub(in crate::localize) fn displace_site(&mut self, std_m: f64) {
         for state in DATUM {
             self.belief.covariance[state][state] += std_m * std_m;
@@ -141,15 +141,16 @@ impl Ekf {
         self.config.datum_std_m = self.config.datum_std_m.hypot(std_m);
     }
 
-    /// The odometer is so many times as noisy.
+    /// Multiplies the odometer noise.
     pub(in crate::localize) fn scale_odometer_noise(&mut self, times: f64) {
         let noise = &mut self.config.noise;
         noise.odometer_m_per_sqrt_m *= times;
         noise.odometer_m_per_sqrt_s *= times;
     }
 
-    /// A filter of this configuration begun anew where this one is, every source in use, its place known to
-    /// `position_std_m` and its heading by the road alone, or to 0.3 rad where no map tells how the road lies.
+    /// Returns a filter with this configuration that restarts at the current position, with every
+    /// source, a position standard deviation of `position_std_m`, and the heading of the road, or a
+    /// standard deviation of 0.3 rad without a map.
     pub(in crate::localize) fn restarted(&self, config: &EkfConfig, position_std_m: f64) -> Self {
         let along_m = self.belief.mean[ALONG];
         let surveyed = |map: &&Arc<Road>| map.gap_between(along_m, along_m).is_none();
@@ -165,7 +166,7 @@ impl Ekf {
         };
         let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
         let mut restarted = Self::new(*config, self.map.clone(), &heads, &start);
-        // Where the road crosses itself its nearest place may be another one.
+        // Where the road crosses itself, the nearest point may be on the wrong branch.
         if self.map.is_some() {
             restarted.belief.mean[ALONG] = along_m;
         }

@@ -1,4 +1,4 @@
-//! The measurement update: an angle's prediction and innovation, its gate, and the corrected belief.
+//! Measurement update: prediction, innovation, gate, and updated state.
 
 use super::angle_model::{AngleModel, locate};
 use super::config::PhaseBias;
@@ -13,23 +13,23 @@ use crate::localize::output::{UpdateReason, UpdateVerdict};
 use crate::observation::{AngleMeasurement, MeasurementKind};
 use crate::radio_head::RadioHead;
 
-/// Most that angles can be later than stated (s).
+/// Maximum estimated time offset of the angles (s).
 const MOST_LATENESS_S: f64 = 0.5;
 
-/// Probability that an angle which its estimator does not vouch for is wrong: as likely as not.
+/// Probability that an angle is wrong if its estimator does not consider it resolved.
 const WRONG_IF_UNRESOLVED: f64 = 0.5;
 
-/// An angle is Gaussian with its stated deviation or, with the probability `wrong`, anything. The
-/// belief after it is a mixture of the belief updated and the belief as it was (probabilistic data
-/// association, Bar-Shalom and Tse 1975). This is the Gaussian measurement, residual and variance,
-/// that gives the belief the mixture's mean and variance. `None` where the mixture is wider than the
-/// belief was: such an angle says nothing.
+/// Returns the Gaussian measurement, residual and variance, that is equivalent to an angle which is
+/// Gaussian or, with the probability `wrong`, arbitrary. The posterior is a mixture of the updated
+/// and the unchanged state (probabilistic data association, Bar-Shalom and Tse 1975); the returned
+/// measurement yields its mean and variance. `None` if the mixture is wider than the prior, because
+/// the angle then contains no information.
 fn equivalent(innovation: &Innovation, wrong: f64) -> Option<(f64, f64)> {
     let (residual, total) = (innovation.residual, innovation.variance);
     let density = innovation.density();
     let holds = (1.0 - wrong) * density / with_outliers(density, wrong);
-    // With the gain K = P Hᵀ/S the mixture has the mean p K r and the covariance
-    // P − p (S − (1 − p) r²) K Kᵀ, p being the probability that the angle holds.
+    // With the gain K = P Hᵀ/S the mixture has the mean p K r and the covariance P − p (S − (1 − p)
+    // r²) K Kᵀ, where p is the probability that the angle is correct.
     let narrowing = holds * (total - (1.0 - holds) * residual * residual);
     let equivalent_total = total * total / narrowing;
     let belief = total - innovation.measurement_variance;
@@ -41,32 +41,34 @@ fn equivalent(innovation: &Innovation, wrong: f64) -> Option<(f64, f64)> {
     })
 }
 
-/// An angle's prediction and innovation.
+/// Prediction and innovation of an angle.
 pub(in crate::localize) struct PredictedMeasurement {
     pub head: usize,
     pub excluded: bool,
     pub place_m: f64,
     pub row: [f64; STATES],
-    /// Without the time-correlated bias, where that is estimated.
+    /// Innovation without the time-correlated bias, if that is estimated.
     pub innovation: Innovation,
-    /// Variance of the angle by its own noise (rad²).
+    /// Variance of the angle's own noise (rad²).
     pub own_variance: f64,
     /// See [`AngleModel`].
     pub aperture: f64,
     pub toward: f64,
     pub survey_variance: f64,
-    /// Time, way and turn since the radio head's last update (s, m, rad).
+    /// Time, distance and heading change since the previous update with the radio head (s, m, rad).
     pub elapsed_s: f64,
     pub moved: (f64, f64),
-    /// Variance by the odometry since its newest sample, and by the bend of the prediction (rad²).
+    /// Variance due to odometry since its newest sample, and due to second-order terms of the
+    /// prediction (rad²).
     pub coasted_variance: f64,
     pub bend_variance: f64,
-    /// How the time-correlated bias may have come about, where it is estimated and the radio head is used.
+    /// Hypotheses for the time-correlated bias, if it is estimated and the radio head is used.
     pub hypotheses: Option<JumpHypotheses>,
 }
 
 impl PredictedMeasurement {
-    /// Share of it that is independent of the last one, where a time-correlated bias is estimated.
+    /// Returns the fraction that is independent of the previous angle, if a time-correlated bias is
+    /// estimated.
     pub fn independent_share(&self) -> f64 {
         bias::independent(self.moved.0.abs())
     }
@@ -95,7 +97,7 @@ impl Ekf {
             .find(|(_, mine)| mine.is(head))
             .ok_or(UpdateReason::UnknownRadioHead)?;
         let (ahead_m, ahead_variance) = self.coasting(measured.time_s);
-        // From the newest odometry to the angle the vehicle has strayed on in its lane.
+        // Between the newest odometry and the angle, the vehicle moves laterally within its lane.
         let ahead = (ahead_m != 0.0)
             .then(|| Reading::exact(ahead_m * (1.0 + self.belief.mean[SCALE])))
             .map(|reading| self.step(&self.belief, &reading));
@@ -146,15 +148,15 @@ impl Ekf {
         })
     }
 
-    /// Variance of an angle's noise, had the radio head not been heard before (rad²).
+    /// Returns the variance of an angle's noise for a first angle of the radio head (rad²).
     pub(in crate::localize) fn first_variance(&self, predicted: &PredictedMeasurement) -> f64 {
         let config = &self.config;
         let scatter = config.scatter_variance(f64::INFINITY, predicted.aperture, predicted.toward);
         predicted.own_variance + scatter
     }
 
-    /// Variance of an angle's systematic errors: surveys, stated bias, odometry since its newest sample, second order
-    /// (rad²).
+    /// Returns the variance of an angle's systematic errors: surveys, specified correlated noise,
+    /// odometry since its newest sample, second-order terms (rad²).
     pub(in crate::localize) fn systematic_variance(&self, predicted: &PredictedMeasurement) -> f64 {
         let bias = self.config.phase_bias.std_rad;
         predicted.survey_variance
@@ -163,7 +165,7 @@ impl Ekf {
             + predicted.bend_variance
     }
 
-    /// A radio head as it is seen from a state, or rather was seen when the angle was received.
+    /// Returns the model of a radio head for a state, at the reception time of the angle.
     fn angle_model(
         &self,
         kind: MeasurementKind,
@@ -206,7 +208,7 @@ impl Ekf {
         self.update_predicted(self.predict_measurement(head, measured), measured)
     }
 
-    /// Corrects the state by an angle that was just predicted.
+    /// Updates the state with a predicted angle.
     #[inline]
     pub(in crate::localize) fn update_predicted(
         &mut self,
@@ -242,14 +244,15 @@ impl Ekf {
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
     }
 
-    /// Corrects state and biases by an angle. One that is far off is called an outlier; of a radio head known as off that is no news of the vehicle.
+    /// Updates state and biases with an angle. A large deviation is an outlier; that of a radio
+    /// head with a known large bias contains no information about the vehicle.
     fn update_with_bias(
         &mut self,
         predicted: &PredictedMeasurement,
         hypotheses: &JumpHypotheses,
         measured: &AngleMeasurement,
     ) -> UpdateVerdict {
-        // Gated with the largest bias variance added.
+        // Gated with the maximum bias variance added.
         let mut seen = predicted.innovation;
         seen.variance += MOST_VARIANCE;
         let mahalanobis2 = seen.mahalanobis2();
@@ -271,7 +274,7 @@ impl Ekf {
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
     }
 
-    /// What stays of the errors of angles, as far as is known.
+    /// Returns the time-correlated noise of the angles with its estimated fraction.
     pub(super) fn phase_bias(&self) -> PhaseBias {
         let mut bias = self.config.phase_bias;
         if bias.is_found {
@@ -280,7 +283,8 @@ impl Ekf {
         bias
     }
 
-    /// Learns what of a radio head's angles stays; `before` is the state that the angle has corrected.
+    /// Learns the time-correlated fraction of a radio head's noise; `before` is the state before
+    /// the update.
     fn learn_what_stays(&mut self, predicted: &PredictedMeasurement, before: &[f64; STATES]) {
         let stated = self.config.phase_bias;
         let Some(head) = self.heads.get_mut(predicted.head) else {
@@ -305,7 +309,8 @@ impl Ekf {
         head.last_residual = Some(residual);
     }
 
-    /// Remembers when and where a radio head was used, and learns from its angle, which has corrected the state `before`.
+    /// Records the time and position of an update with a radio head, and learns from its angle,
+    /// which has updated the state `before`.
     fn note_update(
         &mut self,
         predicted: &PredictedMeasurement,
@@ -322,7 +327,7 @@ impl Ekf {
         }
     }
 
-    /// Clamps scale and lateness to what is plausible, however well more would explain the angles.
+    /// Limits scale and time offset to plausible values, whatever the angles indicate.
     fn keep_bounds(&mut self) {
         let mean = &mut self.belief.mean;
         let scale = self.config.odometer_scale;
@@ -353,7 +358,8 @@ mod tests {
         let normal =
             |x: f64, variance: f64| (-0.5 * x * x / variance).exp() / (TAU * variance).sqrt();
         for measured in [0.0, 0.6, 1.1, -1.4] {
-            // Bayes by the sum over the state: right, or anywhere on the circle.
+            // Bayes' rule by numerical integration over the state: correct, or anywhere on the
+            // circle.
             let mut moments = [0.0; 3];
             for step in -60_000..60_000 {
                 let x = 1e-4 * f64::from(step);

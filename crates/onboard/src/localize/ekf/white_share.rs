@@ -1,39 +1,41 @@
-//! How much of the stated variance of angles is new at every angle, by what successive ones of a radio head differ by.
+//! White fraction of the angles' noise, from the differences of successive angles of a radio head.
 
 use crate::geometry::wrap_angle;
 
-/// Differences that what is believed before any is worth.
+/// Number of differences that the prior counts as.
 const PRIOR_PAIRS: u32 = 16;
 
-/// Weight of the newest difference, at least: what angles are like is kept for some minutes. It is of all radio heads, as it is
-/// their receiver's, and by a single one's differences it would take as many times longer.
+/// Minimum weight of the newest difference: the estimate is kept for some minutes. It is common to
+/// all radio heads, because it belongs to their receiver; the differences of a single one would
+/// take as many times longer.
 const LEAST_WEIGHT: f64 = 1.0 / 2048.0;
 
-/// Squared deviations beyond which a difference is no noise, and the mean square that is left of a normal
-/// distribution cut there, `1 − 2cφ(c)/erf(c/√2)`.
+/// Maximum squared deviation of a difference, and the mean square of a normal distribution
+/// truncated there, `1 − 2cφ(c)/erf(c/√2)`.
 const MOST: f64 = 9.0;
 const OF_MOST: f64 = 0.973_345;
 
-/// Half the mean squared difference of successive angles over their stated variance (von Neumann 1941). What stays from
-/// the one to the next, an error as well as where the vehicle is believed to be, is not in it. `NoiseRatio` of the bank
-/// asks the other question, by filters that lack the radio head and counting tails: by how much angles are noisier than stated.
+/// Half the mean squared difference of successive angles divided by their specified variance (von
+/// Neumann 1941). Constant errors, of the angles or of the position, do not contribute. In
+/// contrast, the bank's `NoiseRatio` estimates the total noise relative to the specified one, with
+/// filters that do not use the radio head, including tails.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct WhiteShare {
     share: f64,
     pairs: u32,
 }
 
-/// What an angle is off by where the vehicle is then believed to be.
+/// Residual of an angle relative to the updated state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Residual {
     /// The residual (rad).
     pub residual_rad: f64,
-    /// The stated variance of the angle (rad²).
+    /// Specified variance of the angle (rad²).
     pub variance: f64,
 }
 
 impl WhiteShare {
-    /// Where so much of the variance stays as far as is known.
+    /// Creates the estimate with a prior of the time-correlated fraction.
     pub const fn new(stays: f64) -> Self {
         Self {
             share: 1.0 - stays,
@@ -41,13 +43,13 @@ impl WhiteShare {
         }
     }
 
-    /// The share that may stay, which is no more than `most`.
+    /// Returns the time-correlated fraction, limited to `most`.
     pub const fn stays(&self, most: f64) -> f64 {
         (1.0 - self.share).clamp(0.0, most)
     }
 
-    /// Takes in two angles of a radio head, between which what stays has stayed: the former as it was off after its update,
-    /// the latter before its own.
+    /// Adds two angles of a radio head, between which the time-correlated error is constant: the
+    /// residual of the first after its update, that of the second before its update.
     pub fn see(&mut self, last: &Residual, now: &Residual) {
         let difference_rad = wrap_angle(now.residual_rad - last.residual_rad);
         let square = difference_rad * difference_rad / (last.variance + now.variance);
@@ -70,7 +72,8 @@ mod tests {
 
     const STD_RAD: f64 = 0.05;
 
-    /// What is found of angles of which such a share is kept by `kept` from each to the next, and some are outliers.
+    /// Estimates the fraction for angles with a time-correlated `share` that is retained by the
+    /// factor `kept` between angles, and a fraction of outliers.
     fn found(share: f64, kept: f64, outliers: f64) -> WhiteShare {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let (mut white, mut last) = (WhiteShare::new(0.25), None);
@@ -93,9 +96,10 @@ mod tests {
         white
     }
 
-    /// The mean square of 2000 differences scatters by √(3/2000), of which three times are allowed; the cut takes less off
-    /// small ones than is made up for, the prior is worth 16, and of both sides of an outlier, which is anywhere within 3 rad, some
-    /// lie within the cut, of a third of its square.
+    /// The mean square of 2000 differences has a standard deviation of √(3/2000), of which three
+    /// are allowed. The truncation is not fully compensated for small differences, and the prior
+    /// counts as 16. Outliers are uniformly distributed within 3 rad; some of their
+    /// differences are within the limit, with a third of its square.
     #[test]
     fn what_does_not_stay_is_found() {
         let within_cut = (2.0 * MOST).sqrt() * STD_RAD / 3.0;
@@ -104,7 +108,8 @@ mod tests {
                 let (white, expected) = (found(share, kept, outliers).share, 1.0 - share * kept);
                 let scatter = 3.0 * (3.0 / 2000f64).sqrt() * expected;
                 let by_prior = f64::from(PRIOR_PAIRS) / 2000.0 * (0.75 - expected).abs();
-                // So many, of squares even in their root: a mean of a third of the cut, and a mean square of a fifth of its own.
+                // Their number has a standard deviation of its square root: a mean of a third of
+                // the limit, and a mean square of a fifth of its square.
                 let within = 2.0 * outliers * within_cut * 2000.0;
                 let by_outliers = (within / 3.0 + 3.0 * (within / 5.0).sqrt()) * MOST / 2000.0;
                 let most = scatter + (1.0 - OF_MOST) * expected + by_prior + by_outliers;

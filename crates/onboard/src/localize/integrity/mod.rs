@@ -1,4 +1,4 @@
-//! How far the estimate can be trusted.
+//! Protection level and integrity state.
 
 mod monitor;
 mod protection_level;

@@ -1,11 +1,12 @@
-//! Integrity monitoring of a bank of filters: protection level and state, recovery where a fault cannot be identified,
-//! and the handover between solutions.
+//! Integrity monitoring of a bank of filters: protection level and state, recovery from
+//! unidentified faults, and the handover between solutions.
 //!
-//! Under each hypothesis of the [`Bank`] one of its filters is right within its own covariance, wherever the reported
-//! solution may be: the protection level is the radius about that which holds for all of them together
-//! ([`LevelEquation`]), of angles as noisy as they are heard to be. With a single radio head it is what odometry and
-//! road can vouch for, grows with the distance driven, and passes the alert limit unless they are good. The states are
-//! those of `docs/integrity.md`.
+//! Under each hypothesis of the [`Bank`], one of its filters is correct within its own covariance,
+//! whatever the reported solution is. The protection level is the radius around the reported
+//! position that holds for all hypotheses together ([`LevelEquation`]), with the measured noise of
+//! the angles. With a single radio head it is determined by odometry and road, grows with the
+//! distance driven, and exceeds the alert limit unless they are precise. `docs/integrity.md`
+//! defines the states.
 
 use std::cell::RefCell;
 
@@ -22,12 +23,12 @@ use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::settings::IntegritySettings;
 
-/// Share of the risk that is not worth the effort.
+/// Fraction of the risk below which a hypothesis is neglected.
 const NEGLIGIBLE: f64 = 0.1;
 
-/// The previous solution, relative to the one that is reported since. Where a radio head is excluded, another mode leads
-/// or a restarted bank takes over, the position may be another at one angle; as long as that may be taken back, the
-/// covariance covers both. Both move on alike.
+/// Previous solution relative to the reported one. When a radio head is excluded, another mode is
+/// selected or a restarted bank takes over, the position may change at a single angle. While this
+/// change may be reverted, the covariance covers both solutions, which move in parallel.
 #[derive(Clone, Copy, Debug)]
 struct Handover {
     since_s: f64,
@@ -36,7 +37,7 @@ struct Handover {
 }
 
 impl Handover {
-    /// Another solution reports `now`, where the previous one reported `before`; `None` where the two agree.
+    /// Creates the handover from `before` to `now`; `None` if both agree.
     pub fn new(before: &PoseEstimate, now: &PoseEstimate) -> Option<Self> {
         let covariance = before.covariance?;
         let [[xx, xy, _], [_, yy, _], _] = covariance;
@@ -52,7 +53,7 @@ impl Handover {
         })
     }
 
-    /// Where the previous solution would be now; `None` after so long (s).
+    /// Returns the current pose of the previous solution; `None` after `patience_s`.
     pub fn beside(&self, told: &PoseEstimate, patience_s: f64) -> Option<PoseEstimate> {
         let [x_m, y_m, heading_rad] = self.apart;
         (told.time_s - self.since_s <= patience_s).then_some(PoseEstimate {
@@ -68,31 +69,32 @@ impl Handover {
 }
 
 clone_in_place! {
-    /// A bank and what became of it.
+    /// Bank of filters and its monitoring.
     #[derive(Debug)]
     pub struct IntegrityMonitor {
         settings: IntegritySettings,
         level: LevelEquation,
-        /// Those of the newest level: room that is kept.
+        /// Hypotheses of the newest level; the memory is reused.
         hypotheses: RefCell<Vec<Hypothesis>>,
         bank: Bank,
         restarted: Option<Restarted>,
-        /// The previous solution.
+        /// Previous solution.
         handover: Option<Handover>,
-        /// Whether it was found by a search, and no restarted bank has confirmed it yet.
+        /// Whether the solution was found by a search, and no restarted bank has confirmed it yet.
         is_found: bool,
-        /// Distance driven (m) when no fault was unidentified last.
+        /// Distance driven (m) at the last time without an unidentified fault.
         trusted_m: f64,
-        /// When its filters began anew last (s).
+        /// Time of the last restart of its filters (s).
         begun_s: f64,
-        /// Whether the odometer's scale was certainly not what is stated, and has not been found to be since.
+        /// Whether the odometer scale certainly contradicted its specification, and has not been
+        /// estimated since.
         has_departed: bool,
         now_s: f64,
     }
 }
 
 clone_in_place! {
-    /// A bank begun anew from a vague pose.
+    /// Bank that restarted from an uncertain pose.
     #[derive(Debug)]
     struct Restarted {
         bank: Bank,
@@ -101,7 +103,8 @@ clone_in_place! {
 }
 
 impl IntegrityMonitor {
-    /// Monitors a filter of these radio heads. One that was found by a search, and not given, is to be confirmed.
+    /// Creates the monitor of a filter of these radio heads. A filter from a search, in contrast to
+    /// a given one, must be confirmed.
     pub fn new(
         ekf: &Ekf,
         heads: &[RadioHead],
@@ -125,13 +128,13 @@ impl IntegrityMonitor {
         }
     }
 
-    /// The leading filter.
+    /// Returns the selected filter.
     pub fn ekf(&self) -> &Ekf {
         self.bank.leader()
     }
 
-    /// The filter by whose uncertainty to listen: where the level is beyond the alert limit, that of the
-    /// hypothesis which contributes most to it; else the leading one.
+    /// Returns the filter that determines the wake-ups: if the level exceeds the alert limit, that
+    /// of the hypothesis with the largest contribution; otherwise the selected one.
     pub fn worst_case(&self) -> &Ekf {
         let (bank, now_s) = (&self.bank, self.ekf().time_s());
         if self.is_near(bank, now_s) {
@@ -146,17 +149,17 @@ impl IntegrityMonitor {
             .map_or(bank.leader(), |(_, clean)| clean)
     }
 
-    /// When a restarted bank took over last (s).
+    /// Returns the time at which a restarted bank last took over (s).
     pub const fn begun_s(&self) -> f64 {
         self.begun_s
     }
 
-    /// The bank that is reported.
+    /// Returns the reported bank.
     pub(in crate::localize) const fn bank(&self) -> &Bank {
         &self.bank
     }
 
-    /// Moves every filter.
+    /// Predicts every filter.
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
         if let Some(restarted) = &mut self.restarted {
             restarted.bank.odometry(sample);
@@ -164,7 +167,8 @@ impl IntegrityMonitor {
         self.bank.odometry(sample)
     }
 
-    /// Takes in an angle: a test of its radio head, and information for every filter that uses it.
+    /// Updates with an angle: the test of its radio head, and every filter that uses the radio
+    /// head.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         self.now_s = self.now_s.max(measured.time_s);
         let odometry_s = self.ekf().time_s();
@@ -187,22 +191,24 @@ impl IntegrityMonitor {
         verdict
     }
 
-    /// By what another solution is known: mode, number of radio heads excluded, restart.
+    /// Returns the identity of the solution: mode, number of excluded radio heads, restart.
     fn solution_id(&self) -> (Option<ModeId>, usize, f64) {
         (self.bank.leading_id(), self.bank.faulty(), self.begun_s)
     }
 
-    /// Keeps a departed odometer scale in mind until a filter knows the scale: a restarted filter does not yet.
+    /// Remembers a contradiction of the odometer scale until a filter has estimated the scale,
+    /// which a restarted filter has not.
     fn hold_departure(&mut self) {
         let main = self.bank.nominal();
         self.has_departed =
             main.odometer_departs() || (self.has_departed && !main.knows_odometer());
     }
 
-    /// Where a fault cannot be identified, the filters may have diverged, so far that
-    /// they refuse the good angles as outliers. Another bank then begins from a pose as vague as what may
-    /// have happened meanwhile, and takes over once no test contradicts it. Until then, or until
-    /// the old one has no doubts any more, nothing is `ok`. What a search found by angles that may have
+    /// If a fault is not identified, the filters may diverge so far that they reject correct angles
+    /// as outliers. A second bank then starts from a pose with the uncertainty of the elapsed
+    /// distance, and takes over once no test contradicts it. Until then, or until the first bank is
+    /// free of contradictions, the state is not `ok`. The result of a search with possibly faulty
+    /// angles is confirmed in the same way.
     /// been at fault is confirmed the same way.
     fn recover(&mut self) {
         let (now_s, patience_s) = (self.now_s, RECOVERY_S);
@@ -239,7 +245,7 @@ impl IntegrityMonitor {
         });
     }
 
-    /// The pose at `time_s`.
+    /// Returns the pose at `time_s`.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
         let mut pose = self.bank.leader().pose(time_s);
         let mixture = self.bank.mixture();
@@ -256,7 +262,7 @@ impl IntegrityMonitor {
         pose
     }
 
-    /// Protection level and state at `time_s`.
+    /// Returns protection level and state at `time_s`.
     pub fn integrity(&self, time_s: f64) -> Integrity {
         let mut hypotheses = self.hypotheses.borrow_mut();
         hypotheses.clear();
@@ -282,13 +288,14 @@ impl IntegrityMonitor {
         }
     }
 
-    /// Whether the error is within the alert limit but for the risk.
+    /// Whether the error is within the alert limit with the required probability.
     fn is_near(&self, bank: &Bank, time_s: f64) -> bool {
         let hypotheses = self.hypotheses_of(bank, time_s).map(|(_, it)| it);
         self.level.holds(self.settings.alert_limit_m, hypotheses)
     }
 
-    /// The hypotheses that are not negligible, each with the filter that is right under it.
+    /// Returns the hypotheses that are not negligible, each with the filter that is correct under
+    /// it.
     fn hypotheses_of<'a>(
         &self,
         bank: &'a Bank,
@@ -315,12 +322,13 @@ mod tests {
     use super::*;
     use crate::localize::modes::trip::{angle, trip_with_bias};
 
-    /// Deviations by which a position may be another one at one angle.
+    /// Maximum change of the position at one angle, in standard deviations.
     const MOST_DEVIATIONS: f64 = 5.0;
 
     #[test]
     fn whoever_takes_over_covers_who_told_the_position_before() {
-        // The odometer reads half as much again, and a radio head is hidden later: neither explains the other.
+        // The odometer measures 1.5 times the distance, and a radio head is blocked later: neither
+        // explains the other.
         const READS: f64 = 1.5;
         const HIDDEN_S: f64 = 8.0;
         const OFF_RAD: f64 = -0.6;
@@ -352,7 +360,7 @@ mod tests {
             }
         }
         assert!(farthest_m > 5.0, "{farthest_m}");
-        // Not for ever.
+        // The handover ends eventually.
         let std_m = last.principal_variances()[0].sqrt();
         assert!(std_m < 0.5 * farthest_m, "{std_m} m");
     }

@@ -1,33 +1,35 @@
-//! Protection levels: how far from the estimate the vehicle may be, but for the risk that is allowed.
+//! Protection levels: the distance that the error exceeds with a given risk.
 //!
 //! Solution separation as in ARAIM (Blanch, Walter, Enge, Lee, Pervan, Rippl, Spletter and Kropp,
 //! IEEE Transactions on Aerospace and Electronic Systems 51, 2015): the level r solves
-//! `Σₖ pₖ P(error > r | k) = risk` over the hypotheses k, nothing at fault (p = 1) and each fault at
-//! its probability. Under k the estimate of the filter that k does not touch is right within its own
-//! covariance; the separation of the two estimates is taken as it is, not as its threshold.
+//! `Σₖ pₖ P(error > r | k) = risk` over the hypotheses k, the fault-free one (p = 1) and each fault
+//! with its probability. Under k, the estimate of the filter that k does not affect is correct
+//! within its own covariance. The actual separation of the two estimates is used, not its
+//! threshold.
 
 use std::f64::consts::{LN_2, LOG2_E, TAU};
 
 use crate::gaussian::principal_variances;
 use crate::localize::output::PoseEstimate;
 
-/// Directions over which a probability is summed.
+/// Number of directions of the quadrature.
 const DIRECTIONS: usize = 32;
 
-/// Share of the squared level to which it is found; it is rounded up.
+/// Relative accuracy of the squared level, which is rounded up.
 const ACCURACY: f64 = 4e-3;
 
-/// Share of the risk below which an upper limit of what a hypothesis adds to it will do.
+/// Fraction of the risk below which an upper bound of a hypothesis' contribution is sufficient.
 const NEGLIGIBLE: f64 = 1e-3;
 
-/// Least logarithm of a probability over the risk: further out it is no straight line to aim along.
+/// Minimum logarithm of probability over risk: below it, the logarithm is not linear in the squared
+/// level.
 const LEAST_EXCESS: f64 = -30.0;
 
-/// Where the vehicle is if something is at fault, as seen from the estimate: a Gaussian.
+/// Position of the vehicle relative to the estimate under a fault: a Gaussian.
 #[derive(Clone, Copy, Debug)]
 pub struct Hypothesis {
     probability: f64,
-    /// Ahead of the estimate and to its left (m).
+    /// Mean ahead of the estimate and to its left (m).
     separation_m: [f64; 2],
     /// Lower triangular square root of the covariance along these axes (m).
     root_m: [f64; 3],
@@ -36,8 +38,8 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
-    /// That `right` is right within `variance_ratio` times its covariance, and not `told`; `None` where
-    /// it does not know its own error.
+    /// Creates the hypothesis that `right` is correct within `variance_ratio` times its covariance,
+    /// instead of `told`; `None` if `right` has no covariance.
     pub fn new(
         probability: f64,
         right: &PoseEstimate,
@@ -69,18 +71,19 @@ impl Hypothesis {
         self.separation_m[0].hypot(self.separation_m[1])
     }
 
-    /// Probability that the vehicle is further ahead or behind than `level_m`.
+    /// Returns the probability that the error along the heading exceeds `level_m`.
     fn beyond_along(&self, level_m: f64) -> f64 {
         beyond_line(self.separation_m[0], self.root_m[0], level_m)
     }
 
-    /// Probability that it is further to a side.
+    /// Returns the probability that the error across the heading exceeds `level_m`.
     fn beyond_across(&self, level_m: f64) -> f64 {
         let std_m = self.root_m[1].hypot(self.root_m[2]);
         beyond_line(self.separation_m[1], std_m, level_m)
     }
 
-    /// Upper limit of the probability that it is further away, `exp(−((r − d)/σ)²/2)`: as if it were round.
+    /// Returns an upper bound of the probability that the error exceeds the radius,
+    /// `exp(−((r − d)/σ)²/2)`: that of a circular distribution.
     fn most_beyond_circle(&self, radius_m: f64) -> f64 {
         let room_m = radius_m - self.distance_m();
         if room_m <= 0.0 {
@@ -89,11 +92,12 @@ impl Hypothesis {
         exp_of_negative(-0.5 * (room_m / self.std_m).powi(2))
     }
 
-    /// Probability that it is further away; where that is at most negligible, an upper limit.
+    /// Returns the probability that the error exceeds the radius; an upper bound if it is at most
+    /// `negligible`.
     ///
-    /// In polar coordinates about the mean, in which the Gaussian is round, the ray in direction t
-    /// leaves the circle at ρ(t), and beyond lies `exp(−ρ²/2)` of what the ray has:
-    /// `1/2π ∫ exp(−ρ(t)²/2) dt`.
+    /// In polar coordinates around the mean, scaled so that the Gaussian is circular, the ray in
+    /// direction t leaves the circle at ρ(t), and the fraction `exp(−ρ²/2)` of the ray's
+    /// probability is beyond: `1/2π ∫ exp(−ρ(t)²/2) dt`.
     fn beyond_circle(
         &self,
         directions: &[[f64; DIRECTIONS]; 2],
@@ -111,7 +115,7 @@ impl Hypothesis {
         }
         let [cosines, sines] = directions;
         let mut beyond = [0.0; DIRECTIONS];
-        // A loop without a branch is done in vectors.
+        // A loop without branches is vectorised.
         for ((beyond, cos), sin) in beyond.iter_mut().zip(cosines).zip(sines) {
             let ray = [first * cos, shared * cos + own * sin];
             let along = x * ray[0] + y * ray[1];
@@ -124,14 +128,15 @@ impl Hypothesis {
     }
 }
 
-/// `exp(x)` of x ≤ 0, to 2 parts in 10⁷, which moves no level. By the library's, which is no vector's, levels took half of
-/// what the whole pipeline does. `2ⁿ exp(r)` for whole n and |r| ≤ ½ ln 2 (Muller, Elementary Functions, 2016, chapter 11),
-/// of r the Taylor polynomial.
+/// Returns `exp(x)` for x ≤ 0 with a relative error of 2 · 10⁻⁷, which does not affect the level.
+/// The library function is not vectorised and took half of the pipeline's time. `2ⁿ exp(r)` for
+/// integer n and |r| ≤ ½ ln 2 (Muller, Elementary Functions, 2016, chapter 11), with the Taylor
+/// polynomial of exp(r).
 #[inline]
 fn exp_of_negative(x: f64) -> f64 {
-    /// 1.5 · 2⁵²: added to a number it leaves that rounded to a whole one, in its lowest bits.
+    /// 1.5 · 2⁵²: added to a number, it leaves the nearest integer in the lowest bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
-    /// From about here on the result is no normal number any more (-708).
+    /// Below about −708 the result is not a normal number.
     const LEAST: f64 = -700.0;
     const TAYLOR: [f64; 7] = [
         1.0 / 720.0,
@@ -142,7 +147,7 @@ fn exp_of_negative(x: f64) -> f64 {
         1.0,
         1.0,
     ];
-    // A number that is none stays so.
+    // NaN remains NaN.
     let x = if x < LEAST { LEAST } else { x };
     let rounded = x * LOG2_E + ROUND;
     let rest = x - (rounded - ROUND) * LN_2;
@@ -150,8 +155,8 @@ fn exp_of_negative(x: f64) -> f64 {
     TAYLOR.iter().fold(0.0, |sum, term| sum * rest + term) * power
 }
 
-/// Probability, at most 1.4 % too large where it is small, that a Gaussian is further from zero than
-/// `level`.
+/// Returns the probability that a Gaussian is farther from zero than `level`; at most 1.4 % too
+/// large where it is small.
 fn beyond_line(mean: f64, std: f64, level: f64) -> f64 {
     let room = level - mean.abs();
     if room <= 0.0 {
@@ -160,33 +165,33 @@ fn beyond_line(mean: f64, std: f64, level: f64) -> f64 {
     (upper_tail(room / std) + upper_tail((level + mean.abs()) / std)).min(1.0)
 }
 
-/// Upper limit of the probability of a standard normal variable above x ≥ 0 (Sampford, Annals of
-/// Mathematical Statistics 24, 1953).
+/// Returns an upper bound of the probability that a standard normal variable exceeds x ≥ 0
+/// (Sampford, Annals of Mathematical Statistics 24, 1953).
 fn upper_tail(x: f64) -> f64 {
     4.0 * exp_of_negative(-0.5 * x * x) / (TAU.sqrt() * (3.0 * x + (x * x + 8.0).sqrt()))
 }
 
-/// Levels that the error leaves with a stated risk.
+/// Protection levels for a given risk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Levels {
     /// In any direction (m).
     pub horizontal_m: f64,
-    /// Ahead or behind (m).
+    /// Along the heading (m).
     pub along_m: f64,
-    /// To either side (m).
+    /// Across the heading (m).
     pub across_m: f64,
 }
 
-/// Finds levels for a risk.
+/// Solver of the level equation for a risk.
 #[derive(Clone, Debug)]
 pub struct LevelEquation {
     risk: f64,
-    /// Their cosines and sines.
+    /// Cosines and sines of the directions.
     directions: [[f64; DIRECTIONS]; 2],
 }
 
 impl LevelEquation {
-    /// The equation for a risk in (0, 1).
+    /// Creates the solver for a risk in (0, 1).
     pub fn new(risk: f64) -> Self {
         let turns_rad: [f64; DIRECTIONS] =
             std::array::from_fn(|number| TAU * number as f64 / DIRECTIONS as f64);
@@ -194,29 +199,31 @@ impl LevelEquation {
         Self { risk, directions }
     }
 
-    /// The risk.
+    /// Returns the risk.
     pub const fn risk(&self) -> f64 {
         self.risk
     }
 
-    /// Whether such a level holds for all of the hypotheses together, which is far less work than to
-    /// solve for the least that does.
+    /// Whether a level holds for all hypotheses together, which is far cheaper than the solution of
+    /// the equation.
     pub fn holds(&self, level_m: f64, hypotheses: impl Iterator<Item = Hypothesis>) -> bool {
         let beyond = hypotheses.map(|it| self.share_beyond(level_m, &it));
         beyond.sum::<f64>() <= self.risk
     }
 
-    /// What a hypothesis adds to the probability of being further away than a level.
+    /// Returns the contribution of a hypothesis to the probability of exceeding a level, relative
+    /// to the risk.
     pub fn share_beyond(&self, level_m: f64, hypothesis: &Hypothesis) -> f64 {
         let negligible = NEGLIGIBLE * self.risk / hypothesis.probability;
         hypothesis.probability * hypothesis.beyond_circle(&self.directions, level_m, negligible)
     }
 
-    /// The levels that hold for all of the hypotheses together.
+    /// Returns the levels that hold for all hypotheses together.
     pub fn solve(&self, hypotheses: &[Hypothesis]) -> Levels {
         let total: f64 = hypotheses.iter().map(|it| it.probability).sum();
         let at_none = (total / self.risk).ln();
-        // A deviation of t leaves exp(−t²/2) at most in a circle: that far, all of them are within.
+        // The probability of exceeding t standard deviations in a circle is at most exp(−t²/2): at
+        // this radius, all hypotheses are within the risk.
         let deviations = (2.0 * at_none).max(0.0).sqrt();
         let reach_m = (hypotheses.iter())
             .map(|it| it.distance_m() + deviations * it.std_m)
@@ -250,9 +257,9 @@ impl LevelEquation {
     }
 }
 
-/// Between which squares a level is, and the logarithms of probability over risk there. Over the
-/// square of the level the logarithm is about a straight line: regula falsi, in which an end that
-/// stays is halved (Illinois) so that both close in.
+/// Bracket of the squared level, with the logarithms of probability over risk at its ends. The
+/// logarithm is almost linear in the squared level: regula falsi, with the retained end halved
+/// (Illinois algorithm) so that both ends converge.
 #[derive(Clone, Copy, Debug)]
 struct Bracket {
     low: f64,
@@ -275,13 +282,13 @@ impl Bracket {
         self.high - self.low > ACCURACY * self.high
     }
 
-    /// Where to look next.
+    /// Returns the next candidate.
     fn next(&self) -> f64 {
         let share = (self.at_low / (self.at_low - self.at_high)).clamp(0.05, 0.95);
         self.low + share * (self.high - self.low)
     }
 
-    /// Takes in what was found there.
+    /// Narrows the bracket with the value at the candidate.
     fn narrow(&mut self, excess: f64) {
         if !self.is_open() {
             return;
@@ -350,7 +357,7 @@ mod tests {
                     &[hypothesis(1.0, [0.0; 2], [[1.0, 0.0], [0.0, small]])],
                 );
                 let radius = RadialQuantile::new(risk).radius([1.0, small]);
-                // Up to 0.2 % of rounding up.
+                // Up to 0.2 % due to rounding up.
                 assert!((-1e-3..3e-3).contains(&(found.horizontal_m / radius - 1.0)));
                 let along_std = 0.6_f64.cos().hypot(small.sqrt() * 0.6_f64.sin());
                 let along = normal_quantile(0.5 * risk) * along_std;
@@ -373,7 +380,7 @@ mod tests {
         );
     }
 
-    /// Of as many draws of hypotheses and places as many are beyond as the risk says.
+    /// The fraction of drawn positions beyond the level equals the risk.
     #[test]
     fn hypotheses_share_the_risk() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -404,7 +411,7 @@ mod tests {
                 beyond[1] += u32::from(x.abs() > found.along_m);
                 beyond[2] += u32::from(y.abs() > found.across_m);
             }
-            // 2000 ± 45 by counting; rounding up by 0.2 %, and the limit of the tail, take off 4 %.
+            // 2000 ± 45 by counting; rounding up by 0.2 %, and the bound of the tail, subtract 4 %.
             for share in beyond.map(|count| f64::from(count) / (f64::from(draws) * risk)) {
                 assert!(
                     (0.89..1.07).contains(&share),

@@ -1,15 +1,16 @@
-//! A static bank of filters, one for each fault mode of the [table](super::table), beside the nominal one.
+//! Static bank of filters: the nominal one, and one for each fault mode of the [table](super::table).
 //!
-//! Multiple-model estimation (MMAE: Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and
-//! Navigation, 2001, 11.6) of modes that do not switch: no filter is mixed with another (as IMM does), so that one
-//! without a radio head has never heard it, as solution separation needs.
+//! Multiple-model estimation (MMAE: Bar-Shalom, Li and Kirubarajan, Estimation with Applications to
+//! Tracking and Navigation, 2001, 11.6) with modes that do not switch. Filters are not mixed (as in
+//! IMM), so that a filter without a radio head has never used the angles of that radio head, as
+//! solution separation requires.
 //!
-//! Beside the filter of every sound radio head run one without each of them and one without each
-//! two. If one radio head is at fault — seen round a corner, moved, spoofed — the filters without
-//! it are not. Those without two tell which one it is: leave out the right one, and the others
-//! agree with each other; leave out a wrong one, and the fault is still among them. And when a
-//! radio head is excluded, filters that have never heard it are ready to take over, together with
-//! those that have heard neither it nor one of the others.
+//! In addition to the filter of all fault-free radio heads there is one without each of them, and
+//! one without each pair. If one radio head is faulty (received by a reflection, moved, spoofed),
+//! the filters without it are correct. The filters without pairs identify it: without the faulty
+//! radio head, the others are consistent with each other; without another one, the fault remains.
+//! After the exclusion of a radio head, filters without its angles replace the previous ones,
+//! including those without one further radio head.
 
 use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP};
 use super::noise_ratio::NoiseRatio;
@@ -23,22 +24,22 @@ use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::settings::{FaultProbability, IntegritySettings};
 
-/// However rare a fault is, under it the error is within the level more often than not.
+/// Maximum probability of the error exceeding the level under a fault, however rare the fault is.
 const MOST_UNDER_FAULT: f64 = 0.49;
 
 /// Minimum number of radio heads that separate the bias of one of them from the position.
 const LEAST_SEPARABLE: usize = 3;
 
 clone_in_place! {
-    /// The filter of a mode that is weighed by its posterior.
+    /// Filter of a mode, weighted by its posterior probability.
     #[derive(Debug)]
     struct ModeFilter {
         mode: &'static Mode,
         prior: f64,
         ekf: Ekf,
-        /// To the nominal mode.
+        /// Likelihood ratio to the nominal mode.
         ratio: LikelihoodRatio,
-        /// Whether the vehicle stood since the filter began.
+        /// Whether the vehicle was at standstill since the filter started.
         at_rest: bool,
     }
 }
@@ -56,7 +57,7 @@ impl ModeFilter {
         }
     }
 
-    /// Those of the table that apply to a filter.
+    /// Returns the modes of the table that apply to a filter.
     fn all(given: &Ekf, faults: &FaultProbability) -> Vec<Self> {
         let nominal = given.nominal();
         let apply = |it: &&Mode| (it.applies)(&nominal, faults);
@@ -64,7 +65,7 @@ impl ModeFilter {
         modes.map(|mode| Self::new(mode, given, faults)).collect()
     }
 
-    /// What of it is carried over to another nominal filter.
+    /// Returns the part that is retained with another nominal filter.
     fn carry(
         &mut self,
         carry: Carry,
@@ -80,13 +81,13 @@ impl ModeFilter {
         }
     }
 
-    /// How many times as probable it is as the nominal mode.
+    /// Returns the odds of the mode to the nominal mode.
     fn odds(&self) -> f64 {
         self.ratio.odds(self.prior)
     }
 
-    /// Moves on by an odometry sample, by which the nominal filter has moved on. What spoke against a fault that may
-    /// begin now says nothing of that.
+    /// Predicts with an odometry sample, after the nominal filter. If the fault may begin at this
+    /// sample, previous evidence against the mode is removed.
     fn odometry(&mut self, nominal: &Ekf, sample: &OdometrySample) {
         self.ekf.odometry(sample);
         let Some(onset) = self.mode.onset else {
@@ -106,7 +107,7 @@ impl ModeFilter {
         self.ratio.raise_to(least);
     }
 
-    /// Takes in an angle, which the nominal filter predicts so.
+    /// Updates with an angle, for which the nominal filter has the given prediction.
     fn update(
         &mut self,
         nominal: (&Ekf, &Result<PredictedMeasurement, UpdateReason>),
@@ -122,17 +123,17 @@ impl ModeFilter {
 }
 
 clone_in_place! {
-    /// The filters.
+    /// Bank of filters.
     #[derive(Debug)]
     pub(in crate::localize) struct Bank {
         settings: IntegritySettings,
         heads: Vec<RadioHead>,
         faulty: Vec<bool>,
-        /// When each of them last disagreed with the filter without it (s).
+        /// Time at which each radio head last contradicted the filter without it (s).
         disagreed_s: Vec<f64>,
-        /// When a source was last at fault and not identified (s).
+        /// Time of the last unidentified fault (s).
         lost_s: f64,
-        /// The filter of every sound radio head, by what is stated.
+        /// Filter of all fault-free radio heads with the nominal model.
         nominal: Ekf,
         modes: Vec<ModeFilter>,
         noise: NoiseRatio,
@@ -143,7 +144,7 @@ clone_in_place! {
 }
 
 impl Bank {
-    /// The modes beside a filter; nothing is known of them at `now_s`.
+    /// Creates the modes around a filter at time `now_s`, without evidence.
     pub fn new(given: &Ekf, heads: &[RadioHead], settings: &IntegritySettings, now_s: f64) -> Self {
         let modes = ModeFilter::all(given, &settings.fault_probability);
         Self::with(given, heads, settings, modes, now_s)
@@ -174,13 +175,13 @@ impl Bank {
         }
     }
 
-    /// The filter of every sound radio head, by what is stated.
+    /// Returns the filter of all fault-free radio heads with the nominal model.
     pub const fn nominal(&self) -> &Ekf {
         &self.nominal
     }
 
-    /// The bank begun anew from a vague pose where the leading filter is, about what is nominal, whatever leads;
-    /// nothing is known of it at `now_s`.
+    /// Returns a bank that restarts at time `now_s` with the nominal model, from an uncertain pose
+    /// at the selected filter.
     pub fn restarted(&self, position_std_m: f64, now_s: f64) -> Self {
         let start = (self.leader()).restarted(self.nominal.config(), position_std_m);
         let modes = ModeFilter::all(&start, &self.settings.fault_probability);
@@ -190,8 +191,9 @@ impl Bank {
         }
     }
 
-    /// The bank about the mode that leads as the nominal one, once it is certain and no radio head is in doubt;
-    /// nothing is known of it at `now_s`. What the others' likelihoods had in common with its own is taken off them.
+    /// Returns the bank with the selected mode as the nominal one, once it is certain and no radio
+    /// head contradicts it. The common part of the likelihood ratios is subtracted from those of
+    /// the other modes.
     pub fn rebased(&self, now_s: f64) -> Option<Self> {
         let leading = self.leading()?;
         let is_certain = (leading.mode.becomes_nominal_at).is_some_and(|it| leading.odds() > it);
@@ -218,43 +220,44 @@ impl Bank {
         }
     }
 
-    /// The bank about the leading mode.
+    /// Returns the bank with the selected mode as the nominal one.
     #[cfg(test)]
     pub(super) fn about_leading(&self) -> Option<Self> {
         self.leading().map(|it| self.about(it, 0.0))
     }
 
-    /// The mode that leads: clearly more probable than the nominal one, and more so than any other.
+    /// Returns the selected mode: its odds to the nominal mode exceed a minimum and those of every
+    /// other mode.
     fn leading(&self) -> Option<&ModeFilter> {
         let most = (self.modes.iter()).max_by(|one, other| one.odds().total_cmp(&other.odds()));
         most.filter(|it| it.odds() > LEAST_ODDS)
     }
 
-    /// The filter that is most probably right: the nominal one, unless another mode leads.
+    /// Returns the selected filter: the nominal one, unless another mode is selected.
     pub fn leader(&self) -> &Ekf {
         self.leading().map_or(&self.nominal, |it| &it.ekf)
     }
 
-    /// The mode that leads, if it is not the nominal one.
+    /// Returns the selected mode if it is not the nominal one.
     pub fn leading_id(&self) -> Option<ModeId> {
         self.leading().map(|it| it.mode.id)
     }
 
-    /// Odds and filter of a mode.
+    /// Returns odds and filter of a mode.
     #[cfg(test)]
     pub(super) fn mode(&self, id: ModeId) -> Option<(f64, &Ekf)> {
         let found = self.modes.iter().find(|it| it.mode.id == id);
         found.map(|it| (it.odds(), &it.ekf))
     }
 
-    /// Whether angles may be off by the mode that leads as if the vehicle were lost.
+    /// Whether the selected mode explains contradicting angles without a lost vehicle.
     pub fn may_mislead(&self) -> bool {
         self.leading().is_some_and(|it| it.mode.misleads)
     }
 
-    /// The hypotheses of the protection level, each with its probability and the filter that is right under it: the
-    /// modes weighed by their posteriors, and, as far as none of those that are faults holds, one or two of the sound
-    /// radio heads at fault.
+    /// Returns the hypotheses of the protection level, each with its probability and the filter
+    /// that is correct under it: the modes with their posterior probabilities, and faults of one or
+    /// two radio heads, weighted by the probability that no fault mode holds.
     pub fn hypotheses(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
         let total = 1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>();
         let faults = (self.modes.iter()).filter(|it| it.mode.is_fault);
@@ -272,7 +275,8 @@ impl Bank {
         self.mixture().chain(heads)
     }
 
-    /// The nominal mode and the modes weighed by their posteriors, each with its posterior and its filter.
+    /// Returns the nominal mode and all other modes, each with its posterior probability and its
+    /// filter.
     pub fn mixture(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
         let total = 1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>();
         let modes = self.modes.iter().map(|it| (it.odds(), &it.ekf));
@@ -280,7 +284,8 @@ impl Bank {
         odds.map(move |(odds, ekf)| (odds / total, ekf))
     }
 
-    /// The filters without a radio head in doubt, one of which may take over soon.
+    /// Returns the filters without a suspected radio head, one of which may replace the nominal
+    /// filter soon.
     pub fn candidates(&self) -> impl Iterator<Item = &Ekf> {
         let in_doubt = |head: &usize| self.statistic(*head) > CLEARED;
         let in_doubt = self.sound().filter(in_doubt);
@@ -292,7 +297,7 @@ impl Bank {
         faulty.filter_map(|(head, faulty)| (!faulty).then_some(head))
     }
 
-    /// Number of radio heads found faulty.
+    /// Returns the number of radio heads identified as faulty.
     pub fn faulty(&self) -> usize {
         self.faulty.iter().filter(|faulty| **faulty).count()
     }
@@ -301,31 +306,31 @@ impl Bank {
         self.faulty.get(head).is_some_and(|faulty| *faulty)
     }
 
-    /// By how much more variance the angles have than stated.
+    /// Returns the ratio of the angles' measured variance to the specified one.
     pub const fn noise_ratio(&self) -> f64 {
         self.noise.ratio()
     }
 
-    /// How far the angles of a radio head are off from the filter without it, in standard
+    /// Returns the deviation of a radio head's angles from the filter without it, in standard
     /// deviations.
     fn statistic(&self, head: usize) -> f64 {
         let test = self.subsets.get(head, head).map(|subset| subset.test(head));
         test.map_or(0.0, |test| self.deviations(head, &test))
     }
 
-    /// The statistic of a test of a radio head, with the noise that there is.
+    /// Returns the statistic of a radio head's test with the measured noise.
     fn deviations(&self, head: usize, test: &HeadTest) -> f64 {
         test.statistic() / self.noise.ratio_of(head).sqrt()
     }
 
-    /// Number of sound radio heads whose statistic is above a threshold.
+    /// Returns the number of fault-free radio heads whose statistic exceeds a threshold.
     fn in_doubt(&self, threshold: f64) -> usize {
         self.sound()
             .filter(|&head| self.statistic(head) > threshold)
             .count()
     }
 
-    /// Moves every filter.
+    /// Predicts every filter.
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
         for subset in self.subsets.iter_mut() {
             subset.ekf.odometry(sample);
@@ -337,7 +342,8 @@ impl Bank {
         verdict
     }
 
-    /// Takes in an angle: a test of its radio head, and information for every filter that uses that.
+    /// Updates with an angle: the test of its radio head, and every filter that uses the radio
+    /// head.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
         let number = self.heads.iter().position(is_it);
@@ -375,7 +381,7 @@ impl Bank {
             if subset.without == [number; 2] {
                 self.noise.see(number, &seen);
             }
-            // While the vehicle stands, scatter is one measurement however often it is seen.
+            // At standstill, scatter is one measurement however often it is repeated.
             if seen.innovation.measurement_variance < 1.0 {
                 for (mine, test) in subset.without.iter().zip(&mut subset.tests) {
                     if *mine == number {
@@ -386,24 +392,24 @@ impl Bank {
         }
     }
 
-    /// Whether a source is at fault and nobody knows which, or too many are.
+    /// Whether there is an unidentified fault, or too many radio heads are faulty.
     pub fn is_lost(&self) -> bool {
         self.in_doubt(DETECTED) > 0 || self.is_outvoted()
     }
 
-    /// Whether half of several radio heads or more are at fault or in doubt.
+    /// Whether at least half of several radio heads are faulty or suspected.
     pub fn is_outvoted(&self) -> bool {
         let against = self.in_doubt(DETECTED) + self.faulty();
         against > 1 && 2 * against >= self.heads.len()
     }
 
-    /// For how long it has not been lost (s).
+    /// Returns the time since the last unidentified fault (s).
     pub fn quiet_s(&self, now_s: f64) -> f64 {
         now_s - self.lost_s
     }
 
-    /// Excludes the radio head that is at fault, where two others remain to agree without it, and
-    /// readmits those that have come to agree again.
+    /// Excludes the faulty radio head if two others remain that agree without it, and readmits
+    /// radio heads that have become consistent again.
     pub fn judge(&mut self, now_s: f64) {
         for head in 0..self.heads.len() {
             let disagrees = self.statistic(head) > CLEARED;
@@ -416,7 +422,8 @@ impl Bank {
                 self.readmit(head);
             }
         }
-        // A wrong choice is itself a fault, and must be as rare as the risk under one.
+        // The exclusion of a wrong radio head is a fault itself, and must have the probability of
+        // the risk under a fault.
         let head = self.settings.fault_probability.of_radio_head(false);
         let risk = (self.settings.risk_per_epoch() / head).min(MOST_UNDER_FAULT);
         let odds = -2.0 * risk.ln();
@@ -428,9 +435,9 @@ impl Bank {
         }
     }
 
-    /// The radio head that is at fault, if one is that much likelier to be it than any other:
-    /// without it the largest statistic among the others falls below what it is without another by
-    /// `odds`, in twice the logarithm of a likelihood ratio.
+    /// Returns the faulty radio head if it is sufficiently more probable than any other: without
+    /// it, the maximum statistic of the others is below that without any other radio head by
+    /// `odds`, in twice the log-likelihood ratio.
     fn faulty_head(&self, odds: f64) -> Option<usize> {
         let watched = || {
             self.sound()
@@ -454,7 +461,7 @@ impl Bank {
         (sure && least < DETECTED && self.statistic(head) > DETECTED).then_some(head)
     }
 
-    /// The largest statistic of a sound radio head when `left_out` is left out.
+    /// Returns the maximum statistic of a fault-free radio head without `left_out`.
     fn disagreement_without(&self, left_out: usize) -> f64 {
         (self.subsets.iter())
             .filter(|subset| !subset.is_of_one() && subset.lacks(left_out))
@@ -464,7 +471,7 @@ impl Bank {
             .fold(0.0, f64::max)
     }
 
-    /// Leaves a radio head out everywhere, and with it what it has done.
+    /// Excludes a radio head from all filters, including the effect of its previous angles.
     pub(super) fn exclude(&mut self, faulty_head: usize) {
         let Some(faulty) = self.faulty.get_mut(faulty_head) else {
             return;
@@ -485,7 +492,7 @@ impl Bank {
         self.subsets.exclude(faulty_head, &self.heads);
     }
 
-    /// Uses a radio head again.
+    /// Readmits a radio head.
     fn readmit(&mut self, head: usize) {
         if let Some(faulty) = self.faulty.get_mut(head) {
             *faulty = false;
@@ -512,8 +519,8 @@ mod tests {
     use crate::observation::MeasurementKind;
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
 
-    /// A minute of driving past four radio heads, of which number 2 is off by `bias_rad`; what was
-    /// measured goes to `sinks`.
+    /// One minute of driving past four radio heads, of which number 2 has a bias of `bias_rad`;
+    /// `sinks` receive the measurements.
     fn drive(
         bias_rad: f64,
         mut sink: impl FnMut(Option<&OdometrySample>, usize, &AngleMeasurement),
@@ -568,7 +575,7 @@ mod tests {
         (Ekf::new(config, Some(map), &heads, &start), heads)
     }
 
-    /// The bank after the drive, and the same filter having done without some radio heads.
+    /// Returns the bank after the drive, and one filter without some radio heads.
     fn after(bias_rad: f64, without: &[usize]) -> (Bank, Ekf) {
         let (mut alone, heads) = ekf();
         for &head in without {
@@ -605,7 +612,7 @@ mod tests {
         let (_, without_both) = after(0.3, &[1, 2]);
         let witness = bank.subsets.get(1, 1).unwrap().ekf.belief();
         assert_eq!(witness, without_both.belief());
-        // The test of the excluded goes on, for the day it agrees again.
+        // The test of the excluded radio head continues, so that it can be readmitted.
         assert!(bank.statistic(2) > 5.5 && !bank.is_lost());
         bank.readmit(2);
         assert_eq!(bank.faulty(), 0);

@@ -1,4 +1,4 @@
-//! How probable an angle is under a mode, and when a decision between modes is made by that.
+//! Likelihood of an angle under a mode, and thresholds for decisions between modes.
 
 use std::f64::consts::TAU;
 
@@ -9,25 +9,29 @@ use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
 
 impl Ekf {
-    /// Returns the log-likelihood of an angle relative to an angle with its own noise alone that is predicted exactly. With
-    /// estimated biases the likelihood contains them, and angles within 2 m of travel count by their independent share.
+    /// Returns the log-likelihood of an angle relative to an exactly predicted angle with its own
+    /// noise only. With estimated biases the likelihood includes them, and angles within 2 m of
+    /// travel are weighted by their independent fraction.
     pub fn relative_log_likelihood(&self, head: &RadioHead, measured: &AngleMeasurement) -> f64 {
         log_likelihood(self, &self.predict_measurement(head, measured))
     }
 }
 
-/// Share of the angles that are outliers, from any direction, where scatter makes no more of them.
+/// Fraction of outliers with a uniformly distributed direction, unless scatter causes more.
 const OUTLIERS: f64 = 2e-3;
 
-/// Odds to the nominal mode from which on a mode is selected. The level covers every hypothesis, selected or not; a
-/// selection at lower odds moves the position back and forth and costs availability (K = 5 dB: 91 instead of 94 %).
+/// Minimum odds to the nominal mode for the selection of a mode. The level covers every hypothesis,
+/// selected or not. With lower odds the position alternates between filters, which reduces
+/// availability (K = 5 dB: 91 instead of 94 %).
 pub(super) const LEAST_ODDS: f64 = 100.0;
 
-/// Logarithm of a likelihood ratio at which a sequential test is decided: wrong once in three million (e⁻¹⁵; Wald 1945),
-/// as a fault of a radio head has it. No mode's grows beyond: what more evidence there is must be forgotten some time.
+/// Log-likelihood ratio at which a sequential test is decided, with an error probability of one in
+/// three million (e⁻¹⁵; Wald 1945), that of a radio head fault. Ratios of modes are limited to it,
+/// because further evidence must be forgotten eventually.
 pub(in crate::localize) const CERTAIN: f64 = 15.0;
 
-/// That of a jump of the speed that no vehicle can do: slip, unless a reading is wild.
+/// Log-likelihood ratio of a physically impossible jump of the speed: wheel slip, unless the
+/// measurement is an outlier.
 pub(super) const SPEED_JUMP: f64 = 6.0;
 
 /// Logarithm of the likelihood ratio of a mode to the nominal one.
@@ -35,25 +39,25 @@ pub(super) const SPEED_JUMP: f64 = 6.0;
 pub(super) struct LikelihoodRatio(f64);
 
 impl LikelihoodRatio {
-    /// One to one.
+    /// Ratio of one.
     pub const NONE: Self = Self(0.0);
 
-    /// That to another mode of this ratio.
+    /// Returns the ratio relative to another mode with the given ratio.
     pub const fn to(self, other: Self) -> Self {
         Self((self.0 - other.0).clamp(-CERTAIN, CERTAIN))
     }
 
-    /// Whether the angles speak against the mode.
+    /// Whether the angles contradict the mode.
     pub const fn is_against(self) -> bool {
         self.0 < 0.0
     }
 
-    /// From now on it is at least so much.
+    /// Raises the ratio to a minimum.
     pub const fn raise_to(&mut self, least: f64) {
         self.0 = self.0.max(least);
     }
 
-    /// Takes in an angle, which the mode's filter and the nominal one predict so.
+    /// Updates with an angle, given the predictions of the mode's filter and of the nominal filter.
     pub fn update(
         &mut self,
         (ekf, predicted): (&Ekf, &Result<PredictedMeasurement, UpdateReason>),
@@ -69,28 +73,30 @@ impl LikelihoodRatio {
         }
     }
 
-    /// The larger of the two.
+    /// Returns the larger ratio.
     pub const fn max(self, other: Self) -> Self {
         Self(self.0.max(other.0))
     }
 
-    /// Takes off what the largest of all modes has beyond certainty, so that any other may yet be found right.
+    /// Subtracts the excess of the largest ratio over certainty, so that any other mode can still
+    /// be selected later.
     pub const fn limit_by(&mut self, most: Self) {
         self.0 = (self.0 - (most.0 - CERTAIN).max(0.0)).max(-CERTAIN);
     }
 
-    /// Posterior odds to the nominal mode, of a prior probability.
+    /// Returns the posterior odds to the nominal mode for a prior probability.
     pub fn odds(self, prior: f64) -> f64 {
         prior / (1.0 - prior) * self.0.exp()
     }
 }
 
-/// Log-likelihood of an angle, relative to one that has but its own noise and is predicted exactly: so places can be
-/// compared.
+/// Returns the log-likelihood of an angle relative to an exactly predicted angle with its own noise
+/// only, so that positions can be compared.
 ///
-/// Angles that are not independent have a variance that says so: they cost nothing, however that
-/// variance differs from place to place. Where a time-correlated bias is estimated, an angle counts
-/// by its independent share. Angles that the gate refuses, or of an excluded radio head, are outliers.
+/// The variance of dependent angles includes their dependence: it does not reduce the likelihood,
+/// although it differs between positions. With an estimated time-correlated bias, an angle is
+/// weighted by its independent fraction. Angles outside the gate, or of an excluded radio head, are
+/// outliers.
 pub(in crate::localize) fn log_likelihood(
     ekf: &Ekf,
     predicted: &Result<PredictedMeasurement, UpdateReason>,
@@ -112,8 +118,10 @@ pub(in crate::localize) fn log_likelihood(
     -0.5 * (innovation.mahalanobis2() + growth.ln())
 }
 
-/// The same where what a place does not know well counts against it: the bend of its prediction and its odometry are its
-/// own, not the angle's noise. By the other measure a place so vague that it explains everything costs nothing.
+/// Returns the log-likelihood in which the uncertainty of a hypothesis reduces it: second-order
+/// terms and odometry are part of the prediction, not of the angle's noise. With
+/// [`Self::relative_log_likelihood`], a hypothesis that is uncertain enough to explain everything
+/// is not penalised.
 pub(in crate::localize) fn log_likelihood_as_stated(
     ekf: &Ekf,
     predicted: &Result<PredictedMeasurement, UpdateReason>,
@@ -128,13 +136,14 @@ pub(in crate::localize) fn log_likelihood_as_stated(
     }
 }
 
-/// Variance (rad²) of an angle by all but the belief, were the radio head not heard before.
+/// Returns the variance (rad²) of an angle without the state covariance, for the first angle of a
+/// radio head.
 fn first_variance(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
     ekf.first_variance(predicted) + ekf.systematic_variance(predicted)
 }
 
-/// Share of an angle that is independent of the radio head's last one; a filter that estimates a time-correlated bias
-/// predicts what repeats itself.
+/// Returns the fraction of an angle that is independent of the previous one of its radio head. A
+/// filter that estimates a time-correlated bias predicts the dependent part.
 fn independent_share(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
     if predicted.hypotheses.is_some() {
         return 1.0;
@@ -142,11 +151,12 @@ fn independent_share(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
     first_variance(ekf, predicted) / predicted.innovation.measurement_variance
 }
 
-/// Probability density of an angle (1/rad): Gaussian, or an outlier from anywhere.
+/// Returns the probability density of an angle (1/rad): Gaussian, or a uniformly distributed
+/// outlier.
 fn density(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
     let inlier = predicted.hypotheses.as_ref().map_or_else(
         || {
-            // The measurement variance of one that repeats another would drown the belief's.
+            // The measurement variance of a repeated angle would exceed that of the state.
             let mut alone = predicted.innovation;
             let belief = (alone.variance - alone.measurement_variance).max(0.0);
             alone.variance = belief + first_variance(ekf, predicted);

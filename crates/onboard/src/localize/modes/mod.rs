@@ -1,5 +1,5 @@
-//! Fault modes: a [table](table), a static bank of filters for them ([`Bank`]), the likelihood by which the bank weighs
-//! them, the test of each radio head, and how noisy the angles are heard to be.
+//! Fault modes: a [table](table), a static bank of filters ([`Bank`]), the likelihood that weights
+//! them, the test of each radio head, and the measured noise of the angles.
 
 mod bank;
 mod likelihood;

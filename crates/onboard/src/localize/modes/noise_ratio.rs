@@ -1,25 +1,27 @@
-//! How much noisier the angles are than stated, as where the Rician K is less than believed.
+//! Ratio of the measured noise of the angles to the specified noise, such as with a lower Rician K
+//! than configured.
 
 use crate::clone_in_place::clone_in_place;
 use crate::geometry::wrap_angle;
 use crate::localize::ekf::ExcludedInnovation;
 
-/// Weight of the newest difference, at least, and differences that the stated noise is worth.
+/// Minimum weight of the newest difference, and number of differences that the specified noise
+/// counts as.
 const LEAST_WEIGHT: f64 = 1.0 / 128.0;
 const STATED: u32 = 16;
 
-/// Deviations at which a difference is cut off, and the mean square that this leaves of a normal distribution:
-/// `erf(c/√2) − 2cφ(c) + 2c²Φ(−c)` (Huber, Robust Statistics, 5.2). The one lets in the tails that scatter makes, the
-/// other tells how noisy angles are beside their outliers.
+/// Limit of a difference in standard deviations, and the mean square of a normal distribution with
+/// that limit: `erf(c/√2) − 2cφ(c) + 2c²Φ(−c)` (Huber, Robust Statistics, 5.2). The larger limit
+/// includes the tails that scatter causes; the smaller one yields the noise without outliers.
 const MOST: f64 = 3.0;
 const OF_MOST: f64 = 0.995_007;
 const CORE: f64 = 1.5;
 const OF_CORE: f64 = 0.778_465;
 
 clone_in_place! {
-    /// Mean squared difference between successive innovations of a radio head, over what it ought to be
-    /// (von Neumann 1941); that of each, and of all. What is off by as much each time, as a fault makes it, does not show
-    /// in it.
+    /// Mean squared difference between successive innovations of a radio head, divided by its
+    /// expected value (von Neumann 1941), for each radio head and for all. A constant error, such
+    /// as that of a fault, does not contribute.
     #[derive(Debug, PartialEq)]
     pub struct NoiseRatio {
         heads: Vec<HeadNoise>,
@@ -27,16 +29,17 @@ clone_in_place! {
     }
 }
 
-/// What was heard of a radio head.
+/// Innovations of a radio head.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct HeadNoise {
-    /// The last innovation, which the next is compared with.
+    /// Previous innovation, for the next difference.
     last: Option<ExcludedInnovation>,
-    /// None until it is heard: it is as noisy as all of them then.
+    /// Ratio of this radio head. Before its first angle it is `None`, and the ratio of all radio
+    /// heads applies.
     ratio: Option<Ratio>,
 }
 
-/// Variance by what is stated, with tails and beside outliers.
+/// Variance relative to the specified one, with tails and without outliers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Ratio {
     differences: u32,
@@ -45,14 +48,14 @@ struct Ratio {
 }
 
 impl Ratio {
-    /// Before anything is seen.
+    /// Ratio before any angle.
     const STATED: Self = Self {
         differences: 0,
         with_tails: 1.0,
         core: 1.0,
     };
 
-    /// Takes in a squared difference over what is expected.
+    /// Adds a squared difference relative to its expected value.
     fn see(&mut self, square: f64) {
         self.differences = self.differences.saturating_add(1);
         let weight = LEAST_WEIGHT.max(f64::from(STATED + self.differences).recip());
@@ -65,7 +68,7 @@ impl Ratio {
 }
 
 impl NoiseRatio {
-    /// As stated, of so many radio heads.
+    /// Creates the ratio for a number of radio heads.
     pub fn new(heads: usize) -> Self {
         let heard = HeadNoise {
             last: None,
@@ -77,7 +80,7 @@ impl NoiseRatio {
         }
     }
 
-    /// As noisy as they were found to be, of filters begun anew.
+    /// Returns the ratio for restarted filters.
     pub fn resumed(&self) -> Self {
         let mut heads = self.heads.clone();
         for head in &mut heads {
@@ -86,7 +89,7 @@ impl NoiseRatio {
         Self { heads, ..*self }
     }
 
-    /// Takes in an angle to radio head number `head`. Within a wavelength scatter is the same.
+    /// Adds an angle to radio head number `head`. Within a wavelength, scatter is identical.
     pub fn see(&mut self, head: usize, now: &ExcludedInnovation) {
         let Some(heard) = self.heads.get_mut(head) else {
             return;
@@ -112,7 +115,7 @@ impl NoiseRatio {
         self.of_all.see(square);
     }
 
-    /// Variance of the angles by what is stated, not less than that.
+    /// Returns the variance of the angles relative to the specified one, at least 1.
     pub const fn ratio(&self) -> f64 {
         self.of_all.with_tails.max(1.0)
     }
@@ -122,12 +125,12 @@ impl NoiseRatio {
         heard.unwrap_or(self.of_all)
     }
 
-    /// That of a radio head.
+    /// Returns the ratio of a radio head.
     pub fn ratio_of(&self, head: usize) -> f64 {
         self.of(head).with_tails.max(1.0)
     }
 
-    /// That of a radio head beside outliers.
+    /// Returns the ratio of a radio head without outliers.
     pub fn core_ratio_of(&self, head: usize) -> f64 {
         self.of(head).core.max(1.0)
     }
@@ -142,7 +145,7 @@ mod tests {
     use super::*;
     use crate::gaussian::Innovation;
 
-    /// An angle of 0.1 rad of stated deviation.
+    /// An angle with a specified standard deviation of 0.1 rad.
     fn predict_measurement(place_wavelengths: f64, residual: f64) -> ExcludedInnovation {
         ExcludedInnovation {
             innovation: Innovation {
@@ -155,7 +158,7 @@ mod tests {
         }
     }
 
-    /// Looks so many wavelengths apart, with these residuals.
+    /// Angles at a given distance in wavelengths, with these residuals.
     fn heard(apart_wavelengths: f64, mut residual_rad: impl FnMut(i32) -> f64) -> NoiseRatio {
         let mut noise = NoiseRatio::new(1);
         for number in 0..2000 {
@@ -168,13 +171,13 @@ mod tests {
         noise
     }
 
-    /// The same, alternating about a mean.
+    /// Angles with residuals that alternate around a mean.
     fn after(mean_rad: f64, by_rad: f64, apart_wavelengths: f64) -> f64 {
         let sign = |number: i32| f64::from(1 - 2 * (number % 2));
         heard(apart_wavelengths, |number| mean_rad + sign(number) * by_rad).ratio()
     }
 
-    /// Means over many drives, which scatter by a tenth each.
+    /// Means over many drives, each with a relative standard deviation of a tenth.
     #[test]
     fn outliers_are_noise_by_their_tails_alone() {
         let drives = 100_u8;
@@ -195,14 +198,14 @@ mod tests {
                 core += noise.core_ratio_of(0) / f64::from(drives);
             }
             if outliers == 0.0 {
-                // Twice the deviation, by either.
+                // Twice the standard deviation with either limit.
                 assert!(
                     (with_tails - 4.0).abs() < 0.15 && (core - 4.0).abs() < 0.15,
                     "{with_tails} {core}"
                 );
             }
         }
-        // Nearly one difference in twelve has an outlier: each adds the square at which it is cut off.
+        // Nearly one of twelve differences contains an outlier: each adds its limited square.
         assert!(
             core < 1.3 * 4.0 && with_tails > 1.3 * 4.0,
             "{core} {with_tails}"
@@ -212,10 +215,10 @@ mod tests {
     #[test]
     fn louder_angles_show_and_a_bias_does_not() {
         assert_eq!(after(0.5, 0.05, 2.0), 1.0);
-        // Differences of 0.4 rad, where 0.14 rad are expected: 8 times the variance.
+        // Differences of 0.4 rad, with an expected 0.14 rad: 8 times the variance.
         let ratio = after(0.5, 0.2, 2.0);
         assert!((ratio - 8.0).abs() < 0.5, "{ratio}");
-        // A vehicle that hardly moves hears the same scatter again.
+        // A slow vehicle receives the same scatter again.
         assert_eq!(after(0.0, 0.2, 1e-3), 1.0);
     }
 
@@ -230,10 +233,10 @@ mod tests {
         }
         assert!((noise.ratio_of(0) - 8.0).abs() < 0.5);
         assert_eq!(noise.ratio_of(1), 1.0);
-        // One that was not heard is as noisy as all of them.
+        // A radio head without angles has the ratio of all radio heads.
         assert_eq!(noise.ratio_of(2), noise.ratio());
         assert!(noise.ratio() > 2.0);
-        // Begun anew it is what it was.
+        // The ratio is unchanged after a restart.
         assert_eq!(noise.resumed().ratio_of(0), noise.ratio_of(0));
     }
 }

@@ -1,32 +1,34 @@
-//! The filters without one or two of the radio heads heard lately, each with its tests: whether the angles to one radio
-//! head keep agreeing with everything else.
+//! Filters without one or two of the recently received radio heads, each with the tests of those
+//! radio heads: whether their angles agree with all other measurements.
 //!
-//! Those of a radio head begin with its first angle, as copies of filters that have heard all others: until then they
-//! would be the same. They end where it has not been heard lately and others are, so that cost grows with the radio
-//! heads in reach and not with those of the site.
+//! The filters without a radio head start at its first angle, as copies of filters that have used
+//! all others; before, they would be identical. They end if the radio head has not been received
+//! recently and others have, so that the cost depends on the radio heads in range, not on those of
+//! the site.
 
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::Innovation;
 use crate::localize::ekf::Ekf;
 use crate::radio_head::RadioHead;
 
-/// Weight of the newest angle in each of the averages: a fault that leaps out is found by the
-/// first, a bias below the noise of single angles by the last.
+/// Weights of the newest angle in the averages: the first detects a large fault fast, the last a
+/// bias below the noise of single angles.
 const WEIGHTS: [f64; 3] = [0.5, 0.125, 0.03125];
 
-/// By how many standard deviations an angle may lead an average: two outliers on end are no fault.
+/// Maximum deviation of an angle from an average, in standard deviations: two successive outliers
+/// are no fault.
 const MOST_LEAD: f64 = 3.0;
 
-/// Statistic, in standard deviations, from which on a radio head is at fault, and below which it agrees: an error of
-/// 4e-8 and of 5e-4 in a single test of a Gaussian.
+/// Statistic, in standard deviations, above which a radio head is faulty, and below which it is
+/// consistent. Error probabilities of a single Gaussian test: 4e-8 and 5e-4.
 pub(super) const DETECTED: f64 = 5.5;
 pub(super) const CLEARED: f64 = 3.5;
 
-/// After this time without disagreement a source counts as sound again (s).
+/// Time without a contradiction after which a source is fault-free again (s).
 pub(in crate::localize) const RECOVERY_S: f64 = 5.0;
 
-/// Exponentially weighted averages of the innovations that a radio head's angles would bring to a
-/// filter that does not use them, each beside the variance it has when nothing is wrong.
+/// Exponentially weighted averages of a radio head's innovations relative to a filter that does not
+/// use it, each with its variance in the fault-free case.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct HeadTest {
     averages: [Average; WEIGHTS.len()],
@@ -35,18 +37,18 @@ pub struct HeadTest {
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 struct Average {
     mean: f64,
-    /// Variance by the noise of the angles; that of the belief is common to all of them.
+    /// Variance due to the noise of the angles; the variance of the state is common to all of them.
     noise: f64,
     belief: f64,
 }
 
 impl HeadTest {
-    /// Takes in one innovation.
+    /// Adds one innovation.
     pub fn push(&mut self, innovation: &Innovation) {
         let belief = (innovation.variance - innovation.measurement_variance).max(0.0);
         let most = MOST_LEAD * innovation.variance.sqrt();
         for (average, weight) in self.averages.iter_mut().zip(WEIGHTS) {
-            // An average that has seen nothing begins with the first angle whole.
+            // The first angle initialises an average.
             let weight = if average.noise == 0.0 { 1.0 } else { weight };
             let kept = 1.0 - weight;
             average.mean += weight * (innovation.residual - average.mean).clamp(-most, most);
@@ -56,7 +58,7 @@ impl HeadTest {
         }
     }
 
-    /// The largest of the averages in units of its standard deviation.
+    /// Returns the maximum of the averages, in units of their standard deviations.
     pub fn statistic(&self) -> f64 {
         self.averages
             .iter()
@@ -66,10 +68,11 @@ impl HeadTest {
     }
 }
 
-/// Angles, of all radio heads, within which one of them is heard lately.
+/// Number of angles, of all radio heads, within which a radio head counts as recently received.
 const LATELY: u64 = 32;
 
-/// So many radio heads keep their filters however long ago they were heard: what they have done may still count.
+/// Number of radio heads that keep their filters independent of the time since reception, because
+/// their previous angles may still contribute.
 const LEAST_WATCHED: usize = 4;
 
 /// Minimum number of radio heads for filters without two of them: with two radio heads, the faulty one cannot be
@@ -77,10 +80,10 @@ const LEAST_WATCHED: usize = 4;
 const LEAST_FOR_PAIRS: usize = 3;
 
 clone_in_place! {
-    /// The filter without one or two radio heads, and the test of each against it.
+    /// Filter without one or two radio heads, and the test of each against it.
     #[derive(Debug)]
     pub(super) struct SubsetFilter {
-        /// Numbers of the radio heads left out; the same twice where it is one.
+        /// Indices of the excluded radio heads; equal for a single one.
         pub without: [usize; 2],
         pub tests: [HeadTest; 2],
         pub ekf: Ekf,
@@ -106,13 +109,14 @@ impl SubsetFilter {
     }
 }
 
-/// All such filters.
+/// All filters without one or two radio heads.
 #[derive(Debug)]
 pub(super) struct Subsets {
-    /// First those without one radio head, in order, and those without two; then such that are there for reuse.
+    /// First the filters without one radio head, in order; then those without two; then unused ones
+    /// for reuse.
     filters: Vec<SubsetFilter>,
     used: usize,
-    /// Number of the last angle of each radio head, and of all of them.
+    /// Index of the last angle of each radio head, and of all of them.
     last: Vec<u64>,
     angles: u64,
 }
@@ -126,7 +130,7 @@ impl Clone for Subsets {
         }
     }
 
-    /// What is there for reuse stays.
+    /// Unused filters are kept for reuse.
     fn clone_from(&mut self, source: &Self) {
         (self.used, self.angles) = (source.used, source.angles);
         self.last.clone_from(&source.last);
@@ -140,7 +144,7 @@ impl Clone for Subsets {
 }
 
 impl Subsets {
-    /// None yet, of so many radio heads.
+    /// Creates an empty set for a number of radio heads.
     pub fn new(heads: usize) -> Self {
         Self {
             filters: Vec::new(),
@@ -158,14 +162,14 @@ impl Subsets {
         self.filters.iter_mut().take(self.used)
     }
 
-    /// The one without these radio heads.
+    /// Returns the filter without these radio heads.
     pub fn get(&self, one: usize, other: usize) -> Option<&SubsetFilter> {
         let without = [one.min(other), one.max(other)];
         self.iter().find(|it| it.without == without)
     }
 
-    /// A radio head is about to be heard; `keeps` tells of which radio heads filters must not
-    /// end, by their statistic.
+    /// Prepares the filters for an angle of a radio head; `keeps` returns, from its statistic,
+    /// whether the filters of a radio head must not end.
     pub fn hear(
         &mut self,
         head: usize,
@@ -190,7 +194,7 @@ impl Subsets {
         } else {
             ones
         };
-        // The first are those of one radio head, in order, the new one not yet among them.
+        // The first filters are those without one radio head, in order, without the new one.
         for number in 0..pairs {
             if let Some([other, _]) = self.filters.get(number).map(|it| it.without) {
                 let without = [head.min(other), head.max(other)];
@@ -203,7 +207,7 @@ impl Subsets {
         }
     }
 
-    /// Replaces every filter that has heard a radio head at fault by one that has not.
+    /// Replaces every filter that has used a faulty radio head by one that has not.
     pub fn exclude(&mut self, faulty: usize, heads: &[RadioHead]) {
         for number in 0..self.used {
             let Some([first, second]) = self.filters.get(number).map(|it| it.without) else {
@@ -225,7 +229,8 @@ impl Subsets {
         }
     }
 
-    /// The radio head that has not been heard for longest, if that is not lately and enough others are watched.
+    /// Returns the radio head with the longest time since reception, if that is not recent and
+    /// enough others are monitored.
     fn longest_unheard(&self, keeps: impl Fn(usize, f64) -> bool) -> Option<usize> {
         let last = |head: &usize| self.last.get(*head).copied().unwrap_or_default();
         let ones = (self.iter().filter(|it| it.is_of_one())).map(|it| it.without[0]);
@@ -254,7 +259,8 @@ impl Subsets {
         self.used = kept;
     }
 
-    /// Begins a filter without these radio heads, as a copy of the one that lacks all of them but the new one.
+    /// Starts a filter without these radio heads, as a copy of the one without all of them except
+    /// the new one.
     fn begin(&mut self, without: [usize; 2], new: (usize, Option<&RadioHead>), nominal: &Ekf) {
         let spare = self.filters.len() > self.used;
         let spare = if spare { self.filters.pop() } else { None };
@@ -282,7 +288,7 @@ impl Subsets {
     }
 }
 
-/// Leaves a radio head out, or uses it again.
+/// Excludes a radio head, or includes it again.
 pub(super) fn exclude(ekf: &mut Ekf, head: Option<&RadioHead>, excluded: bool) {
     if let Some(head) = head {
         ekf.set_excluded(head, excluded);
@@ -314,7 +320,7 @@ mod tests {
                     hear(head);
                 }
             }
-            // The first is not heard lately, and its filters end as another one is heard.
+            // The first one is not recent, and its filters end when another one is received.
             let now = hear(5);
             assert_eq!(now.get(0, 0).is_some(), keeps_first);
             assert_eq!(now.get(3, 0).is_some(), keeps_first);

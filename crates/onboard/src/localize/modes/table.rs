@@ -1,65 +1,68 @@
-//! The table of fault modes: what may be wrong, how probable that is before any angle is heard, how a filter that
-//! reckons with it differs from the nominal one, and what its hypothesis goes through. A mode is a row; a further one is
-//! a further row and its test.
+//! Table of fault modes: possible faults, their prior probabilities, the difference of their
+//! filters from the nominal one, and the transitions of their hypotheses. A mode is a row; an
+//! additional mode needs a row and its test.
 
 use crate::localize::ekf::{Ekf, EkfConfig, MOST_SLIP};
 use crate::settings::{DriveKind, FaultProbability};
 
-/// What a mode is called.
+/// Identifier of a mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::localize) enum ModeId {
-    /// The odometer slips.
+    /// Wheel slip.
     Slip,
-    /// Mounting and phases of the array are off.
+    /// Wrong mounting angle or phases of the array.
     UncalibratedArray,
-    /// The odometer is noisier than stated.
+    /// Odometer noise above the specified one.
     NoisyOdometer,
-    /// The site plan is displaced as a whole.
+    /// Displacement of the whole site plan.
     DisplacedSite,
-    /// The angles are noisier than stated.
+    /// Angle noise above the specified one.
     NoisyAngles,
 }
 
-/// What a hypothesis carries over where the nominal filter becomes another one.
+/// Part of a hypothesis that is retained when another filter becomes the nominal one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::localize) enum Carry {
-    /// Filter and likelihood.
+    /// Filter and likelihood ratio.
     All,
-    /// Both, but for the radio head that is excluded.
+    /// Filter and likelihood ratio, without the excluded radio head.
     AllButHead,
-    /// Filter and likelihood where the angles do not speak against it, else nothing.
+    /// Filter and likelihood ratio unless the angles contradict the mode; otherwise nothing.
     IfNotAgainst,
-    /// Nothing: it begins anew from the nominal filter.
+    /// Nothing: the hypothesis restarts from the nominal filter.
     Nothing,
 }
 
-/// A row of the table.
+/// Row of the table.
 #[derive(Debug)]
 pub(in crate::localize) struct Mode {
     pub id: ModeId,
-    /// Whether it is watched beside this nominal filter.
+    /// Whether the mode is monitored, given this nominal filter.
     pub applies: fn(&Ekf, &FaultProbability) -> bool,
     /// Prior probability.
     pub prior: fn(&EkfConfig, &FaultProbability) -> f64,
-    /// How its filter differs from the nominal one.
+    /// Modification of the nominal filter.
     pub alter: fn(&mut Ekf),
-    /// How its filter follows the variance that the angles are heard to have, as a multiple of what is stated.
+    /// Adaptation of the filter to the measured variance of the angles, as a multiple of the
+    /// specified one.
     pub adapt: fn(&mut Ekf, f64),
-    /// Whether it is a fault: radio heads are monitored for a second fault only as far as it does not hold.
+    /// Whether the mode is a fault; radio heads are then monitored for a second fault with the
+    /// probability that no fault mode holds.
     pub is_fault: bool,
-    /// How it begins anew whenever the vehicle sets off or its speed jumps by a share, at which a fault may begin.
+    /// Restart of the filter when the vehicle starts to move or its speed jumps by a fraction, at
+    /// which a fault may begin.
     pub onset: Option<fn(&mut Ekf, f64)>,
-    /// When a radio head is excluded,
+    /// Part that is retained when a radio head is excluded.
     pub on_exclude: Carry,
-    /// and when a mode becomes the nominal one.
+    /// Part that is retained when another mode becomes the nominal one.
     pub on_rebase: Carry,
-    /// Odds from which on it becomes the nominal mode.
+    /// Odds above which the mode becomes the nominal mode.
     pub becomes_nominal_at: Option<f64>,
-    /// Whether angles may be off by it as if the vehicle were lost.
+    /// Whether the mode explains contradicting angles without a lost vehicle.
     pub misleads: bool,
 }
 
-/// Defaults of a row.
+/// Default row.
 const ROW: Mode = Mode {
     id: ModeId::Slip,
     applies: |_, _| true,
@@ -85,11 +88,11 @@ const SLIP: Mode = Mode {
     ..ROW
 };
 
-/// The modes, in the order in which their filters are updated.
+/// Modes, in the order of their filter updates.
 pub(in crate::localize) static TABLE: [Mode; 5] = [
     SLIP,
-    // Where every filter estimates a bias, that explains what slip would.
-    // The likelihoods soon outweigh this prior, and that of noisier angles.
+    // With estimated biases, a bias explains the effect of slip. The likelihood ratio soon
+    // dominates this prior, and that of noisier angles.
     Mode {
         id: ModeId::UncalibratedArray,
         applies: |nominal, _| {
@@ -101,20 +104,20 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
         becomes_nominal_at: Some(100.0),
         ..ROW
     },
-    // The wheels of a differential drive slip a little with every metre.
+    // The wheels of a differential drive slip slightly with every metre.
     Mode {
         id: ModeId::NoisyOdometer,
         applies: |nominal, _| {
             let config = nominal.config();
             config.drive == DriveKind::Road
         },
-        // So many times as probable as slip, but no likelier than not.
+        // 90 times as probable as slip, limited to 0.5.
         prior: |_, faults| (90.0 * faults.odometer).min(0.5),
         alter: |ekf| ekf.scale_odometer_noise(3.0),
         on_rebase: Carry::Nothing,
         ..ROW
     },
-    // Without a map the radio heads are the frame.
+    // Without a map, the radio heads define the frame.
     Mode {
         id: ModeId::DisplacedSite,
         applies: |nominal, faults| faults.all_radio_heads > 0.0 && nominal.has_map(),
@@ -142,7 +145,7 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
     },
 ];
 
-/// A trip past four radio heads at 4 m/s, for tests.
+/// Trip past four radio heads at 4 m/s, for tests.
 #[cfg(test)]
 pub(in crate::localize) mod trip {
     use std::sync::Arc;
@@ -179,7 +182,7 @@ pub(in crate::localize) mod trip {
         (heads, road, ekf)
     }
 
-    /// An angle.
+    /// Returns an angle.
     pub(in crate::localize) const fn angle(time_s: f64, phase_rad: f64) -> AngleMeasurement {
         AngleMeasurement {
             kind: MeasurementKind::Angle,
@@ -208,28 +211,29 @@ mod tests {
     use crate::observation::OdometrySample;
     use crate::settings::IntegritySettings;
 
-    /// How the world departs from what is stated.
+    /// Deviation of the simulated environment from the nominal model.
     #[derive(Default)]
     struct World {
-        /// The array is turned by so much (rad).
+        /// Rotation of the array (rad).
         turned_rad: f64,
-        /// All radio heads stand so far off (m).
+        /// Displacement of all radio heads (m).
         moved_m: [f64; 2],
-        /// The odometer reads so much more, as a share, from a time on (s).
+        /// Relative scale error of the odometer, and the time of its onset (s).
         scale: (f64, f64),
-        /// The angles have so many times the variance that is stated besides their own.
+        /// Variance of the additional angle noise, relative to the specified variance.
         noise: f64,
-        /// They are heard until this time (s); always, if 0.
+        /// End of reception (s); 0 for none.
         heard_until_s: f64,
-        /// Prior probability of a bias, by which the filters estimate one.
+        /// Prior probability of a bias.
         bias_probability: f64,
     }
 
-    /// How far off a filter is at the end (m).
+    /// Final error of a filter (m).
     type Distance = Box<dyn Fn(&Ekf) -> f64>;
 
-    /// So long past four radio heads in this world, whose angles are off by `off_rad` after so many metres: the bank
-    /// then, and how far off its leading filter, and that of a mode, is.
+    /// Drives past four radio heads until a time, with an additional angle error `off_rad` of radio
+    /// head and distance: returns the bank, and the errors of its selected filter and of a mode's
+    /// filter.
     fn drive(world: &World, until_s: f64, off_rad: impl Fn(usize, f64) -> f64) -> (Bank, Distance) {
         let (heads, road, ekf) = trip_with_bias(world.bias_probability);
         let mut bank = Bank::new(&ekf, &heads, &IntegritySettings::default(), 0.0);
@@ -293,7 +297,7 @@ mod tests {
         let (bank, off_m) = drive(&world, 60.0, EXACT);
         assert_eq!(bank.leading_id(), Some(ModeId::UncalibratedArray));
         assert!(off_m(bank.leader()) < 0.3);
-        // About its filter as the nominal one nothing is wrong any more.
+        // With its filter as the nominal one, there is no fault.
         let bank = bank.about_leading().unwrap();
         assert!(bank.leading_id().is_none() && bank.mode(ModeId::UncalibratedArray).is_none());
     }
@@ -315,7 +319,7 @@ mod tests {
             let std_m = found.covariance[state][state].sqrt();
             assert!(std_m < 0.3 && by_m.abs() < 4.0 * std_m, "{by_m} of {std_m}");
         }
-        // It is no reason to exclude a radio head, and stays where one is.
+        // The mode is no reason to exclude a radio head, and remains after an exclusion.
         bank.exclude(0);
         assert!(
             bank.leading_id() == Some(ModeId::DisplacedSite) && *bank.leader().belief() == found
@@ -346,7 +350,7 @@ mod tests {
         let (bank, _) = drive(&world, 30.0, EXACT);
         assert!(bank.noise_ratio() > 20.0);
         let (_, noisy) = bank.mode(ModeId::NoisyAngles).unwrap();
-        // Of a K of 10 dB that is stated.
+        // Relative to the specified K of 10 dB.
         assert!((noisy.config().noise_ratio() - 10.0).abs() < 1e-9);
     }
 
@@ -426,7 +430,7 @@ mod tests {
             assert!(odds > 0.1, "{odds}");
             let covariance = slip.pose(29.9).covariance.unwrap();
             let std_m = (covariance[0][0] + covariance[1][1]).sqrt();
-            // Slip by the jump is one deviation of what is expected.
+            // Slip of the size of the jump is one standard deviation.
             assert!(
                 (off_m(slip) / std_m - 1.0).abs() < 0.3,
                 "{} of {std_m}",
@@ -435,12 +439,12 @@ mod tests {
         }
     }
 
-    /// Estimated as a nominal condition.
+    /// Prior probability of multipath as a nominal condition.
     const MULTIPATH: f64 = 0.9;
 
     #[test]
     fn a_correlated_bias_is_nominal() {
-        // Of each radio head another one every three metres, as reflections make it.
+        // A new bias of each radio head every three metres, as caused by reflections.
         let bias_rad = |head: usize, way_m: f64| {
             let number = (way_m / 3.0).floor() as u64 * 4 + head as u64;
             0.3 * ChaCha8Rng::seed_from_u64(number).sample::<f64, _>(StandardNormal)
@@ -456,7 +460,7 @@ mod tests {
         assert!(off_m(bank.leader()) < 1.0, "{}", off_m(bank.leader()));
     }
 
-    /// A bias of each radio head could explain a displaced plan as well.
+    /// A bias of each radio head could also explain a displaced site plan.
     #[test]
     fn a_displaced_site_leads_beside_estimated_biases() {
         let moved_m = [1.2, -1.6];
