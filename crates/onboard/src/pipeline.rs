@@ -331,8 +331,8 @@ impl Onboard {
                     Observed::Angle(measured) => self.collect(ssb, Some(measured)),
                 }
             }
-            let are_right = |monitors: &Box<Monitors>| !monitors.faults().has_channel();
-            if self.monitors.as_ref().is_none_or(are_right) {
+            let are_right = |monitors: &Monitors| !monitors.faults().has_channel();
+            if self.monitors.as_deref().is_none_or(are_right) {
                 self.localizer.update(&mut self.burst)?;
                 for update in &self.burst {
                     if let Some(execution) = self.executions.get_mut(update.number) {
