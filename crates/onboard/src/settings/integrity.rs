@@ -46,8 +46,7 @@ pub struct FaultProbability {
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub odometer: f64,
     /// Displacement of all radio heads relative to the map. A filter estimates it, and the angles weigh that filter.
-    /// Without a map the radio heads define the frame, and this fault does not exist. Default: 0.05, because the mean
-    /// share of errors beyond the level under this fault is at most the risk of 8e-4 divided by this probability.
+    /// Without a map the radio heads define the frame, and this fault does not exist.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub all_radio_heads: f64,
     /// Prior probability of an array fault (mounting or phases). The monitor does not detect this
@@ -73,7 +72,7 @@ impl Default for FaultProbability {
         Self {
             radio_head: None,
             odometer: 1e-3,
-            all_radio_heads: 0.05,
+            all_radio_heads: 0.01,
             array: 1e-5,
         }
     }

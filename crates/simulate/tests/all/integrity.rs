@@ -7,7 +7,6 @@
 
 use crate::common;
 use onboard::localize::IntegrityState;
-use onboard::settings::IntegritySettings;
 use simulate::scenario::{FaultKind, FaultSettings, Scenario};
 use simulate::{IntegritySummary, Step};
 use toml::Value;
@@ -75,33 +74,6 @@ fn nominal_runs_are_ok_and_within_the_protection_level() {
     let ratio = total.median_ratio();
     let chance = 4.0 * 0.33 / (runs as f64).sqrt();
     assert!(ratio < 6.0 * (1.0 + chance) && ratio > 3.0, "{ratio}");
-}
-
-/// Along a straight road, the angles cannot separate a displacement of all radio heads from an error of the start. The
-/// level bounds the share of errors beyond it by the risk over the prior of the displacement, on average over
-/// displacements.
-#[test]
-fn a_displacement_of_all_radio_heads_is_covered_before_it_is_found() {
-    let settings = IntegritySettings::default();
-    let most = settings.risk_per_epoch() / settings.fault_probability.all_radio_heads;
-    assert!(most < 0.02, "{most}");
-    let yard = changed("yard", [("vehicle.integrity", value("{}"))]);
-    let heads = yard.site.radio_heads.iter().map(|head| {
-        let [x_m, y_m, z_m] = head.position_m;
-        let position_m = format!("{{ position_m = [{:?}, {y_m:?}, {z_m:?}] }}", x_m + 2.0);
-        (head.name.clone(), value(&position_m))
-    });
-    let displaced = changed(
-        "yard",
-        [
-            ("vehicle.integrity", value("{}")),
-            ("truth.site.radio_heads", Value::Table(heads.collect())),
-        ],
-    );
-    // The start of the first and of the last run is 0.6 m off, two standard deviations, against the displacement.
-    let total = IntegritySummary::sum(&common::campaign(&displaced, 12, 4).integrity);
-    assert!(2 * total.ok > total.epochs, "{} ok", total.ok);
-    assert!(total.risk() < most, "{} of at most {most}", total.risk());
 }
 
 /// Noisier angles do not indicate a faulty radio head; the protection level grows.
