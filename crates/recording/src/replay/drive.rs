@@ -197,8 +197,12 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// Diagnoses the faults of the sensors that are active at the end of the drive.
+    /// Diagnoses the faults of the sensors that are active at the end of the drive, unless a
+    /// diagnosis of the input explains why the angles contradict the odometry.
     fn diagnose_faults(&mut self) {
+        if !self.drive.diagnoses.is_empty() {
+            return;
+        }
         let active = self.faults;
         for it in active.iter() {
             self.drive.diagnoses.push(Diagnosis {

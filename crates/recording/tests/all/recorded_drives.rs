@@ -336,7 +336,7 @@ fn angle_logs_come_back_and_bad_lines_are_left_out() {
     let bad = "0.04,1008,0,0,0.1,1,0\n0.04,1,-1,0,0.1,1,0\n0.04,1,0,0,-0.1,1,0\n0.04,1,0,0,0,1,0\n\
                0.04,1,0,NaN,0.1,1,0\n0.04,1,0,0,inf,1,0\n0.04,1,0,,0.1,1,0\n0.04,1.5,0,0,0.1,1,0\n\
                1.7e18,1,0,0,0.1,1,0\n";
-    fs::write(&file, good + &bad.replace('\n', ",1\n")).unwrap();
+    fs::write(&file, good + &bad.replace('\n', ",1,0\n")).unwrap();
     let log = read_angle_log(&file).unwrap();
     assert_eq!(log.angles, angles);
     let lines: Vec<usize> = log.remarks.iter().map(|remark| remark.line).collect();
