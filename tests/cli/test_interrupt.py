@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 LONG: dict[str, list[str]] = {
     "run": ["run", "paper-real-odometry-4", "--runs", "400", "--out", "out"],
     "evaluate": ["evaluate", "--out", "out"],
+    "rerun": ["rerun", "earlier"],
     "search": ["search"],
     "fit": ["fit", "--runs", "100000"],
     "explore": ["explore"],
@@ -77,6 +78,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("interrupted")
     access_av.synthesize("paper-real-odometry-4", folder / "drive", duration_s=20.0)
     access_av.drives.log_angles("yard", folder / "logged", duration_s=60.0)
+    earlier = ["run", "yard", "--runs", "3", "--out", "earlier"]
+    subprocess.run([sys.executable, "-m", "access_av", *earlier], cwd=folder, check=True)
     masts = "".join(f"mast-{n},{20 * n},{(-1) ** n * 45},8\n" for n in range(-5, 9))
     (folder / "masts.csv").write_text("name,x_m,y_m,z_m\n" + masts)
     (folder / "space.toml").write_text("[vehicle.wake_up.due]\nbase_ms = [80.0, 100.0, 150.0]\n")

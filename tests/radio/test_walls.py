@@ -112,7 +112,8 @@ def test_walls_that_cannot_be_are_named() -> None:
         [x_m + dx_m, y_m + dy_m] for dx_m, dy_m in ((-5, -5), (5, -5), (5, 5), (-5, 5), (-5, -5))
     ]
     assert any(
-        "radio_heads[0].position_m: walls keep it out" in it for it in said({"points_m": ring})
+        "radio_heads[0].position_m: walls hide the road from it" in it
+        for it in said({"points_m": ring})
     )
     for wall, key in (
         ({"points_m": [[0.0, 0.0]]}, r"walls\[0\].points_m"),

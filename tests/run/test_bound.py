@@ -78,7 +78,7 @@ def test_snr_is_the_link_budgets() -> None:
 def test_unusable_places_are_refused() -> None:
     core = _core.Bound(Scenario.load("paper"))
     one, two = np.zeros(1), np.zeros(2)
-    with pytest.raises(ValueError, match="as many"):
+    with pytest.raises(ValueError, match="equal lengths"):
         core.at(one, two, 1.0, 0.0)
     for looks in (0.0, -1.0, float("nan")):
         with pytest.raises(ValueError, match="looks"):

@@ -375,9 +375,9 @@ def test_a_localizer_stands_in_for_the_built_in_one() -> None:
     ("pose", "named"),
     [
         ((1.0, float("nan"), 0.0), "not finite"),
-        ((1.0, 2.0), "something else"),
-        ("here", "something else"),
-        ((1.0, 2.0, 0.0, [[1.0]]), "something else"),
+        ((1.0, 2.0), "a value other than"),
+        ("here", "a value other than"),
+        ((1.0, 2.0, 0.0, [[1.0]]), "a value other than"),
         ((1.0, 2.0, 0.0, -np.eye(3)), "negative"),
     ],
 )

@@ -458,7 +458,7 @@ def test_pilots_know_their_noise() -> None:
     for wrong, message in (
         (-1.0, "noise_variance must be"),
         ([1.0, 1.0], "one number per antenna: 4, not 2"),
-        ("much", "a number, or one for each antenna"),
+        ("much", "one number or one number per antenna"),
     ):
         with pytest.raises(ValueError, match=message):
             aoa.maximum_likelihood_pilots(np.ones((4, 3), complex), noise_variance=wrong)

@@ -80,10 +80,9 @@ class Operation:
         ...     }
         ... )
         >>> print(Operation.of(steps, 1.0).in_words())
-        The vehicle may rely on its position 62 % of the time (state ok); half of that time it \
-knows it to within 0.4 m (protection level). The rest of the time it knows that it may not, and \
-has to slow down or stop: 30 % because the protection level was above the alert limit of 1 m, \
-8 % because several radio heads contradict each other, or the array or the odometer all of them.
+        The position is available (state ok) 62 % of the time, with a median protection level of \
+0.4 m. Otherwise the vehicle must slow down or stop. Causes: 30 % protection level above the alert \
+limit of 1 m, 8 % contradictions between radio heads, array and odometer.
         """
         told = steps.filter(pl.col("integrity").is_not_null() | pl.col("searching"))
         if told["integrity"].null_count() == told.height:

@@ -178,9 +178,9 @@ fn coordinates(site: &Site, road: Option<&Road>) -> Option<Warning> {
             .into_iter()
             .fold(0.0, f64::max)
     };
-    let why = "places of a plant as near to each other are written in degrees";
-    let write = "write metres east and north of a point of the plant's own; a degree of latitude is \
-                 111195 m, one of longitude that times the cosine of the latitude";
+    let why = "positions of a plant this close together are probably in degrees";
+    let write = "specify metres east and north of a point of the plant; a degree of latitude is \
+                 111195 m, a degree of longitude that times the cosine of the latitude";
     if heads.len() > 1 && extent(&heads) < DEGREES {
         let value = format!("{:?}", site.radio_heads[0].position_m);
         return Some(warning("radio_heads[0].position_m", value, why, write));

@@ -8,7 +8,7 @@ Examples
 --------
 >>> from access_av import columns
 >>> columns.TABLES["executions"].null["angle_rad"]
-'the snapshots carry no angle'
+'no angle could be estimated'
 >>> columns.GLOSSARY["covariance_xy_m2"].unit
 'm²'
 """
