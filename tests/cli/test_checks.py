@@ -118,7 +118,8 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
         {"vehicle.start.heading_std_rad": 5.0}, "heading_std_rad", "0.0873"),
     # Places.
     "one head in another frame": (
-        {"site.radio_heads[1].position_m": [52600.0, -30.0, 8.0]}, "radio_heads[1]", "one local frame"),
+        {"site.radio_heads[1].position_m": [52600.0, -30.0, 8.0]},
+        "radio_heads[1]", "one local frame"),
     "road far from all heads": ({"motion.path": PATH_AWAY}, "radio_heads[0]", "one local frame"),
     "road in degrees": (
         {"site.road": {"polyline_m": [[8.68, 50.11], [8.685, 50.11], [8.686, 50.113]]}},
@@ -142,7 +143,8 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
     "array in millimetres": (
         {"vehicle.array.position_m": [0.5, 0.0, 1800.0]}, "array.position_m[2]", "1800 mm are 1.8"),
     "two heads that are one": (
-        {"site.radio_heads[1].position_m": [30.0, 25.01, 8.0]}, "radio_heads[1]", "remove duplicates"),
+        {"site.radio_heads[1].position_m": [30.0, 25.01, 8.0]},
+        "radio_heads[1]", "remove duplicates"),
     "two heads of one name": (
         {"site.radio_heads[1].name": "gate"}, "radio_heads[1].name", "gate-1"),
     "a start off the road": (
