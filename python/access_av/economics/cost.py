@@ -1,4 +1,4 @@
-"""What the approach saves in money: roadside units, sensors, energy per day and per fleet."""
+"""Cost savings: roadside units, sensors, energy per day and per fleet."""
 
 from __future__ import annotations
 

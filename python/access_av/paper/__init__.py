@@ -1,6 +1,6 @@
-"""The ACCESS-AV paper: its numbers, its evaluation, its claims beside what is obtained.
+"""The ACCESS-AV paper: figures, evaluation, and comparison of its claims with the results.
 
-Everything outside of this package is general and knows nothing of it.
+No module outside of this package depends on it.
 
 Examples
 --------

@@ -1,4 +1,4 @@
-"""What the controller itself contributes: a constant in its place that executes as often.
+"""Contribution of the controller: comparison with a constant wake-up time of equal rate.
 
 Everything else stays, the gate included where a reading has one, and the runs are the same. What is
 left of a difference, run by run, is the controller's.
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 # Intervals of the front, in ms: from every SSB to beyond the paper's t_max.
 FRONT_MS = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 150.0, 180.0, 240.0, 320.0, 480.0, 1000.0)
-# A difference below this share of the error matters to nobody.
+# Fraction of the error below which a difference is irrelevant.
 LEAST_SHARE = 0.05
 
 
 @dataclass(frozen=True)
 class Ablation:
-    """A power mode of a reading with its controller, and with a constant in its place.
+    """Power mode of an interpretation, with its controller and with a constant wake-up time.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the paper leaves open: what was chosen, why, and what another value does.
+"""Assumptions where the paper is not specific, with reason and effect of alternatives.
 
 One thing is changed at a time, from the shipped reading; ``chosen.toml`` has them. What they do
 together is what :mod:`access_av.paper.unknowns` draws.
@@ -68,7 +68,7 @@ def entries() -> list[dict[str, Any]]:
 def effects(
     driver: Driver, runs: int = RUNS, *, progress: Callable[[int, int], None] | None = None
 ) -> list[Effect]:
-    """The shipped values, and after each what its alternatives do, over so many runs."""
+    """Returns the shipped values, each followed by the effects of its alternatives."""
     paper = load(SHIPPED).scenario
     driver = replace(driver, methods=("music",), runs=runs, known={}, tapes=[], progress=None)
     here = _driven(driver, paper)

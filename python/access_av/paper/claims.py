@@ -1,4 +1,4 @@
-"""The paper's claims beside what the evaluation obtains, with what each verdict is worth."""
+"""Verdicts on the paper's claims, with their weight of evidence."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def check_claims(
 
 
 def margins(outcome: Outcome) -> dict[str, Numbers]:
-    """By how much each claim is met in every variant; what cannot be judged is absent."""
+    """Returns the margin of each claim in every variant, without claims that cannot be judged."""
     found = {}
     for claim_id, entry in stated_claims().items():
         if entry["rule"] == NOT_TESTABLE:
@@ -247,7 +247,7 @@ def _turns(margins: Numbers) -> bool:
 
 
 def _obtained(entry: Mapping[str, Any], value: Any) -> Any:
-    """The value of the sample as it is, in the stated one's shape."""
+    """Returns the value of the original sample, in the shape of the paper's value."""
     if entry["rule"] == "equal":
         return value
     if entry["rule"] == "modes":

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 RESAMPLES = 200
 # Percentiles are over every 25th SSB, half a second apart: closer errors are correlated.
 SPARSE = 25
-# What every world is driven by: the paper's methods.
+# Methods of the paper that are simulated in every environment.
 TAPED = tuple(method.replace("_", "-") for method in METHODS)
 
 

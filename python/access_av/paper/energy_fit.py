@@ -89,7 +89,7 @@ def numbers(freedoms: Collection[str] = SHIPPED) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class ModeDemand:
-    """What a power mode is asked for in one trip.
+    """Load of a power mode in one trip.
 
     Attributes
     ----------

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Setting:
-    """What a drive depends on besides scenario and seed."""
+    """Parameters of a run in addition to scenario and seed."""
 
     method: str
     adaptive: bool
@@ -151,7 +151,7 @@ class Evaluation(Result):
         return max(float(drives.longest_gap_s) for drives in self.outcome.adaptive.values())
 
     def refit(self, freedoms: Sequence[str]) -> Evaluation:
-        """The same drives, the energies per execution fitted by other freedoms.
+        """Returns the evaluation with energies per estimate fitted with other degrees of freedom.
 
         Nothing changes where they are the platform's own. Operating points keep theirs.
         """
@@ -222,7 +222,7 @@ def evaluate(
 
 
 def evaluate_with(driver: Driver, reading: Reading) -> Evaluation:
-    """The same, by a driver that may know some of the drives already."""
+    """Evaluates an interpretation with a driver that may have cached runs."""
     started = time.monotonic()
     platform = driver.platform
     driven: dict[Setting, Driven] = {}
@@ -312,7 +312,7 @@ def outcome_of(
 
 
 def settings_of(reading: Reading, platform: Platform) -> dict[str, float]:
-    """What a reading is set to where the paper states a setting, by name."""
+    """Returns the values of an interpretation for the settings that the paper specifies."""
     scenario = json.loads(reading.scenario.resolved(platform.core).to_json())
     vehicle = scenario["vehicle"]
     controller = vehicle["wake_up"].get("due", vehicle["wake_up"])
@@ -326,7 +326,7 @@ def settings_of(reading: Reading, platform: Platform) -> dict[str, float]:
 
 
 def demands(outcome: Outcome, platform: Platform) -> dict[int, ModeDemand]:
-    """What an evaluation asked of each power mode."""
+    """Returns the load of each power mode in an evaluation."""
     return _demands(platform, outcome.fixed, outcome.adaptive, 1)
 
 

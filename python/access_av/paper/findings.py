@@ -1,4 +1,4 @@
-"""What an evaluation obtains for each claim of the paper.
+"""Results of an evaluation for each claim of the paper.
 
 Errors are the mean over the runs of the absolute error, worst along the track. What the paper
 states is in ``paper.toml``; how each number is obtained is here. All are arrays over variants
@@ -28,7 +28,7 @@ class MissingFigureError(Exception):
 
 @dataclass(frozen=True)
 class Finding:
-    """What is obtained for a claim.
+    """Result for a claim.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ def _most_in_mode_0(outcome: Outcome) -> Finding:
 
 
 def _refrigerators(_: Outcome) -> Finding:
-    """Of what the paper states to be saved: no simulation is in it."""
+    """Result computed from the savings in the paper, without simulation."""
     kwh = float(of_claim("e6_fleet_of_100_saved_per_day_mj")) / 3.6
     each_kwh = float(paper_numbers()["day"]["refrigerator_kwh"])
     return Finding(
@@ -273,13 +273,13 @@ def _e4(outcome: Outcome) -> Finding:
 
 
 def saved_per_trip_j(outcome: Outcome, mode: int) -> Numbers:
-    """What adaptive MUSIC saves in a mode against MUSIC at its base wake-up time."""
+    """Energy saving of adaptive MUSIC in a mode relative to MUSIC at its base wake-up time."""
     adaptive_j = energy_j(outcome, mode, "music", adaptive=True)
     return np.asarray(energy_j(outcome, mode, "music") - adaptive_j)
 
 
 def saving(outcome: Outcome, mode: int) -> Saving:
-    """The same as a saving by day and fleet, of the sample as it is."""
+    """Energy saving per day and fleet, for the original sample."""
     return Saving(
         per_trip_j=float(saved_per_trip_j(outcome, mode)[0]),
         trip_s=outcome.trip_s,
@@ -329,7 +329,7 @@ def _both_at_once(outcome: Outcome) -> Finding:
 
 
 def _settings(*names: str) -> Callable[[Outcome], Finding]:
-    """What the reading is set to where the paper states a setting."""
+    """Values of the interpretation for the settings that the paper specifies."""
 
     def find(outcome: Outcome) -> Finding:
         if missing := [name for name in names if name not in outcome.settings]:

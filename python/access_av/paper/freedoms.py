@@ -1,4 +1,4 @@
-"""What each freedom of the energy fit buys: the claims that are met with it.
+"""Claims that are met with each degree of freedom of the energy fit.
 
 The drives are the same; only the energies per execution are fitted anew. What a freedom solves for
 is met by construction, so the fewer it takes, the more a claim of energy says.
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from access_av.paper.claims import Claim
     from access_av.paper.evaluation import Evaluation
 
-# One after the other, each beside those before it.
+# Returns the degrees of freedom cumulatively.
 LADDER = tuple(tuple(FREEDOMS)[:count] for count in range(len(FREEDOMS) + 1))
 
 
@@ -101,7 +101,7 @@ def ladder(
         Claims as ``paper.toml`` has them; its own when ``None``.
     """
     stated = stated_claims() if stated is None else stated
-    # What no energy is in stays as it was judged.
+    # Verdicts without energies are unchanged.
     with_energy = {
         name: entry for name, entry in stated.items() if "energy" in entry.get("rests_on", ())
     }

@@ -1,4 +1,4 @@
-"""What the paper leaves open, as a space to draw readings from.
+"""Unspecified parameters of the paper, as a space of interpretations.
 
 Each dimension has a stated range and says how it changes the paper's scenario. Dimensions of the
 *world* change what is driven through, and so every campaign; those of the *controller* only what
@@ -27,7 +27,7 @@ MIDDLE_SNR_DB, SHIPPED_EIRP_DBM = 5.0, -17.3
 
 @dataclass(frozen=True)
 class Dimension:
-    """One thing that the paper leaves open.
+    """Parameter that the paper does not specify.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ EVERY = 5
 
 @dataclass(frozen=True)
 class Drives:
-    """One setting, driven many times.
+    """Setting with many runs.
 
     Attributes
     ----------

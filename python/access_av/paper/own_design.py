@@ -126,7 +126,7 @@ def compare(driver: Driver, evaluation: Evaluation) -> list[Comparison]:
 
 
 def beside(evaluation: Evaluation, mode: int, ours: Drives, *, knows_road: bool) -> Comparison:
-    """Drives of ours beside the paper's adaptive point in a mode."""
+    """Compares runs of the proposed method with the paper's adaptive point in a mode."""
     papers = evaluation.outcome.adaptive[mode]
     papers_j: float | None = None
     ours_j: float | None = None
@@ -161,7 +161,7 @@ def beside(evaluation: Evaluation, mode: int, ours: Drives, *, knows_road: bool)
     )
 
 
-# A real odometer, and a start as it is known at a loading bay.
+# Realistic odometer, and start uncertainty at a loading bay.
 REAL = {
     "vehicle.odometer.scale_std": 0.003,
     "vehicle.odometer.noise_m_per_sqrt_m": 0.01,

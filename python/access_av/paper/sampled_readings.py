@@ -83,7 +83,7 @@ class Sample:
         return [int(index) for index in np.lexsort((-short, -self.held()))]
 
     def values(self, index: int) -> dict[str, Any]:
-        """What was drawn for a reading."""
+        """Sampled values of an interpretation."""
         return named(self.dimensions, self.coordinates[index].tolist())
 
 
@@ -182,7 +182,7 @@ def _task(
 
 
 def _rule(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """What of a claim decides its margin."""
+    """Part of a claim that determines its margin."""
     return {key: entry.get(key) for key in ("rule", "stated", "tolerance", "query")}
 
 
@@ -241,13 +241,13 @@ def _side_by_side(readings: list[Drives]) -> Drives:
 
 
 def as_reading(values: Mapping[str, Any], name: str = "found") -> Reading:
-    """What was drawn, as a reading."""
+    """Returns a sampled point as an interpretation."""
     scenario = Scenario.from_toml(as_toml(values, name))
     return Reading(name, "Found by the search", scenario, OPEN, keeps_t_max=True)
 
 
 def as_toml(values: Mapping[str, Any], name: str = "found") -> str:
-    """What was drawn, as a file of a reading: laid over the paper's scenario."""
+    """Returns a sampled point as a file that overrides the paper's scenario."""
     [head] = json.loads(Scenario.load("paper").to_json())["site"]["radio_heads"]
     tables: dict[str, dict[str, Any]] = {"site": {}, "site.radio_heads": {}, "vehicle": {}}
     changes = world_changes(values) | controller_changes(values, values)
@@ -278,7 +278,7 @@ CANDIDATES = 8
 
 @dataclass(frozen=True)
 class Confirmed:
-    """A reading that was driven again.
+    """Interpretation that was simulated again.
 
     Attributes
     ----------

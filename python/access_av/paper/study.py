@@ -55,7 +55,7 @@ class Study:
     unusable
         Readings that could not be evaluated, and why.
     bought
-        What each freedom of the energy fit buys.
+        Claims met with each degree of freedom of the energy fit.
     fair
         The shipped reading and ours told the same, in mode 0.
     effects
@@ -85,7 +85,7 @@ class Study:
         return [claim for claim in self.claims if claim.reading == reading]
 
     def tables(self) -> dict[str, pl.DataFrame]:
-        """What is written, as tables; columns as :mod:`access_av.columns` has them."""
+        """Returns the written tables; columns as :mod:`access_av.columns` has them."""
         named = {
             name: pl.concat(
                 [

@@ -1,4 +1,4 @@
-"""What the evaluation comes to, in sentences made from what was obtained."""
+"""Summary of the evaluation in sentences."""
 
 from __future__ import annotations
 
@@ -245,7 +245,7 @@ def counts_text(claims: Sequence[Claim]) -> str:
 
 
 def ours_text(study: Study) -> str:
-    """Ours beside the paper's adaptive point, with the road's course and without."""
+    """Comparison of the proposed method with the paper's adaptive point, with and without a map."""
     sentences = []
     for knows_road, who in (
         (False, "Our tracker, which wakes up when its own error asks for it, told no road either,"),
@@ -270,7 +270,7 @@ def ours_text(study: Study) -> str:
 
 
 def fair_text(study: Study) -> str:
-    """Ours and the paper's reading told the same, and what remains."""
+    """Comparison of the proposed method and the paper's method with equal information."""
     rms_m = {(each.real_odometer, each.knows_road, each.who): each.rms_m for each in study.fair}
     count = {
         (each.real_odometer, each.knows_road, each.who): each.executions for each in study.fair

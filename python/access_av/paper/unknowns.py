@@ -1,4 +1,4 @@
-"""On what the claims hang: Sobol indices of their margins over what the paper leaves open.
+"""Sensitivity of the claims: Sobol indices of their margins over the unspecified parameters.
 
 Readings are drawn from stated ranges (:mod:`access_av.paper.space`), a gate being one of the things
 drawn. A polynomial chaos expansion is fitted to each claim's margin (Legendre polynomials, which
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
     from access_av.paper.outcome import Numbers
     from access_av.paper.sampled_readings import Sample
 
-# Total indices below matter to nobody.
+# Total indices below this value are irrelevant.
 MATTERS = 0.1
 # Degrees of a single dimension, and of two together.
 SINGLE, PAIR = 4, 2
 RESAMPLES = 200
-# Polynomials are kept whose coefficient is so many of its standard deviations away from zero.
+# Minimum ratio of a polynomial's coefficient to its standard deviation.
 STANDS_OUT = 3.0
 
 
 @dataclass(frozen=True)
 class Index:
-    """How much of a claim's margin hangs on a dimension: shares of its variance.
+    """Sensitivity of a claim's margin to a parameter: fractions of its variance.
 
     Attributes
     ----------

@@ -239,7 +239,7 @@ def _where(study: Study) -> str:
 
 
 def _places(study: Study) -> str:
-    """What the charts along the road show, as a table to unfold."""
+    """Data of the charts along the road, as a collapsible table."""
     step = math.ceil(study.places.height / MOST_PLACES)
     rows = [
         (

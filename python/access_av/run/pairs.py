@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from access_av.statistics.percentiles import Percentile
 
-# What variants are compared with.
+# Baseline of the comparison of variants.
 AS_IT_IS = "as it is"
 DRIVES = "drives"
 # A vehicle with a larger error is off its lane and that of the opposite direction, in metres.

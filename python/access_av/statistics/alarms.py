@@ -1,4 +1,4 @@
-"""Alarms of a guarded localizer: in time, early, and what they kept silent about."""
+"""Alarms of a monitored localizer: timely, early and missed alarms."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Alarms:
     duration_s: float
 
     def per_hour(self, count: int) -> float:
-        """So many of them in an hour of driving."""
+        """Returns the number per hour of driving."""
         return count / (self.duration_s / 3600.0)
 
     @classmethod

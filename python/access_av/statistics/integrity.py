@@ -22,7 +22,7 @@ STATES = ("ok", "degraded", "unavailable")
 
 @dataclass(frozen=True)
 class Integrity:
-    """How a guarded localizer kept its promises.
+    """Integrity statistics of a monitored localizer.
 
     Attributes
     ----------

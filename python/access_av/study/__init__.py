@@ -1,4 +1,4 @@
-"""A plant's question answered: is it good enough here, where not, what mends it, what it costs."""
+"""Plant study: accuracy verdict, positions with large errors, remedies and costs."""
 
 from access_av.study.answer import study_plant
 from access_av.study.study_result import Study

@@ -25,7 +25,7 @@ MOST_VARIANTS = 24
 
 @dataclass(frozen=True)
 class Compared:
-    """A variant beside the first one.
+    """Comparison of a variant with the baseline.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ def compare(
 
 
 def beside_first(found: Sequence[Errors], percents: Sequence[float]) -> list[Compared]:
-    """What was driven in the same worlds, each beside the first."""
+    """Compares variants that were simulated in equal environments with the first one."""
     return [
         Compared(
             it,

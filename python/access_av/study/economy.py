@@ -32,7 +32,7 @@ NO_MONEY = ("_g_per_kwh", "_power_w", "_embodied_kg", "_spacing_m")
 
 @dataclass(frozen=True)
 class Prices:
-    """What things cost at a plant: its own figures, else published ones.
+    """Prices of a plant: its own figures, otherwise published ones.
 
     Attributes
     ----------

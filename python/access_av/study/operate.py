@@ -223,7 +223,7 @@ def _screened(
 
 
 def _finalists(screened: list[Point]) -> list[Operation]:
-    """What screening recommends, the vehicle's own, and those that more drives could prefer."""
+    """Candidates: the screening's choice, the vehicle's own operation, and possible rivals."""
     chosen = recommended(screened)
     if chosen is None:
         return []

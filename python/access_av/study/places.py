@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 # A percentile is of the errors so far before and behind a place: of one metre there are too few.
 WINDOW_M = 5.0
-# Worst places are told this far apart.
+# Minimum distance between reported worst positions, in metres.
 APART_M = 40.0
 MOST_PLACES = 3
-# Until so far from its start a vehicle knows its place mostly from what it is told there.
+# Distance from the start within which the given start dominates the position (m).
 STARTING_M = 20.0
-# An odometer carries errors on for so long; so much more than usual is worth naming.
+# Distance over which the odometer carries errors on (m), and ratio that is reported.
 CARRIED_M = 60.0
 MORE_THAN_USUAL = 1.25
 # Below this SNR noise is a large part of an angle's error.

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from access_av import _core
 
-# What is left of each error by the remedy.
+# Returns the ratio of each error after the remedy to that before.
 SURVEYED_STD_M = 0.02  # a total station or RTK-GNSS, in each of x and y
 CALIBRATED_MOUNTING_STD_RAD = 0.002
 CALIBRATED_PHASE_STD_RAD = 0.01
@@ -140,7 +140,7 @@ def _odometer(vehicle: Mapping[str, Any], vehicles: int) -> Remedy | None:
 
 
 def _move(scenario: _core.Scenario, site: Mapping[str, Any]) -> Remedy | None:
-    """The radio head whose move to the best place beside the weakest one helps the bound most."""
+    """Returns the radio head whose move to the best position near the weakest one helps most."""
     heads = site["radio_heads"]
     if len(heads) < 2:
         return None

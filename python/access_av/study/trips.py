@@ -117,7 +117,7 @@ class Driven(Errors):
         return None if energy is None else energy["value"].total_j
 
     def first(self, runs: int) -> Driven:
-        """The same of the first so many drives, which is how pairs are made."""
+        """Returns the trips of the first `runs` drives, for paired comparisons."""
         return replace(
             self,
             errors_m=self.errors_m[:runs],

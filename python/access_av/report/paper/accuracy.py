@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from access_av.report.chart import Spec
 
 
-# A trend: the shadowing of single SSBs, drawn afresh for each, is averaged over so many of them.
+# Trend: average over this number of SSBs, because the shadowing of each SSB is independent.
 TREND_SSBS = 100
 
 
@@ -155,7 +155,7 @@ def _error_chart(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spe
                 scale=alt.Scale(
                     domain=names, range=[[4, 3] if name == EVERY_SSB else [1, 0] for name in names]
                 ),
-                # The same legend as the colours': two would contradict each other.
+                # One legend for colours and symbols, because two could contradict each other.
                 legend=alt.Legend(title=None),
             ),
             opacity=alt.condition(picked, alt.value(1.0), alt.value(0.15)),
@@ -175,7 +175,7 @@ def _error_chart(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spe
 
 
 def _line_names(points: pl.DataFrame) -> list[str]:
-    """Names for a legend; MUSIC at every SSB has its own where it stands beside the others."""
+    """Names for a legend; MUSIC at every SSB has its own name in a comparison."""
     mixed = points["campaign"].n_unique() > 1
     return [
         EVERY_SSB

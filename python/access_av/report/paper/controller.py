@@ -1,4 +1,4 @@
-"""The report's sections on what the controller contributes, and on ours beside it."""
+"""Report sections on the controller's contribution and on the proposed method."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def contribution(study: Study, specs: dict[str, Spec]) -> str:
 
 
 def fair(study: Study) -> str:
-    """The shipped reading and ours, told the same."""
+    """Paper's method and proposed method with equal information."""
     names = {
         "paper": "the paper's reading",
         "ours": "ours",
@@ -88,7 +88,7 @@ def fair(study: Study) -> str:
 
 
 def ours(study: Study) -> str:
-    """Ours beside the paper's adaptive point in each mode."""
+    """Proposed method and the paper's adaptive point in each mode."""
     rows = [
         (
             str(each.mode) if each.map else f"{each.mode}, road unknown",

@@ -87,7 +87,7 @@ def queries(evaluation: Evaluation) -> str:
 
 
 def _asked() -> list[Query]:
-    """What the paper asks, and who keeps its first claim."""
+    """Requirements of the paper, and the points that meet its first claim."""
     asked = [
         Query(**of_claim(claim, "query"))
         for claim in ("d1_budget_210_j", "d2_budget_260_j_rms_015_m")

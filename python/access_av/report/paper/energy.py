@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def energy_text(evaluation: Evaluation) -> str:
-    """What the energies are, and whose."""
+    """Energies and their sources."""
     free, solved = numbers(evaluation.freedoms)
     return escape(
         "Energy of a trip is the number of executions times the energy of one execution. "
@@ -69,7 +69,7 @@ def energy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
 
 
 def freedoms(study: Study) -> str:
-    """What each freedom of the energy fit buys."""
+    """Claims met with each degree of freedom of the energy fit."""
     if not study.bought:
         return "<p>The platform's energies are its own: nothing was fitted.</p>"
     titles = {each.reading.name: each.reading.title for each in study.evaluations}

@@ -25,7 +25,7 @@ FLEET = paper_numbers()["day"]["fleet"]
 
 
 def cost_text(evaluation: Evaluation) -> str:
-    """What roadside units would cost, and what energy is saved in a day."""
+    """Cost of roadside units, and energy saved per day."""
     units = cost.roadside_units(UNITS_NOT_BUILT)
     mode = evaluation.platform.modes[0].number
     try:
@@ -148,7 +148,7 @@ def _grid_name(grid: str) -> str:
 
 
 def _carbon_chart(footprints: dict[str, carbon.Footprint]) -> Spec:
-    """Lifetime emissions in use by grid, central value and range, embodied beside it."""
+    """Lifetime emissions in operation by grid (value and range), with embodied emissions."""
     any_one = next(iter(footprints.values()))
     rows = [
         {

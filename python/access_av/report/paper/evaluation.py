@@ -94,7 +94,7 @@ def render(study: Study, specs: dict[str, Spec] | None = None) -> str:
 
 
 def _tiles(study: Study) -> str:
-    """By what its verdict is worth: claims met under the shown reading."""
+    """Claims met under the shown interpretation, by weight of evidence."""
     name = study.shown.reading.title
     met = summary.counts(study.of(study.shown.reading.name))
     made = [

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from access_av.report.chart import Spec
 
 WIDTH = 640
-# Those that need the whole study; the last two where the unknowns were asked for.
+# Figures that need the whole study; the last two need the sensitivity analysis.
 NAMES = ("ablation", "front", "sobol", "share")
 
 

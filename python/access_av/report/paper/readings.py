@@ -34,7 +34,7 @@ PROMISED = (("accuracy", 0), ("energy", -1))
 
 
 def readings(study: Study) -> str:
-    """What the readings are, which halves hold under each, and what carries them."""
+    """Interpretations, the claim groups that hold under each, and the supporting claims."""
     rows = []
     for index, half in enumerate(summary.halves(study), start=1):
         claims = study.of(half.reading.name)
@@ -140,7 +140,7 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
 
 
 def chosen(study: Study) -> str:
-    """What the paper leaves open, what was chosen, and what another value does."""
+    """Assumptions where the paper is not specific, and the effects of alternatives."""
     head = ("What is open", "Chosen", "Why")
     if not study.effects:
         rows = [tuple(escape(it[key]) for key in ("what", "value", "why")) for it in entries()]
@@ -184,7 +184,7 @@ def matrix(study: Study) -> str:
 
 
 def claims(study: Study) -> str:
-    """The claims under the shown reading, with intervals and what each verdict is worth."""
+    """Claims under the shown interpretation, with intervals and the weight of evidence."""
     rows = []
     for claim in study.of(study.shown.reading.name):
         turns = " " + badge("turns with the seed", "fit") if claim.turns_with_seed else ""
