@@ -25,19 +25,19 @@ const CHUNK: usize = 4 * HOP;
 const BEFORE: usize = 256;
 const AFTER: usize = 512;
 
-/// Where the PSS stands out.
+/// Detected PSS.
 pub(super) struct Seen {
     statistic: f32,
-    /// First sample of the PSS, in the recording.
+    /// First sample of the PSS in the recording.
     pub(super) sample: f64,
     /// Offset from the recording's centre, in steps of half a subcarrier, ...
     pub(super) received_hz: f64,
-    /// ... and the multiple of 15 kHz nearest to it.
+    /// ... and the nearest multiple of 15 kHz.
     offset_hz: f64,
 }
 
-/// Where the PSS stands out up to `reach_hz` from the recording's centre, the likeliest first, one
-/// for each multiple of 15 kHz.
+/// Returns the offsets up to `reach_hz` from the recording's centre at which the PSS is detected,
+/// the most probable first, one for each multiple of 15 kHz.
 pub(super) fn likely_offsets(
     spacing: SubcarrierSpacing,
     rate_hz: f64,
@@ -100,8 +100,8 @@ pub(super) fn likely_offsets(
     ))
 }
 
-/// The strongest maxima, one for each offset, those left out that are but a stronger one's PSS,
-/// overlapping with itself shifted in frequency. `near`: samples of a symbol.
+/// Returns the strongest maxima, one for each offset, without frequency-shifted sidelobes of a
+/// stronger PSS. `near` is the number of samples of a symbol.
 fn strongest(mut seen: Vec<Seen>, near: f64, scs_hz: f64) -> Vec<Seen> {
     seen.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
     let width_hz = SUBCARRIERS as f64 * scs_hz;
@@ -133,7 +133,7 @@ fn strongest(mut seen: Vec<Seen>, near: f64, scs_hz: f64) -> Vec<Seen> {
     kept
 }
 
-/// The multiple of 15 kHz nearest to `hz` inside the reach.
+/// Returns the multiple of 15 kHz nearest to `hz` within the range.
 pub(super) fn nearest_offset(hz: f64, reach_hz: f64) -> f64 {
     let last = (reach_hz / OFFSET_UNIT_HZ).floor();
     (hz / OFFSET_UNIT_HZ).round().clamp(-last, last) * OFFSET_UNIT_HZ

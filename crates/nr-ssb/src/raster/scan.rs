@@ -137,7 +137,7 @@ pub fn scan_off_raster(
         let mut found_hz: Vec<f64> = same.map(received_hz).collect();
         for seen in likely_offsets(spacing, rate_hz, antennas, reach)? {
             let offset_hz = seen.received_hz;
-            // What is there shows a subcarrier beside as well.
+            // An SSB is also visible one subcarrier away.
             let same_place = |hz: &f64| (hz - offset_hz).abs() < 1.5 * spacing.hz();
             if found_hz.iter().any(same_place) {
                 continue;
@@ -148,7 +148,7 @@ pub fn scan_off_raster(
                 continue;
             };
             let received_hz = offset_hz + strongest.coarse_cfo_hz;
-            // A wrong frequency would be taken for an offset (TS 38.211 §5.4).
+            // A wrong SSB frequency would bias the offset (TS 38.211 §5.4).
             let offset_hz = match centre_hz {
                 Some(centre_hz) => {
                     let tuned_hz = centre_hz + offset_hz;
@@ -166,7 +166,8 @@ pub fn scan_off_raster(
     Ok(without_shadows(finds))
 }
 
-/// The samples around an SSB whose PSS was seen at `sample`, `ratio` of them for one at the base rate.
+/// Returns the samples around an SSB whose PSS starts at `sample`; `ratio` is the number of samples
+/// per sample at the base rate.
 fn around<'a>(antennas: &[&'a [Complex32]], sample: f64, ratio: f64) -> Vec<&'a [Complex32]> {
     let from = (sample - SSB_SAMPLES as f64 * ratio).max(0.0) as usize;
     let to = (sample + 2.0 * SSB_SAMPLES as f64 * ratio) as usize;
@@ -177,7 +178,8 @@ fn around<'a>(antennas: &[&'a [Complex32]], sample: f64, ratio: f64) -> Vec<&'a 
     antennas.iter().map(part).collect()
 }
 
-/// How far from the recording's centre that of an SSB can lie; negative where no SSB fits.
+/// Returns the maximum distance of an SSB's centre from that of the recording; negative if no SSB
+/// fits.
 pub fn reach_hz(rate_hz: f64, spacing: SubcarrierSpacing) -> f64 {
     0.5 * rate_hz - 0.5 * SUBCARRIERS as f64 * spacing.hz()
 }
@@ -186,7 +188,7 @@ fn band(centre_hz: f64, reach_hz: f64) -> RangeInclusive<f64> {
     centre_hz - reach_hz..=centre_hz + reach_hz
 }
 
-/// Those that none of the others casts, the strongest first.
+/// Returns the results that are not ghosts of others, the strongest first.
 fn without_shadows(mut finds: Vec<RasterFind>) -> Vec<RasterFind> {
     let snr_db = |find: &RasterFind| find.strongest().map_or(f64::NEG_INFINITY, |it| it.snr_db);
     finds.sort_by(|a, b| snr_db(b).total_cmp(&snr_db(a)));

@@ -1,4 +1,4 @@
-//! The receiver of however many antennas.
+//! Receiver for any number of antennas.
 
 use num_complex::Complex32;
 
@@ -9,7 +9,7 @@ use super::stream::StreamReceiver;
 use crate::dsp::tones::Tone;
 use crate::search::SearchError;
 
-/// A [`StreamReceiver`] whose number of antennas is not part of its type; places of SSBs are at the
+/// [`StreamReceiver`] for a number of antennas that is known at run time. Sample indices are at the
 /// input's rate. See the [module](super).
 pub struct Receiver {
     config: ReceiverConfig,
@@ -17,7 +17,7 @@ pub struct Receiver {
     stream: Box<dyn Stream>,
 }
 
-/// A stream of any number of antennas.
+/// Stream of any number of antennas.
 trait Stream: Send {
     fn tracked(&self) -> usize;
 
@@ -63,10 +63,11 @@ impl<const A: usize> Stream for StreamReceiver<A> {
 }
 
 impl Receiver {
-    /// Plans transforms and buffers. `centre_frequency_hz` stands at 0 Hz in the samples.
+    /// Creates FFT plans and buffers. `centre_frequency_hz` is the frequency at 0 Hz of the
+    /// samples.
     ///
     /// # Errors
-    /// [`ReceiverError`] for a rate, band, number of antennas or setting that is not possible.
+    /// [`ReceiverError`] for an invalid rate, band, number of antennas or setting.
     pub fn new(
         config: ReceiverConfig,
         sample_rate_hz: f64,
@@ -93,32 +94,33 @@ impl Receiver {
         })
     }
 
-    /// The settings.
+    /// Returns the configuration.
     pub const fn config(&self) -> &ReceiverConfig {
         &self.config
     }
 
-    /// Samples per second and antenna.
+    /// Returns the sample rate per antenna.
     pub const fn sample_rate_hz(&self) -> f64 {
         self.sample_rate_hz
     }
 
-    /// Beams that are tracked now.
+    /// Returns the number of tracked beams.
     pub fn tracked(&self) -> usize {
         self.stream.tracked()
     }
 
-    /// DC offset and tones that are subtracted from what is received, the strongest first; frequencies from
-    /// the SSB's centre.
+    /// Returns the DC offset and tones that are subtracted, the strongest first; frequencies are
+    /// relative to the SSB's centre.
     pub fn tones(&self) -> Vec<Tone> {
         self.stream.tones()
     }
 
-    /// Takes the next samples of every antenna and shows `take` the SSBs that they complete, in order
-    /// of time. What is searched is held back by 6 ms, what is tracked by the front end's block.
+    /// Processes the next samples of every antenna and passes each completed SSB to `take`, in
+    /// order of time. The latency is 6 ms for a search, and one block of the front end for
+    /// tracking.
     ///
     /// # Errors
-    /// [`ReceiverError::FrontEnd`] for another number of antennas or unequal lengths.
+    /// [`ReceiverError::FrontEnd`] for a wrong number of antennas or unequal lengths.
     pub fn push(
         &mut self,
         antennas: &[&[Complex32]],
@@ -127,10 +129,10 @@ impl Receiver {
         self.stream.push(antennas, take)
     }
 
-    /// Ends the stream: shows what is held back and forgets all cells.
+    /// Ends the stream: passes on pending SSBs and removes all cells.
     ///
     /// # Errors
-    /// None that [`push`](Self::push) has not.
+    /// Those of [`push`](Self::push).
     pub fn finish(&mut self, take: &mut dyn FnMut(&HeardSsb)) -> Result<(), ReceiverError> {
         self.stream.finish(take)
     }

@@ -1,23 +1,23 @@
-//! A beam that a receiver keeps to.
+//! Tracked beam of a receiver.
 
 use crate::search::{DetectedSsb, SearchConfig};
 use crate::standard::pci::Pci;
 use crate::track::{TrackError, Tracker};
 
-/// SSBs in a row that must be missing before a beam is given up.
+/// Number of consecutive missed SSBs before a beam is removed.
 const MISSES: u32 = 8;
 
-/// A beam that is tracked. Places are in samples at the base rate.
+/// Tracked beam. Positions are in samples at the base rate.
 pub(super) struct Beam<const A: usize> {
     pub pci: Pci,
     pub ssb_index: u8,
     pub tracker: Tracker<A>,
-    /// Where the next SSB is expected ...
+    /// Expected start of the next SSB ...
     pub next_start: f64,
-    /// ... so many periods after the last one that was seen, and where that was.
+    /// ... its number of periods after the last received one, and the position of that.
     periods: f64,
     last_seen: f64,
-    /// Whether it was seen since a search found it.
+    /// Whether the beam was received since a search detected it.
     pub is_followed: bool,
 }
 
@@ -34,20 +34,20 @@ impl<const A: usize> Beam<A> {
         })
     }
 
-    /// Its SSB was seen, and is expected a period later.
+    /// Records a received SSB; the next one is expected a period later.
     pub fn seen(&mut self, start: f64, period: f64) {
         (self.last_seen, self.periods, self.is_followed) = (start, 0.0, true);
         self.skip(1.0, period);
     }
 
-    /// Moves on by some bursts; the clocks drift meanwhile as they were seen to.
+    /// Advances by some bursts, with the estimated clock drift.
     pub fn skip(&mut self, bursts: f64, period: f64) {
         self.periods += bursts;
         self.next_start = self.tracker.expected_start(self.periods * period);
     }
 
-    /// Moves on to its first SSB that does not begin before `first`: asleep meanwhile, or the samples are
-    /// missing.
+    /// Advances to the first SSB that does not begin before `first`, after a sleep or missing
+    /// samples.
     pub fn skip_to(&mut self, first: f64, period: f64) {
         if self.next_start < first {
             let drifted = self.tracker.expected_start(period) - self.tracker.expected_start(0.0);
@@ -55,9 +55,9 @@ impl<const A: usize> Beam<A> {
         }
     }
 
-    /// A search has found it again; by how many samples it came off its period.
+    /// Continues at an SSB from a search; returns its deviation from the period in samples.
     pub fn found(&mut self, found: &DetectedSsb, period: f64) -> f64 {
-        // Bursts since it was seen last.
+        // Number of bursts since the last received one.
         let late = (found.sample_start - self.next_start) / period;
         let bursts = self.periods + late.round();
         self.tracker.found(found, bursts.max(1.0) * period);

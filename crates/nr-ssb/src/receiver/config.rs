@@ -1,38 +1,38 @@
-//! What a receiver is told.
+//! Receiver configuration.
 
 use crate::search::{SearchConfig, SearchError};
 use crate::standard::numerology::SubcarrierSpacing;
 
-/// Largest frequency offset looked at, in subcarriers: beyond it the filter cuts into PSS and SSS.
+/// Maximum frequency offset in subcarriers: beyond it, the filter attenuates PSS and SSS.
 const MOST_SUBCARRIERS: f64 = 15.0;
 
-/// What a receiver is told.
+/// Receiver configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReceiverConfig {
-    /// Spacing, antennas, the absolute frequency of the SSB's centre, and how far about one frequency
-    /// offset a search reaches.
+    /// Spacing, antennas, absolute frequency of the SSB's centre, and range of a search around one
+    /// frequency offset.
     pub search: SearchConfig,
-    /// From one burst set to the next: 5, 10, 20, 40, 80 or 160 ms, or the shortest of several cells.
+    /// Period of the burst sets: 5, 10, 20, 40, 80 or 160 ms; the shortest one of several cells.
     pub period_s: f64,
-    /// Largest error of receiver's and cells' oscillators together, in parts per million. Every offset
-    /// within it is searched where none is known yet.
+    /// Maximum error of the receiver's and cells' oscillators together, in ppm. Without a known
+    /// offset, this range is searched.
     pub oscillator_ppm: f64,
-    /// How often all samples of a period are searched for cells and beams that are not yet tracked.
+    /// Interval at which all samples of a period are searched for new cells and beams.
     pub search_every_s: f64,
-    /// How long a beam must be missed, eight SSBs at least, before it is given up.
+    /// Minimum duration, and at least eight SSBs, of missed reception before a beam is removed.
     pub lost_after_s: f64,
-    /// Cells to listen to; all without.
+    /// Cells that are received; `None` for all.
     pub cells: Option<Vec<u16>>,
-    /// Cell and index of each beam that there is, where that is known: while all of them come, none is searched
-    /// for. Empty otherwise.
+    /// Cell and index of every transmitted beam, if known. While all of them are received, no
+    /// search takes place. Empty if unknown.
     pub beams: Vec<(u16, u8)>,
-    /// Whether the PBCH of tracked SSBs is decoded: for what it says, and for its elements as pilots.
+    /// Whether the PBCH of tracked SSBs is decoded, for its message and as additional pilots.
     pub decode_pbch: bool,
 }
 
 impl ReceiverConfig {
-    /// For SSBs around `ssb_freq_hz` every 20 ms by oscillators of 20 ppm, with their PBCH; a search every
-    /// second, beams given up after two.
+    /// SSBs around `ssb_freq_hz` every 20 ms, oscillators of 20 ppm, PBCH decoding, a search every
+    /// second, and removal of beams after two seconds.
     pub fn new(ssb_freq_hz: f64, spacing: SubcarrierSpacing, antennas: usize) -> Self {
         Self {
             search: SearchConfig {
@@ -49,12 +49,12 @@ impl ReceiverConfig {
         }
     }
 
-    /// The largest `oscillator_ppm` that can be searched at a frequency: 15 subcarriers.
+    /// Returns the maximum `oscillator_ppm` at a frequency: 15 subcarriers.
     pub fn widest_ppm(ssb_freq_hz: f64, spacing: SubcarrierSpacing) -> f64 {
         1e6 * MOST_SUBCARRIERS * spacing.hz() / ssb_freq_hz.abs().max(1.0)
     }
 
-    /// Frequency offsets, a subcarrier apart, that the oscillators may have.
+    /// Returns the number of frequency offsets of the search, one subcarrier apart.
     pub(super) fn offsets(&self) -> u32 {
         let ssb_freq_hz = self.search.ssb_freq_hz.unwrap_or(0.0);
         let largest_hz = 1e-6 * self.oscillator_ppm * ssb_freq_hz;
@@ -63,12 +63,12 @@ impl ReceiverConfig {
         2 * steps.clamp(0.0, MOST_SUBCARRIERS) as u32 + 1
     }
 
-    /// Samples of a period at the base rate.
+    /// Returns the period in samples at the base rate.
     pub(super) fn period(&self) -> f64 {
         self.period_s * self.search.spacing.base_rate_hz()
     }
 
-    /// Whether receiving with these settings is possible.
+    /// Returns an error if the configuration is invalid.
     pub(super) fn check(&self) -> Result<(), SearchError> {
         let ssb_freq_hz = self.search.ssb_freq_hz.unwrap_or(0.0);
         let widest_ppm = Self::widest_ppm(ssb_freq_hz, self.search.spacing);

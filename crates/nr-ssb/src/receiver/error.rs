@@ -1,20 +1,20 @@
-//! What makes receiving impossible.
+//! Errors of a receiver.
 
 use crate::input::front_end::FrontEndError;
 use crate::search::SearchError;
 use crate::track::TrackError;
 
-/// What makes receiving impossible.
+/// Reason why reception is impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReceiverError {
-    /// The rate, the place of the SSB in the band, or the samples do not suit.
+    /// The rate, the position of the SSB in the band, or the samples are invalid.
     #[error(transparent)]
     FrontEnd(#[from] FrontEndError),
-    /// A setting of the search.
+    /// Invalid setting of the search.
     #[error(transparent)]
     Search(#[from] SearchError),
-    /// A setting of the tracker.
+    /// Invalid setting of the tracker.
     #[error(transparent)]
     Track(#[from] TrackError),
 }

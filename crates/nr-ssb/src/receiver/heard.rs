@@ -1,4 +1,4 @@
-//! What a receiver says of one SSB.
+//! Result of the reception of one SSB.
 
 use num_complex::{Complex32, Complex64};
 
@@ -10,45 +10,45 @@ use crate::standard::message::payload::BchPayload;
 use crate::standard::numerology::Lmax;
 use crate::standard::pci::Pci;
 
-/// One SSB that was heard.
+/// Received SSB.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeardSsb {
-    /// The cell.
+    /// Physical cell identity.
     pub pci: Pci,
-    /// The beam.
+    /// SSB index (beam).
     pub ssb_index: u8,
-    /// How many of them the cell has, where frequency or PBCH tell.
+    /// Burst set size, if the frequency or the PBCH determines it.
     pub lmax: Option<Lmax>,
-    /// Second half of the frame, where DM-RS or PBCH tell.
+    /// Whether the SSB is in the second half of the frame, if DM-RS or PBCH determine it.
     pub half_frame: Option<bool>,
-    /// What the PBCH says, if its checksum held.
+    /// Payload of the PBCH, if its CRC is correct.
     pub payload: Option<BchPayload>,
-    /// First sample of the SSB, its cyclic prefix included, at the input's rate, from the first one
-    /// pushed.
+    /// First sample of the SSB including its cyclic prefix, at the input's rate, relative to the
+    /// first sample of the stream.
     pub sample_start: f64,
-    /// Carrier frequency offset, Hz.
+    /// Carrier frequency offset in Hz.
     pub cfo_hz: f64,
-    /// SNR of a resource element, mean over the antennas, dB.
+    /// SNR of a resource element, mean over the antennas, in dB.
     pub snr_db: f64,
-    /// Per antenna the channel on the 240 subcarriers, delay and offset taken out, in the scale of an
-    /// unnormalised transform of 256: a tone of amplitude one has 256.
+    /// Channel on the 240 subcarriers for each antenna, with delay and offset compensated, in the
+    /// scale of an unnormalised DFT of 256: a tone of amplitude one has 256.
     pub channel: Vec<[Complex32; SUBCARRIERS]>,
-    /// How its noise hangs together from subcarrier to subcarrier.
+    /// Covariance of the channel's noise over the subcarriers.
     pub channel_covariance: ChannelCovariance,
-    /// Per symbol and antenna what the pilots say together, in that scale: the noise has the variance that it
-    /// has on a resource element and is independent from block to block, which that of `channel` is not from
-    /// subcarrier to subcarrier. What angles are to be estimated from.
+    /// Despread pilots for each symbol and antenna, in the scale of `channel`. The noise has the
+    /// variance of a resource element and is independent between blocks, in contrast to the noise
+    /// of `channel` between subcarriers. Angles are estimated from these blocks.
     pub blocks: Vec<Vec<Complex64>>,
-    /// Variance of the noise on a resource element, per antenna, in that scale squared.
+    /// Noise variance of a resource element for each antenna, in that scale squared.
     pub noise_variance: Vec<f64>,
-    /// SS-RSRP, SS-RSRQ and SS-SINR per antenna.
+    /// SS-RSRP, SS-RSRQ and SS-SINR for each antenna.
     pub measurements: Vec<Measurement>,
-    /// Looked at where it was expected; `false` of the first after a search has found its beam.
+    /// Whether the SSB was received at its expected time; `false` for the first one after a search.
     pub tracked: bool,
 }
 
 impl HeardSsb {
-    /// What was seen, places brought to a rate of `ratio` samples for each one at the base rate.
+    /// Converts a received SSB; `ratio` is the number of input samples per sample at the base rate.
     pub(super) fn new<const A: usize>(seen: &mut Seen<'_, A>, ratio: f64) -> Self {
         let ssb = seen.ssb;
         let mut channel = vec![[Complex32::ZERO; SUBCARRIERS]; A];

@@ -1,11 +1,12 @@
-//! One receiver: samples of any rate in, SSBs with the channel of every antenna out.
+//! Receiver: input samples of any rate, output SSBs with the channel of every antenna.
 //!
-//! Until a beam is found, and from then on once in [`search_every_s`](ReceiverConfig::search_every_s) unless
-//! all [`beams`](ReceiverConfig::beams) that are known come, all samples of a period are searched; between
-//! searches an SSB is looked at only where it is expected. That is [`WindowReceiver`], which takes windows of
-//! samples at the base rate; [`StreamReceiver`] puts the [front
-//! end](crate::front_end) before it, for samples of any rate in blocks of any length, with gaps; and
-//! [`Receiver`] is that of a number of antennas which is not part of its type.
+//! All samples of a period are searched until a beam is detected, and then every
+//! [`search_every_s`](ReceiverConfig::search_every_s), unless all known
+//! [`beams`](ReceiverConfig::beams) are received. Between searches, SSBs are received at their
+//! expected times only. [`WindowReceiver`] does this for windows of samples at the base rate.
+//! [`StreamReceiver`] adds the [front end](crate::front_end), for samples of any rate in blocks of
+//! any length, with gaps. [`Receiver`] is the variant for a number of antennas that is known at run
+//! time.
 //!
 //! ```
 //! # use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};

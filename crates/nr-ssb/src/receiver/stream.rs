@@ -1,4 +1,4 @@
-//! The receiver of a stream.
+//! Receiver of a stream.
 
 use num_complex::Complex32;
 
@@ -8,31 +8,32 @@ use super::window::{GUARD, Seen, Window, WindowReceiver};
 use crate::dsp::base_rate::SSB_SAMPLES;
 use crate::input::front_end::FrontEnd;
 
-/// Time that is searched at once (s).
+/// Duration of the samples that are searched together (s).
 const SEARCHED_S: f64 = 0.005;
 
-/// What is needed beyond the place where an SSB begins.
+/// Number of samples required after the start of an SSB.
 const BEYOND: f64 = SSB_SAMPLES as f64 + GUARD;
 
-/// Front end and [`WindowReceiver`] for samples of any rate, in blocks of any length: what it says does
-/// not depend on where blocks end.
+/// Front end and [`WindowReceiver`] for samples of any rate, in blocks of any length. The results
+/// do not depend on the block boundaries.
 pub struct StreamReceiver<const A: usize> {
     receiver: WindowReceiver<A>,
     front_end: FrontEnd,
-    /// Samples searched at once, at the base rate.
+    /// Number of samples that are searched together, at the base rate.
     stretch: i64,
-    /// Samples at the base rate that may still be looked at; the first is number `start`.
+    /// Samples at the base rate that may still be processed; the index of the first one is `start`.
     base: [Vec<Complex32>; A],
     start: i64,
-    /// Up to where it is decided whether to search.
+    /// End of the samples for which a search has been decided.
     searched: i64,
 }
 
 impl<const A: usize> StreamReceiver<A> {
-    /// Plans transforms and buffers. `centre_frequency_hz` stands at 0 Hz in the samples.
+    /// Creates FFT plans and buffers. `centre_frequency_hz` is the frequency at 0 Hz of the
+    /// samples.
     ///
     /// # Errors
-    /// [`ReceiverError`] for a rate, band, number of antennas or setting that is not possible.
+    /// [`ReceiverError`] for an invalid rate, band, number of antennas or setting.
     pub fn new(
         config: ReceiverConfig,
         sample_rate_hz: f64,
@@ -53,18 +54,18 @@ impl<const A: usize> StreamReceiver<A> {
         Ok(made)
     }
 
-    /// What keeps to the beams.
+    /// Returns the receiver of windows.
     pub const fn receiver(&self) -> &WindowReceiver<A> {
         &self.receiver
     }
 
-    /// Samples of the input for each one at the base rate, which SSBs are counted at.
+    /// Returns the number of input samples per sample at the base rate, the unit of SSB positions.
     pub fn input_per_output(&self) -> f64 {
         self.front_end.input_per_output()
     }
 
-    /// Up to where all SSBs of the beams that are tracked have been shown, samples at the base rate: a burst
-    /// is complete once the last of its beams was there.
+    /// Returns the sample at the base rate before which all SSBs of tracked beams have been passed
+    /// on. A burst is complete once its last beam has been.
     pub fn heard_until(&self) -> f64 {
         let next_start = self.receiver.next_start();
         if next_start.is_finite() {
@@ -74,11 +75,11 @@ impl<const A: usize> StreamReceiver<A> {
         }
     }
 
-    /// Takes the next samples of every antenna and shows `take` the SSBs that they complete, in order
-    /// of time; places are in samples at the base rate from the first of all.
+    /// Processes the next samples of every antenna and passes each completed SSB to `take`, in
+    /// order of time. Positions are in samples at the base rate, relative to the first one.
     ///
     /// # Errors
-    /// [`ReceiverError::FrontEnd`] for another number of antennas or unequal lengths.
+    /// [`ReceiverError::FrontEnd`] for a wrong number of antennas or unequal lengths.
     pub fn push(
         &mut self,
         antennas: &[&[Complex32]],
@@ -88,11 +89,11 @@ impl<const A: usize> StreamReceiver<A> {
         self.hear(false, take)
     }
 
-    /// The samples go on at number `sample` of the input: those between are missing. Shows what was held
-    /// back.
+    /// Sets the index of the next input sample to `sample`; the samples before it are missing.
+    /// Passes on pending SSBs.
     ///
     /// # Errors
-    /// None that [`push`](Self::push) has not.
+    /// Those of [`push`](Self::push).
     pub fn gap_to(
         &mut self,
         sample: u64,
@@ -103,10 +104,11 @@ impl<const A: usize> StreamReceiver<A> {
         Ok(())
     }
 
-    /// Ends a stretch of samples: shows what is held back. What comes next is after a gap of no length.
+    /// Ends a segment of samples and passes on pending SSBs. Subsequent samples follow a gap of
+    /// zero length.
     ///
     /// # Errors
-    /// None that [`push`](Self::push) has not.
+    /// Those of [`push`](Self::push).
     pub fn finish(&mut self, take: &mut dyn FnMut(Seen<'_, A>)) -> Result<(), ReceiverError> {
         self.front_end.finish(&mut self.base);
         for samples in &mut self.base {
@@ -117,7 +119,7 @@ impl<const A: usize> StreamReceiver<A> {
         Ok(())
     }
 
-    /// Forgets beams and samples, for a stream that begins anew.
+    /// Removes beams and samples, for a restarted stream.
     pub fn reset(&mut self) {
         let mut unheard: [Vec<Complex32>; A] = std::array::from_fn(|_| Vec::new());
         self.front_end.finish(&mut unheard);
@@ -125,12 +127,12 @@ impl<const A: usize> StreamReceiver<A> {
         self.go_on_at(0);
     }
 
-    /// Number of the sample after the last.
+    /// Returns the index after the last sample.
     fn end(&self) -> i64 {
         self.start + self.base[0].len() as i64
     }
 
-    /// The next sample at the base rate is this one, after silence: an SSB may begin with it.
+    /// Continues at this sample of the base rate after silence: an SSB may begin there.
     fn go_on_at(&mut self, number: i64) {
         for samples in &mut self.base {
             samples.clear();
@@ -139,7 +141,8 @@ impl<const A: usize> StreamReceiver<A> {
         (self.start, self.searched) = (number - GUARD as i64, number);
     }
 
-    /// Searches and tracks in the order in which the samples for it are there; all that are there at the end.
+    /// Searches and tracks in the order in which the samples become available; at the end, all of
+    /// them.
     fn hear(
         &mut self,
         is_end: bool,

@@ -1,4 +1,4 @@
-//! The search through a recording, or through a stream block by block.
+//! Search in a recording, or in a stream block by block.
 
 use num_complex::Complex32;
 
@@ -12,17 +12,18 @@ use crate::dsp::matched_filter::{MatchedFilter, PssCandidate};
 use crate::dsp::tones::{Tone, ToneCanceller};
 use crate::numeric::false_alarm::exponential_sum_threshold;
 
-/// Candidates examined per 20 ms at most; what noise and sidelobes offer beyond is not worth it.
+/// Maximum number of examined candidates per 20 ms; further ones are noise and sidelobes.
 const CANDIDATES_PER_20_MS: usize = 200;
-/// PSS candidates that noise may offer in 20 ms. Each costs an examination, none a false cell.
+/// Expected number of PSS candidates due to noise in 20 ms. Each costs an examination, but causes
+/// no false cell.
 const NOISE_CANDIDATES_PER_20_MS: f64 = 4.0;
-/// Part of the threshold that a candidate must keep once the correlation of the antennas' noise is
-/// allowed for, its timing still off by up to half a sample.
+/// Fraction of the threshold that a candidate must reach after whitening over the antennas, with a
+/// timing error of up to half a sample.
 const PSS_FLOOR: f32 = 0.75;
-/// Sums of a million samples' energies stay finite below this.
+/// Maximum energy of a sample, for which sums over a million samples are finite.
 const MAX_ENERGY: f32 = 1e30;
 
-/// Searches blocks of samples at the base rate; owns all plans and buffers.
+/// Searcher of sample blocks at the base rate. It owns all plans and buffers.
 pub struct Searcher {
     config: SearchConfig,
     base_rate_hz: f64,
@@ -30,15 +31,15 @@ pub struct Searcher {
     examiner: Examiner,
     pss_threshold: f32,
     pub(crate) canceller: ToneCanceller,
-    /// Samples of the end of the last block and of this one, per antenna.
+    /// End of the last block followed by the current block, for each antenna.
     buffer: Vec<Vec<Complex32>>,
-    /// Number of samples before the buffer's first.
+    /// Number of samples before the first one of the buffer.
     buffer_start: u64,
     candidates: Vec<PssCandidate>,
 }
 
 impl Searcher {
-    /// Plans a search.
+    /// Creates a searcher.
     ///
     /// # Errors
     /// [`SearchError::Antennas`], [`SearchError::Setting`].
@@ -48,7 +49,7 @@ impl Searcher {
         let hypotheses = cfo_hypotheses(config.cfo_range_hz, config.spacing.hz() / 3.0);
         let trials = 0.02 * base_rate_hz * 3.0 * hypotheses.len() as f64;
         let pss_probability = NOISE_CANDIDATES_PER_20_MS / trials;
-        // Any of 336 SSS and 8 DM-RS may make the sum large.
+        // The maximum over 336 SSS and 8 DM-RS determines the false-alarm probability.
         let cell_probability = config.false_alarm / (trials * 336.0 * 8.0);
         let antennas = config.antennas;
         let mut filter = MatchedFilter::new(config.spacing.hz(), &hypotheses, antennas);
@@ -68,7 +69,7 @@ impl Searcher {
         })
     }
 
-    /// All SSBs in one recording, in order of time.
+    /// Returns all SSBs of one recording, in order of time.
     ///
     /// # Errors
     /// [`SearchError::AntennaCount`], [`SearchError::UnequalLengths`], [`SearchError::TooShort`].
@@ -84,8 +85,8 @@ impl Searcher {
         self.push(antennas)
     }
 
-    /// The SSBs that are complete with the next block of a stream, in order of time. Those that
-    /// reach over the block's end come with the next one.
+    /// Returns the SSBs that the next block of a stream completes, in order of time. SSBs across
+    /// the end of the block are returned with the next one.
     ///
     /// # Errors
     /// [`SearchError::AntennaCount`], [`SearchError::UnequalLengths`].
@@ -93,11 +94,11 @@ impl Searcher {
         self.push_with(antennas, &mut |_, _| {})
     }
 
-    /// As [`push`](Self::push), and shows `look` every SSB as it is found, stronger ones first. Its
-    /// payload may become known later, from another SSB.
+    /// Like [`push`](Self::push), and passes every SSB to `look` upon detection, stronger ones
+    /// first. Its payload may become known later, from another SSB.
     ///
     /// # Errors
-    /// As [`push`](Self::push).
+    /// Those of [`push`](Self::push).
     pub fn push_with(
         &mut self,
         antennas: &[&[Complex32]],
@@ -110,7 +111,7 @@ impl Searcher {
         for (buffer, input) in self.buffer.iter_mut().zip(antennas) {
             buffer.copy_within(kept - tail.., 0);
             buffer.truncate(tail);
-            // One sample that is not a number, or whose energy is none, would spoil a whole transform.
+            // A single sample that is not finite, or too large, would corrupt a whole transform.
             let usable = |x: &Complex32| x.norm_sqr() < MAX_ENERGY;
             buffer.extend(
                 input
@@ -125,7 +126,7 @@ impl Searcher {
         Ok(self.examiner.found_in_order())
     }
 
-    /// Moves to an SSB at another frequency, and forgets the stream so far.
+    /// Sets another SSB frequency, and removes the state of the stream.
     ///
     /// # Errors
     /// [`SearchError::Setting`] unless the frequency is finite.
@@ -137,7 +138,7 @@ impl Searcher {
         Ok(())
     }
 
-    /// Searches around this carrier frequency offset from now on.
+    /// Sets the central carrier frequency offset of the search.
     ///
     /// # Errors
     /// [`SearchError::Setting`] if it is more than 32 subcarriers.
@@ -153,7 +154,7 @@ impl Searcher {
         Ok(())
     }
 
-    /// Forgets the stream so far.
+    /// Removes the state of the stream.
     pub fn reset(&mut self) {
         self.buffer.iter_mut().for_each(Vec::clear);
         self.buffer_start = 0;
@@ -161,17 +162,18 @@ impl Searcher {
         self.examiner.forget();
     }
 
-    /// The settings.
+    /// Returns the configuration.
     pub fn config(&self) -> &SearchConfig {
         &self.config
     }
 
-    /// What became of the candidates in the block searched last.
+    /// Returns the number of candidates at each stage in the last block.
     pub fn counts(&self) -> SearchCounts {
         self.examiner.counts()
     }
 
-    /// DC offset and tones that were subtracted from the block searched last, the strongest first.
+    /// Returns the DC offset and tones that were subtracted from the last block, the strongest
+    /// first.
     pub fn tones(&self) -> impl Iterator<Item = Tone> + '_ {
         self.canceller.tones(self.base_rate_hz)
     }
@@ -192,7 +194,7 @@ impl Searcher {
     }
 
     fn examine_all(&mut self, length: usize, look: &mut dyn FnMut(&DetectedSsb, &ReceivedSsb<'_>)) {
-        // The PSS of an SSB that lies inside the buffer.
+        // PSS of an SSB within the buffer.
         let Some(end) = (length + 1).checked_sub(SSB_SAMPLES - CYCLIC_PREFIX) else {
             return;
         };
@@ -220,7 +222,7 @@ impl Searcher {
             let Some(alignment) = self.examiner.examine(place, &candidate, look) else {
                 continue;
             };
-            // Around an SSB that is now gone the matched filter is run again.
+            // The matched filter is repeated around an SSB that was subtracted.
             let from = alignment.start.saturating_sub(SSB_SAMPLES / 4).max(first);
             let to = (alignment.start + SSB_SAMPLES).min(end);
             self.candidates

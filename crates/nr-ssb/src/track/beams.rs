@@ -1,4 +1,4 @@
-//! What is known of a cell's SSBs beforehand, and which of them was received.
+//! Known resource elements of a cell's SSBs, and identification of the received beam.
 
 use num_complex::Complex32;
 
@@ -16,40 +16,40 @@ use crate::standard::sequence::dmrs::{DMRS_LEN, dmrs};
 use crate::standard::sequence::pss::{SYNC_LEN, pss};
 use crate::standard::sequence::sss::sss;
 
-/// Probability that noise around the expected place passes for the cell.
+/// Probability that noise at the expected position is accepted as the cell.
 const FALSE_ALARM: f64 = 1e-4;
-/// Standard deviations by which the DM-RS of the beam that is named must stand out of what the
-/// same elements give by chance: 17 without noise, and reached by chance once in 6 million.
+/// Minimum statistic of the identified beam's DM-RS, in standard deviations of chance: 17 without
+/// noise, and exceeded by chance once in 6 million.
 const BEAM_STANDS_OUT: f32 = 5.5;
 
-/// Part of the energy that rounding may leave over, or take too much, of a signal without noise.
+/// Relative rounding error of the energy of a signal without noise.
 const ROUNDING: f32 = 1e-6;
 
-/// Which SSB was received, and by how many samples later than the grids have it.
+/// Received beam, and its delay in samples relative to the grids.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seen {
     pub(super) ibar_ssb: u8,
     pub(super) delay: f64,
 }
 
-/// The pilots of one cell's beams.
+/// Pilots of a cell's beams.
 pub(super) struct Beams {
     pci: Pci,
-    /// All that is known beforehand, per ī_SSB.
+    /// Known elements for each ī_SSB.
     references: Vec<SsbGrid>,
     /// PSS and SSS.
     chips: [[f32; SYNC_LEN]; 2],
-    /// DM-RS per ī_SSB, real and imaginary parts.
+    /// DM-RS for each ī_SSB, real and imaginary parts.
     dmrs: Vec<[[f32; DMRS_LEN]; 2]>,
     delays: DelaySearch,
-    /// Per antenna: PSS and SSS despread, and the energy that they came with.
+    /// Despread PSS and SSS with their energies, for each antenna.
     sync: Vec<Groups>,
     energies: Vec<f32>,
     threshold: f64,
 }
 
 impl Beams {
-    /// The beams of this cell, to be received with so many antennas.
+    /// Creates the pilots of a cell for a number of antennas.
     pub(super) fn new(pci: Pci, antennas: usize) -> Self {
         Self {
             pci,
@@ -66,19 +66,19 @@ impl Beams {
         }
     }
 
-    /// PSS, SSS and DM-RS of a beam.
+    /// Returns PSS, SSS and DM-RS of a beam.
     pub(super) fn reference(&self, ibar_ssb: u8) -> Option<&SsbGrid> {
         self.references.get(usize::from(ibar_ssb))
     }
 
-    /// Which SSB it is and how late, if PSS and SSS say that the cell is there and the DM-RS
-    /// leaves no doubt of the beam.
+    /// Returns beam and delay of an SSB, if PSS and SSS confirm the cell and the DM-RS identifies
+    /// the beam.
     pub(super) fn identify(
         &mut self,
         grids: &[ReceivedGrid],
         phases: &[Complex32; SYMBOLS],
     ) -> Option<Seen> {
-        // PSS and SSS lie on the same subcarriers of their symbols.
+        // PSS and SSS are on the same subcarriers of their symbols.
         let outputs = self.sync.iter_mut().zip(&mut self.energies);
         for (grid, (groups, power)) in grids.iter().zip(outputs) {
             let pss = grid[0].get(pss_indices())?.first_chunk::<SYNC_LEN>()?;
@@ -97,7 +97,7 @@ impl Beams {
         let mut statistic = 0.0;
         let mut combined = [Complex32::ZERO; DMRS_LEN];
         for (grid, (groups, power)) in grids.iter().zip(self.sync.iter().zip(&self.energies)) {
-            // |Σ|²/N against the energy that it leaves over: noise whatever the channel's level.
+            // |Σ|²/N relative to the residual energy: independent of the power of the channel.
             let gain = complex_product(groups, &sync_ramp);
             let explained = gain.norm_sqr() / (2 * SYNC_LEN) as f32;
             let left = (power - explained).max(ROUNDING * power);
@@ -112,7 +112,7 @@ impl Beams {
         if statistic.is_nan() || statistic <= self.threshold {
             return None;
         }
-        // DM-RS lie on every fourth subcarrier.
+        // The DM-RS is on every fourth subcarrier.
         let mut undelayed = [Complex32::ZERO; SUBCARRIERS / 4];
         let cycles = delay / SYMBOL_FFT as f64;
         let first = f64::from(self.pci.get() % 4) - 120.0;
@@ -131,7 +131,7 @@ impl Beams {
     }
 }
 
-/// PSS, SSS and DM-RS of one SSB.
+/// Returns PSS, SSS and DM-RS of one SSB.
 fn pilots(pci: Pci, ibar_ssb: u8) -> SsbGrid {
     let real = |chip| Complex32::new(chip, 0.0);
     let mut grid = SsbGrid::zeros();

@@ -1,6 +1,6 @@
-//! The subcarrier spacing.
+//! Subcarrier spacing.
 
-/// Where the raster of frequency range 2 begins (TS 38.104 Table 5.4.3.1-1), Hz.
+/// Lower end of the raster of frequency range 2 (TS 38.104 Table 5.4.3.1-1), in Hz.
 pub(crate) const FR2_FROM_HZ: f64 = 24.25e9;
 
 /// Subcarrier spacing of the SSB (TS 38.104 §5.4.3.3): 15 and 30 kHz in frequency range 1, 120 and
@@ -18,15 +18,15 @@ pub enum SubcarrierSpacing {
 }
 
 impl SubcarrierSpacing {
-    /// All of them.
+    /// All spacings.
     pub const ALL: [Self; 4] = [Self::Khz15, Self::Khz30, Self::Khz120, Self::Khz240];
 
-    /// The spacing of so many kilohertz, if an SSB can have it.
+    /// Returns the spacing in kilohertz, if an SSB can have it.
     pub fn from_khz(khz: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|spacing| spacing.khz() == khz)
     }
 
-    /// Those of the frequency range that `frequency_hz` lies in.
+    /// Returns the spacings of the frequency range that contains `frequency_hz`.
     pub fn of_range(frequency_hz: f64) -> [Self; 2] {
         if frequency_hz < FR2_FROM_HZ {
             [Self::Khz15, Self::Khz30]
@@ -35,7 +35,7 @@ impl SubcarrierSpacing {
         }
     }
 
-    /// In kilohertz.
+    /// Returns the spacing in kilohertz.
     pub const fn khz(self) -> u32 {
         match self {
             Self::Khz15 => 15,
@@ -45,22 +45,23 @@ impl SubcarrierSpacing {
         }
     }
 
-    /// In hertz.
+    /// Returns the spacing in hertz.
     pub fn hz(self) -> f64 {
         f64::from(self.khz()) * 1e3
     }
 
-    /// Sample rate of a 256-point FFT, in hertz: the lowest rate that this crate works at.
+    /// Returns the sample rate of a 256-point FFT in hertz: the base rate of this crate.
     pub fn base_rate_hz(self) -> f64 {
         256.0 * self.hz()
     }
 
-    /// OFDM symbols in half a millisecond; the first of them has the longer cyclic prefix.
+    /// Returns the number of OFDM symbols in half a millisecond; the first one has a longer cyclic
+    /// prefix.
     pub const fn symbols_per_half_ms(self) -> usize {
         7 * (self.khz() / 15) as usize
     }
 
-    /// OFDM symbols in a half frame of 5 ms.
+    /// Returns the number of OFDM symbols in a half frame of 5 ms.
     pub const fn symbols_per_half_frame(self) -> usize {
         10 * self.symbols_per_half_ms()
     }

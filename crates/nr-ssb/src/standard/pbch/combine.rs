@@ -1,11 +1,11 @@
-//! Combining the PBCHs of several periods.
+//! Combination of the PBCHs of several periods.
 //!
-//! From one period to the next only the SFN's low bits and the half-frame bit change, and the
-//! payload's scrambling with them. How they change depends on where the first period lies in the
-//! 160 ms after which the SFN's high bits move on. For every such place the difference between two
-//! payloads is known; CRC, polar code and rate matching being linear, so is the difference between
-//! their coded bits, and turning the signs of the ratios there makes them add up. The right place
-//! decodes, and says so itself.
+//! Between periods, only the SFN's low bits, the half-frame bit and the payload's scrambling
+//! change. The change depends on the position of the first period within the 160 ms after which the
+//! SFN's high bits change. For every position, the difference between two payloads is known. CRC,
+//! polar code and rate matching are linear, so that the difference between their coded bits is also
+//! known. Log-likelihood ratios are added after the corresponding sign changes. The correct
+//! position yields a valid CRC, and its message contains the position.
 
 use super::decode::{Decoded, Decoder, recover};
 use super::encode::{message, with_crc};
@@ -16,28 +16,28 @@ use crate::standard::message::payload::{BchPayload, scramble};
 use crate::standard::numerology::Lmax;
 use crate::standard::pci::Pci;
 
-/// Half frames (of 5 ms) with the same six high bits of the SFN.
+/// Number of half frames (of 5 ms) with equal six high bits of the SFN.
 const SAME_SFN_MSB: u32 = 32;
-/// Half frames in 20 ms: periods a multiple of this apart agree in the half frame and in the SFN's
-/// last bit, and the scrambling does not depend on those.
+/// Number of half frames in 20 ms. Periods at multiples of this distance have equal half-frame bits
+/// and equal last SFN bits, on which the scrambling does not depend.
 const COARSEST_STEP: u32 = 4;
 
-/// The PBCH of one period, all of the same cell and SSB index.
+/// PBCH of one period; all periods have the same cell and SSB index.
 #[derive(Debug, Clone, Copy)]
 pub struct Period<'a> {
-    /// Log-likelihood ratios as for [`Decoder::decode`], weighted by their periods' own SNR.
+    /// Log-likelihood ratios like those of [`Decoder::decode`], weighted by the SNR of the period.
     pub llr: &'a [f32; E],
-    /// When it was received: half frames of 5 ms since the first one; 4 for the SSB 20 ms later.
+    /// Reception time in half frames of 5 ms since the first one; 4 for the SSB 20 ms later.
     pub half_frames: u16,
 }
 
 impl Decoder {
-    /// Decode the PBCHs of several periods together, about 10·log₁₀(n) dB better than one by one. The
-    /// payload returned is that of the first period.
+    /// Decodes the PBCHs of several periods together, with a gain of about 10·log₁₀(n) dB. Returns
+    /// the payload of the first period.
     ///
-    /// Takes up to 8 list decodings at periods of 20 ms or multiples, up to 32 at 5 ms; worth it only
-    /// after the last period failed alone. Periods on the other side of a change of the SFN's high
-    /// bits, every 160 ms, cannot be added: of the two sides the one with more periods is used.
+    /// Up to 8 list decodings are needed at periods of multiples of 20 ms, up to 32 at 5 ms, so
+    /// that it is useful only after the last period failed alone. Periods before and after a change
+    /// of the SFN's high bits, every 160 ms, cannot be added; the side with more periods is used.
     ///
     /// # Errors
     /// [`Error::NonFiniteLlr`] for a NaN or infinite ratio.
@@ -55,7 +55,7 @@ impl Decoder {
         for (coded, period) in self.periods.iter_mut().zip(periods) {
             recover(period.llr, pci, v, coded)?;
         }
-        // A power of two that divides all times.
+        // Power of two that divides all times.
         let all_times = periods
             .iter()
             .fold(COARSEST_STEP, |all, p| all | u32::from(p.half_frames));
@@ -77,8 +77,8 @@ impl Decoder {
         Ok(None)
     }
 
-    /// Sum of the periods as if all had the payload of one of them, the first period lying `start`
-    /// half frames after a change of the SFN's high bits; the time of that one.
+    /// Adds the periods as if all had the payload of one of them, for a first period `start` half
+    /// frames after a change of the SFN's high bits. Returns the time of that one.
     fn add_up(&mut self, periods: &[Period], start: u32, pci: Pci, lmax: Lmax) -> Option<u32> {
         let side = |period: &Period| (start + u32::from(period.half_frames)) / SAME_SFN_MSB;
         let count = |period: &&Period| periods.iter().filter(|p| side(p) == side(period)).count();
@@ -103,7 +103,7 @@ impl Decoder {
     }
 }
 
-/// Add `llr`, its sign reversed where `flips` has a 1.
+/// Adds `llr` with a reversed sign for each 1 in `flips`.
 fn add_flipped(sum: &mut [f32; N], llr: &[f32; N], flips: &polar::Codeword) {
     let words = sum
         .chunks_exact_mut(64)
@@ -117,12 +117,12 @@ fn add_flipped(sum: &mut [f32; N], llr: &[f32; N], flips: &polar::Codeword) {
     }
 }
 
-/// Half frames since the SFN's high bits changed.
+/// Returns the number of half frames since the SFN's high bits changed.
 fn clock(payload: &BchPayload) -> u32 {
     2 * u32::from(payload.sfn_lsb) + u32::from(payload.half_frame)
 }
 
-/// What the same SSB said `half_frames` before.
+/// Returns the message of the same SSB `half_frames` earlier.
 fn earlier(decoded: &Decoded, half_frames: u32, lmax: Lmax) -> Decoded {
     const SFN_CYCLE: u32 = 2048;
     let now = 2 * u32::from(decoded.payload.sfn()) + u32::from(decoded.payload.half_frame);
@@ -131,7 +131,7 @@ fn earlier(decoded: &Decoded, half_frames: u32, lmax: Lmax) -> Decoded {
     payload.mib.sfn_msb = (then / 32) as u8;
     payload.sfn_lsb = (then / 2 % 16) as u8;
     payload.half_frame = then % 2 == 1;
-    // Reserved bits are in the message but not in the payload's fields.
+    // Reserved bits are part of the message, but not of the payload's fields.
     let sent = scramble((decoded.message >> 24) as u32, decoded.pci, lmax);
     let reserved = sent ^ decoded.payload.bits(lmax);
     Decoded {
