@@ -1,4 +1,4 @@
-//! Scans of a recording: on the raster, and off it.
+//! Scans of a recording, on and off the synchronization raster.
 
 use std::ops::RangeInclusive;
 
@@ -15,14 +15,14 @@ use crate::dsp::base_rate::SSB_SAMPLES;
 use crate::standard::grid::SUBCARRIERS;
 use crate::standard::numerology::SubcarrierSpacing;
 
-/// Share of the probability of a false cell, 1e-3 for 20 ms, that each of two scans at each of two
-/// spacings may use up.
+/// False-alarm probability of each of two scans at each of two spacings, for a total of 1e-3 per 20
+/// ms.
 const FALSE_ALARM: f64 = 0.25e-3;
 
-/// All SSBs of a recording, `antennas` channels at `rate_hz` around `centre_hz` (`None`: unknown),
-/// at whatever frequency, and subcarrier spacing of its frequency range (range 1 if unknown); the
-/// frequency with the strongest SSB first:
-/// [`scan_raster`], then [`scan_off_raster`] for what is beside.
+/// Returns all SSBs of a recording with `antennas` at `rate_hz` around `centre_hz` (`None`:
+/// unknown), at any frequency and every subcarrier spacing of the frequency range (range 1 if
+/// unknown), the frequency with the strongest SSB first. It is [`scan_raster`], followed by
+/// [`scan_off_raster`] for the other frequencies.
 ///
 /// # Errors
 /// Those of [`scan_raster`].
@@ -40,14 +40,15 @@ pub fn scan(
     Ok(without_shadows(finds))
 }
 
-/// The SSBs on the points of the synchronization raster, the point with the strongest first.
+/// Returns the SSBs at the points of the synchronization raster, the point with the strongest
+/// first.
 ///
-/// A point also shows what lies up to half a subcarrier beside it, on the global frequency raster;
-/// such an SSB is placed there, without a GSCN, if the phase between its symbols clearly says so.
-/// In doubt it is taken to be on the point, and the rest for its carrier frequency offset: a cell
-/// that is to be searched for must be on this raster.
+/// An SSB within half a subcarrier of a point, on the global frequency raster, is also detected at
+/// the point. It is assigned to its own frequency, without a GSCN, if the phase between its symbols
+/// is unambiguous. Otherwise it is assigned to the point, and the difference is part of its carrier
+/// frequency offset, because cells that UEs search for are on this raster.
 ///
-/// The probability of a false cell, half of 1e-3 for 20 ms, is shared among the points.
+/// The false-alarm probability, half of 1e-3 for 20 ms, is divided among the points.
 ///
 /// # Errors
 /// [`ScanError::FrontEnd`] for a rate that cannot be converted, [`ScanError::Search`] for
@@ -69,7 +70,8 @@ pub fn scan_raster(
         let batches: Vec<&[RasterPoint]> = points.chunks(AT_ONCE).collect();
         let found = in_parallel(&batches, worker, |at_point, points| {
             let placed = |find: RasterFind, at_point: &mut PointSearch| {
-                // What the point's neighbours on the global frequency raster hold shows here too.
+                // SSBs at neighbouring points of the global frequency raster are also detected
+                // here.
                 let at = find.point;
                 let band_hz = band(centre_hz, reach);
                 let Some(ssb) = find.strongest() else {
@@ -95,22 +97,22 @@ pub fn scan_raster(
     Ok(without_shadows(finds))
 }
 
-/// The SSBs anywhere in the band but where `known` ones are.
+/// Returns the SSBs anywhere in the band, except at the `known` ones.
 ///
-/// The PSS is looked for at steps of half a subcarrier through the whole band; around the strongest
-/// maxima an SSB is looked for, and where there is one, all of the recording is searched. An SSB belongs to a point of the global frequency
-/// raster (TS 38.104 §5.4.2.1, multiples of 15 kHz from 3 GHz on), which may be nearer
-/// than its carrier frequency offset. It is the phase between symbols that tells them apart (TS
-/// 38.211 §5.4), and where that leaves a doubt the smaller offset is preferred.
+/// The PSS is searched for in steps of half a subcarrier over the whole band. An SSB is searched
+/// for around the strongest maxima, and if it is detected, in the whole recording. An SSB is
+/// assigned to a point of the global frequency raster (TS 38.104 §5.4.2.1, multiples of 15 kHz from
+/// 3 GHz on), whose spacing may be below the carrier frequency offset. The phase between symbols
+/// distinguishes the points (TS 38.211 §5.4); if it is ambiguous, the smaller offset is preferred.
 ///
-/// Without the absolute centre frequency there is no raster to count from: an SSB is placed at
-/// the nearest multiple of 15 kHz (the unit of k_SSB, TS 38.211 §7.4.3.1) from the recording's
-/// centre, the rest is frequency offset, and that comes from inside the symbols only and is less
-/// precise, see [`ssb_freq_hz`](crate::search::SearchConfig::ssb_freq_hz). The probability of a false
-/// cell, half of 1e-3 for 20 ms, is shared among all points of the band.
+/// Without an absolute centre frequency there is no raster: an SSB is assigned to the nearest
+/// multiple of 15 kHz (the unit of k_SSB, TS 38.211 §7.4.3.1) from the recording's centre. The
+/// remainder is its frequency offset, which is estimated within symbols only and is less precise,
+/// see [`ssb_freq_hz`](crate::search::SearchConfig::ssb_freq_hz). The false-alarm probability, half
+/// of 1e-3 for 20 ms, is divided among all points of the band.
 ///
-/// Takes time in proportion to bandwidth squared, duration and antennas, on all processors: of one
-/// antenna 20 ms at 46 Msps some half a second on two.
+/// The duration is proportional to bandwidth squared, recording length and number of antennas, on
+/// all processors: about half a second for 20 ms of one antenna at 46 Msps on two processors.
 ///
 /// # Errors
 /// Those of [`scan_raster`].

@@ -1,10 +1,10 @@
-//! The receiver of windows: searches until it has found a beam, tracks, and searches again.
+//! Receiver of windows: searches until a beam is detected, tracks, and searches again.
 //!
-//! A receiver without beams looks at every frequency offset that the oscillators may have, a
-//! subcarrier apart, from the last one known or none outwards: at up to four of them in one burst, so that
-//! the work of a burst is bounded and the longest period does not make the search long. Then it rests
-//! for a moment and begins anew. With beams it searches about their own offset for others, now and
-//! then; at once where none of them came.
+//! Without beams, the receiver searches every frequency offset that the oscillators may have, one
+//! subcarrier apart, outwards from the last known one or zero. It searches at most four offsets per
+//! burst, so that the load of a burst is bounded and the longest period does not make the search
+//! long. After all offsets, it pauses briefly and restarts. With beams, it searches around their
+//! own offset for further beams at intervals, and immediately if none of them is received.
 
 use num_complex::Complex32;
 
@@ -16,78 +16,82 @@ use crate::dsp::tones::Tone;
 use crate::search::{SearchError, Searcher};
 use crate::track::{Tracked, Tracker};
 
-/// Samples at the base rate that there must be to either side of an SSB: half a cyclic prefix and the filter's reach.
+/// Number of samples required on either side of an SSB, at the base rate: half a cyclic prefix and
+/// the range of the filter.
 pub(super) const GUARD: f64 = 16.0;
-/// Time after which a search that found nothing at any offset begins anew, and beams are searched for of which
-/// none came, in seconds.
+/// Time after which an unsuccessful search over all offsets restarts, and after which missing beams
+/// are searched for, in seconds.
 const LOST_INTERVAL_S: f64 = 0.1;
-/// Offsets that a burst is searched at where no beam is known: one for so much of a period (s), at most so many.
+/// Period (s) per frequency offset of a burst's search without beams, and maximum number of
+/// offsets.
 const PERIOD_OF_OFFSET_S: f64 = 0.04;
 const MOST_OFFSETS: f64 = 4.0;
-/// Time after which DC offset and tones are looked for again, in seconds; after [`LOST_INTERVAL_S`] where an SSB
-/// is missing.
+/// Interval of the measurement of DC offset and tones, in seconds; [`LOST_INTERVAL_S`] if an SSB is
+/// missing.
 const TONE_INTERVAL_S: f64 = 1.0;
-/// Samples before and after the place where an SSB is expected that tones are subtracted from.
+/// Number of samples before and after the expected SSB from which tones are subtracted.
 const BEFORE: usize = 1500;
 const AFTER: usize = 2596;
-/// Samples by which a beam that is found again may come off its period: beyond any drift of its clock.
+/// Maximum deviation of a beam from its period, in samples, far above any clock drift.
 const OFF_PERIOD: f64 = 100.0;
 
 /// Samples at the base rate.
 #[derive(Debug, Clone, Copy)]
 pub struct Window<'a> {
-    /// Number of the first sample, counted by the receiver's clock.
+    /// Index of the first sample, in samples of the receiver's clock.
     pub start: i64,
-    /// The samples of each antenna, equally many.
+    /// Samples of each antenna, with equal lengths.
     pub antennas: &'a [&'a [Complex32]],
 }
 
 impl Window<'_> {
-    /// Number of the sample after the last.
+    /// Returns the index after the last sample.
     pub(super) fn end(&self) -> f64 {
         let length = self.antennas.iter().map(|samples| samples.len()).min();
         self.start as f64 + length.unwrap_or(0) as f64
     }
 }
 
-/// One SSB that was seen, and its tracker, to ask for what it has received.
+/// Received SSB and its tracker, which stores the received elements.
 pub struct Seen<'a, const A: usize> {
-    /// What tracking says of it.
+    /// Result of the tracker.
     pub ssb: &'a Tracked<A>,
     /// Its tracker.
     pub tracker: &'a mut Tracker<A>,
-    /// Looked at where it was expected; `false` of the first after a search has found its beam.
+    /// Whether the SSB was received at its expected time; `false` for the first one after a search.
     pub is_followed: bool,
-    /// Samples at the base rate that were missing untold before it, but for whole periods: all beams came off
-    /// their period at once. They are not counted in `sample_start`.
+    /// Unreported missing samples before the SSB at the base rate, modulo the period: all beams
+    /// deviated from their period at once. They are not part of `sample_start`.
     pub untold: f64,
 }
 
-/// Keeps to the beams on one frequency, for windows of samples however they came about: cut from a
-/// stream, or around each burst.
+/// Tracks the beams at one frequency in windows of samples, which may be parts of a stream or
+/// surround each burst.
 pub struct WindowReceiver<const A: usize> {
     config: ReceiverConfig,
     searcher: Searcher,
     beams: Vec<Beam<A>>,
-    /// Where a search last began (samples), and up to where it goes on.
+    /// Start of the last search (samples), and its end.
     search_begun: f64,
     search_until: f64,
     searches: u64,
-    /// Frequency offset that beams were last found at, in Hz, and number of offsets searched in vain since.
+    /// Frequency offset of the last detected beams, in Hz, and number of offsets searched without
+    /// success since then.
     offset_hz: f64,
     in_vain: u32,
-    /// Samples that were missing untold so far.
+    /// Total number of unreported missing samples.
     untold: f64,
-    /// Where tones were last looked for (samples), and the samples without them.
+    /// Position of the last tone measurement (samples), and the samples without tones.
     tones_measured: f64,
     cleaned: Vec<Vec<Complex32>>,
 }
 
 impl<const A: usize> WindowReceiver<A> {
-    /// A receiver that knows no beam yet.
+    /// Creates a receiver without beams.
     ///
     /// # Errors
-    /// [`ReceiverError::Search`] for impossible settings, or unless they are for `A` antennas.
+    /// [`ReceiverError::Search`] for an invalid configuration, or one for another number of
+    /// antennas than `A`.
     pub fn new(config: ReceiverConfig) -> Result<Self, ReceiverError> {
         config.check()?;
         let (given, expected) = (config.search.antennas, A);
@@ -109,22 +113,22 @@ impl<const A: usize> WindowReceiver<A> {
         })
     }
 
-    /// The settings.
+    /// Returns the configuration.
     pub const fn config(&self) -> &ReceiverConfig {
         &self.config
     }
 
-    /// Beams that are tracked now.
+    /// Returns the number of tracked beams.
     pub fn tracked(&self) -> usize {
         self.beams.len()
     }
 
-    /// Windows that were searched.
+    /// Returns the number of searched windows.
     pub const fn searches(&self) -> u64 {
         self.searches
     }
 
-    /// Forgets all beams, but not the oscillators' offset: the count of samples begins anew.
+    /// Removes all beams, but keeps the oscillators' offset: the index of samples restarts.
     pub fn reset(&mut self) {
         self.beams.clear();
         (self.search_begun, self.search_until) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
@@ -132,13 +136,13 @@ impl<const A: usize> WindowReceiver<A> {
         self.tones_measured = f64::NEG_INFINITY;
     }
 
-    /// DC offset and tones that are subtracted from what is received, the strongest first; frequencies from the
-    /// SSB's centre.
+    /// Returns the DC offset and tones that are subtracted, the strongest first; frequencies are
+    /// relative to the SSB's centre.
     pub fn tones(&self) -> impl Iterator<Item = Tone> + '_ {
         self.searcher.tones()
     }
 
-    /// Looks for tones in the window where it is time to.
+    /// Measures tones in the window if a measurement is due.
     pub(super) fn measure_tones(&mut self, window: &Window<'_>) {
         let is_missing = self.beams.iter().any(|beam| beam.tracker.misses() > 0);
         let interval_s = if is_missing {
@@ -153,10 +157,11 @@ impl<const A: usize> WindowReceiver<A> {
         }
     }
 
-    /// Searches the window where it is time to, and shows `take` the SSBs that lie in it, in order of time.
+    /// Searches the window if a search is due, and passes the SSBs in it to `take`, in order of
+    /// time.
     ///
     /// # Errors
-    /// [`ReceiverError`] for another number of antennas or unequal lengths.
+    /// [`ReceiverError`] for a wrong number of antennas or unequal lengths.
     pub fn receive(
         &mut self,
         window: &Window<'_>,
@@ -172,7 +177,7 @@ impl<const A: usize> WindowReceiver<A> {
         Ok(())
     }
 
-    /// Whether the samples from `start` on are to be searched: a search goes on for a period.
+    /// Whether the samples starting at `start` are searched: a search continues for one period.
     pub(super) fn searches_at(&mut self, start: f64) -> bool {
         if start < self.search_until {
             return true;
@@ -200,7 +205,7 @@ impl<const A: usize> WindowReceiver<A> {
         is_due
     }
 
-    /// Whether there is no other beam to be found, and how far off in frequency they are.
+    /// Whether all known beams are received; updates the frequency offset of the beams.
     fn all_come(&mut self) -> bool {
         let (beams, known) = (&self.beams, &self.config.beams);
         let comes = |known: &(u16, u8)| {
@@ -214,21 +219,21 @@ impl<const A: usize> WindowReceiver<A> {
         all_come
     }
 
-    /// A search has been through a period.
+    /// Records a search over a whole period.
     fn count_in_vain(&mut self) {
         if self.beams.is_empty() {
             self.in_vain = self.in_vain.saturating_add(self.at_once());
         }
     }
 
-    /// Frequency offsets searched at once.
+    /// Returns the number of frequency offsets that are searched together.
     fn at_once(&self) -> u32 {
         let offsets = (self.config.period_s / PERIOD_OF_OFFSET_S).round();
         (offsets.clamp(1.0, MOST_OFFSETS) as u32).min(self.config.offsets())
     }
 
-    /// The frequency offset to search around: that of the beams there are, else the last one known,
-    /// one subcarrier above, one below, two above, and so on.
+    /// Returns the frequency offset of search number `number`: that of the beams, otherwise the
+    /// last known one, one subcarrier above, one below, two above, and so on.
     fn centre_hz(&self, number: u32) -> f64 {
         if let Some(beam) = self.beams.iter().min_by_key(|beam| beam.tracker.misses()) {
             return beam.tracker.cfo_hz();
@@ -284,13 +289,13 @@ impl<const A: usize> WindowReceiver<A> {
         Ok(())
     }
 
-    /// Where the next SSB is expected.
+    /// Returns the expected start of the next SSB.
     pub(super) fn next_start(&self) -> f64 {
         let starts = self.beams.iter().map(|beam| beam.next_start);
         starts.fold(f64::INFINITY, f64::min)
     }
 
-    /// Looks at the first SSB expected in the window; `false` where there is none.
+    /// Tracks the first expected SSB in the window; returns `false` if there is none.
     pub(super) fn track_next(
         &mut self,
         window: &Window<'_>,
@@ -336,7 +341,7 @@ impl<const A: usize> WindowReceiver<A> {
         let seen = beam
             .tracker
             .track(antennas, start, beam.next_start, decode)?;
-        // The beam is told by DM-RS; another's SSB is not this one.
+        // The DM-RS identifies the beam; the SSB of another beam is rejected.
         if let Some(ssb) = seen.filter(|seen| seen.ssb_index == beam.ssb_index) {
             let is_followed = beam.is_followed;
             beam.seen(ssb.sample_start, period);
