@@ -5,7 +5,7 @@ use nr_ssb::raster::scan;
 use nr_ssb::search::DetectedSsb;
 use serde_json::Value;
 
-/// What the recordings' annotations are held to, Hz.
+/// Maximum difference from the recordings' annotations, in Hz.
 const CFO_TOLERANCE_HZ: f64 = 20.0;
 
 #[test]
@@ -73,8 +73,8 @@ fn every_annotated_ssb_is_found_without_being_told_where() {
     }
 }
 
-/// An operator's recording holds weaker cells beside the annotated one. A cell that was only
-/// imagined would have another time or message than the network that it is in.
+/// A recording of an operator contains weaker cells in addition to the annotated one. A false cell
+/// would have another time or message than the network.
 fn weaker_cells_belong_to_the_network(name: &str, annotations: &[Value], ssbs: &[DetectedSsb]) {
     let strong = ssbs.iter().filter(|ssb| ssb.snr_db > 0.0).count();
     assert_eq!(strong, annotations.len(), "{name}");

@@ -1,5 +1,5 @@
-//! Clocks that differ: over every burst period and spacing, up to 20 ppm, the beam that is named
-//! is the beam that was sent, its SNR is told right, and no search is needed once it is tracked.
+//! Different clocks: for every burst period and spacing, up to 20 ppm, the identified beam is the
+//! transmitted one, its SNR is correct, and tracking needs no search.
 
 use crate::air;
 use nr_ssb::search::{SearchConfig, Searcher};
@@ -11,7 +11,7 @@ const WINDOW: usize = 2048;
 const MARGIN: f64 = 400.0;
 const BEAM: u8 = 5;
 
-/// Eight beams of one cell, heard by four antennas through a clock that is too fast.
+/// Eight beams of one cell, received by four antennas with a fast clock.
 struct Drifting {
     cell: air::Cell,
     sent: Vec<Complex32>,
@@ -39,13 +39,13 @@ impl Drifting {
         }
     }
 
-    /// Where the beam of period `number` begins by the receiver's clock.
+    /// Returns the start of the beam of period `number` by the receiver's clock.
     fn start(&self, number: f64) -> f64 {
         let sent = number * self.period + self.cell.ssb_start(BEAM);
         sent * (1.0 + 1e-6 * self.ppm)
     }
 
-    /// What is received around it, and the number of the first sample.
+    /// Returns the samples around it, and the index of the first sample.
     fn window(&mut self, number: f64) -> (Vec<Vec<Complex32>>, f64) {
         let start = self.start(number);
         let window_start = (start - MARGIN).floor();
@@ -70,7 +70,7 @@ impl Drifting {
         (antennas, window_start)
     }
 
-    /// What the receiver's search finds in period 0, told roughly where the oscillator is.
+    /// Returns the tracker after a search in period 0 with an approximate oscillator offset.
     fn tracker(&mut self) -> Tracker<4> {
         let (antennas, window_start) = self.window(0.0);
         let scs = self.cell.spacing.hz();
@@ -89,7 +89,8 @@ impl Drifting {
     }
 }
 
-/// Of so many SSBs, those named, named wrongly, and with an SNR that is off by more than 1 dB.
+/// Number of SSBs, identified ones, wrongly identified ones, and those with an SNR error above 1
+/// dB.
 #[derive(Debug, Default)]
 struct Tally {
     ssbs: u32,
@@ -99,7 +100,7 @@ struct Tally {
 }
 
 impl Tally {
-    /// Looks at the beam of period `number`, `periods` after the one seen last.
+    /// Tracks the beam of period `number`, `periods` after the last received one.
     fn look(&mut self, air: &mut Drifting, tracker: &mut Tracker<4>, number: f64, periods: f64) {
         let (antennas, window_start) = air.window(number);
         let windows = std::array::from_fn(|antenna| antennas[antenna].as_slice());
@@ -183,7 +184,7 @@ fn sleep_is_bridged_by_what_was_learned() {
     }
 }
 
-/// Wherever an SSB within reach is, it is found there or not at all, and named rightly.
+/// An SSB within the range is identified correctly or not at all.
 #[test]
 fn an_ssb_off_its_place_is_named_rightly_or_not_at_all() {
     let mut named = [0_u32; 25];

@@ -1,4 +1,4 @@
-//! Strong cells that come distorted, or with a stronger PSS, leave nothing that looks like another cell.
+//! Strong cells with distortion, or with a stronger PSS, cause no false cell.
 
 use crate::air;
 use std::f32::consts::SQRT_2;
@@ -11,8 +11,8 @@ const ANTENNAS: usize = 4;
 /// Samples of an OFDM symbol and its cyclic prefix.
 const SYMBOL: usize = 274;
 
-/// Of ten recordings of one cell at this SNR, `distort` done to the samples of its SSB: in how many it
-/// was found and decoded, and how many others were found.
+/// Returns, over ten recordings of one cell at this SNR with `distort` applied to the samples of
+/// its SSB, the number in which it was decoded, and the number of other cells.
 fn cells(snr_db: f64, distort: impl Fn(&mut [Complex32])) -> (usize, usize) {
     let (mut decoded, mut others) = (0, 0);
     for seed in 0..10 {

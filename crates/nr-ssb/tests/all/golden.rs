@@ -138,7 +138,7 @@ fn every_stage_of_the_pbch_and_back() {
         assert!(pbch_indices(pci).iter().map(at).eq(symbols));
         let pilots = dmrs(pci, ibar_ssb(lmax, index, half_frame));
         assert!(dmrs_indices(pci).iter().map(at).eq(pilots));
-        // What was sent by the book is read by the decoder.
+        // The decoder decodes the reference symbols.
         let mut llrs = [0.0; 864];
         for (llr, bit) in llrs.iter_mut().zip(&sent) {
             *llr = if *bit == 0 { 4.0 } else { -4.0 };

@@ -1,4 +1,4 @@
-//! Cells beside a loaded neighbour, and strong ones whose message is spoilt.
+//! Cells next to a loaded neighbour, and strong ones with a corrupted message.
 
 use crate::air;
 use nr_ssb::search::{SearchConfig, Searcher};

@@ -114,8 +114,8 @@ fn a_centre_between_all_rasters_gives_the_right_frequency_and_offset() {
     }
 }
 
-/// Far more of an offset than the frequency can be told from: the cell is found all the same, at a
-/// frequency whose phases between symbols agree with what was received.
+/// With an offset far above the spacing of the raster, the cell is still detected, at a frequency
+/// whose phases between symbols agree with the received ones.
 #[test]
 fn an_oscillator_of_20_ppm_hides_no_cell() {
     let mut rng = air::rng(6);
@@ -130,7 +130,8 @@ fn an_oscillator_of_20_ppm_hides_no_cell() {
                 for centre_hz in [Some(ssb_freq_hz - 1.5e6), None] {
                     let what = format!("{spacing:?} {ssb_freq_hz} {cfo_ppm} {centre_hz:?}");
                     let finds = scan(&air::slices(&samples), RATE_HZ, centre_hz).unwrap();
-                    // What is not decoded may be noise, in one of a thousand recordings of 20 ms.
+                    // An SSB that is not decoded may be noise, in one of a thousand recordings of
+                    // 20 ms.
                     let decoded = |find: &&RasterFind| find.ssbs[0].payload.is_some();
                     let decoded: Vec<_> = finds.iter().filter(decoded).collect();
                     assert_eq!(decoded.len(), 1, "{what}");
@@ -181,7 +182,7 @@ fn a_weak_cell_off_the_raster_is_found_beside_a_strong_one_on_it() {
             cell.delay = delay_s * spacing.base_rate_hz() + 0.3;
             cell.cfo_hz = 1e-6 * ssb_freq_hz;
             let samples = on_the_air(&cell, ssb_freq_hz - centre_hz, f64::INFINITY, &mut rng);
-            // As wide as it is, a resource element of 30 kHz collects twice the noise.
+            // A resource element of 30 kHz collects twice the noise of one of 15 kHz.
             let width_db = 10.0 * (spacing.hz() / 30e3).log10();
             let amplitude = 10f64.powf(0.05 * (snr_db + width_db)) as f32;
             for (sum, x) in received[0].iter_mut().zip(&samples[0]) {
@@ -199,7 +200,7 @@ fn a_weak_cell_off_the_raster_is_found_beside_a_strong_one_on_it() {
     }
 }
 
-/// How weak a cell may be, one SSB in 3 ms on one antenna, on the raster and beside it.
+/// Detection limits of a cell on and off the raster, with one SSB in 3 ms on one antenna.
 #[test]
 fn off_the_raster_a_cell_may_be_nearly_as_weak() {
     let trials = 25;

@@ -6,7 +6,7 @@ use nr_ssb::{Lmax, Pci};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Periods that lie so many half frames apart.
+/// Returns periods that are `half_frames` apart.
 fn every(half_frames: u16, llrs: &[[f32; 864]]) -> Vec<Period<'_>> {
     let at = |(llr, n)| Period {
         llr,
@@ -15,7 +15,7 @@ fn every(half_frames: u16, llrs: &[[f32; 864]]) -> Vec<Period<'_>> {
     llrs.iter().zip(0..).map(at).collect()
 }
 
-/// The requirement is at most 0.01. So few errors that 0.01 or more is refuted with 95 %.
+/// The requirement is at most 0.01. The number of errors refutes 0.01 or more with 95 % confidence.
 #[test]
 fn few_block_errors_at_minus_8_db() {
     let blocks = 20_000;

@@ -86,7 +86,7 @@ fn every_ssb_of_a_stream_is_heard_once_with_its_channel() {
             assert!((snr_db - 10.0).abs() < 1.5, "{snr_db}");
         }
     }
-    // The same wherever the blocks end.
+    // The result does not depend on the block boundaries.
     for block in [1000, 76_800, 500_001] {
         assert_eq!(heard(config.clone(), &samples, block), all, "{block}");
     }

@@ -50,7 +50,7 @@ fn every_ssb_of_a_stream_is_found_once_wherever_the_blocks_end() {
 fn all_cells_of_one_raster_point_are_found() {
     let mut samples = air::silence(4, FRAME);
     let mut cells = [cell(10, 4), cell(11, 4), cell(12, 4)];
-    // The same PSS for two of them.
+    // Two of them have the same PSS.
     for (cell, (pci, level)) in cells.iter_mut().zip([(300, 1.0), (601, 0.4), (903, 0.18)]) {
         cell.pci = pci;
         cell.lmax = nr_ssb::Lmax::L8;

@@ -123,7 +123,8 @@ fn phases_between_antennas_are_as_without_tones() {
             assert_eq!(found.len(), 1, "{seed}: {above_ssb_db} dB");
         }
     }
-    // The same noise: what differs is what a tone leaves. 1.1 times the RMSE without.
+    // All three have equal noise, so that the difference is due to the tone: at most 1.1 times the
+    // RMSE without it.
     let [without, weak, strong] = squares.map(f64::sqrt);
     assert!(weak < 1.1 * without, "{weak} {without}");
     assert!(strong < 1.1 * without, "{strong} {without}");

@@ -1,6 +1,6 @@
-//! Equality with reference vectors made by independent encoders: bits exact, samples within 1e-6.
-//! They lie beside the project, so that these tests run on demand (`--include-ignored`); what must
-//! hold everywhere is in `golden.rs`.
+//! Equality with reference vectors of independent encoders: exact for bits, within 1e-6 for
+//! samples. The vectors are not part of the project, so that these tests run on demand
+//! (`--include-ignored`); `golden.rs` contains the tests that run everywhere.
 
 use crate::common::{self, Vectors, cells, pack};
 use nr_ssb::burst::ssb_grid;

@@ -1,4 +1,4 @@
-//! The state that outlives the program: pose, calibration and excluded radio heads.
+//! Saved state across restarts of the program: pose, calibration and excluded radio heads.
 
 use serde::{Deserialize, Serialize};
 
@@ -54,7 +54,7 @@ pub struct SavedState {
     pub speed_mps: f64,
     /// Yaw rate in rad/s, where known.
     pub yaw_rate_radps: Option<f64>,
-    /// Metres that the odometer reads per metre driven, and its standard deviation.
+    /// Odometer scale: distance measured per distance driven, and its standard deviation.
     pub odometer_scale: Option<Calibration>,
     /// Bias of the yaw rate in rad/s, and its standard deviation.
     pub yaw_rate_bias_radps: Option<Calibration>,
@@ -73,7 +73,7 @@ pub struct SavedState {
 pub struct Resumption {
     /// Elapsed time in seconds.
     pub elapsed_s: f64,
-    /// Distance driven by the odometer's counter, in metres; `None` where it does not tell.
+    /// Distance driven by the odometer's counter, in metres; `None` if it is unknown.
     pub driven_m: Option<f64>,
     /// Standard deviation of the position after it, in metres.
     pub position_std_m: f64,
@@ -92,7 +92,7 @@ impl SavedState {
     ) -> Option<Resumption> {
         let reach_m = top_speed_mps * elapsed_s;
         let counted_m = self.distance_m.map(|before_m| sample.distance_m - before_m);
-        // A counter that was set to zero meanwhile does not tell.
+        // A counter that was reset in the meantime contains no information.
         let driven_m = counted_m.filter(|it| it.abs() <= reach_m + STANDING_STD_M);
         let (growth_m, way_m) = match driven_m {
             Some(driven_m) => {

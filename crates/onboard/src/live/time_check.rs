@@ -424,7 +424,7 @@ mod tests {
                 assert_eq!(verdict, Ok(TimeVerdict::Continues), "{number}");
             }
         }
-        // Of a backlog of which most was lost one step is more than a second.
+        // After a backlog with most messages lost, one step is longer than a second.
         let mut check = warm(0.0);
         assert!(check.next(1.0, Some(6.0), false).is_ok());
         assert!(check.next(5.0, Some(6.0), false).is_ok());

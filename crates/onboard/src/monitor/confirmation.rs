@@ -1,10 +1,11 @@
 //! Confirmation of a given or resumed pose by angles.
 
-/// Accepted angles, less those refused as outliers, that confirm a pose. An angle of another position is accepted by
-/// chance with the width of its gate, a few percent of all directions; five are not.
+/// Number of accepted angles minus rejected ones that confirms a pose. At a wrong position, one
+/// angle is accepted by chance with the probability of its gate, a few percent; five are not.
 const CONFIRMING_ANGLES: u32 = 5;
 
-/// Radio heads that must be among them, where the site has so many: one alone confirms a direction only.
+/// Number of different radio heads among them, if the site has them: one radio head confirms a
+/// direction only.
 const CONFIRMING_HEADS: usize = 2;
 
 /// Whether angles have confirmed the pose, and the evidence so far.
@@ -17,7 +18,8 @@ pub struct Confirmation {
 }
 
 impl Confirmation {
-    /// Of a pose that was found by angles (`is_confirmed`), or was given, at a site with so many radio heads.
+    /// Creates the state of a pose that was found by angles (`is_confirmed`) or given, at a site
+    /// with `heads` radio heads.
     pub fn new(is_confirmed: bool, heads: usize) -> Self {
         Self {
             is_confirmed,
@@ -32,17 +34,17 @@ impl Confirmation {
         self.is_confirmed
     }
 
-    /// The pose was found by angles.
+    /// Records that the pose was found by angles.
     pub const fn confirm(&mut self) {
         self.is_confirmed = true;
     }
 
-    /// The pose is to be confirmed again.
+    /// Requires another confirmation of the pose.
     pub fn restart(&mut self) {
         *self = Self::new(false, self.needed_heads);
     }
 
-    /// Takes in the verdict on an angle to a radio head.
+    /// Adds the verdict on an angle to a radio head.
     pub fn angle(&mut self, pci: u16, is_accepted: bool) {
         if !is_accepted {
             self.score = self.score.saturating_sub(1);

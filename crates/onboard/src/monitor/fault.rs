@@ -85,7 +85,7 @@ impl Fault {
         }
     }
 
-    /// What to do about it.
+    /// Returns the recommended action.
     pub const fn what_to_do(self) -> &'static str {
         match self.source() {
             FaultSource::Odometry => "stop; check the odometer and the source of the odometry",

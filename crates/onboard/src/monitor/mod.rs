@@ -38,7 +38,7 @@ pub struct Monitors {
     contradiction: Contradiction,
     motion: MotionMonitor,
     channels: ChannelMonitor,
-    /// Of a given pose: until then every burst is received.
+    /// Confirmation of a given pose: until then every burst is received.
     confirmation: Confirmation,
     distance_m: f64,
     /// Localization without odometry.

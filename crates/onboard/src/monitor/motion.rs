@@ -27,7 +27,8 @@ const STANDING_M: f64 = 0.02;
 const STANDING_RAD: f64 = 0.1;
 /// Standard deviation of an angle in addition to its noise, in radians: scatter that moves while the vehicle stands.
 const STANDING_SIGMA_RAD: f64 = 0.02;
-/// The same on the move, where the multipath changes.
+/// Standard deviation of an angle on the move, in addition to its noise, in radians: the multipath
+/// changes.
 const MOVING_SIGMA_RAD: f64 = 0.06;
 /// Maximum acceleration by the friction of tyres, in m/s², and minimum change of the speed that is compared with it, in
 /// m/s: a smaller one may be noise, or a small robot whose wheels are commanded in steps.

@@ -64,9 +64,9 @@ fn turns_on_the_spot() {
     let (pose, [x_std_m, y_std_m, heading_std_rad]) = end(true);
     assert!((pose.heading_rad - std::f64::consts::FRAC_PI_2).abs() < 3.0 * heading_std_rad);
     assert!((pose.x_m - 5.0).abs() < 3.0 * x_std_m && (pose.y_m - 5.0).abs() < 3.0 * y_std_m);
-    // What the data sheet leaves after thirteen seconds: bias, the root of the noise's variance, and
-    // the wheels' scale, which tell the turn as they tell the distance.
-    // And when between two samples the turn began and ended, evenly distributed.
+    // Error according to the data sheet after thirteen seconds: bias, standard deviation of the
+    // noise, and scale of the wheels, which measure the turn and the distance. The times at which
+    // the turn began and ended between two samples are uniformly distributed.
     let change_rad = 0.02 * std::f64::consts::FRAC_PI_2 / 3.0;
     let heading_rad = (0.005_f64.powi(2)
         + (0.002 * 13.0_f64).powi(2)

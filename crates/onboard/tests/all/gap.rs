@@ -1,4 +1,4 @@
-//! A tracker that hears nothing, where the road was not surveyed.
+//! Tracker without angles on an unsurveyed stretch of the road.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
 const RADIUS_M: f64 = 200.0;
 const TURN_RAD: f64 = 0.1;
 
-/// A tracker on a straight road: 90 m of it, 80 m that nobody has surveyed, and 90 m again.
+/// Returns a tracker on a straight road: 90 m, 80 m unsurveyed, and 90 m.
 fn tracker(at_m: f64, aside_m: f64, position_std_m: f64) -> (Ekf, Gap) {
     let gap_m = 4.0 * RADIUS_M * TURN_RAD.sin();
     let road = format!(
@@ -75,8 +75,8 @@ fn the_gap_is_told_and_costs_certainty_until_the_lane_is_kept_again() {
             told_m.push(along_m);
         }
     }
-    // By then the place is known to 0.1 m of start, 0.003 of scale and 0.01 m per √m, and the
-    // verdict comes a sample later.
+    // At that time, the position error consists of 0.1 m of the start, a scale error of 0.003 and
+    // 0.01 m per √m; the verdict follows one sample later.
     let margin_m =
         |driven_m: f64| 3.0 * (0.01 + (0.003 * driven_m).powi(2) + 1e-4 * driven_m).sqrt() + 0.08;
     let (first_m, last_m) = (told_m[0], told_m[told_m.len() - 1]);

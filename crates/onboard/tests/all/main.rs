@@ -1,4 +1,4 @@
-//! What runs on the vehicle, from outside.
+//! Tests of the vehicle's software through its public interface.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "these are tests")]
 
 #[path = "../../../nr-ssb/tests/all/air/mod.rs"]

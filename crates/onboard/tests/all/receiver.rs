@@ -8,7 +8,7 @@ use onboard::settings::{ArraySettings, Pilots};
 
 const PERIOD_S: f64 = 0.02;
 
-/// A cell with eight beams, heard by four antennas through a clock that is too fast.
+/// Cell with eight beams, received by four antennas with a fast clock.
 struct Air {
     cell: air::Cell,
     ppm: f64,
@@ -46,7 +46,7 @@ impl Air {
         self.receiver_of(&[])
     }
 
-    /// A receiver that is told which beams there are.
+    /// Returns a receiver with known beams.
     fn receiver_of(&self, beams: &[u8]) -> Receiver {
         Receiver::new(ReceiverConfig {
             beams: beams.iter().map(|beam| (self.cell.pci, *beam)).collect(),
@@ -62,7 +62,7 @@ impl Air {
         .unwrap()
     }
 
-    /// Beams that the receiver reports of burst `number`.
+    /// Returns the beams that the receiver reports for burst `number`.
     fn heard(&self, receiver: &mut Receiver, number: u32) -> Vec<u8> {
         let rate_hz = self.cell.spacing.base_rate_hz();
         let begin = (1000.0 + f64::from(number) * PERIOD_S * rate_hz) * (1.0 + 1e-6 * self.ppm);
@@ -142,7 +142,8 @@ fn while_all_beams_that_are_known_come_none_is_searched_for() {
         assert_eq!(air.heard(&mut receiver, number), all, "burst {number}");
     }
     assert_eq!(receiver.searches(), 1);
-    // One is gone for longer than it is kept, and found again as by who knows of none.
+    // One beam is absent for longer than it is kept, and detected again as by a receiver without
+    // beams.
     air.send((1..8).collect());
     for number in 150..280 {
         air.heard(&mut receiver, number);

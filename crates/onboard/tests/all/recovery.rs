@@ -1,4 +1,4 @@
-//! A vehicle that was told wrongly where it starts finds back.
+//! Recovery of a vehicle from a wrong given start.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -51,7 +51,7 @@ struct Drive {
 }
 
 impl Drive {
-    /// At the origin, and told to be elsewhere.
+    /// Creates a drive that starts at the origin with the given start `told`.
     fn new(told: Pose) -> Self {
         let site = Site::from_toml(SITE, "hall", &Shipped).unwrap();
         let vehicle = Vehicle::from_toml(VEHICLE, "robot", &Shipped).unwrap();
@@ -73,7 +73,7 @@ impl Drive {
         STEP_S * f64::from(self.steps)
     }
 
-    /// One step on; every fifth hears all radio heads.
+    /// Advances by one step; every fifth step has an angle of each radio head.
     fn step(&mut self, speed_mps: f64, rate_radps: f64) {
         self.steps += 1;
         self.way_m += STEP_S * speed_mps;
@@ -103,7 +103,7 @@ impl Drive {
         }
     }
 
-    /// Winds about until a time: the worst error from another one on (m).
+    /// Drives along a winding path until a time: returns the maximum error after `from_s` (m).
     fn wind(&mut self, until_s: f64, from_s: f64) -> f64 {
         let mut worst_m: f64 = 0.0;
         while self.time_s() < until_s {
@@ -121,8 +121,8 @@ impl Drive {
     }
 }
 
-/// Ninety seconds of winding about the hall: the worst error from the sixtieth on, and whether it
-/// was found anew.
+/// Ninety seconds of a winding path in the hall: returns the maximum error after sixty seconds, and
+/// whether a search relocated the vehicle.
 fn drive(told: Pose) -> (f64, bool) {
     let mut drive = Drive::new(told);
     let worst_m = drive.wind(90.0, 60.0);
@@ -156,7 +156,7 @@ fn a_wrong_start_is_noticed_and_left() {
 #[test]
 fn who_has_begun_anew_is_searched_for_no_more() {
     let mut drive = Drive::new(Pose::default());
-    // On the spot a search believes nothing that it finds.
+    // At standstill, no result of a search is accepted.
     let mut lost_s = |seconds: f64| {
         let until_s = drive.time_s() + seconds;
         let mut lost_s = 0.0;

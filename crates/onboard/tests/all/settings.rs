@@ -1,4 +1,4 @@
-//! Sites and vehicles as files: what they may be like, what is laid over what, and what is refused.
+//! Sites and vehicles as files: `like`, overrides, and rejected values.
 
 use onboard::receive::ReceiverConfig;
 use onboard::settings::{
@@ -6,7 +6,7 @@ use onboard::settings::{
     Site, TomlFile, UncertaintySettings, Vehicle, WakeUpSettings, check_together,
 };
 
-/// Files in memory, beside the shipped ones.
+/// Files in memory, in addition to the shipped ones.
 struct Shelf(&'static [(&'static str, &'static str)]);
 
 impl Library for Shelf {
@@ -64,7 +64,7 @@ fn a_file_is_like_another_but_for_its_own_keys() {
     again.name.clone_from(&carrier.name);
     again.odometer.scale = 1.0;
     assert_eq!(again, carrier);
-    // What is written out stands by itself.
+    // The written file does not depend on others.
     assert!(!mine.to_toml().contains("like ="));
     assert_eq!(vehicle(&mine.to_toml()).unwrap(), mine);
     // A list is replaced as a whole.
@@ -109,7 +109,7 @@ fn another_kind_takes_none_of_the_old_ones_keys() {
         panic!("{:?}", fixed.wake_up)
     };
     assert_eq!(settings.interval_ms, Some(40.0));
-    // The same kind keeps them.
+    // The keys remain with the same kind.
     let tight = vehicle("like = 'tugger'\nwake_up = { policy = 'uncertainty', bound_m = 0.1 }");
     let Some(WakeUpSettings::Uncertainty(settings)) = tight.unwrap().wake_up else {
         panic!("the policy is uncertainty")
@@ -206,7 +206,8 @@ fn a_site_need_not_have_a_road() {
         "{message}"
     );
 
-    // There a vehicle must know where it starts, or hear enough to be found.
+    // Without a road, a vehicle needs a known start, or a sufficient number of radio heads for a
+    // search.
     let mut carrier = Vehicle::from_library("carrier", &Shipped).unwrap();
     let check = Check { file: "both" };
     check_together(&hall, &carrier, check).unwrap();

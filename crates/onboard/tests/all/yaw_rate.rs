@@ -1,4 +1,4 @@
-//! What a good gyroscope tells: in bends, and where its samples are lost.
+//! Use of a good gyroscope: in bends, and with lost samples.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

@@ -165,7 +165,7 @@ pub fn add_noise(antennas: &mut [Vec<Complex32>], snr_db: f64, rng: &mut ChaCha8
     }
 }
 
-/// The same noise and nothing else.
+/// Replaces the samples by noise such that a resource element of unit gain has this SNR.
 pub fn fill_with_noise(antennas: &mut [Vec<Complex32>], snr_db: f64, rng: &mut ChaCha8Rng) {
     for samples in antennas.iter_mut() {
         samples.fill(Complex32::ZERO);

@@ -1,4 +1,4 @@
-//! Reads the reference vectors, which lie beside the project.
+//! Reader of the reference vectors, which are in a directory next to the project.
 
 use std::fs::File;
 use std::io::Read;
@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use npyz::{Deserialize, NpyFile};
 use nr_ssb::{BchPayload, Lmax, Mib, Pci};
 
-/// The directory of reference data: `ACCESS_AV_DATA`, or `../shared/data` beside the project.
+/// Returns the directory of reference data: `ACCESS_AV_DATA`, or `../shared/data`.
 pub fn data_dir() -> PathBuf {
     std::env::var_os("ACCESS_AV_DATA").map_or_else(
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),

@@ -6,13 +6,13 @@ use nr_ssb::search::{SearchConfig, Searcher};
 
 use crate::air;
 
-/// What a number of searches, each of 20 ms, came to.
+/// Results of a number of searches of 20 ms each.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Tally {
     pub searches: u64,
     /// Searches that reported a cell, decoded or not.
     pub false_cells: u64,
-    /// Of these, with a MIB whose checksum held.
+    /// Number of these with a MIB and a correct CRC.
     pub false_mibs: u64,
     pub pss_candidates: u64,
     pub pbch_tried: u64,
@@ -48,8 +48,8 @@ pub fn search_noise(antennas: usize, seeds: impl Iterator<Item = u64>) -> Tally 
     tally
 }
 
-/// The probability that `events` in `trials` refute with 95 %: the upper limit of Clopper and
-/// Pearson, at which so few events have the probability 0.05.
+/// Returns the probability that `events` in `trials` refute with 95 % confidence: the upper limit
+/// of Clopper and Pearson.
 pub fn upper_limit(events: u64, trials: u64) -> f64 {
     let so_few = |p: f64| {
         let mut term = trials as f64 * (-p).ln_1p();
