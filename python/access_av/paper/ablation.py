@@ -40,7 +40,7 @@ class Ablation:
     rms_error_m, constant_rms_m
         RMS errors of both.
     gain_m
-        By how much the controller's RMS error is less.
+        RMS error with the constant minus that with the controller.
     gain_low_m, gain_high_m
         Its paired 95 % interval: both drive the same runs, which are resampled together.
     matters

@@ -33,11 +33,11 @@ class Effect:
     Attributes
     ----------
     value
-        What was chosen instead; what is shipped where ``is_shipped``.
+        Alternative value; the shipped value if ``is_shipped``.
     worst_error_m, rms_error_m, executions
-        Of adaptive MUSIC.
+        Result of adaptive MUSIC.
     fixed_rms_m, every_ssb_rms_m
-        Of MUSIC at its base wake-up time and at every SSB.
+        Results of MUSIC at its base wake-up time and at every SSB.
     rms_std_m
         Standard deviation of ``rms_error_m`` by the runs.
     """
@@ -55,7 +55,7 @@ class Effect:
 
 
 def entries() -> list[dict[str, Any]]:
-    """What was chosen, each with ``what``, ``value``, ``why`` and ``alternatives``.
+    """Returns the assumptions, each with ``what``, ``value``, ``why`` and ``alternatives``.
 
     Examples
     --------

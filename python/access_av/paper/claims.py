@@ -110,7 +110,7 @@ def evidence(
     chosen: Collection[str],
     freedoms: Collection[str] = energy_fit.SHIPPED,
 ) -> str:
-    """What it is worth that a claim is met, where ``chosen`` was chosen with the claims in view.
+    """Returns the weight of evidence of a met claim; ``chosen`` was chosen with the claims known.
 
     ``freedoms`` are those of the energies per execution: what one of them solves for is met by
     construction.
@@ -141,13 +141,13 @@ def check_claims(
     Parameters
     ----------
     outcome
-        The campaigns of one reading; variants beside the first are resamples of its runs.
+        Campaigns of one interpretation; variants after the first are resamples of its runs.
     reading
         Its name.
     chosen
-        What of it was chosen with the claims in view.
+        Parameters of the interpretation that were chosen with the claims known.
     freedoms
-        What the energies per execution were fitted by.
+        Degrees of freedom of the fitted energies per estimate.
     stated
         Claims as ``paper.toml`` has them; its own when ``None``. One that cannot be judged says why
         in its note, and the others are judged.

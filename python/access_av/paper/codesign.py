@@ -1,4 +1,4 @@
-"""Our engine, tracker and policy beside the paper's adaptive point, with the receiver counted.
+"""Comparison of the proposed engine, tracker and policy with the paper's adaptive point.
 
 Two steps are kept apart. In the *paper's accounting* an execution of ours costs what the paper's
 does, so that only tracker and policy differ. With *our engine* it costs its cycles at the mode's
@@ -37,9 +37,9 @@ class Point:
     Attributes
     ----------
     energy_j
-        Of a trip, by extent of the parameters: low, value, high.
+        Energy of a trip, by extent of the parameters: low, value, high.
     boundary
-        What that counts.
+        Components that the energy includes.
     """
 
     executions: float
@@ -58,7 +58,7 @@ class Compared:
     paper, policy, engine
         The paper's adaptive point; our tracker and policy in its accounting; and on our engine.
     error_less_m
-        By how much our RMS error is less, run by run: mean, and its 95 % interval.
+        RMS error of the paper minus that of the proposed method: mean and 95 % interval.
     """
 
     mode: int
@@ -74,7 +74,7 @@ class Compared:
 
     @property
     def engine_ratio(self) -> float:
-        """The same on our engine."""
+        """Returns the energy saved on the proposed engine."""
         return _worst_ratio(self.engine, self.paper)
 
     @property

@@ -19,7 +19,7 @@ What is solved for is no evidence, so the fit is free in as little as it can be,
 :data:`FREEDOMS` names what it may be free in. One is not in :data:`SHIPPED`: another ratio in modes
 1 to 5, by one common factor, solved for so that the average saving over all modes and methods is
 the paper's 43.09 %. Nothing speaks for such a factor but the figure that it makes come true.
-:mod:`access_av.paper.freedoms` tells what each freedom buys.
+:mod:`access_av.paper.freedoms` lists the claims met with each degree of freedom.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Freedom:
     Attributes
     ----------
     says
-        What it is.
+        Description.
     free, solved
         Numbers that it adds, and how many of them are solved for from stated figures.
     """
@@ -124,7 +124,7 @@ def fit_energy(
     modes
         Executions and base wake-up times by mode number; must hold modes 0 and 7.
     freedoms
-        What it is free in, of :data:`FREEDOMS`.
+        Degrees of freedom of the fit, of :data:`FREEDOMS`.
 
     Returns
     -------

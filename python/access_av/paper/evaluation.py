@@ -104,11 +104,11 @@ class Evaluation(Result):
     snr
         SNR along the track; columns ``snr``.
     outcome
-        What the claims are judged by.
+        Numbers for the verdicts on the claims.
     refitted
-        Whether the energies per execution were fitted to the paper anew, or are the platform's.
+        Whether the energies per estimate were fitted to the paper, or are the platform's.
     freedoms
-        What they were fitted by, of :data:`access_av.paper.energy_fit.FREEDOMS`.
+        Degrees of freedom of the fit, of :data:`access_av.paper.energy_fit.FREEDOMS`.
     duration_s, origin
         Computing time; version and commit. Not compared.
     """
@@ -271,7 +271,7 @@ def outcome_of(
     fit_each: bool = False,
     settings: Mapping[str, float] | None = None,
 ) -> tuple[Outcome, bool]:
-    """What the claims are judged by, and whether its energies were fitted anew.
+    """Returns the numbers for the verdicts, and whether the energies were fitted.
 
     A platform whose energies were fitted to the paper gets those that fit the reading's own
     executions, those of the first variant unless ``fit_each``; one that was measured keeps its

@@ -35,9 +35,9 @@ class Finding:
     value
         The obtained value: an array over variants, or several by name.
     note
-        What else there is to say.
+        Remark.
     conflict
-        What there is to say when the claim is not met.
+        Remark if the claim is not met.
     spread
         How far single trips depart from the mean.
     """

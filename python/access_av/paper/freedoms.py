@@ -1,7 +1,7 @@
 """Claims that are met with each degree of freedom of the energy fit.
 
-The drives are the same; only the energies per execution are fitted anew. What a freedom solves for
-is met by construction, so the fewer it takes, the more a claim of energy says.
+All use equal runs; only the energies per estimate are fitted again. A claim that a degree of
+freedom solves for is met by construction, so that fewer degrees of freedom give more evidence.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Bought:
         Number of claims under the shown reading that are reproduced, and of those that agree by
         construction or by arithmetic, which are not counted as reproduced.
     average_saving_percent
-        What e4 is about, under the shown reading.
+        Result of claim e4 under the shown interpretation.
     energy, both
         Readings that keep the energy half, and of those the ones that keep both.
     """

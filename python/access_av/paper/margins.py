@@ -1,4 +1,4 @@
-"""By how much a claim is met: the rules of ``paper.toml``.
+"""Margins of the claims: the rules of ``paper.toml``.
 
 A margin is relative to what is stated, unless that is 0; it is positive where the claim is met, and
 continuous, so that it has an interval and a sensitivity. Obtained values may be arrays over

@@ -32,11 +32,11 @@ class Dimension:
     Attributes
     ----------
     label
-        What a reader is told.
+        Display name.
     low, high
         Range; logarithmic where ``is_log``.
     choices
-        What there is to choose from, where it is not a number.
+        Possible values, if it is not a number.
     """
 
     name: str
@@ -74,7 +74,7 @@ WORLD = (
     Dimension("heading", "heading between estimates", choices=("held", "mean")),
     Dimension("snapshots", "snapshots", 10.0, 40.0),
 )
-# What is drawn beside them where it is asked on what the claims hang: also a real head's power.
+# Additional parameters of the sensitivity analysis: also the power of a real radio head.
 OPEN_WORLD = (
     Dimension("eirp_dbm", "radiated power / dBm", -23.3, 10.0),
     *WORLD[1:],
@@ -104,7 +104,7 @@ GATE = Dimension("gate", "gate", choices=("none", "within t_max", "without bound
 
 
 def world_changes(point: Mapping[str, Any]) -> dict[str, Any]:
-    """What a point of :data:`WORLD` or :data:`OPEN_WORLD` changes, by dotted paths."""
+    """Returns the overrides of a point of :data:`WORLD` or :data:`OPEN_WORLD`."""
     changes = {
         "site.radio_heads[0].eirp_dbm": point["eirp_dbm"],
         "site.rician_k_db": point["rician_k_db"],
@@ -125,9 +125,9 @@ def world_changes(point: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def controller_changes(point: Mapping[str, Any], world: Mapping[str, Any]) -> dict[str, Any]:
-    """What a point of :data:`CONTROLLER`, and a gate, change in a world.
+    """Returns the overrides of a point of :data:`CONTROLLER` and of a gate.
 
-    What the vehicle believes of its link budget departs from the truth, not the other way round.
+    The nominal link budget of the vehicle differs from the true one, which is unchanged.
     """
     eirp_dbm = world["eirp_dbm"]
     if point["set_point"] == "expected":

@@ -1,6 +1,6 @@
-"""What the claims are judged by: the paper's three campaigns as numbers.
+"""Numbers for the verdicts on the claims: the results of the paper's three campaigns.
 
-Every number is an array over *variants* of the same campaigns: the sample as it is, resamples of
+Every number is an array over *variants* of the same campaigns: the original sample, resamples of
 its runs (which make intervals), or readings that a search lays side by side. Claims do not care.
 """
 
@@ -35,7 +35,7 @@ class Drives:
     longest_gap_s
         Longest time between two estimates of any run.
     besides_j
-        Energy besides that of the executions, where the platform counts it.
+        Energy other than that of the estimates, if the platform includes it.
     worst_of_runs_m
         Maximum error of each run in x or y over every SSB; ``None`` if runs are unknown.
     track_m
@@ -89,7 +89,7 @@ class Drives:
         Parameters
         ----------
         executions
-            Of each run.
+            Values of each run.
         errors_m
             Estimate minus truth in x and y at every SSB, of shape (runs, SSBs, 2).
         weights
@@ -131,15 +131,15 @@ class Outcome:
     adaptive
         Campaign R by power mode.
     energy_per_execution_j
-        By power mode and method; what the platform has no figure for is absent.
+        Energy by power mode and method; values that the platform lacks are absent.
     trip_s
         Duration of a trip.
     cpu_mhz
         Clock by power mode.
     base_wake_up_ms
-        By power mode and method.
+        Wake-up time by power mode and method.
     settings
-        What else the reading and the evaluation are set to that the paper states, by name.
+        Other settings that the paper specifies, by name.
     duty
         Share of the day that is driven.
     """
@@ -157,7 +157,7 @@ class Outcome:
 
 
 def resamples(runs: int, count: int, seed: int = 0) -> Numbers:
-    """Weights of a bootstrap over whole runs; the first row is the sample as it is.
+    """Returns weights of a bootstrap over whole runs; the first row is the original sample.
 
     Examples
     --------

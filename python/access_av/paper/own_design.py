@@ -39,18 +39,18 @@ HEADROOM_DB = 9.0
 
 @dataclass(frozen=True)
 class Comparison:
-    """Ours beside the paper's adaptive point in a power mode, on the same runs.
+    """Comparison of the proposed method with the paper's adaptive point in a power mode.
 
     Attributes
     ----------
     map
         Whether the tracker knows the road's course.
     energy_j, papers_energy_j
-        Of a trip; ``None`` where the platform has no figure.
+        Energy of a trip; ``None`` if the platform has no value.
     error_less_m, error_less_low_m, error_less_high_m
-        By how much our RMS error is less, with its paired 95 % interval.
+        RMS error of the paper minus that of the proposed method, with its paired 95 % interval.
     executions_less, executions_less_low, executions_less_high
-        The same of the executions, and so of the energy.
+        Difference of the numbers of estimates, with its paired 95 % interval.
     ours
         Drives of our tracker.
     """
@@ -174,14 +174,14 @@ ONCE_MS = 3.6e6
 
 @dataclass(frozen=True)
 class Fair:
-    """One way to localize in mode 0, with what it is told.
+    """Method in mode 0 with its information.
 
     Attributes
     ----------
     real_odometer
         Whether odometer and start have errors, as :data:`REAL` has them.
     knows_road
-        Whether it is told the road's course.
+        Whether the method has a map of the road.
     who
         ``paper``, ``ours``, ``one angle``, or ``bound``: what no localizer can do better than, with
         an angle at every SSB.
@@ -222,7 +222,7 @@ class Fair:
 
 
 def fair(driver: Driver, evaluation: Evaluation) -> list[Fair]:
-    """The paper's reading and ours in mode 0, told the same.
+    """Compares the paper's method and the proposed one in mode 0 with equal information.
 
     Told the road, the paper's method needs its angles for nothing, since it takes no more than the
     heading from them; what it does then is what the tracker does with one angle. The bound stands

@@ -32,7 +32,7 @@ class Reading:
     Attributes
     ----------
     chosen
-        What of it was chosen with the paper's claims in view: of :data:`OPEN`.
+        Parameters of :data:`OPEN` that were chosen with the paper's claims known.
     keeps_t_max
         Whether it claims to keep t_max.
     """

@@ -49,17 +49,17 @@ class Sample:
     Attributes
     ----------
     dimensions
-        What was drawn.
+        Sampled values.
     coordinates
         One row per reading, from 0 to 1.
     world
         Which world each reading is in.
     margins
-        Of each claim, in the readings' order.
+        Margins of each claim, in the order of the interpretations.
     longest_gap_s
         Longest time between two estimates in any mode.
     executions
-        Of adaptive MUSIC in the platform's first mode.
+        Number of estimates of adaptive MUSIC in the platform's first mode.
     worst_error_m
         Worst error of adaptive MUSIC in any mode.
     """
@@ -283,7 +283,7 @@ class Confirmed:
     Attributes
     ----------
     label
-        Its place in the search, or what was moved to be beside the best one.
+        Rank in the search, or the parameter that differs from the best one.
     held
         How many claims it meets.
     missed

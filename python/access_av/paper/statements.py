@@ -1,4 +1,4 @@
-"""What the paper states, as data: ``paper.toml``."""
+"""Statements of the paper as data: ``paper.toml``."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def stated_claims() -> dict[str, Any]:
 
 
 def of_claim(claim_id: str, key: str = "stated") -> Any:
-    """What the paper states in a claim, or another field of the claim's entry.
+    """Returns the value of a claim, or another field of the claim's entry.
 
     Examples
     --------

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from access_av.run.campaign import Campaign
 
 FIT_SOURCE = "access-av fit: agrees with the sums and statements of the paper"
-# Of `evaluate --unknowns`: worlds, controllers in each, drives per setting.
+# Sizes of `evaluate --unknowns`: environments, controllers in each, runs per setting.
 UNKNOWNS = (512, 2, 8)
 
 
@@ -43,13 +43,13 @@ class Study:
     evaluations
         One per reading, in their order.
     claims
-        Of all readings.
+        Verdicts of all interpretations.
     ablations
         Each reading with a constant in the controller's place, by power mode.
     front
         MUSIC at fixed intervals, in ms.
     ours
-        Our localizer and wake-up beside the shipped reading, by power mode.
+        Proposed method compared with the shipped interpretation, by power mode.
     unknowns
         On what the claims hang, where asked for.
     unusable
@@ -57,9 +57,9 @@ class Study:
     bought
         Claims met with each degree of freedom of the energy fit.
     fair
-        The shipped reading and ours told the same, in mode 0.
+        Both methods with equal information, in mode 0.
     effects
-        What each thing that was chosen does when it is chosen otherwise.
+        Effects of alternative assumptions.
     """
 
     evaluations: list[Evaluation]

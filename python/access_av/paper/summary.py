@@ -78,7 +78,7 @@ def controller(ablations: Sequence[Ablation]) -> tuple[int, int, int]:
 
 
 def controller_text(counts: tuple[int, int, int]) -> str:
-    """The same in words.
+    """Returns the counts in words.
 
     Examples
     --------

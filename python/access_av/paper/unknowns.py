@@ -41,7 +41,7 @@ class Index:
     Attributes
     ----------
     first, total
-        By itself, and together with others.
+        First-order and total index.
     first_low, first_high, total_low, total_high
         Ends of their 95 % intervals.
     """
@@ -84,7 +84,7 @@ class Unknowns:
     def matter(self) -> list[Index]:
         """Total indices of :data:`MATTERS` or more, of claims that something can speak for.
 
-        Those by construction and by arithmetic hold whatever is drawn, or are solved for.
+        Claims by construction and by arithmetic are excluded.
         """
         stated = stated_claims()
         return [
@@ -149,8 +149,8 @@ def expansion(coordinates: Numbers, levels: list[int]) -> tuple[list[tuple[int, 
     coordinates
         Points from 0 to 1, one row each.
     levels
-        How many choices each dimension has; 0 for a number. A choice is told by its number, with as
-        many polynomials less one, which is all that can be said of it.
+        Number of choices of each dimension; 0 for a number. A choice is represented by its
+        index, with one polynomial less than choices.
     """
     points, dimensions = coordinates.shape
     single: list[list[Numbers]] = []
@@ -205,7 +205,7 @@ class Fit:
 
     @classmethod
     def of(cls, terms: list[tuple[int, ...]], basis: Numbers, margin: Numbers) -> Fit:
-        """Those that stand out of the noise.
+        """Returns the polynomials with significant coefficients.
 
         The strongest is taken first and the others are looked for in what it leaves (orthogonal
         matching pursuit), until none stands out: in a basis that is orthogonal up to the draw, a

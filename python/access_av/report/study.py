@@ -42,7 +42,7 @@ def render_study(study: Study, beside: str = "") -> str:
     Parameters
     ----------
     study
-        What :func:`access_av.study_plant` returned.
+        Result of :func:`access_av.study_plant`.
     beside
         A section on other variants, as HTML.
     """

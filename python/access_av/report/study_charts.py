@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 TALLEST_MAP_PX = 640.0
 MARGIN_M = 25.0
-# Of the target, and the colours of the road within each: cold where it is kept, warm where not.
+# Fractions of the target, with the colour of the road: cold if met, warm if not.
 SHARES = (0.5, 1.0, 1.5)
 COLOURS = ("#2f7ed8", "#56b4e9", "#e69f00", "#d55e00")
 STRETCHES = 300

@@ -36,13 +36,13 @@ class Errors:
     Attributes
     ----------
     name
-        What it is called in tables.
+        Name in tables.
     errors_m
         Shape (rows, epochs); infinite as long as the place is searched for.
     duration_s
-        Of a row.
+        Duration of a row.
     rows
-        What a row is, in the plural.
+        Name of the rows, in the plural.
     """
 
     name: str

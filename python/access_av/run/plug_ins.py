@@ -81,7 +81,7 @@ def factory(plug_in: Any, role: str) -> Factory | None:
     Parameters
     ----------
     plug_in
-        What the user gave; ``None`` for none.
+        Plug-in of the user; ``None`` for none.
     role
         ``estimator``, ``policy`` or ``localizer``.
 

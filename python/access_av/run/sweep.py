@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # Keys of a sweep whose values are plug-ins instead of settings.
 PLUG_INS = ("estimator", "policy", "localizer")
-# Errors are kept every so many SSBs: at 20 ms, a vehicle moves 0.8 m meanwhile.
+# Number of SSBs between stored errors: at 20 ms, a vehicle moves 0.8 m in this time.
 ERRORS_EVERY = 10
 MAX_COMBINATIONS = 1000
 
@@ -41,7 +41,7 @@ class Sweep(Result):
     results
         The simulation of each combination.
     scenario, seed, runs
-        What was swept, the seed of all combinations, and the number of runs of each.
+        Swept keys, seed of all combinations, and number of runs of each.
     percent
         Percentile of ``delta_m`` and of :meth:`plot`.
     origin

@@ -328,7 +328,7 @@ def text(drawn: Drawn, origin: Origin | None) -> str:
     Parameters
     ----------
     drawn
-        What is written; its road as points.
+        Site; its road is written as points.
     origin
         Latitude and longitude of the map's zero; metres, so named, where ``None``.
 

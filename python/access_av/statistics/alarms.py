@@ -11,7 +11,7 @@ from access_av.statistics.consistency import horizontal_error_m
 
 @dataclass(frozen=True)
 class Alarms:
-    """What became of alarms, an alarm being a step at which the state leaves ``ok``.
+    """Statistics of alarms; an alarm is a step at which the state leaves ``ok``.
 
     Attributes
     ----------

@@ -22,7 +22,7 @@ def clopper_pearson(
     successes
         How often it happened.
     trials
-        Of how many independent trials.
+        Number of independent trials.
     probability
         Coverage, above 0 and below 1.
 
@@ -59,7 +59,7 @@ def wilson(successes: int, trials: int, *, probability: float = 0.95) -> tuple[f
     successes
         How often it happened.
     trials
-        Of how many independent trials.
+        Number of independent trials.
     probability
         Coverage, above 0 and below 1.
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from access_av.study.trips import Driven
 
-# Angles of all drives of the plant as it is, without a given number of runs. A vehicle that wakes
+# Angles of all drives of the nominal plant, without a given number of runs. A vehicle that wakes
 # up by its own error estimates the angles of about a quarter of the SSBs.
 BUDGET_ANGLES = 105_000.0
 WOKEN_SHARE = 0.25

@@ -166,7 +166,7 @@ def compare(
     Parameters
     ----------
     scenarios
-        By their labels.
+        Variants by label.
     percents
         Which percentiles of the error.
     """

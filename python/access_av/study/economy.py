@@ -37,9 +37,9 @@ class Prices:
     Attributes
     ----------
     currency
-        What money is counted in.
+        Currency.
     ranges, sources
-        By the keys of ``[prices]`` and of ``economics/prices.toml``; money in ``currency``.
+        Values by the keys of ``[prices]`` and ``economics/prices.toml``; money in ``currency``.
     published
         Keys whose figures are published ones, because the plant does not state them.
     """
@@ -75,7 +75,7 @@ class Day:
     Attributes
     ----------
     trips_wh
-        What localizing adds: trips, of all vehicles.
+        Additional energy of localization, for the trips of all vehicles.
     idle_wh
         What the computers draw anyway while the vehicles are switched on; ``None`` without a
         figure.

@@ -89,7 +89,7 @@ class Measures:
     Attributes
     ----------
     before
-        The same drives without any measure.
+        Paired drives without any measure.
     single
         Measures of one remedy, the most effective one first.
     sets
@@ -133,7 +133,7 @@ def measures(
     before
         Drives without any measure; measures get as many.
     targets, prices
-        Those of the plant.
+        Targets and prices of the plant.
     seed
         Seed of ``before``.
     simulate

@@ -152,7 +152,7 @@ def operate(
     plant, targets
         The plant and its targets.
     believed
-        Drives of the plant as it is.
+        Drives of the nominal plant.
     runs
         Runs of each operation, power mode and block.
     seed

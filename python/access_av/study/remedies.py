@@ -29,7 +29,7 @@ class Remedy:
     Attributes
     ----------
     name
-        What it is called in tables.
+        Name in tables.
     what
         In words, with its numbers.
     settings

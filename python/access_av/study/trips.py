@@ -57,7 +57,7 @@ class Driven(Errors):
     Attributes
     ----------
     scenario
-        What was driven.
+        Simulated scenario.
     levels_m
         Protection levels, shape (runs, epochs); NaN where the position may not be relied on.
     time_s
