@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import json
 import os
-import socket
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 from amqtt.client import MQTTClient
+from attack.node.node import free_port
 
 import access_av
 from conftest import ROOT
@@ -32,12 +32,6 @@ def wake_up_every(drive: Path, interval_s: float) -> None:
     fixed = {"wake_up.policy": "fixed", "wake_up.interval_ms": 1e3 * interval_s}
     vehicle = access_av.Vehicle.load(str(file)).with_overrides(fixed)
     file.write_text(vehicle.to_toml(), encoding="utf-8")
-
-
-def free_port(kind: int = socket.SOCK_STREAM) -> int:
-    with socket.socket(type=kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Broker:

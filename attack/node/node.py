@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import shutil
 import signal
@@ -19,13 +20,28 @@ PROGRAM = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-n
 END_S = 5.0
 # Capacity of the small disk in MiB.
 DISK_MIB = 4
+# Ports of the campaign: the first one, their number in each process, and the number of processes.
+FIRST_PORT = 20_000
+PORTS_EACH = 12
+PROCESSES = 1000
+_chosen = itertools.count()
 
 
-def free_port() -> int:
-    """A free TCP port."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+def free_port(kind: int = socket.SOCK_STREAM) -> int:
+    """A free TCP or UDP port that no other process of the campaign chooses.
+
+    A port that the system proposes is free only until somebody opens it: two nodes that start at
+    the same time can get the same one. Each process therefore has ports of its own, below the
+    ports of outgoing connections.
+    """
+    first = FIRST_PORT + PORTS_EACH * (os.getpid() % PROCESSES)
+    for _ in range(PORTS_EACH):
+        port = first + next(_chosen) % PORTS_EACH
+        with socket.socket(type=kind) as probe, contextlib.suppress(OSError):
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(("127.0.0.1", port))
+            return port
+    sys.exit(f"error: ports {first} to {first + PORTS_EACH - 1} are in use")
 
 
 def has_small_disk() -> bool:

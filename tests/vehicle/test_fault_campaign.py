@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 SEED = 1
 # Nodes at once: a run waits most of the time.
 AT_ONCE = 12
+# Further runs of a fault that violated a bound; none may violate it again.
+REPEATED = 2
 # Faults that exceed a bound: docs/node.md lists them with their figures.
 SHORTFALLS = {
     "odometry frozen at its speed, vehicle stops",
@@ -40,7 +42,14 @@ def test_every_fault_is_reported_and_recovered_from_within_its_bounds(tmp_path: 
         and not it.uses_samples
         and (small_disk or "disk" not in it.outputs)
     ]
-    verdicts = campaign.run_all(chosen, SEED, 1, AT_ONCE, tmp_path)
+    verdicts = campaign.run_all(chosen, SEED, 1, AT_ONCE, tmp_path / "first")
+    # The computer may pause the node and not the test: a violation counts if it occurs again
+    # when fewer nodes run.
+    violated = {it.fault for it in verdicts if it.violations and not it.was_busy}
+    if violated:
+        again = [it for it in chosen if it.name in violated]
+        verdicts = [it for it in verdicts if it.fault not in violated]
+        verdicts += campaign.run_all(again, SEED, REPEATED, AT_ONCE // 4, tmp_path / "again")
     too_busy = [it.fault for it in verdicts if it.was_busy]
     wrong = {it.fault: it.violations for it in verdicts if it.violations and not it.was_busy}
     assert not wrong

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import jsonschema
 import numpy as np
 import pytest
+from attack.node.node import free_port
 from mcap.reader import make_reader
 from prometheus_client.parser import text_string_to_metric_families
 from rosbags.highlevel import AnyReader
@@ -29,7 +30,7 @@ import layout
 from access_av.drives.recorded import log_angles
 from browser import Browser
 from conftest import ROOT
-from node import NODE, SCHEMAS, Broker, command, free_port, wake_up_every
+from node import NODE, SCHEMAS, Broker, command, wake_up_every
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

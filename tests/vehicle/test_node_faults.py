@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import jsonschema
 import pytest
+from attack.node.node import free_port
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 import access_av
-from node import NODE, SCHEMAS, Broker, free_port
+from node import NODE, SCHEMAS, Broker
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from attack.node.node import free_port
 
 import access_av
 from access_av.drives.recorded import log_angles
@@ -55,9 +56,7 @@ class Run:
 
     def __init__(self, drive: Path, folder: Path) -> None:
         self.drive, self.folder = drive, folder
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = int(probe.getsockname()[1])
+        self.port = free_port()
         self.settings = folder / "node.toml"
         self.settings.write_text(
             f'name = "faults"\nmessages = ["tcp-listen://127.0.0.1:{self.port}"]\n'
