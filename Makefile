@@ -1,18 +1,18 @@
-# ACCESS-AV: what a person types. `make help` lists it.
+# Commands of ACCESS-AV; `make help` lists them.
 PYTHON ?= python3
 SHELL := bash
 .SHELLFLAGS := -o pipefail -c
 BIN := .venv/bin
 SOURCES := $(shell find crates sites vehicles scenarios platforms plants -type f 2>/dev/null) Cargo.toml Cargo.lock pyproject.toml
 
-# Nothing is compiled twice by make: what incremental builds keep for that costs time, and what they build is slower.
+# Incremental builds take longer than full ones, and their programs are slower.
 export CARGO_INCREMENTAL ?= 0
 
-# Tests of a file stay in one process: they share what it has driven.
-# One more than there are cores: some only wait.
+# All tests of a file run in one process and share its simulated drives. One process more than cores, because some
+# tests only wait.
 PYTEST := $(BIN)/python -m pytest --numprocesses $(shell expr $$(nproc 2>/dev/null || echo 1) + 1) --dist loadscope
 
-# Reference vectors and recordings, beside the project.
+# Reference vectors and recordings, next to the project.
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
 
 .DEFAULT_GOAL := help
@@ -21,41 +21,41 @@ DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
 help: ## List these commands
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
-demo: .venv/installed ## Install into .venv, evaluate the paper under every reading, write results/latest/report.html
+demo: .venv/installed ## Install into .venv, evaluate the paper, write results/latest/report.html
 	$(BIN)/access-av evaluate
 
 NODE := target/debug/access-av-node
-live: .venv/installed-live $(NODE) ## Drive a simulated yard in real time into the node, and open its page (Ctrl-C ends it)
+live: .venv/installed-live $(NODE) ## Send a simulated drive to the node in real time, and open its page (Ctrl-C ends it)
 	$(BIN)/python examples/live/live.py --node $(NODE) $(LIVE)
 
 $(NODE): $(SOURCES)
 	cargo build --package access-av-node
 
-check: lint ## Check after a change: formats, lints, types, the fast tests of both languages
+check: lint ## Run formats, lints, types and the fast tests of both languages
 	cargo test --workspace --quiet --lib
 	$(PYTEST) -m "not slow"
 
-# Examples are compiled by clippy, and here by nobody: linking them takes longer than the doc tests run.
+# Clippy checks the examples; linking them takes longer than all doc tests.
 TESTED := --workspace --quiet --lib --bins --tests
 
-test: lint ## Run everything: formats, lints, types, every test of both languages
+test: lint ## Run formats, lints, types and all tests of both languages
 	@if [ -d "$(DATA)" ]; then ACCESS_AV_DATA="$(DATA)" cargo test $(TESTED) -- --include-ignored --skip table_of_; \
 	  else echo "not tested: reference vectors and recordings; no $(DATA) (ACCESS_AV_DATA)"; \
 	  cargo test $(TESTED); fi
 	cargo test --workspace --quiet --doc
 	$(PYTEST)
 
-attack: .venv/installed-test $(NODE) ## Attack it with random input, drives and plug-ins (SEED=… repeats), then inject faults into the running node
+attack: .venv/installed-test $(NODE) ## Run random inputs, drives and plug-ins, and inject faults into the running node (SEED=… repeats; hours)
 	$(BIN)/python -m attack $(if $(SEED),--seed $(SEED)) $(ATTACK)
 	$(BIN)/python -m attack node $(if $(SEED),--seed $(SEED)) --out results/fault-campaign.json
 
-test-radio: .venv/installed-test ## Build the node with SoapySDR (Debian: libsoapysdr-dev) and test it with a radio that plays a drive
+test-radio: .venv/installed-test ## Build the node with SoapySDR (Debian: libsoapysdr-dev) and test it with a simulated radio
 	cargo build --package access-av-node --features soapy
 	$(BIN)/python -m pytest tests/vehicle/test_radio.py
 
 AARCH64 := aarch64-unknown-linux-gnu
-# What the compiler of another processor needs (Debian: gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user, and a rustup
-# with that target; or rustc-web cargo-web libstd-rust-web-dev:arm64 libc6:arm64).
+# Requirements of the cross compiler (Debian): gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user, and rustup with
+# this target; or rustc-web cargo-web libstd-rust-web-dev:arm64 libc6:arm64.
 EMULATED := CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
 	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER=qemu-aarch64
 export QEMU_LD_PREFIX ?= $(or $(wildcard /usr/aarch64-linux-gnu),/)
@@ -65,7 +65,7 @@ else
 EMULATED += cargo
 endif
 
-test-aarch64: .venv/installed-test ## Build what runs on the vehicle for aarch64 and test it, emulated on another processor
+test-aarch64: .venv/installed-test ## Build the vehicle's programs for aarch64 and test them in an emulator
 	@command -v aarch64-linux-gnu-gcc >/dev/null && command -v qemu-aarch64 >/dev/null || { echo \
 	  "not tested: gcc-aarch64-linux-gnu, qemu-user, libc6-dev-arm64-cross, a Rust for $(AARCH64) needed"; exit 2; }
 	cargo build --quiet --package access-av-node
@@ -73,7 +73,7 @@ test-aarch64: .venv/installed-test ## Build what runs on the vehicle for aarch64
 	$(BIN)/python -m pytest tests/vehicle/test_aarch64.py
 	$(EMULATED) test --quiet --target $(AARCH64) -p aoa-array -p nr-ssb -p onboard
 
-count-aarch64: ## Count the instructions per estimate on aarch64, NEON against portable code
+count-aarch64: ## Count the instructions per estimate on aarch64: NEON and portable code
 	$(filter-out /usr/bin/cargo cargo,$(EMULATED)) $(PYTHON) benches/aarch64_instructions.py $(lastword $(EMULATED))
 
 DIST :=
@@ -82,7 +82,7 @@ dist: .venv/bin/python ## Build wheels, node binaries and Debian packages for x8
 	$(BIN)/python packaging/dist.py $(DIST)
 
 ALONE := aoa-array nr-ssb
-package: ## Pack the crates that others may use alone, and build and test each from its package
+package: ## Pack the crates for independent use, and test each from its package
 	cargo package --allow-dirty --no-verify $(ALONE:%=-p %)
 	folder=$$(mktemp -d) && trap 'rm -rf "$$folder"' EXIT && for crate in $(ALONE); do \
 	  tar -xf target/package/$$crate-[0-9]*.crate -C "$$folder" && \
@@ -102,29 +102,29 @@ docs: .venv/installed-docs ## Build the documentation site target/docs/site/inde
 	$(BIN)/python docs/site/build.py
 
 CHROMIUM ?= chromium
-figures: .venv/installed ## Evaluate the paper in full (some 10 minutes) and take the figures of README and docs/paper.md from it
+figures: .venv/installed ## Evaluate the paper with five seeds (10 minutes) and make the figures of README and docs/paper.md
 	$(BIN)/access-av evaluate --seeds 5 --unknowns --out results/paper
 	for name in ablation front sobol; do cp results/paper/$$name.svg docs/paper-$$name.svg; done
 	$(MAKE) --no-print-directory picture REPORT=results/paper/report.html
 
 REPORT := results/latest/report.html
-picture: ## Take the README's picture from the report of the last evaluation (needs chromium)
+picture: ## Make the README's picture from the last report (needs chromium)
 	$(CHROMIUM) --headless --no-sandbox --hide-scrollbars --virtual-time-budget=20000 \
 	  --window-size=1300,1150 --screenshot=docs/report.png file://$(abspath $(REPORT))
 
-bench: .venv/installed-bench ## Compare angle estimators and cell search with their peers; time the evaluation
+bench: .venv/installed-bench ## Compare angle estimators and cell search with other libraries; time the evaluation
 	$(BIN)/python benches/aoa_peers.py
 	$(BIN)/python benches/nr_peers.py
 	$(BIN)/python benches/evaluation.py
 
-clean: ## Remove what was built (results stay)
+clean: ## Remove all build products; results are kept
 	rm -rf .venv target python/access_av/*.so
 
 .venv/bin/python:
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
 
-# Says what is being built, and all of it where that fails.
+# Prints the progress of the build, and its whole log if it fails.
 define install
 	@$(BIN)/python -m pip install --verbose --editable $(1) --config-settings build-args='--profile $(2)' 2>&1 \
 	  | tee .venv/install.log \
@@ -133,7 +133,7 @@ define install
 	@touch $@
 endef
 
-# Built once for all but benchmarks, as Rust's own tests are: in half the time, and it checks for overflow.
+# The profile of the Rust tests: half the build time of a release, and integer overflow is checked.
 .venv/installed: .venv/bin/python $(SOURCES)
 	@echo "Building the Rust core: some minutes, once"
 	$(call install,.,dev)
@@ -151,7 +151,7 @@ endef
 .venv/installed-docs: .venv/installed
 	$(call install,'.[docs]',dev)
 
-# As wheels are.
+# The profile of the wheels.
 .venv/installed-bench: .venv/bin/python $(SOURCES)
 	@echo "Building the Rust core with every optimisation: some minutes, once"
 	$(call install,'.[bench]',release)

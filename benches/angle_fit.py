@@ -169,7 +169,7 @@ def channel_estimates(count: int) -> Iterator[Case]:
                     ("smoothed channel", aoa.maximum_likelihood(cell.channel)),
                     ("whitened channel", aoa.maximum_likelihood(looks)),
                     (
-                        "whitened, noise told",
+                        "whitened, noise known",
                         aoa.maximum_likelihood_pilots(looks, noise_variance=variance),
                     ),
                     ("the cell's angle", cell),

@@ -64,7 +64,7 @@ def main() -> None:
         agree += agrees
         if not agrees:
             better, worse = (one, other) if high < 0.0 else (other, one)
-            print(f"the study has it otherwise: “{better}” is surely better than “{worse}”")
+            print(f"the study disagrees: it states that “{better}” is better than “{worse}”")
     pairs = len(driven) * (len(driven) - 1) // 2
     print(f"{sure} of {pairs} pairs are sure; the study agrees in {agree} of them")
 

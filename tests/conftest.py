@@ -16,7 +16,7 @@ ROOT = Path(__file__).parent.parent
 for size in ("COLUMNS", "LINES"):
     os.environ.pop(size, None)
 
-# A worker a core: threads of linear algebra beside them spend ten times the work on waiting.
+# One worker per core: further threads of linear algebra take ten times the CPU time, by waiting.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 

@@ -21,7 +21,7 @@ MEASURE = """
     found.push(`page is ${document.documentElement.scrollWidth} px wide in ${innerWidth}`);
   for (const svg of document.querySelectorAll("svg.marks")) {
     const edge = svg.getBoundingClientRect();
-    // Labels that would overlap are there, and seen by nobody.
+    // Labels that would overlap exist, but are hidden.
     const texts = [...svg.querySelectorAll("text")].filter((it) => it.textContent.trim()
       && getComputedStyle(it).opacity !== "0");
     const boxes = texts.map((it) => [it, it.getBoundingClientRect()]);

@@ -115,7 +115,7 @@ def main() -> None:
     parser.add_argument("--node", default=str(ROOT / "target/release/access-av-node"))
     parser.add_argument("--duration-s", type=float, default=60.0)
     parser.add_argument("--every-ssb", action="store_true")
-    parser.add_argument("--interval-s", type=float, help="a burst every so many seconds")
+    parser.add_argument("--interval-s", type=float, help="time between two received bursts")
     parser.add_argument("--stream-off", action="store_true")
     parser.add_argument("--radio", action="store_true")
     parser.add_argument("--times", type=int)

@@ -47,7 +47,7 @@ antennas = [0, 1, 2, 3]
         until = time.monotonic() + OPENED_WITHIN_S
         while not (self.log.exists() and self.log.read_text(encoding="ascii").endswith("\n")):
             if time.monotonic() > until:
-                raise TimeoutError(f"nobody has opened {self.device}")
+                raise TimeoutError(f"no program has opened {self.device}")
             time.sleep(0.01)
         zero_s = float(self.log.read_text(encoding="ascii").splitlines()[0])
         wheels = self.wheels

@@ -1,4 +1,4 @@
-"""What is written and not meant is refused or warned of, with what to write."""
+"""Doubtful settings are rejected or cause a warning that names the correction."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ FAULT = {"from_s": 60_000.0, "until_s": 68_000.0, "what": {"kind": "stuck-antenn
 PATH_AWAY = {"start": {"x_m": 3e4, "y_m": 4e4}, "segments": [{"length_m": 300.0}]}
 SAME_INDEX = {"site.radio_heads[1].ssb_index": 0, "site.radio_heads[2].ssb_index": 0}
 
-# What is set, the key that is named, and what is said of what to write.
+# Setting, key in the message, and correction in the message.
 NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
     # As people have written it.
     "turn in degrees": (
@@ -149,7 +149,7 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
         {"site.radio_heads[1].name": "gate"}, "radio_heads[1].name", "gate-1"),
     "a start off the road": (
         {"vehicle.start.pose": {"x_m": 100.0, "y_m": 300.0}}, "start.pose", "frame of the road"),
-    "a start where nothing is heard": (
+    "a start where no SSB is received": (
         {"vehicle.drive": "differential", "vehicle.start.pose": {"x_m": 9e4, "y_m": 9e4}},
         "start.pose", "frame of the radio heads"),
     # Radio.
@@ -217,7 +217,7 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
 
 
 def said(overrides: dict[str, object]) -> list[str]:
-    """What is said of it, refused or warned of."""
+    """Returns the messages: rejections and warnings."""
     try:
         return [str(warning) for warning in scenario(**overrides).warnings()]
     except SettingsError as error:
@@ -235,7 +235,7 @@ def test_the_plant_itself_is_fine() -> None:
     assert scenario().warnings() == []
 
 
-# What a file has, and what is said of it.
+# Contents of a file, and its message.
 FILES = {
     "position_m = [3,5, 2,0, 8,0]": "write 3.5, not 3,5",
     'eirp_dbm = "3,5"': "write 3.5, not 3,5",
@@ -461,7 +461,7 @@ def test_every_command_says_it_before_all_else(
 
 
 def test_commands_load_settings_in_one_place() -> None:
-    """What a command runs on is read by `options`, which says what is doubtful of it."""
+    """`options` reads the inputs of every command and warns of doubtful settings."""
     for file in (ROOT / "python" / "access_av" / "commands").glob("*.py"):
         loads = re.findall(r"\b(?:Scenario|Site|Vehicle)\.load\(", file.read_text(encoding="utf-8"))
         assert not loads or file.name == "options.py", file.name

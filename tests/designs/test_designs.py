@@ -181,7 +181,7 @@ def test_a_full_disk_names_the_part_and_leaves_nothing(
 
 
 class Dying(Executor):
-    """Workers that are gone after so many tasks."""
+    """Workers that end after a number of tasks."""
 
     def __init__(self, after: int) -> None:
         self.left = after
@@ -360,7 +360,7 @@ PAIRS = [(1.0, 0.4), (2.0, 0.2), (2.1, 0.35), (4.0, 0.1), (4.1, 0.1), (8.0, 0.3)
 def test_front_and_its_confidence() -> None:
     driven = cloud(20, PAIRS)
     assert set(front(driven)) - {4} == {0, 1, 3}
-    # What common random numbers cannot tell apart may be of the front; what is beaten is not.
+    # Designs that common random numbers do not separate may be on the front.
     assert {0, 1, 3} <= set(may_be_front(driven)) <= {0, 1, 3, 4}
 
 
@@ -597,7 +597,7 @@ def test_command_on_any_scenario(tmp_path: Path, run: Callable[..., Finished]) -
     assert (some.code, none.code) == (0, 3)
     told = json.loads((tmp_path / "o/manifest.json").read_text())
     assert told["space"]["keys"]["vehicle.wake_up.interval_ms"] == [2000.0, 8000.0]
-    # What is to be typed in the directory asks for the same drives, and gives the same again.
+    # The printed command repeats the same drives and gives the same results.
     shutil.copytree(tmp_path / "results", tmp_path / "o/results")
     before = (tmp_path / "o/designs.parquet").read_bytes()
     again = run(tmp_path / "o", *shlex.split(told["repeat"])[1:], "--out", "again")

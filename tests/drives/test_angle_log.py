@@ -38,7 +38,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def log(drive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What the command writes."""
+    """Files that the command writes."""
     place = tmp_path_factory.mktemp("log")
     found = estimate_angles(
         drive / "site.toml", drive / "iq.sigmf-meta", vehicle=drive / "vehicle.toml"
@@ -73,7 +73,7 @@ def test_a_log_of_angles_locates_as_its_samples_do(
     by_csv = located(out / "angles.csv", out / "vehicle.toml")
     by_parquet = located(out / "angles.parquet", out / "vehicle.toml")
     assert by_csv.poses.equals(by_parquet.poses)
-    # The same angles: those of the log are all that were heard from the samples.
+    # The angles are equal: the log contains all angles that were estimated from the samples.
     heard = by_samples.angles.join(rows, on=["time_s", "pci", "ssb_index"])
     assert heard.height == by_samples.angles.height
     np.testing.assert_allclose(heard["phase_rad"], heard["phase_rad_right"], atol=1e-12)
@@ -85,7 +85,7 @@ def test_a_log_of_angles_locates_as_its_samples_do(
     deviation_m = (
         by_samples.poses["covariance_xx_m2"] + by_samples.poses["covariance_yy_m2"]
     ).sqrt()
-    # What is told differently, scatter as correlated, moves the pose by less than it is uncertain.
+    # Correlated scatter instead of white noise changes the pose by less than its uncertainty.
     assert (apart_m < deviation_m).all()
 
 

@@ -419,7 +419,7 @@ def test_a_drive_is_located_by_variants_side_by_side(access_av: Cli, tmp_path: P
     errors_m = errors_m.head(4 * (errors_m.len() // 4)).sort()  # in four stretches of one length
     assert first["percentile_m"] == errors_m[math.ceil(0.9 * errors_m.len()) - 1]
     assert first["delta_m"] is None
-    # An odometer told 3 % wrong is ten stated deviations off; the same file is the same drive.
+    # A scale error of 3 % is ten standard deviations of the odometer; the file is the same.
     assert worse["delta_m"] == pytest.approx(worse["percentile_m"] - first["percentile_m"])
     assert worse["delta_m"] > 0.0
     assert (same["delta_m"], same["delta_low_m"], same["delta_high_m"]) == (0.0, 0.0, 0.0)

@@ -37,7 +37,7 @@ def angles(**columns: pl.Expr) -> Callable[[Robot], None]:
 
 
 def as_angle(it: Robot, value: pl.Expr) -> None:
-    """The log tells the angle from the axis, in place of the electrical one."""
+    """The log contains the angle from the axis instead of the electrical angle."""
     it.angles = it.angles.select(
         "time_s", "pci", angle_rad=value, angle_sigma_rad="phase_sigma_rad"
     )

@@ -14,7 +14,7 @@ from hall_drive import World, simulate
 sys.path.insert(0, str(ROOT / "benches"))
 from off_the_road import Case, locate
 
-# Standard deviations of what a lap tells of the lateness (s): a road leaves turns alone to tell it.
+# Standard deviation of the time offset that one lap determines (s): with a road, only turns do.
 LATENESS_STD_S = {False: 0.02, True: 0.035}
 
 

@@ -167,7 +167,7 @@ def test_what_cannot_be_judged_is_named_and_the_others_are_judged() -> None:
         assert found[name].verdict == NOT_JUDGED
         assert found[name].obtained is None
         assert said in found[name].note
-    # Beside these two the settings, of which a synthetic evaluation has none.
+    # In addition to these two the settings, of which a synthetic evaluation has none.
     unjudged = {name for name, claim in found.items() if claim.verdict == NOT_JUDGED}
     assert {name for name in unjudged if not name.startswith("x")} == {
         "a1_adaptive_worst_m",

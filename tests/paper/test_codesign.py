@@ -1,4 +1,4 @@
-"""Platforms, their energy models, and ours beside the paper's adaptive point."""
+"""Platforms, energy models, and the proposed method against the paper's adaptive point."""
 
 from __future__ import annotations
 

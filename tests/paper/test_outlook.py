@@ -26,7 +26,7 @@ def test_calibration_by_known_looks_finds_the_array(imperfect: SimpleNamespace) 
     array = imperfect.imperfect_array(random)
     known = imperfect.looks(random, array, np.full(500, 20.0))
     found = imperfect.calibrate(*known)
-    # Up to one complex factor, which no angle hangs on.
+    # Up to one complex factor, which no angle depends on.
     factor = np.vdot(found, array) / np.vdot(found, found)
     assert np.linalg.norm(array - factor * found) < 0.01 * np.linalg.norm(array)
     phase_rad, channels = imperfect.looks(random, array, np.full(2000, 10.0))
@@ -39,7 +39,7 @@ def test_calibration_by_known_looks_finds_the_array(imperfect: SimpleNamespace) 
 
 
 def test_two_numbers_take_away_what_turns_and_runs_ahead(imperfect: SimpleNamespace) -> None:
-    """Of an array without coupling whose phase grows from antenna to antenna nothing is left."""
+    """An array without coupling and with a phase linear in the antenna has no residual."""
     random = np.random.default_rng(5)
     array = np.diag(np.exp(0.1j * np.arange(imperfect.ELEMENTS)))
     known = imperfect.looks(random, array, np.full(500, 20.0))

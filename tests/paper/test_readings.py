@@ -1,4 +1,4 @@
-"""The paper's readings: what each is, what it keeps, and what the controller is worth in it."""
+"""Interpretations of the paper: settings, invariants, and the effect of the controller."""
 
 from __future__ import annotations
 

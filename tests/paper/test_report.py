@@ -67,7 +67,7 @@ def test_is_small_enough_to_mail(page: str) -> None:
     [(0.0, "makes no difference"), (0.5, "helps"), (-0.5, "harms")],
 )
 def test_says_that_the_controller_matters_only_where_it_does(gain: float, said: str) -> None:
-    """A constant in the controller's place is told from a controller by what it obtains."""
+    """The report distinguishes a constant wake-up time from a controller by their results."""
     study = synthetic.study(controller_gain=gain)
     text = readings(study)
     assert text.count(f'<td data-label="Algorithm 1">{said}</td>') == 2
@@ -127,7 +127,7 @@ def test_the_map_is_drawn_to_scale_and_heads_in_their_order(
 
 
 def test_time_axes_start_with_the_data() -> None:
-    """A clock that counts from 1970 would press a drive into one line beside the origin."""
+    """With Unix times on its axis, a chart would show the drive as one line."""
     time_s = pl.Series("time_s", [1.7e9, 1.7e9 + 5.0, 1.7e9 + 10.0])
     compared = pl.DataFrame([time_s]).with_columns(deviations=1.0, verdict=pl.lit("accepted"))
     errors = {"error": pl.DataFrame([time_s]).with_columns(error_m=0.1)}

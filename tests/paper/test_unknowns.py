@@ -53,7 +53,7 @@ def drawn(
 
 
 def test_indices_of_a_function_that_is_known() -> None:
-    """3 a + 2 ab + choice on (−1, 1): variances 3, 4/9 and 1, beside noise of 0.25; d is idle."""
+    """3 a + 2 ab + choice on (−1, 1): variances 3, 4/9 and 1, noise 0.25; d has no effect."""
     dimensions = (
         *(Dimension(name, name) for name in "ab"),
         Dimension("c", "c", choices=("n", "y")),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from conftest import Finished
 
-# Of which everything but the odometer is exact.
+# Everything is exact except the odometer.
 YARD = Scenario.load("yard").with_overrides(
     {
         "vehicle.array": {},
@@ -96,7 +96,7 @@ def test_the_next_level_is_reached_by_what_is_said_to_reach_it() -> None:
     assert math.isclose(levels["6"].share, found.cheapest.share, rel_tol=1e-12)
     shares = {change.what: change.share for change in found.changes}
     assert all(found.share < share for share in shares.values())
-    # So does what the plan says of its own radio heads.
+    # The same holds for the radio heads of the plan.
     told = {it.level.name: it.share for it in bound(planned.scenario).verdicts}
     assert math.isclose(shares[f"a radio head at {planned.chosen[0]}"], told["6"], rel_tol=1e-12)
 
@@ -211,7 +211,7 @@ def test_cases_of_an_integrity_campaign_stand_side_by_side(
     assert [case["variant"] for case in cases] == ["as it is"] * 2 + [varied] * 2
     compared = pl.read_parquet(tmp_path / "out" / "compared.parquet")
     assert tuple(compared.columns) == columns.TABLES["compared"].columns
-    # Each case beside its own.
+    # Each case next to its counterpart.
     assert compared["variant"].to_list() == [
         f"{case}, as set, 4 radio heads: {variant}"
         for case in ("none", "array 1 degree off")
@@ -256,7 +256,7 @@ def test_the_level_grows_as_less_risk_is_asked(tmp_path: Path) -> None:
     assert levels == sorted(levels)
     assert levels[2] > 1.3 * levels[0]
     # Quantiles of a Gaussian grow as the root of the logarithm, here to 1.45 times; slip, that is
-    # negligible beside the larger risk, counts beside the smaller.
+    # negligible compared with the larger risk, not compared with the smaller one.
     assert levels[2] < 3.0 * levels[0]
 
 

@@ -1,4 +1,4 @@
-"""What flatters is named; what is shipped for plants takes nothing as exact."""
+"""Optimistic assumptions are listed; the shipped plants assume nothing to be exact."""
 
 from __future__ import annotations
 

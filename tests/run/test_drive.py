@@ -1,4 +1,4 @@
-"""What ``run`` tells of covariances, protection levels and percentiles."""
+"""Covariances, protection levels and percentiles in the results of ``run``."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_integrity_is_there_without_trajectories(guarded: Simulation) -> None:
     assert again.trajectories is None
     assert again.integrity is not None
     assert again.integrity == guarded.integrity
-    # The same steps are counted in the table; its median is exact, the other a histogram's.
+    # The table counts equal steps; its median is exact, the other a histogram's.
     assert guarded.trajectories is not None
     counted = Integrity.of(guarded.trajectories)
     assert counted is not None
@@ -183,7 +183,7 @@ def test_a_start_from_scratch_says_when_it_was_found(
 
 
 def test_a_vehicle_that_cannot_be_found_has_no_error() -> None:
-    # Nothing is heard.
+    # No SSB is received.
     silent = {f"site.radio_heads[{index}].eirp_dbm": -140.0 for index in (0, 1)}
     scenario = Scenario.load("paper-real-odometry-2").with_overrides(
         {"vehicle.start.known": False, "motion.start_at_m": 290.0, **silent}

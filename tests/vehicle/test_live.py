@@ -285,7 +285,7 @@ def test_the_ros_node_follows_its_topics(monkeypatch: pytest.MonkeyPatch) -> Non
     assert pose.header.frame_id == "map"
     assert pose.pose.pose.position.x == pytest.approx(-48.5 + 1.5 * drives_on, abs=0.4)
     assert 0.005 < pose.pose.covariance[0] < 0.1
-    # What is refused is said, and the node goes on.
+    # Rejected input is reported, and the node continues.
     seen.callbacks["angles"](SimpleNamespace(data="{"))
     seen.callbacks["angles"](SimpleNamespace(data='{"pci": -1}'))
     drives()

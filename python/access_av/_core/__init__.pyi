@@ -65,7 +65,7 @@ class SettingsWarning:
     def __hash__(self, /) -> int: ...
 
 class _Settings:
-    """What site, vehicle, scenario and platform have in common."""
+    """Base class of site, vehicle, scenario and platform."""
 
     @staticmethod
     def names() -> list[str]: ...

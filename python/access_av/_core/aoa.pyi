@@ -89,7 +89,7 @@ class DirectionEstimate:
         """Standard deviation of `elevation_rad`; 0 where the elevation was given."""
     @property
     def noise_covariance(self) -> NDArray[np.float64]:
-        """What of `covariance` noise alone makes."""
+        """Part of `covariance` that is noise."""
     @property
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of azimuth and elevation in rad^2, `(2, 2)` or `(batch, 2, 2)`."""
@@ -114,12 +114,12 @@ class DirectionEstimate:
 
 @final
 class MeasuredManifold:
-    """What an array receives from every direction, measured: patterns and coupling included."""
+    """Measured response of an array to every direction, including element patterns and coupling."""
 
     def __new__(
         cls, responses: ArrayLike, elevations_rad: ArrayLike | None = None
     ) -> MeasuredManifold:
-        """Of responses `(azimuths, antennas)` or `(elevations, azimuths, antennas)`."""
+        """From responses of shape `(azimuths, antennas)` or `(elevations, azimuths, antennas)`."""
 
 def direction(
     snapshots: _Samples,

@@ -21,7 +21,7 @@ def came() -> bool:
     """Whether Ctrl-C has come."""
 
 def writing(folder: str | PathLike[str]) -> None:
-    """Remember a folder in which files are written beside their places."""
+    """Register a folder that contains temporary files of a write."""
 
 def clean() -> None:
     """Leave no partial file behind, and no folder with nothing in it."""

@@ -23,10 +23,10 @@ class Cell:
         """Whether the PBCH was not decoded."""
     @property
     def lmax(self) -> int | None:
-        """SSB indices that the cell has, 4, 8 or 64, where frequency or PBCH tell."""
+        """Number of SSB indices of the cell (4, 8 or 64), if frequency or PBCH determine it."""
     @property
     def half_frame(self) -> int | None:
-        """1 in the second half of a frame, where DM-RS or PBCH tell."""
+        """1 in the second half of a frame, if DM-RS or PBCH determine it."""
     @property
     def sfn(self) -> int | None:
         """System frame number, if the PBCH's checksum held."""
@@ -105,7 +105,7 @@ class Cell:
 
 @final
 class Scan:
-    """What a scan of a recording found."""
+    """Result of a scan of a recording."""
 
     def __new__(
         cls, cells: Sequence[Cell], faults: Sequence[str], looked: Sequence[str]
@@ -115,7 +115,7 @@ class Scan:
         """The SSBs in order of time."""
     @property
     def faults(self) -> list[str]:
-        """What is wrong with the channels, and removed tones."""
+        """Faults of the channels, and removed tones."""
     @property
     def looked(self) -> list[str]:
         """Where was looked."""

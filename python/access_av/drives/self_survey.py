@@ -209,7 +209,7 @@ def survey(
     heard = {head for drive in logged for head in drive.log.heads}
     if not heard & set(model.heads):
         which = ", ".join(f"pci={pci} ssb_index={index}" for pci, index in sorted(heard)[:8])
-        raise InputError(f"no angle is to a radio head of {site.name}; heard: {which or 'none'}")
+        raise InputError(f"no angle is to a radio head of {site.name}; received: {which or 'none'}")
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         return _identify(_Problem(model, logged, pool, progress))
 

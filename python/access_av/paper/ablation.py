@@ -1,7 +1,7 @@
 """Contribution of the controller: comparison with a constant wake-up time of equal rate.
 
-Everything else stays, the gate included where a reading has one, and the runs are the same. What is
-left of a difference, run by run, is the controller's.
+All other settings are equal, including an SNR threshold, and so are the runs. The paired difference
+of a run is the effect of the controller.
 """
 
 from __future__ import annotations

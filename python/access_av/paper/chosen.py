@@ -1,7 +1,7 @@
 """Assumptions where the paper is not specific, with reason and effect of alternatives.
 
-One thing is changed at a time, from the shipped reading; ``chosen.toml`` has them. What they do
-together is what :mod:`access_av.paper.unknowns` draws.
+One assumption of the default interpretation is changed at a time; ``chosen.toml`` lists them.
+:mod:`access_av.paper.unknowns` varies all of them together.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
 """Comparison of the proposed engine, tracker and policy with the paper's adaptive point.
 
-Two steps are kept apart. In the *paper's accounting* an execution of ours costs what the paper's
-does, so that only tracker and policy differ. With *our engine* it costs its cycles at the mode's
-clock. The receiver is counted in both: settling and burst, for every SSB that is listened to. The
-paper's figures do not say what they count; ours are what localization adds to a computer that is on
-anyway. A range takes every parameter to the same end for both.
+There are two steps. In the *paper's accounting*, an estimate of the proposed method costs the same
+energy as one of the paper, so that only localizer and policy differ. With the *proposed engine*, it
+costs its measured cycles at the clock of the power mode. Both include the energy of the receiver,
+settling time and burst, for every received SSB. The paper does not state the boundary of its
+energies; ours are the energy in addition to a computer that is on. A range sets every parameter to
+the same end for both methods.
 """
 
 from __future__ import annotations

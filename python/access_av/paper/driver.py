@@ -1,4 +1,4 @@
-"""Drives of one setting after another, each simulated once."""
+"""Simulates each setting once, one after another."""
 
 from __future__ import annotations
 

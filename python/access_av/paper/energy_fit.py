@@ -1,24 +1,24 @@
-"""Fit the energy per execution, per mode and method, to the figures the paper gives.
+"""Fit the energy per execution of each power mode and method to the figures of the paper.
 
-The paper measures energy on its board but prints only some of the sums. This module finds the
-energies per execution that agree with them, given the executions the simulation obtains:
+The paper measures energy on its board, but states only some of the sums. This module determines the
+energies per execution that agree with these sums, for the simulated numbers of executions:
 
 1. *A prior from measurement.* One busy core of the board draws
    ``P = 6.97 W + 0.148 W · (f / 1.2 GHz)^3.96`` (MLPerf Inference v1.1 wall power of modes 0, 2, 3,
    4 and 5, residual at most 0.17 W). An execution lasts as long as the base wake-up time, so its
    prior energy is ``P(f) · t_base``, scaled to the paper's mode 0.
 2. *MUSIC.* Fixed and adaptive MUSIC are the same computation and share one energy per execution.
-   Mode 0 follows from its fixed sum, 627.22 J, mode 7 from its adaptive one, 206.5 J. Every other
-   mode is the value nearest to the prior that keeps what the paper says of it: above 210 J (only
-   mode 7 is within), below 260 J for modes 2, 3 and 6 and above it for the rest, and a fixed
-   baseline below that of mode 0.
-3. *ESPRIT and Root-MUSIC.* Mode 0 follows from the stated sums. Elsewhere they draw MUSIC's power
-   times their ratio in mode 0: one ratio per method, the same in all modes.
+   Mode 0 follows from its fixed sum, 627.22 J, mode 7 from its adaptive one, 206.5 J. In every
+   other mode it is the value nearest to the prior that agrees with the paper: above 210 J (only
+   mode 7 is below), below 260 J for modes 2, 3 and 6, above it for the others, and with a sum of
+   the fixed policy below that of mode 0.
+3. *ESPRIT and Root-MUSIC.* Mode 0 follows from the stated sums. In the other modes, their
+   power is that of MUSIC times their ratio in mode 0: one ratio per method, equal in all modes.
 
-What is solved for is no evidence, so the fit is free in as little as it can be, and
-:data:`FREEDOMS` names what it may be free in. One is not in :data:`SHIPPED`: another ratio in modes
-1 to 5, by one common factor, solved for so that the average saving over all modes and methods is
-the paper's 43.09 %. Nothing speaks for such a factor but the figure that it makes come true.
+A claim that the fit solves for is no evidence. The fit therefore has few degrees of freedom, listed
+in :data:`FREEDOMS`. One of them is not in :data:`SHIPPED`: a common factor of the ratios in modes
+1 to 5 for which the average saving over all modes and methods equals the paper's 43.09 %. The only
+argument for this factor is the figure that it is solved for.
 :mod:`access_av.paper.freedoms` lists the claims met with each degree of freedom.
 """
 

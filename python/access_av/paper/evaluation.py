@@ -1,11 +1,11 @@
-"""The paper's evaluation under one reading: three campaigns over methods, modes and policies.
+"""The paper's evaluation under one interpretation: campaigns over methods, modes and policies.
 
-P   every method at every SSB (20 ms), what the radio would allow;
-Q   every method in every power mode at its base wake-up time, what the computer allows;
+P   every method at every SSB (20 ms), the limit of the radio signal;
+Q   every method in every power mode at its base wake-up time, the limit of the computer;
 R   adaptive MUSIC in every power mode.
 
-Power modes that share a method, a policy and a wake-up time drive the same way, so each such
-setting is simulated once, on the same seeds as all others.
+Power modes with equal method, policy and wake-up time have equal drives: such a setting is
+simulated once, with the same seeds as all others.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Results of an evaluation for each claim of the paper.
 
-Errors are the mean over the runs of the absolute error, worst along the track. What the paper
-states is in ``paper.toml``; how each number is obtained is here. All are arrays over variants
-(:mod:`access_av.paper.outcome`).
+An error is the mean absolute error over the runs, at the SSB of the track where it is largest.
+``paper.toml`` contains the statements of the paper; this module computes the corresponding results.
+All of them are arrays over variants (:mod:`access_av.paper.outcome`).
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def _a1(outcome: Outcome) -> Finding:
             "worst_error_of_a_trip_p99_m": round(p99_m, 4),
         }
         note += (
-            f" That is of the mean over the runs: in the worst mode {within:.0%} of the single "
+            f" This is the mean over the runs; in the worst mode {within:.0%} of the single "
             f"trips stay within {bound_m} m at every SSB, and the 99th percentile of a trip's "
             f"maximum error is {p99_m:.2f} m."
         )

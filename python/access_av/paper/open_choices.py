@@ -1,8 +1,8 @@
 """Unspecified parameters of the paper, as a space of interpretations.
 
-Each dimension has a stated range and says how it changes the paper's scenario. Dimensions of the
-*world* change what is driven through, and so every campaign; those of the *controller* only what
-adaptive MUSIC does in it. Points are coordinates from 0 to 1.
+Each dimension has a range and a rule by which it changes the paper's scenario. Dimensions of the
+*environment* change every campaign; those of the *controller* change adaptive MUSIC only. Points
+are coordinates from 0 to 1.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Numbers for the verdicts on the claims: the results of the paper's three campaigns.
 
 Every number is an array over *variants* of the same campaigns: the original sample, resamples of
-its runs (which make intervals), or readings that a search lays side by side. Claims do not care.
+its runs (for intervals), or the interpretations of a search. Claims treat all of them equally.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
-"""Our own localizer and wake-up on the paper's trip, in the paper's accounting.
+"""Proposed localizer and wake-up policy on the paper's trip, in the paper's accounting.
 
-A Kalman filter over pose and odometer in the place of dead reckoning, woken up when its own error
-would exceed a bound, in the place of Algorithm 1. Radio, vehicle, odometer, runs, the estimator
-(MUSIC), the time that it needs and its energy per execution stay the paper's.
+A Kalman filter with pose and odometer states replaces dead reckoning. A policy that wakes up before
+the error exceeds a target replaces Algorithm 1. Radio, vehicle, odometer, runs, estimator (MUSIC),
+its duration and its energy per execution are those of the paper.
 
-What a vehicle is told decides such a comparison. On the paper's trip the odometer and the start are
-exact, so that whoever knows the road's course needs no angle at all. :func:`fair` therefore lays
-both beside each other with the road known to both and to neither, with the paper's odometer and
-with a real one, and beside them what one angle would do and what no localizer can do better than.
+The information that each method has decides such a comparison. On the paper's trip, odometer and
+start are exact, so that a method that knows the road needs no angle. :func:`fair` therefore
+compares both with equal information: with and without the road, with the paper's odometer and with
+a real one. It adds the result of one single angle, and the posterior bound.
 """
 
 from __future__ import annotations
@@ -226,7 +226,7 @@ def fair(driver: Driver, evaluation: Evaluation) -> list[Fair]:
 
     Told the road, the paper's method needs its angles for nothing, since it takes no more than the
     heading from them; what it does then is what the tracker does with one angle. The bound stands
-    beside a real odometer alone: its model, which is the tracker's, takes none for exact.
+    with a real odometer only, because the model of the localizer has no exact odometer.
     """
     mode = driver.platform.modes[0]
     base_ms = mode.base_wake_up_ms["music"]

@@ -1,7 +1,7 @@
-"""Readings of the paper: each a scenario that fills in what the paper leaves open.
+"""Interpretations of the paper: scenarios that set the parameters which it does not specify.
 
-A reading is a small TOML file ``like = "paper"`` in ``readings/``; ``readings/index.toml`` has
-their order, and what of each was chosen in view of the paper's claims.
+An interpretation is a TOML file with ``like = "paper"`` in ``readings/``; ``readings/index.toml``
+contains their order, and the parameters that were selected in view of the paper's claims.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""Many readings of the paper, drawn from what it leaves open and judged by its claims.
+"""Interpretations of the paper, drawn from its unspecified parameters, with verdicts on its claims.
 
-Worlds are drawn first, and several controllers for each: the fixed campaigns are driven once a
-world. A world with its controllers is one part on disk, so that a search that was stopped goes on.
+Environments are drawn first, and several controllers for each of them, because the campaigns with
+fixed intervals are simulated once for each environment. An environment with its controllers is one
+part on disk, so that an interrupted search continues.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The paper under several readings: each evaluated, judged and held against others."""
+"""Evaluation of the paper under several interpretations, with verdicts and comparisons."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Study:
     ours
         Proposed method compared with the shipped interpretation, by power mode.
     unknowns
-        On what the claims hang, where asked for.
+        Sensitivity of the claims, if requested.
     unusable
         Readings that could not be evaluated, and why.
     bought

@@ -1,12 +1,12 @@
 """Sensitivity of the claims: Sobol indices of their margins over the unspecified parameters.
 
-Readings are drawn from stated ranges (:mod:`access_av.paper.space`), a gate being one of the things
-drawn. A polynomial chaos expansion is fitted to each claim's margin (Legendre polynomials, which
-are orthogonal over uniform ranges, by least squares); its squared coefficients are shares of
-variance, and so first-order and total Sobol indices (Sudret, Reliability Engineering & System
-Safety 93, 2008). Of the polynomials only those are kept that stand out of the noise. What they do
-not explain is told beside the indices. Intervals are by the bootstrap over whole worlds with these
-polynomials ("fast bPCE": Marelli and Sudret, Structural Safety 75, 2018).
+Interpretations are drawn from ranges (:mod:`access_av.paper.open_choices`); the SNR threshold is
+one of the parameters. A polynomial chaos expansion is fitted to the margin of each claim by least
+squares, with Legendre polynomials, which are orthogonal for uniform ranges. Its squared
+coefficients are shares of the variance and give first-order and total Sobol indices (Sudret,
+Reliability Engineering & System Safety 93, 2008). Only significant polynomials are kept; the
+unexplained share is stated with the indices. Intervals are computed by a bootstrap over whole
+environments with these polynomials ("fast bPCE": Marelli and Sudret, Structural Safety 75, 2018).
 """
 
 from __future__ import annotations

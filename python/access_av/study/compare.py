@@ -125,7 +125,7 @@ def varied(vary: Sequence[str]) -> list[tuple[str, dict[str, Any]]]:
     ]
     if len(found) > MOST_VARIANTS:
         raise InputError(
-            f"--vary: {len(found)} variants; at most {MOST_VARIANTS} are driven beside each other, "
+            f"--vary: {len(found)} variants; at most {MOST_VARIANTS} are compared, "
             "access-av designs searches more"
         )
     return found if vary else []

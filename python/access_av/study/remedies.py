@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 SURVEYED_STD_M = 0.02  # a total station or RTK-GNSS, in each of x and y
 CALIBRATED_MOUNTING_STD_RAD = 0.002
 CALIBRATED_PHASE_STD_RAD = 0.01
-REMEMBERED_SCALE_STD = 0.0005  # by how much tyres and load change it from one day to the next
+REMEMBERED_SCALE_STD = 0.0005  # change by tyres and load from one day to the next
 SHORTEST_PERIOD_MS = 5.0  # TS 38.331, ssb-periodicityServingCell
 
 

@@ -124,7 +124,7 @@ fn check_row<const N: usize>(trials: usize) -> [usize; 2] {
 
 #[test]
 fn errors_of_reliable_angles_follow_their_standard_deviation() {
-    // Of five numbers of snapshots, five SNRs and two estimators.
+    // Five numbers of snapshots, five SNRs, two estimators.
     let judged = [
         check_row::<2>(4000),
         check_row::<3>(3000),

@@ -76,7 +76,7 @@ fn weak_pilots_are_unresolved() {
     );
     assert!(
         believed_noise < 200,
-        "{believed_noise} of 4000 blocks of noise believed"
+        "{believed_noise} of 4000 blocks of noise accepted"
     );
 }
 

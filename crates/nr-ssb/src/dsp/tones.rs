@@ -45,7 +45,7 @@ const LOBE: usize = 4;
 const SURROUNDINGS: usize = 4;
 /// Maximum number of lines.
 const MOST_TONES: usize = 16;
-/// Amplitudes are fitted anew after this number of samples.
+/// Amplitudes are fitted again after this number of samples.
 const STRETCH: usize = 4096;
 /// Minimum number of samples that amplitudes are fitted to.
 const SHORTEST_FIT: usize = 256;

@@ -211,7 +211,7 @@ fn moved(payload: BchPayload, half_frames: i32) -> BchPayload {
     result
 }
 
-/// The size of burst sets that is told, or that the bands there have.
+/// The configured size of burst sets, or the size in the bands at this frequency.
 fn size(spacing: SubcarrierSpacing, told: Option<Lmax>, ssb_freq_hz: Option<f64>) -> LikelyLmax {
     let told = told.map(|likely| LikelyLmax {
         likely,

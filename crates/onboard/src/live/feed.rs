@@ -402,7 +402,7 @@ impl Live {
         self.hear_angles()
     }
 
-    /// Returns the next outcome of an angle, oldest first. Of more than 256 outcomes, the oldest
+    /// Returns the next outcome of an angle, oldest first. If there are more than 256 outcomes, the oldest
     /// are lost.
     pub fn next_outcome(&mut self) -> Option<Outcome> {
         self.outcomes.pop_front()

@@ -140,7 +140,7 @@ impl Reason {
                 "drive on; check place, PCI and line of sight of the radio heads that are left out"
             }
             Self::LevelAboveLimit { .. } => {
-                "drive on with care: the level falls as more radio heads are heard"
+                "drive on with care: the level falls as more radio heads are received"
             }
             Self::FaultSuspected => {
                 "drive on with care; if it stays, check odometer, array and site against their files"
@@ -173,7 +173,7 @@ impl fmt::Display for Reason {
             Self::SeveralPlaces { places: 1 } => {
                 write!(f, "the place that fits is not yet certain")
             }
-            Self::SeveralPlaces { places } => write!(f, "{places} places fit what was heard"),
+            Self::SeveralPlaces { places } => write!(f, "{places} places fit the received angles"),
             Self::AnglesElsewhere => write!(f, "angles come from elsewhere than predicted"),
             Self::SourcesDisagree => write!(f, "half of the radio heads or more disagree"),
             Self::FaultyHeads { heads: 1 } => write!(f, "a radio head is at fault and left out"),

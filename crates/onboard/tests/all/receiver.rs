@@ -126,7 +126,7 @@ fn a_beam_that_vanishes_costs_nothing_and_is_heard_again_when_it_returns() {
     // Back within the second that passes between two searches.
     air.send(all.clone());
     let back = (200..252).find(|number| air.heard(&mut receiver, *number) == all);
-    println!("heard again in burst {back:?}");
+    println!("received again in burst {back:?}");
     let back = back.unwrap();
     for number in back + 1..back + 20 {
         assert_eq!(air.heard(&mut receiver, number), all, "burst {number}");

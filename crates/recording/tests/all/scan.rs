@@ -158,7 +158,7 @@ fn faults_of(spoil: impl FnOnce(&mut Vec<Vec<Complex32>>)) -> Vec<ChannelFault> 
     assert_eq!(
         found.ssbs.len(),
         1,
-        "whatever a channel lacks, the others hear the cell"
+        "the other channels receive the cell"
     );
     found.faults
 }

@@ -34,7 +34,7 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
     specs["sobol"] = _index_chart(found)
     specs["share"] = _share_chart(found)
     ranges = table(
-        ("What the paper leaves open", "Range"),
+        ("Unspecified parameter", "Range"),
         [(each.label, each.range_text) for each in DIMENSIONS],
     )
     return (
@@ -43,7 +43,7 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
         "thing, by itself or together with others. Cells below "
         f"{LEAST_TOTAL:.0%} are left empty; “unexplained” is what the expansion cannot say.</p>"
         + f"<p>{escape(_width_text(found))}</p>"
-        + figure("sobol", "Total Sobol index of each claim's margin.", "On what the claims hang")
+        + figure("sobol", "Total Sobol index of each claim's margin.", "Sensitivity of the claims")
         + figure(
             "share",
             "Bars are 95 % intervals over worlds.",
@@ -56,7 +56,7 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
 def _width_text(found: Unknowns) -> str:
     widest = max((each.half_width for each in found.matter), default=0.0)
     return (
-        f"Of claims that are neither arithmetic nor solved for, {len(found.matter)} total indices "
+        f"For claims that are neither arithmetic nor solved for, {len(found.matter)} total indices "
         f"are {MATTERS:g} or more; their 95 % intervals are at most ± {widest:.3f} wide."
     )
 
