@@ -32,9 +32,10 @@ def energy_text(evaluation: Evaluation) -> str:
         "values the paper states. "
         + (
             "Energies per execution were fitted to those and to the paper’s statements about the "
-            f"rest, for each interpretation separately: {free} numbers are free, {solved} of them
-            solved for " "from stated figures. Agreement is therefore a check of the executions, not
-            of the power." if evaluation.refitted
+            f"rest, for each interpretation separately: {free} numbers are free, {solved} of them "
+            "solved for from stated figures. Agreement is therefore a check of the executions, not "
+            "of the power."
+            if evaluation.refitted
             else "Energies per execution are the platform’s own."
         )
         + _missing(evaluation)
