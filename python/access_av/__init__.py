@@ -60,7 +60,7 @@ from access_av._core import (
     Vehicle,
     __version__,
 )
-from access_av.errors import InputError
+from access_av.errors import ImplausibleSettingsWarning, InputError
 from access_av.lazy import attach
 
 if TYPE_CHECKING:
@@ -90,6 +90,7 @@ __all__ = [
     "Drive",
     "ErrorBound",
     "Evaluation",
+    "ImplausibleSettingsWarning",
     "InputError",
     "Live",
     "Plan",

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import polars as pl
 import pytest
 
-from access_av import SettingsError, SettingsWarning
+import short_plant
+from access_av import ImplausibleSettingsWarning, SettingsError, SettingsWarning, simulate
 from access_av._core import Platform, Scenario, Site, Vehicle
 from access_av.errors import InputError
 from access_av.tables import validation
@@ -506,3 +507,47 @@ def test_dead_reckoning_with_two_radio_heads_is_reported_by_varied_commands(
     done = access_av("designs", tmp_path / "short.toml", *space, "--out", tmp_path / "d")
     assert done.code == 0, done.err
     assert " ".join(done.err.split()).count(said) == 1
+
+
+DEAD_RECKONING = """
+[vehicle]
+like = "tugger"
+[vehicle.localizer]
+kind = "dead-reckoning"
+[vehicle.integrity]
+enabled = false
+[vehicle.wake_up]
+policy = "fixed"
+interval_ms = 100.0
+"""
+
+
+def test_dead_reckoning_with_two_radio_heads_is_reported_by_study(
+    access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
+    plant = tmp_path / "plant.toml"
+    plant.write_text(
+        short_plant.PLANT.replace('vehicle = "tugger"', "") + DEAD_RECKONING, encoding="utf-8"
+    )
+    other = tmp_path / "other.toml"
+    other.write_text('like = "plant.toml"\n', encoding="utf-8")
+    done = access_av("study", plant, "--compare", other)
+    assert done.code == 2
+    said = "`vehicle.localizer.kind` is dead-reckoning"
+    words = " ".join(done.err.split())
+    assert f"plant.toml: {said}" in words
+    assert f"other.toml: {said}" in words
+
+
+def test_dead_reckoning_with_two_radio_heads_is_reported_by_simulate() -> None:
+    dead_reckoning = {
+        "vehicle.localizer.kind": "dead-reckoning",
+        "vehicle.integrity.enabled": False,
+        "motion.start_at_m": 292.0,
+    }
+    two = Scenario.load("paper-real-odometry-2").with_overrides(dead_reckoning)
+    with pytest.warns(ImplausibleSettingsWarning, match=r"supports one radio head.*has 2"):
+        simulate(two, runs=1)
+    # One radio head is what it supports: warnings are errors in these tests.
+    one = json.loads(two.site.to_json())["radio_heads"][:1]
+    simulate(two.with_overrides({"site.radio_heads": one}), runs=1)

@@ -15,6 +15,7 @@ from access_av import (
     SettingsError,
     Site,
     Vehicle,
+    __version__,
     columns,
     drives,
     survey,
@@ -80,6 +81,7 @@ def test_a_head_and_an_array_that_are_elsewhere_are_found(logged: Path) -> None:
     assert heads[0]["position_m"][0] == by_key["radio_heads[0].position_m[0]"].found
     # The specified noise is conservative: the innovations are within the model.
     assert 0.3 < found.nis < 1.1
+    assert found.origin.version == __version__
 
 
 def test_what_it_writes_locates_better(

@@ -18,5 +18,7 @@ def test_a_study_is_saved_and_loaded_unchanged(tmp_path: Path) -> None:
     saved = found.save(tmp_path / "study.zip")
     loaded = access_av.Study.load(saved)
     assert loaded == found
+    assert loaded.origin.version == access_av.__version__
+    assert loaded.scenario == found.plant.scenario()
     assert loaded.summary() == found.summary()
     assert loaded.save(tmp_path / "again.zip").read_bytes() == saved.read_bytes()

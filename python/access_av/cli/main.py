@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 import sys
+import warnings
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -40,7 +41,7 @@ from access_av.cli.terminal import (
     show_error,
     write_what_can_be_written,
 )
-from access_av.errors import InputError
+from access_av.errors import ImplausibleSettingsWarning, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -117,6 +118,8 @@ for _what in ("site", "vehicle", "scenario", "platform", "plant"):
 def main() -> None:
     """Runs the command line; reports invalid input as one message with exit code 2."""
     write_what_can_be_written()
+    # The commands print these warnings themselves, once for each scenario.
+    warnings.simplefilter("ignore", ImplausibleSettingsWarning)
     try:
         try:
             app()

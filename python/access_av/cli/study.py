@@ -72,8 +72,12 @@ def study(
     chosen = Plant.load(plant)
     look_for_underlay(chosen.scenario().site)
     announce(plant, chosen.warnings())
-    others = {name: Plant.load(name).scenario() for name in compare or ()}
-    scenarios = of_scenario(chosen.scenario(), vary, others)
+    others = {name: Plant.load(name) for name in compare or ()}
+    for name, other in others.items():
+        announce(name, other.warnings())
+    scenarios = of_scenario(
+        chosen.scenario(), vary, {name: it.scenario() for name, it in others.items()}
+    )
     directory = ResultsDirectory.create(f"study-{chosen.name}", out)
     with progress("Driving") as tick:
         found = study_plant(

@@ -17,7 +17,7 @@ import json
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.errors import InputError
-from access_av.tables.result import Result
+from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -117,6 +117,8 @@ class Survey(Result):
         Mean normalized innovation squared; 1 for a correct model.
     iterations
         Number of Gauss–Newton steps.
+    origin
+        Version and commit that computed it. Not compared.
     """
 
     parameters: list[Parameter]
@@ -127,6 +129,7 @@ class Survey(Result):
     used: int
     nis: float
     iterations: int
+    origin: Origin = field(default_factory=origin, compare=False)
 
     def table(self) -> pl.DataFrame:
         """Returns one row per parameter; columns ``access_av.columns.TABLES["survey"]``."""

@@ -7,7 +7,7 @@ import math
 import os
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ from access_av.errors import InputError
 from access_av.run import service_levels
 from access_av.run.error_bound import along_route
 from access_av.tables import validation
-from access_av.tables.result import Result
+from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -50,6 +50,8 @@ class Plan(Result):
         One row per mast, added alone; columns ``masts`` of :mod:`access_av.columns`.
     verdicts
         Service levels that the bound permits with the new radio heads.
+    origin
+        Version and commit that computed it. Not compared.
     """
 
     scenario: _core.Scenario
@@ -58,6 +60,7 @@ class Plan(Result):
     chosen: list[str]
     ranking: pl.DataFrame
     verdicts: list[service_levels.Verdict]
+    origin: Origin = field(default_factory=origin, compare=False)
 
 
 def plan(

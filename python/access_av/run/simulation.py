@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -13,6 +14,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.device.platform import Platform
+from access_av.errors import ImplausibleSettingsWarning
 from access_av.run import service_levels
 from access_av.run.operation import Operation
 from access_av.run.plug_ins import factory
@@ -31,6 +33,8 @@ Scenario = _core.Scenario
 
 # Number of SSBs in the first ten seconds, at a period of 20 ms.
 SETTLED_STEPS = 500
+# Key of the plausibility warning of a localizer that does not support the site.
+LOCALIZER_KEY = "localizer.kind"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -293,6 +297,11 @@ def simulate(
     OSError
         Too many threads for the system.
 
+    Warns
+    -----
+    ImplausibleSettingsWarning
+        The localizer does not support the site: dead reckoning with several radio heads.
+
     Examples
     --------
     >>> result = simulate("paper", runs=2, seed=7)
@@ -301,6 +310,8 @@ def simulate(
     """
     if not isinstance(scenario, Scenario):
         scenario = Scenario.load(str(scenario))
+    if localizer is None:
+        _warn_of_localizer(scenario)
     found = _core.simulate(
         scenario,
         runs,
@@ -315,6 +326,13 @@ def simulate(
         progress=progress,
     )
     return Simulation.of(found, scenario, seed)
+
+
+def _warn_of_localizer(scenario: Scenario) -> None:
+    """Warns of a localizer that does not support the site, at the caller of :func:`simulate`."""
+    for it in scenario.warnings():
+        if it.key.endswith(LOCALIZER_KEY):
+            warnings.warn(f"{scenario.name}: {it}", ImplausibleSettingsWarning, stacklevel=3)
 
 
 def _table(columns: Mapping[str, Any]) -> pl.DataFrame:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from access_av.study import economy
 from access_av.study.targets import table as targets_table
-from access_av.tables.result import Result
+from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
     from access_av import _core
@@ -53,6 +53,8 @@ class Study(Result):
         Values that are equal to the template's or the default.
     played
         The first drive with the nominal channel, step by step.
+    origin
+        Version and commit that computed it. Not compared.
     """
 
     plant: _core.Plant
@@ -70,6 +72,12 @@ class Study(Result):
     ways: dict[str, Way]
     unverified: list[Unverified]
     played: Simulation
+    origin: Origin = field(default_factory=origin, compare=False)
+
+    @property
+    def scenario(self) -> _core.Scenario:
+        """Scenario of the drives with the nominal channel."""
+        return self.believed.scenario
 
     def __repr__(self) -> str:
         return f"Study({self.plant.name}: {self.verdict})"
