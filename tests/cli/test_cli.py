@@ -144,13 +144,30 @@ def test_explore_answers_from_the_last_evaluation(
     assert "No operating point has energy ≤ 1 J" in none.out
 
 
-def test_evaluate_shows_tables_in_a_narrow_terminal(access_av: Cli, tmp_path: Path) -> None:
+def test_output_of_evaluate_fits_one_screen(access_av: Cli, tmp_path: Path) -> None:
+    """Verdict, three figures and the path of the report; the report contains everything else."""
     arguments = ("--reading", "gate", "--runs", "1", "--out", str(tmp_path / "e"))
     done = access_av("evaluate", *arguments, columns=60)
     assert done.code == 0, done.err
-    assert "Claims under" in done.out
-    tables = done.out.split("Claims of the paper")[0]
-    assert max(map(len, tables.splitlines())) <= 60
+    lines = done.out.splitlines()
+    assert len(lines) <= 24
+    assert max(map(len, lines[:-1])) <= 60
+    assert lines[-1].endswith(str(tmp_path / "e" / "report.html"))
+    words = " ".join(done.out.split())
+    assert words.startswith("The paper's accuracy and its saving do not hold together")
+    claims = {it["id"]: it for it in json.loads((tmp_path / "e/claims.json").read_text())}
+    for name in ("a1_adaptive_worst_m", "e4_average_saving_percent"):
+        obtained, verdict = claims[name]["obtained"], claims[name]["verdict"]
+        assert f"{obtained:.4g} {verdict}" in words
+    evident = [
+        it
+        for it in claims.values()
+        if it["evidence"] not in ("by construction", "arithmetic") and it["verdict"] != "not judged"
+    ]
+    reproduced = sum(it["verdict"] == "reproduced" for it in evident)
+    assert f"reproduced claims {len(evident)} {reproduced}" in words
+    for private in ("reading", "freedom", "told"):
+        assert private not in words
 
 
 def test_shipped_files_are_listed_shown_and_fine(access_av: Cli, tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 BOTH = "Accuracy and saving hold together only if estimates wait for a better SSB"
-NONE = "The paper's accuracy and its saving do not hold together under this reading"
+NONE = "The paper's accuracy and its saving do not hold together under this interpretation"
 
 
 @pytest.fixture(scope="module")
@@ -67,15 +67,17 @@ def test_what_a_freedom_buys_is_what_judging_with_it_gives(evaluations: list[Eva
     [shipped] = [each for each in made.bought if each.is_shipped]
     assert not shipped.both
     assert summary.headline(made) == (
-        "The paper's accuracy and its saving hold together under none of 2 readings"
+        "The paper's accuracy and its saving hold together under none of 2 interpretations"
     )
-    assert "one more freedom of the energy fit: another ratio in modes 1 to 5" in summary.lead(made)
+    assert "one more parameter of the energy fit: another ratio in modes 1 to 5" in summary.lead(
+        made
+    )
 
 
 def test_a_subset_of_readings_has_a_headline_of_its_own(evaluations: list[Evaluation]) -> None:
     for each in evaluations:
         alone = study([each], SHIPPED)
         assert summary.headline(alone) == NONE
-        assert each.reading.title in summary.lead(alone) or "none of the readings" in summary.lead(
+        assert each.reading.title in summary.lead(alone) or "no interpretation" in summary.lead(
             alone
         )

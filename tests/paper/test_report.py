@@ -77,7 +77,7 @@ def test_says_that_the_controller_matters_only_where_it_does(gain: float, said: 
 
 def test_sentences_are_made_from_what_was_obtained() -> None:
     study = synthetic.study()
-    assert "hold together under none of 2 readings" in summary.headline(study)
+    assert "hold together under none of 2 interpretations" in summary.headline(study)
     met = {claim.id: replace(claim, verdict="reproduced") for claim in study.of("gate")}
     both = replace(study, claims=[*study.of("every-ssb"), *met.values()])
     assert "only if estimates wait" in summary.headline(both)
