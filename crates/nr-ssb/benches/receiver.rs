@@ -52,6 +52,20 @@ fn track_one_ssb_of_4_antennas(bencher: divan::Bencher, decode_pbch: bool) {
     });
 }
 
+/// Delay, carrier phase, range rate and power of a tracked SSB.
+#[divan::bench]
+fn observe_one_ssb_of_4_antennas(bencher: divan::Bencher) {
+    let (config, samples) = scene();
+    let mut searcher = Searcher::new(config.clone()).unwrap();
+    let slices = air::slices(&samples);
+    let cell = searcher.search(&slices).unwrap()[0].clone();
+    let mut tracker = Tracker::<4>::new(&config, &cell).unwrap();
+    let antennas = std::array::from_fn(|antenna| slices[antenna]);
+    let tracked = tracker.track(&antennas, 0.0, cell.sample_start, false);
+    let ssb = tracked.unwrap().unwrap();
+    bencher.bench_local(|| tracker.observe(divan::black_box(&ssb)).is_some());
+}
+
 /// A cell off the raster at 5 dB, on one antenna at 46.08 Msps for 20 ms, with unknown parameters.
 #[divan::bench(sample_count = 3, sample_size = 1)]
 fn scan_off_raster_20_ms_at_46_msps(bencher: divan::Bencher) {

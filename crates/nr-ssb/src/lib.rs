@@ -144,6 +144,7 @@
 //! | receive SSBs from a sample stream | [`receiver`] |
 //! | find the SSBs at a known frequency | [`search`] |
 //! | process further SSBs of a known cell | [`track`] |
+//! | measure delay, carrier phase, range rate and power | [`observables`] |
 //! | find SSBs anywhere in a band | [`raster`] |
 //! | resample a recording to the rate of the search | [`front_end`] |
 //! | diagnose the channels of a recording | [`diagnose`] |
@@ -166,12 +167,13 @@
 //! [`ScanError`](raster::ScanError) or a [`TrackError`](track::TrackError); those of a receiver are
 //! a [`ReceiverError`](receiver::ReceiverError). This crate does not panic.
 
-// Each folder depends on the previous ones only: numeric, standard; transmit, dsp; input, one_ssb;
-// search; track, raster; receiver.
+// Each folder depends on the previous ones only: numeric, standard; transmit, dsp; input, one_ssb,
+// observables; search; track, raster; receiver.
 mod dsp;
 mod error;
 mod input;
 mod numeric;
+pub mod observables;
 mod one_ssb;
 pub mod raster;
 pub mod receiver;

@@ -60,7 +60,9 @@ mod _core {
     #[pymodule]
     mod nr {
         #[pymodule_export]
-        use crate::nr::{Cell, Receiver, Scan, Searcher, build_burst, scan, search};
+        use crate::nr::{
+            Cell, Observables, Receiver, Scan, Searcher, build_burst, scan, search,
+        };
         use pyo3::prelude::*;
 
         #[pymodule_init]

@@ -2,10 +2,12 @@
 
 mod burst;
 mod channel;
+mod observables;
 mod receiver;
 mod searcher;
 
 pub use burst::build_burst;
+pub use observables::Observables;
 pub use receiver::Receiver;
 pub use searcher::Searcher;
 
@@ -93,6 +95,8 @@ use crate::recording::{Recording, RecordingError};
 ///     ``aoa.maximum_likelihood_pilots(cell.blocks, noise_variance=1.0)``. Empty for one antenna.
 /// noise_variance : list of float
 ///     Noise variance on a resource element for each antenna, in the squared scale of `channel`.
+/// observables : Observables or None
+///     Delay, carrier phase, range rate and power, from a `Receiver`; None from a search.
 #[pyclass(frozen, get_all, module = "access_av._core.nr")]
 pub struct Cell {
     pci: u16,
@@ -125,6 +129,7 @@ pub struct Cell {
     channel_covariance: Covariance,
     blocks: Blocks,
     noise_variance: Vec<f64>,
+    observables: Option<Observables>,
 }
 
 /// Creates a cell without an angle from an SSB of a search or a receiver, whose fields have equal
@@ -179,6 +184,7 @@ impl Cell {
             channel_covariance: Covariance(Some(ssb.channel_covariance.clone())),
             blocks: Blocks(view.map_or_else(Vec::new, |view| view.blocks)),
             noise_variance: ssb.noise_variance.clone(),
+            observables: Observables::of(ssb),
         );
         cell.with_angle(angle.as_ref())
     }
@@ -221,6 +227,7 @@ impl From<&FoundSsb> for Cell {
             channel_covariance: Covariance(found.channel_covariance.clone()),
             blocks: Blocks(found.blocks.clone()),
             noise_variance: found.noise_variance.clone(),
+            observables: None,
         );
         cell.with_angle(found.angle.as_ref())
     }

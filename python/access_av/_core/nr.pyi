@@ -6,7 +6,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from access_av._core import Recording
 
-__all__ = ["Cell", "Receiver", "Scan", "Searcher", "build_burst", "scan", "search"]
+__all__ = [
+    "Cell",
+    "Observables",
+    "Receiver",
+    "Scan",
+    "Searcher",
+    "build_burst",
+    "scan",
+    "search",
+]
 
 @final
 class Cell:
@@ -102,6 +111,92 @@ class Cell:
     @property
     def noise_variance(self) -> list[float]:
         """Noise variance of a resource element, each antenna's, in the channel's scale squared."""
+    @property
+    def observables(self) -> Observables | None:
+        """Delay, carrier phase, range rate and power, from a `Receiver`; None from a search."""
+
+@final
+class Observables:
+    """Delay, carrier phase, range rate and power of one SSB, with standard deviations."""
+
+    @property
+    def first_path_start(self) -> float:
+        """First sample of the SSB on the first path, at the rate of the input."""
+    @property
+    def delay_offset_s(self) -> float:
+        """Delay of the first path relative to `Cell.sample_start`, in seconds."""
+    @property
+    def delay_sigma_s(self) -> float:
+        """Standard deviation of `first_path_start` in seconds: noise and multipath."""
+    @property
+    def delay_noise_sigma_s(self) -> float:
+        """Standard deviation of `first_path_start` in seconds due to noise."""
+    @property
+    def multipath(self) -> str:
+        """`not detected`, `separated` or `uncertain` (first path weak or blocked)."""
+    @property
+    def carrier_phase_rad(self) -> float:
+        """Carrier phase of antenna 0 at `reference_start`, within pi, in rad."""
+    @property
+    def carrier_phase_sigma_rad(self) -> float:
+        """Standard deviation of `carrier_phase_rad` in rad: noise and multipath."""
+    @property
+    def carrier_phase_multipath_sigma_rad(self) -> float:
+        """Standard deviation of the phase of one antenna due to multipath, in rad."""
+    @property
+    def reference_start(self) -> float:
+        """Sample to which phase, amplitudes and frequency refer, at the rate of the input."""
+    @property
+    def frequency_hz(self) -> float:
+        """Carrier frequency offset from `rate_source` in Hz."""
+    @property
+    def frequency_sigma_hz(self) -> float:
+        """Standard deviation of `frequency_hz` in Hz."""
+    @property
+    def range_rate_m_s(self) -> float:
+        """Rate of the pseudorange in m/s, including the offset of both oscillators."""
+    @property
+    def range_rate_sigma_m_s(self) -> float:
+        """Standard deviation of `range_rate_m_s` in m/s."""
+    @property
+    def rate_source(self) -> str:
+        """`phase difference` to the previous SSB, or `within SSB`."""
+    @property
+    def interval_s(self) -> float:
+        """Time since the previous SSB of the beam in seconds; 0 without one."""
+    @property
+    def phase_change_rad(self) -> float:
+        """Carrier phase minus that of the previous SSB, within pi, in rad."""
+    @property
+    def phase_change_sigma_rad(self) -> float:
+        """Standard deviation of `phase_change_rad` in rad; infinite without a previous SSB."""
+    @property
+    def ambiguity_m_s(self) -> float:
+        """Change of the range rate for one cycle of `phase_change_rad`, in m/s."""
+    @property
+    def wrong_cycles_probability(self) -> float:
+        """Probability of a wrong number of cycles in a rate from a phase difference."""
+    @property
+    def rsrp_dbfs(self) -> float:
+        """Power of a resource element of all paths, mean over the antennas, in dBFS."""
+    @property
+    def rsrp_sigma_db(self) -> float:
+        """Standard deviation of `rsrp_dbfs` in dB."""
+    @property
+    def first_path_dbfs(self) -> float:
+        """Power of a resource element of the first path in dBFS."""
+    @property
+    def first_path_sigma_db(self) -> float:
+        """Standard deviation of `first_path_dbfs` in dB."""
+    @property
+    def amplitudes(self) -> NDArray[np.complex128]:
+        """Amplitude of every antenna with the carrier phase, complex128 `(antennas,)`."""
+    @property
+    def amplitude_variance(self) -> NDArray[np.float64]:
+        """Noise variance of `amplitudes`, float64 `(antennas,)`."""
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of delay (s), phase (rad), frequency offset (Hz), float64 `(3, 3)`."""
 
 @final
 class Scan:

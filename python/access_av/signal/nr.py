@@ -23,7 +23,15 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from access_av._core import Recording
-from access_av._core.nr import Cell, Receiver, Scan, Searcher, build_burst, scan
+from access_av._core.nr import (
+    Cell,
+    Observables,
+    Receiver,
+    Scan,
+    Searcher,
+    build_burst,
+    scan,
+)
 from access_av._core.nr import search as _search
 from access_av.signal.recorded_angles import stated_places, stated_spacing, stated_truths
 
@@ -35,6 +43,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Cell",
     "Cells",
+    "Observables",
     "Receiver",
     "Recording",
     "Scan",

@@ -13,7 +13,7 @@ use crate::standard::grid::SUBCARRIERS;
 
 /// Shift of the FFT window into the cyclic prefix, which avoids interference of the neighbouring
 /// symbol for paths before the strongest one and timing errors of one sample.
-const BACK_OFF: usize = 6;
+pub(crate) const BACK_OFF: usize = 6;
 
 /// OFDM demodulator for SSBs: four FFTs per antenna.
 pub struct Demodulator {

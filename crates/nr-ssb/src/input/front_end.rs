@@ -109,6 +109,8 @@ pub struct FrontEnd {
     consumed_input: u64,
     /// Number of output samples so far, for each antenna.
     produced: u64,
+    /// Index of the first output sample in the stream, for the phase of the mixer.
+    origin: u64,
 }
 
 /// Frequency that is shifted to 0 Hz.
@@ -167,6 +169,7 @@ impl FrontEnd {
             pending: vec![vec![Complex32::ZERO; lead_in]; antennas],
             consumed_input: 0,
             produced: 0,
+            origin: 0,
         };
         front_end.tune(offset_hz)?;
         Ok(front_end)
@@ -278,6 +281,20 @@ impl FrontEnd {
         }
         self.consumed_input = 0;
         self.produced = 0;
+        self.origin = 0;
+    }
+
+    /// Continues a finished stream at input sample `sample`, after a gap. Returns the index of the
+    /// next output sample. Output samples remain at multiples of M/L input samples, and the mixer
+    /// continues its phase.
+    pub(crate) fn resume_at(&mut self, sample: u64) -> u64 {
+        let missing = sample % self.decimation as u64;
+        for pending in &mut self.pending {
+            pending.resize(pending.len() + missing as usize, Complex32::ZERO);
+        }
+        self.consumed_input = missing;
+        self.origin = sample / self.decimation as u64 * self.interpolation as u64;
+        self.origin
     }
 
     /// Processes a whole recording: [`push`](Self::push) and [`finish`](Self::finish).
@@ -394,12 +411,13 @@ impl FrontEnd {
     /// Returns the phase of the mixer at the first sample of the next output block, and its step
     /// per sample.
     fn block_phase(&self, tuning: &Tuning) -> (Complex64, Complex64) {
-        let hop_start = i128::from(self.produced) - self.margin as i128;
+        let next = self.origin + self.produced;
+        let hop_start = i128::from(next) - self.margin as i128;
         let start_input = hop_start / self.interpolation as i128 * self.decimation as i128;
         let bins =
             (i128::from(tuning.centre_bin) * start_input).rem_euclid(self.input_block as i128);
-        let cycles = bins as f64 / self.input_block as f64
-            + (tuning.residual_cycles * self.produced as f64).fract();
+        let cycles =
+            bins as f64 / self.input_block as f64 + (tuning.residual_cycles * next as f64).fract();
         (
             Complex64::cis(-TAU * cycles),
             Complex64::cis(-TAU * tuning.residual_cycles),

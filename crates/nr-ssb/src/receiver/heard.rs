@@ -4,6 +4,7 @@ use num_complex::{Complex32, Complex64};
 
 use super::window::Seen;
 use crate::dsp::channel_covariance::ChannelCovariance;
+use crate::observables::Observables;
 use crate::one_ssb::measure::Measurement;
 use crate::standard::grid::SUBCARRIERS;
 use crate::standard::message::payload::BchPayload;
@@ -43,6 +44,13 @@ pub struct HeardSsb {
     pub noise_variance: Vec<f64>,
     /// SS-RSRP, SS-RSRQ and SS-SINR for each antenna.
     pub measurements: Vec<Measurement>,
+    /// Delay, carrier phase, range rate and power. Sample positions are at the input's rate.
+    pub observables: Option<Observables>,
+    /// Amplitude of a resource element for each antenna, with the phase of the carrier phase, in the
+    /// scale of `channel`. Empty without `observables`.
+    pub amplitudes: Vec<Complex64>,
+    /// Noise variance of `amplitudes`.
+    pub amplitude_variance: Vec<f64>,
     /// Whether the SSB was received at its expected time; `false` for the first one after a search.
     pub tracked: bool,
 }
@@ -51,6 +59,13 @@ impl HeardSsb {
     /// Converts a received SSB; `ratio` is the number of input samples per sample at the base rate.
     pub(super) fn new<const A: usize>(seen: &mut Seen<'_, A>, ratio: f64) -> Self {
         let ssb = seen.ssb;
+        let observed = seen.tracker.observe(ssb);
+        let observables = observed.as_ref().map(|it| {
+            let mut at_input = it.observables;
+            at_input.delay.first_path_start *= ratio;
+            at_input.phase.reference_start *= ratio;
+            at_input
+        });
         let mut channel = vec![[Complex32::ZERO; SUBCARRIERS]; A];
         let channel_covariance = seen.tracker.channel(ssb.residual_delay, &mut channel);
         Self {
@@ -67,6 +82,9 @@ impl HeardSsb {
             blocks: ssb.blocks.iter().map(|block| block.to_vec()).collect(),
             noise_variance: ssb.noise_variance.to_vec(),
             measurements: ssb.measurements.to_vec(),
+            observables,
+            amplitudes: observed.map_or_else(Vec::new, |it| it.amplitudes.to_vec()),
+            amplitude_variance: observed.map_or_else(Vec::new, |it| it.amplitude_variance.to_vec()),
             tracked: seen.is_followed,
         }
     }

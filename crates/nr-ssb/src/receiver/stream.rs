@@ -24,6 +24,8 @@ pub struct StreamReceiver<const A: usize> {
     /// Samples at the base rate that may still be processed; the index of the first one is `start`.
     base: [Vec<Complex32>; A],
     start: i64,
+    /// Index of the next input sample.
+    next_input: u64,
     /// End of the samples for which a search has been decided.
     searched: i64,
 }
@@ -48,6 +50,7 @@ impl<const A: usize> StreamReceiver<A> {
             receiver: WindowReceiver::new(config)?,
             base: std::array::from_fn(|_| Vec::new()),
             start: 0,
+            next_input: 0,
             searched: 0,
         };
         made.go_on_at(0);
@@ -86,6 +89,7 @@ impl<const A: usize> StreamReceiver<A> {
         take: &mut dyn FnMut(Seen<'_, A>),
     ) -> Result<(), ReceiverError> {
         self.front_end.push(antennas, &mut self.base)?;
+        self.next_input += antennas.first().map_or(0, |it| it.len()) as u64;
         self.hear(false, take)
     }
 
@@ -99,8 +103,8 @@ impl<const A: usize> StreamReceiver<A> {
         sample: u64,
         take: &mut dyn FnMut(Seen<'_, A>),
     ) -> Result<(), ReceiverError> {
-        self.finish(take)?;
-        self.go_on_at((sample as f64 / self.input_per_output()).round() as i64);
+        self.end_segment(take)?;
+        self.resume_at(sample);
         Ok(())
     }
 
@@ -110,13 +114,24 @@ impl<const A: usize> StreamReceiver<A> {
     /// # Errors
     /// Those of [`push`](Self::push).
     pub fn finish(&mut self, take: &mut dyn FnMut(Seen<'_, A>)) -> Result<(), ReceiverError> {
+        self.end_segment(take)?;
+        self.resume_at(self.next_input);
+        Ok(())
+    }
+
+    fn end_segment(&mut self, take: &mut dyn FnMut(Seen<'_, A>)) -> Result<(), ReceiverError> {
         self.front_end.finish(&mut self.base);
         for samples in &mut self.base {
             samples.extend([Complex32::ZERO; GUARD as usize]);
         }
-        self.hear(true, take)?;
-        self.go_on_at(self.end() - GUARD as i64);
-        Ok(())
+        self.hear(true, take)
+    }
+
+    /// Continues at this input sample.
+    fn resume_at(&mut self, sample: u64) {
+        self.next_input = sample;
+        let next = self.front_end.resume_at(sample);
+        self.go_on_at(next as i64);
     }
 
     /// Removes beams and samples, for a restarted stream.
@@ -124,7 +139,7 @@ impl<const A: usize> StreamReceiver<A> {
         let mut unheard: [Vec<Complex32>; A] = std::array::from_fn(|_| Vec::new());
         self.front_end.finish(&mut unheard);
         self.receiver.reset();
-        self.go_on_at(0);
+        self.resume_at(0);
     }
 
     /// Returns the index after the last sample.

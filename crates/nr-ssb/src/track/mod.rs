@@ -16,6 +16,7 @@ mod error;
 mod frequency;
 mod index;
 mod late;
+mod observe;
 mod tracked;
 mod tracker;
 

@@ -11,12 +11,14 @@ use super::error::TrackError;
 use super::frequency::FrequencyLoop;
 use super::index::SsbIndex;
 use super::late::REACH;
+use super::observe::Observer;
 use super::tracked::Tracked;
 use crate::dsp::alignment::Alignment;
 use crate::dsp::base_rate::{CYCLIC_PREFIX, SYMBOL_FFT};
 use crate::dsp::channel_covariance::ChannelCovariance;
 use crate::dsp::timing;
 use crate::numeric::decibel::decibel;
+use crate::observables::Observed;
 use crate::one_ssb::acquire::{Acquired, Acquirer};
 use crate::one_ssb::broadcast::BroadcastDecoder;
 use crate::one_ssb::measure::measure;
@@ -51,6 +53,11 @@ pub struct Tracker<const A: usize> {
     frequency: FrequencyLoop,
     clock: ClockLoop,
     misses: u32,
+    /// Observables, if the carrier frequency is known.
+    observer: Option<Observer<A>>,
+    /// Demodulation of the last SSB, in a window whose first sample has the index `window_start`.
+    demodulation: Alignment,
+    window_start: f64,
 }
 
 impl<const A: usize> Tracker<A> {
@@ -79,6 +86,14 @@ impl<const A: usize> Tracker<A> {
             frequency: FrequencyLoop::new(cell, base_rate_hz),
             clock: ClockLoop::new(cell.sample_start, cell.cfo_hz, carrier_hz, base_rate_hz),
             misses: 0,
+            observer: carrier_hz.map(|hz| Observer::new(config.spacing, hz)),
+            demodulation: Alignment {
+                start: 0,
+                delay: 0.0,
+                cfo_cycles: 0.0,
+                phase_step: 0.0,
+            },
+            window_start: 0.0,
         })
     }
 
@@ -95,6 +110,10 @@ impl<const A: usize> Tracker<A> {
         self.clock.found(cell.sample_start, samples);
         self.index.follow(cell.ssb_index);
         self.misses = 0;
+        // Missing samples, or a restarted mixer, may be the reason of the search.
+        if let Some(observer) = &mut self.observer {
+            observer.forget();
+        }
     }
 
     /// Returns the filtered carrier frequency offset in Hz.
@@ -151,6 +170,7 @@ impl<const A: usize> Tracker<A> {
         };
         self.misses = 0;
         tracked.sample_start += window_start;
+        self.window_start = window_start;
         let sent_after = self.clock.sent_after(tracked.sample_start);
         tracked.ssb_index = match tracked.payload {
             Some(payload) => payload.ssb_index,
@@ -224,6 +244,13 @@ impl<const A: usize> Tracker<A> {
         estimate.covariance().delayed(residual_delay)
     }
 
+    /// Returns delay, carrier phase, range rate and power of the last SSB, which [`track`](Self::track)
+    /// returned; `None` without a carrier frequency. Each SSB is passed once, in order of time.
+    pub fn observe(&mut self, ssb: &Tracked<A>) -> Option<Observed<A>> {
+        let observer = self.observer.as_mut()?;
+        Some(observer.observe(ssb, &self.acquirer, &self.demodulation, self.window_start))
+    }
+
     /// Returns the burst set size: decoded, or the more probable one.
     pub const fn lmax(&self) -> Lmax {
         self.index.lmax()
@@ -277,6 +304,7 @@ impl<const A: usize> Tracker<A> {
         {
             return None;
         }
+        let demodulation = alignment;
         alignment.shift(delay)?;
         let known: f64 = pilots.iter().map(|count| f64::from(*count)).sum();
         let mut snr = 0.0;
@@ -287,6 +315,7 @@ impl<const A: usize> Tracker<A> {
             snr += power / noise.max(1e-30) / A as f64;
             measure(&grids[antenna], power, noise)
         });
+        self.demodulation = demodulation;
         let half_frame = match (payload, self.index.lmax()) {
             (Some(BchPayload { half_frame, .. }), _) => Some(half_frame),
             (None, Lmax::L4) => Some(ibar_ssb >= 4),

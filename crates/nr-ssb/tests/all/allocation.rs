@@ -74,6 +74,8 @@ fn warm_tracking_allocates_nothing() {
         ] {
             let seen = tracker.track(window, 0.0, expected, decode_pbch).unwrap();
             assert_eq!(seen.is_some(), there);
+            let observed = seen.and_then(|ssb| tracker.observe(&ssb));
+            assert_eq!(observed.is_some(), there);
         }
     };
     visit();
