@@ -33,10 +33,9 @@ impl Engine {
             inbox.give_back(block.antennas); // arrived after the gate was closed
             return Ok(());
         }
-        let pending_s = self.pending.length() as f64 / self.rate_hz();
-        let is_next = (self.pending.time_s + pending_s - block.time_s).abs() < 0.5 / self.rate_hz();
-        if pending_s > 0.0 && !is_next {
+        if self.pending.length() > 0 && !self.pending.continues_in(&block, self.rate_hz()) {
             self.receive(true)?;
+            self.publish_heard(Some(came))?;
         }
         self.pending.append(&block);
         inbox.give_back(block.antennas);

@@ -6,6 +6,18 @@ const RATE_ERROR: f64 = 1e-4;
 /// Minimum time by which a block of a restarted stream precedes the end of the last block (s).
 const RESTART_S: f64 = 1.0;
 
+/// Resolution of the time of a block, in seconds: that of the number, and one sample.
+fn resolution_s(time_s: f64, rate_hz: f64) -> f64 {
+    (2.0 * time_s.abs() * f64::EPSILON).max(1.0 / rate_hz)
+}
+
+/// Returns the maximum time in seconds between the end of a block of `length` samples and the start
+/// of the next block at `time_s`, if they are contiguous. Unix times have a resolution of one sample
+/// at 4 Msps.
+pub fn contiguity_tolerance_s(time_s: f64, rate_hz: f64, length: usize) -> f64 {
+    2.0 * resolution_s(time_s, rate_hz) + RATE_ERROR * length as f64 / rate_hz
+}
+
 /// Relation of a block of samples to the previous one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Continuity {
@@ -82,10 +94,9 @@ impl StreamClock {
             return (Continuity::First, 0);
         };
         let late_s = time_s - self.time_s(next as f64);
-        // Resolution of the time stamp and of one sample.
-        let resolution_s = (2.0 * time_s.abs() * f64::EPSILON).max(1.0 / self.rate_hz);
-        let drift_s = RATE_ERROR * self.last_length as f64 / self.rate_hz;
-        let (continuity, left_out) = if late_s.abs() <= 2.0 * resolution_s + drift_s {
+        let resolution_s = resolution_s(time_s, self.rate_hz);
+        let tolerance_s = contiguity_tolerance_s(time_s, self.rate_hz, self.last_length);
+        let (continuity, left_out) = if late_s.abs() <= tolerance_s {
             self.keep_to(next, time_s, resolution_s);
             (Continuity::Contiguous, 0)
         } else if late_s > 0.0 {
