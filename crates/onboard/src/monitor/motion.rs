@@ -22,6 +22,8 @@ use super::fault::Fault;
 const STANDSTILL_INTERVAL_S: f64 = 0.5;
 /// Maximum speed of a standing vehicle, in m/s.
 const STANDING_MPS: f64 = 0.01;
+/// Minimum speed of a vehicle that does not stand, in m/s, where standstill is confirmed.
+const LEAST_MOVING_MPS: f64 = 0.5;
 /// Maximum motion between two angles at standstill, in metres and radians.
 const STANDING_M: f64 = 0.02;
 const STANDING_RAD: f64 = 0.1;
@@ -112,6 +114,8 @@ pub struct MotionMonitor {
     references: Vec<Reference>,
     last: Option<OdometrySample>,
     yaw_rad: f64,
+    /// Last speed other than standstill, without sign, in m/s.
+    moving_mps: f64,
     standing_since_s: Option<f64>,
     received_s: f64,
     suspicions: u32,
@@ -127,6 +131,7 @@ impl MotionMonitor {
             references: Vec::with_capacity(heads),
             last: None,
             yaw_rad: 0.0,
+            moving_mps: LEAST_MOVING_MPS,
             standing_since_s: None,
             received_s: f64::NEG_INFINITY,
             suspicions: 0,
@@ -154,6 +159,9 @@ impl MotionMonitor {
         let last = self.last.replace(*sample).unwrap_or(*sample);
         let duration_s = sample.time_s - last.time_s;
         self.yaw_rad += sample.yaw_rate_radps.unwrap_or(0.0) * duration_s;
+        if sample.speed_mps.abs() > STANDING_MPS {
+            self.moving_mps = sample.speed_mps.abs().max(LEAST_MOVING_MPS);
+        }
         let change_mps = (sample.speed_mps - last.speed_mps).abs();
         let is_sudden = change_mps >= SUDDEN_MPS && change_mps > FRICTION_MPS2 * duration_s;
         let fault = if !is_sudden || last.speed_mps.abs() < SUDDEN_MPS {
@@ -269,24 +277,30 @@ impl MotionMonitor {
         };
         let age_s = seen.time_s - reference.time_s;
         let stands = moved_m.abs() <= STANDING_M && turned_rad.abs() <= STANDING_RAD;
-        let change_rad = |share: f64, turn_rad: f64| {
-            let pose = reference.pose.along_chord(share * moved_m, turn_rad);
+        let change_rad = |moved_m: f64, turn_rad: f64| {
+            let pose = reference.pose.along_chord(moved_m, turn_rad);
             let residual_rad =
                 (self.sight).residual_rad(seen.kind, pose, &seen.head, seen.value_rad);
             wrap_angle(residual_rad - reference.residual_rad)
         };
         let mut next = reference;
         let mut has_served = false;
-        if reference.is_stale {
+        // The fading of the last centimetres before a stop is not that of the standstill.
+        let is_of_motion = |since_s: f64| reference.time_s < since_s;
+        if reference.is_stale || (stands && self.standing_since_s.is_some_and(is_of_motion)) {
             has_served = true;
         } else if stands && self.standing_since_s.is_some() {
             let variance = seen.variance + reference.variance + 2.0 * STANDING_SIGMA_RAD.powi(2);
-            let squared = change_rad(1.0, turned_rad).powi(2) / variance;
+            let change = change_rad(moved_m, turned_rad);
+            let squared = change.powi(2) / variance;
+            // An angle confirms the standstill if continued motion would have changed it.
+            let driven_rad = change_rad(self.moving_mps * age_s, 0.0);
+            let is_distinct = wrap_angle(driven_rad - change).powi(2) / variance >= DISTINCT;
             burst.standing += 1;
             burst.sum += squared;
             burst.largest = burst.largest.max(squared);
             if squared < OUTLIER {
-                burst.good += 1;
+                burst.good += u32::from(is_distinct);
                 next.jumped_s = None;
             } else {
                 burst.bad += 1;
@@ -299,8 +313,8 @@ impl MotionMonitor {
             }
         } else if has_pose {
             let variance = seen.variance + reference.variance + 2.0 * MOVING_SIGMA_RAD.powi(2);
-            let expected_rad = change_rad(1.0, turned_rad);
-            let others_rad = [change_rad(0.0, 0.0), change_rad(-1.0, turned_rad)];
+            let expected_rad = change_rad(moved_m, turned_rad);
+            let others_rad = [change_rad(0.0, 0.0), change_rad(-moved_m, turned_rad)];
             let apart = others_rad.map(|it| wrap_angle(it - expected_rad).powi(2) / variance);
             let is_distinct = apart.iter().any(|it| *it >= DISTINCT);
             has_served = is_distinct || age_s > MOVING_AGE_S;
@@ -371,7 +385,8 @@ impl MotionMonitor {
 
     /// Notes whether the angles of a burst contradict or confirm the odometry.
     fn judge_odometry(&mut self, burst: &Burst, now_s: f64) {
-        let is_wrong = burst.bad > 1 || (burst.bad == 1 && burst.good == 0);
+        // While the odometry stands, the vehicle's motion changes the angles of near radio heads first.
+        let is_wrong = burst.bad > 1 || (burst.bad == 1 && (burst.good == 0 || burst.standing > 0));
         if is_wrong {
             self.confirmed = (now_s, 0);
         } else {
