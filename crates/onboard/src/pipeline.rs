@@ -272,7 +272,8 @@ impl Onboard {
         let estimate = localizer.pose(newest.time_s)?;
         let (localizer, first) = match change {
             Change::Begin => {
-                let localizer = monitors.fallback.begin(estimate.pose)?;
+                let pose = monitors.take_free_pose().unwrap_or(estimate.pose);
+                let localizer = monitors.fallback.begin(pose)?;
                 (localizer, monitors.fallback.odometry(&newest))
             }
             Change::End => (monitors.fallback.end(&estimate)?, newest),
@@ -374,7 +375,8 @@ impl Onboard {
         let newest_s = self.odometry.map_or(time_s, |sample| sample.time_s);
         let estimate = localizer.pose(newest_s.max(time_s))?;
         let is_known = localizer.hypotheses().is_none();
-        monitors.angles(time_s, &self.burst, is_known.then_some(estimate.pose));
+        let (pose, ekf) = (is_known.then_some(estimate.pose), localizer.ekf());
+        monitors.angles(time_s, &self.burst, pose, ekf);
         if monitors.is_without_odometry() {
             monitors.fallback.received(&estimate);
         }

@@ -32,6 +32,14 @@ pub enum Fault {
         /// Numbers of the channels, from 0, in increasing order.
         channels: [u8; 2],
     },
+    /// The signal of an SSB comes from two directions: two radio heads have one PCI, or a reflection is as strong as the
+    /// direct signal.
+    DuplicatePci {
+        /// PCI of the SSB.
+        pci: u16,
+        /// Index of the SSB.
+        ssb_index: u8,
+    },
 }
 
 /// The part that a fault belongs to.
@@ -42,6 +50,8 @@ pub enum FaultSource {
     Odometry,
     /// A receive channel, by its number from 0.
     Channel(u8),
+    /// A radio head, by its PCI.
+    RadioHead(u16),
 }
 
 impl Fault {
@@ -54,6 +64,7 @@ impl Fault {
             Self::DeadChannel { .. } => "dead_channel",
             Self::InvertedChannel { .. } => "inverted_channel",
             Self::ExchangedChannels { .. } => "exchanged_channels",
+            Self::DuplicatePci { .. } => "duplicate_pci",
         }
     }
 
@@ -69,10 +80,11 @@ impl Fault {
             Self::ExchangedChannels {
                 channels: [channel, _],
             } => FaultSource::Channel(channel),
+            Self::DuplicatePci { pci, .. } => FaultSource::RadioHead(pci),
         }
     }
 
-    /// Numbers of the channels for metrics; empty for the odometry.
+    /// Numbers of the channels, or PCI, for metrics; empty for the odometry.
     pub fn subject(self) -> String {
         match self {
             Self::ExchangedChannels {
@@ -81,6 +93,7 @@ impl Fault {
             other => match other.source() {
                 FaultSource::Odometry => String::new(),
                 FaultSource::Channel(channel) => channel.to_string(),
+                FaultSource::RadioHead(pci) => pci.to_string(),
             },
         }
     }
@@ -91,6 +104,9 @@ impl Fault {
             FaultSource::Odometry => "stop; check the odometer and the source of the odometry",
             FaultSource::Channel(_) => {
                 "stop; check the cables from the antennas to the receiver, and samples.stream.antennas"
+            }
+            FaultSource::RadioHead(_) => {
+                "give each radio head a PCI of its own; check for reflections"
             }
         }
     }
@@ -116,6 +132,11 @@ impl fmt::Display for Fault {
             Self::ExchangedChannels {
                 channels: [first, second],
             } => write!(f, "receive channels {first} and {second} are exchanged"),
+            Self::DuplicatePci { pci, ssb_index } => write!(
+                f,
+                "the signal of PCI {pci}, SSB index {ssb_index} comes from two directions: two radio heads have this PCI, \
+                 or a reflection is as strong"
+            ),
         }
     }
 }
@@ -156,6 +177,12 @@ impl ActiveFaults {
         faults.find(|it| it.source() == FaultSource::Odometry)
     }
 
+    /// Whether the odometry or a receive channel is at fault: every burst is received until it ends.
+    pub fn has_of_vehicle(&self) -> bool {
+        self.iter()
+            .any(|it| !matches!(it.fault.source(), FaultSource::RadioHead(_)))
+    }
+
     /// Whether a receive channel is at fault: the localizer then gets no angles.
     pub fn has_channel(&self) -> bool {
         self.iter()
@@ -178,10 +205,21 @@ impl ActiveFaults {
         })
     }
 
-    /// Adds a fault that was detected at a time (s). A fault beyond the eighth is not kept.
+    /// Adds a fault that was detected at a time (s). A fault beyond the eighth is not kept, unless a fault of the vehicle
+    /// can replace that of a radio head.
     pub fn begin(&mut self, fault: Fault, since_s: f64) {
         if self.contains(fault) {
             return;
+        }
+        let is_of_head = |it: Fault| matches!(it.source(), FaultSource::RadioHead(_));
+        if self.0.iter().all(Option::is_some) && !is_of_head(fault) {
+            let last = self
+                .0
+                .iter_mut()
+                .rfind(|it| it.is_some_and(|it| is_of_head(it.fault)));
+            if let Some(last) = last {
+                *last = None;
+            }
         }
         if let Some(free) = self.0.iter_mut().find(|it| it.is_none()) {
             *free = Some(ActiveFault { fault, since_s });
@@ -220,9 +258,18 @@ mod tests {
         assert_eq!(faults.iter().map(|it| it.fault).collect::<Vec<_>>(), [dead]);
         faults.end(dead);
         assert!(faults.is_empty() && faults == ActiveFaults::default());
+        for pci in 0..20 {
+            let ssb_index = 0;
+            faults.begin(Fault::DuplicatePci { pci, ssb_index }, 0.0);
+        }
+        assert_eq!(faults.iter().count(), MAX_FAULTS);
+        assert!(!faults.has_of_vehicle());
+        faults.begin(Fault::OdometryFrozen, 0.0);
+        assert_eq!(faults.of_odometry(), Some(Fault::OdometryFrozen));
         for channel in 0..20 {
             faults.begin(Fault::DeadChannel { channel }, 0.0);
         }
         assert_eq!(faults.iter().count(), MAX_FAULTS);
+        assert_eq!(faults.of_odometry(), Some(Fault::OdometryFrozen));
     }
 }

@@ -5,20 +5,25 @@
 
 mod channels;
 mod confirmation;
+mod constancy;
 mod contradiction;
+mod directions;
 mod fallback;
 mod fault;
 mod motion;
 
 pub use channels::ChannelMonitor;
 pub use confirmation::Confirmation;
+pub use constancy::Constancy;
 pub use contradiction::Contradiction;
+pub use directions::DirectionMonitor;
 pub use fallback::Fallback;
 pub use fault::{ActiveFault, ActiveFaults, Fault, FaultSource};
 pub use motion::MotionMonitor;
 
 use crate::geometry::Pose;
-use crate::localize::{AngleUpdate, UpdateReason};
+use crate::localize::modes::OdometryTest;
+use crate::localize::{AngleUpdate, Ekf, UpdateReason};
 use crate::observation::{OdometrySample, SsbObservation};
 use crate::settings::{Site, Vehicle};
 use crate::sight::Sight;
@@ -37,7 +42,11 @@ pub enum Change {
 pub struct Monitors {
     contradiction: Contradiction,
     motion: MotionMonitor,
+    constancy: Constancy,
+    /// Test of a suspicious odometry.
+    test: Option<Box<OdometryTest>>,
     channels: ChannelMonitor,
+    directions: DirectionMonitor,
     /// Confirmation of a given pose: until then every burst is received.
     confirmation: Confirmation,
     distance_m: f64,
@@ -54,7 +63,10 @@ impl Monitors {
         Self {
             contradiction: Contradiction::default(),
             motion: MotionMonitor::new(Sight::new(vehicle), heads),
+            constancy: Constancy::default(),
+            test: None,
             channels: ChannelMonitor::new(site, vehicle, heads),
+            directions: DirectionMonitor::new(site, vehicle, heads),
             confirmation: Confirmation::new(false, heads),
             distance_m: 0.0,
             fallback: Fallback::new(site, vehicle),
@@ -79,6 +91,7 @@ impl Monitors {
             self.faults.end(fault);
         }
         self.is_without_odometry = false;
+        self.test = None;
         self.motion.restart();
         self.confirmation.restart();
     }
@@ -93,6 +106,7 @@ impl Monitors {
     /// Starts again with another odometry.
     pub fn forget_odometry(&mut self) {
         self.contradiction = Contradiction::default();
+        self.constancy = Constancy::default();
         self.motion.forget();
         self.restart();
     }
@@ -105,6 +119,12 @@ impl Monitors {
             self.faults.begin(fault, sample.time_s);
         }
         self.distance_m = sample.distance_m;
+        self.constancy.odometry(sample);
+        if !self.constancy.is_suspicious() {
+            self.test = None;
+        } else if let Some(test) = &mut self.test {
+            test.odometry(sample);
+        }
         if self.contradiction.odometry(sample) {
             self.faults
                 .begin(Fault::OdometryContradictory, sample.time_s);
@@ -120,7 +140,10 @@ impl Monitors {
 
     /// Whether the burst at a time (s) is to be received, whatever the wake-up policy says.
     pub fn wants(&self, time_s: f64) -> bool {
-        !self.faults.is_empty() || !self.confirmation.is_confirmed() || self.motion.wants(time_s)
+        self.faults.has_of_vehicle()
+            || !self.confirmation.is_confirmed()
+            || self.constancy.is_suspicious()
+            || self.motion.wants(time_s)
     }
 
     /// Notes that the burst at a time (s) is received.
@@ -131,36 +154,70 @@ impl Monitors {
     /// Takes in an SSB as the array received it.
     pub fn ssb(&mut self, observation: &SsbObservation) {
         let (faults, time_s) = (&mut self.faults, observation.ssb.time_s);
-        (self.channels).ssb(observation, self.distance_m, &mut |fault, begins| {
+        let mut change = |fault, begins| {
             if begins {
                 faults.begin(fault, time_s);
             } else {
                 faults.end(fault);
             }
-        });
+        };
+        (self.channels).ssb(observation, self.distance_m, &mut change);
+        (self.directions).ssb(observation, self.distance_m, &mut change);
     }
 
     /// Takes in the angles of a burst at a time (s), given the pose at the newer of odometry and burst, `None` while it is
-    /// searched for.
-    pub fn angles(&mut self, time_s: f64, updates: &[AngleUpdate], pose: Option<Pose>) {
+    /// searched for. `ekf` is the filter of the localizer, if the pose is known.
+    pub fn angles(
+        &mut self,
+        time_s: f64,
+        updates: &[AngleUpdate],
+        pose: Option<Pose>,
+        ekf: Option<&Ekf>,
+    ) {
         for update in updates {
             let verdict = update.verdict;
             if verdict.accepted || verdict.reason == UpdateReason::Outlier {
                 self.confirmation.angle(update.head.pci, verdict.accepted);
             }
         }
-        let found = self.motion.angles(updates, pose);
+        let found = (self.motion.angles(updates, pose)).or_else(|| self.test(updates, ekf));
         let by_angles = [Fault::OdometryFrozen, Fault::OdometryReversed];
         match (self.faults.of_odometry(), found) {
             (None, Some(fault)) => {
                 self.faults.begin(fault, time_s);
                 self.motion.restart();
+                self.constancy.mark_fault();
             }
-            (Some(fault), _) if by_angles.contains(&fault) && self.motion.is_confirmed(time_s) => {
+            (Some(fault), _)
+                if by_angles.contains(&fault)
+                    && self.motion.is_confirmed(time_s)
+                    && !self.constancy.is_suspicious() =>
+            {
                 self.faults.end(fault);
             }
             _ => {}
         }
+    }
+
+    /// Tests a suspicious odometry by the angles of a burst. Returns the fault that they show.
+    fn test(&mut self, updates: &[AngleUpdate], ekf: Option<&Ekf>) -> Option<Fault> {
+        if self.is_without_odometry || !self.constancy.is_suspicious() {
+            return None;
+        }
+        match (&mut self.test, ekf) {
+            (Some(test), _) => test.angles(updates),
+            (None, Some(ekf)) => self.test = Some(Box::new(OdometryTest::new(ekf))),
+            (None, None) => {}
+        }
+        let is_fault = self.test.as_deref().is_some_and(OdometryTest::is_fault);
+        is_fault.then_some(Fault::OdometryFrozen)
+    }
+
+    /// Ends the test of the odometry, if it runs. Returns the pose of its filter that does not depend on the odometry.
+    pub fn take_free_pose(&mut self) -> Option<Pose> {
+        let test = self.test.take()?;
+        let free = test.free();
+        Some(free.pose(free.time_s()).pose)
     }
 
     /// Returns the change of the localizer that is due.

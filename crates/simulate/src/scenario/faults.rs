@@ -48,6 +48,8 @@ pub enum FaultKind {
     },
     /// The odometry repeats the values of its last sample before the fault.
     OdometerFrozen,
+    /// The odometry repeats the speed of its last sample before the fault; the distance advances at this speed.
+    OdometerHeld,
     /// The odometry reports no motion: constant distance, zero speed and zero yaw rate.
     OdometerStopped,
     /// The odometry reports motion of the wrong sign.
@@ -149,6 +151,7 @@ impl FaultSettings {
             }
             FaultKind::OdometerSlip { .. }
             | FaultKind::OdometerFrozen
+            | FaultKind::OdometerHeld
             | FaultKind::OdometerStopped
             | FaultKind::OdometerReversed => Ok(()),
         }

@@ -117,6 +117,13 @@ impl Faults {
                 ..last
             };
         }
+        if is(FaultKind::OdometerHeld) {
+            sample = OdometrySample {
+                time_s,
+                distance_m: last.distance_m + last.speed_mps * (time_s - last.time_s),
+                ..last
+            };
+        }
         if is(FaultKind::OdometerStopped) {
             sample.distance_m = last.distance_m;
             sample.speed_mps = 0.0;

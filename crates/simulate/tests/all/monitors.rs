@@ -2,6 +2,7 @@
 
 use onboard::localize::IntegrityState;
 use onboard::monitor::Fault;
+use onboard::settings::{Shipped, TomlFile};
 use simulate::scenario::{FaultKind, FaultSettings, Scenario};
 use simulate::{RunRecord, Step};
 
@@ -131,6 +132,38 @@ fn a_departure_that_the_odometry_misses_is_detected_by_the_angles() {
     }
 }
 
+/// The odometry repeats its cruising speed while the vehicle brakes with 0.5 m/s² before its first stop.
+#[test]
+fn odometry_held_at_its_speed_is_detected_while_the_vehicle_brakes() {
+    let nominal = drives(&shipped("yard"), 5, 1).remove(0);
+    assert!(nominal.steps.iter().all(|it| it.faults.is_empty()));
+    let stands = |pair: &[Step]| pair[0].truth.point().distance_m(pair[1].truth.point()) == 0.0;
+    let mut pairs = nominal.steps.windows(2).skip(500);
+    let stop_s = pairs.find(|it| stands(it)).unwrap()[0].time_s;
+    let (cruise_mps, braking_mps2) = (15.0 / 3.6, 0.5);
+    let from_s = stop_s - cruise_mps / braking_mps2;
+    let fault = FaultSettings {
+        from_s,
+        until_s: from_s + 20.0,
+        what: FaultKind::OdometerHeld,
+    };
+    let scenario = Scenario {
+        faults: vec![fault],
+        ..shipped("yard")
+    };
+    for run in drives(&scenario, 5, 1) {
+        let first = run.steps.iter().find(|it| !it.faults.is_empty()).unwrap();
+        assert!(
+            first.faults.contains(Fault::OdometryFrozen),
+            "{:?}",
+            first.faults
+        );
+        let since_s = first.time_s - from_s;
+        // The radio heads are 50 m away, so that their angles change slowly.
+        assert!(since_s > 0.0 && since_s < 5.0, "{since_s}");
+    }
+}
+
 #[test]
 fn faults_of_the_channels_are_detected_within_twenty_ssbs() {
     for (what, expected) in [
@@ -172,6 +205,40 @@ fn faults_of_the_channels_are_detected_within_twenty_ssbs() {
                 .find(|it| it.time_s > UNTIL_S && it.faults.is_empty());
             assert!(ended.unwrap().time_s < UNTIL_S + 10.0, "{what:?}");
         }
+    }
+}
+
+/// A second transmitter 80 m from a radio head, with its PCI and SSB index. The site's scatter is 20 dB below the line of
+/// sight. "Reported within 20 SSBs" counts those of the radio head whose angles were estimated.
+#[test]
+fn two_radio_heads_with_one_pci_are_reported_within_twenty_ssbs() {
+    let fault = FaultSettings {
+        from_s: FROM_S,
+        until_s: UNTIL_S,
+        what: FaultKind::DuplicateHead {
+            radio_head: 0,
+            by_m: [60.0, -50.0],
+        },
+    };
+    let overrides = [("site.rician_k_db", 20.0.into())];
+    let scenario = Scenario {
+        faults: vec![fault],
+        ..shipped("yard").with_overrides(overrides, &Shipped).unwrap()
+    };
+    for run in drives(&scenario, 6, 2) {
+        let [before, during] = faulty(&run);
+        assert!(before.is_empty(), "{:?}", before[0].faults);
+        let first = during.first().unwrap();
+        let found = first.faults.iter().next().unwrap().fault;
+        let Fault::DuplicatePci { pci, .. } = found else {
+            panic!("{found:?}");
+        };
+        let of_head = run.executions.iter().filter(|it| it.ssb.pci == pci);
+        let times = of_head.map(|it| it.ssb.time_s);
+        let ssbs = times
+            .filter(|it| (FROM_S..first.time_s).contains(it))
+            .count();
+        assert!(ssbs <= 20, "{ssbs}");
     }
 }
 

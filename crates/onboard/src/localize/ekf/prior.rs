@@ -141,6 +141,11 @@ impl Ekf {
         self.config.datum_std_m = self.config.datum_std_m.hypot(std_m);
     }
 
+    /// Sets the odometer noise, so that angles determine the distance (m/√m).
+    pub(in crate::localize) const fn expect_free_motion(&mut self, m_per_sqrt_m: f64) {
+        self.config.noise.odometer_m_per_sqrt_m = m_per_sqrt_m;
+    }
+
     /// Multiplies the odometer noise.
     pub(in crate::localize) fn scale_odometer_noise(&mut self, times: f64) {
         let noise = &mut self.config.noise;

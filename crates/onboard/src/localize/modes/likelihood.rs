@@ -47,6 +47,11 @@ impl LikelihoodRatio {
         Self((self.0 - other.0).clamp(-CERTAIN, CERTAIN))
     }
 
+    /// Returns the logarithm.
+    pub const fn value(self) -> f64 {
+        self.0
+    }
+
     /// Whether the angles contradict the mode.
     pub const fn is_against(self) -> bool {
         self.0 < 0.0

@@ -4,11 +4,13 @@
 mod bank;
 mod likelihood;
 mod noise_ratio;
+mod odometry_test;
 mod subsets;
 mod table;
 
 pub(in crate::localize) use bank::Bank;
 pub(in crate::localize) use likelihood::{CERTAIN, log_likelihood, log_likelihood_as_stated};
+pub use odometry_test::OdometryTest;
 pub use subsets::HeadTest;
 pub(in crate::localize) use subsets::RECOVERY_S;
 pub(in crate::localize) use table::ModeId;
