@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 # Time at which the odometry stops, while the vehicle drives on (s).
-STOPS_S = 8.0
+STOPS_S = 26.0
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("drive")
     changes = {"vehicle.receiver.lateness_std_s": 0.0, "vehicle.acceleration_mps2": 2.0}
     scenario = access_av.Scenario.load("yard").with_overrides(changes)
-    drives.log_angles(scenario, directory, duration_s=12.0)
+    drives.log_angles(scenario, directory, duration_s=30.0)
     return directory
 
 
@@ -53,7 +53,7 @@ def test_a_fault_that_lasts_is_a_remark_and_a_diagnosis(drive: Path, tmp_path: P
     assert float(begun[0].split()[3]) == pytest.approx(STOPS_S, abs=2.0)
     (diagnosis,) = found.diagnoses
     # When it is since, what it is, and what to do.
-    assert "since 8." in diagnosis or "since 9." in diagnosis, diagnosis
+    assert any(f"since {second}." in diagnosis for second in (26, 27)), diagnosis
     assert "the odometry is frozen" in diagnosis
     assert "check the odometer" in diagnosis
 
