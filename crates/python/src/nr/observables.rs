@@ -63,7 +63,7 @@ use pyo3::prelude::*;
 ///     float64, `(3, 3)`: covariance of delay (s), carrier phase (rad) and the frequency offset
 ///     within this SSB (Hz).
 #[derive(Clone)]
-#[pyclass(frozen, get_all, skip_from_py_object, module = "access_av._core.nr")]
+#[pyclass(frozen, get_all, module = "access_av._core.nr")]
 pub struct Observables {
     first_path_start: f64,
     delay_offset_s: f64,
