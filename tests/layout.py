@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import os
 import shutil
 from pathlib import Path
@@ -65,6 +67,20 @@ axe.run(document, { resultTypes: ["violations"] }).then((it) => it.violations
 """
 
 
+# Texts of a chart that are labels of points, with their boxes; those of axes and legend are not.
+TEXTS = """
+(() => [...document.querySelectorAll('#%s svg .mark-text.role-mark text')]
+  .filter(it => it.textContent.trim())
+  .map(it => { const box = it.getBoundingClientRect();
+    return [it.textContent, box.left, box.top, box.right, box.bottom]; }))()
+"""
+POINTS = """
+(() => [...document.querySelectorAll('#%s svg .mark-symbol.role-mark path')]
+  .map(it => { const box = it.getBoundingClientRect();
+    return [(box.left + box.right) / 2, (box.top + box.bottom) / 2, box.width / 2]; }))()
+"""
+
+
 def chromium() -> str | None:
     """Returns the browser, or skips without one."""
     return shutil.which("chromium") or shutil.which("chromium-browser")
@@ -86,4 +102,51 @@ def hindrances(browser: Browser) -> list[str]:
     """Serious and critical findings of axe, if ``ACCESS_AV_AXE`` is the path of ``axe.min.js``."""
     browser.evaluate(Path(os.environ["ACCESS_AV_AXE"]).read_text("utf-8") + ";0")
     found: list[str] = browser.evaluate(AXE)
+    return found
+
+
+def names(label: str) -> list[str]:
+    """Returns the names that a label lists: "1, 3–5" are 1, 3, 4 and 5."""
+    found: list[str] = []
+    for part in filter(None, label.split(", ")):
+        first, _, last = part.partition("–")
+        found += [first] if not last else [str(it) for it in range(int(first), int(last) + 1)]
+    return found
+
+
+def label_faults(browser: Browser, chart: str, spec: dict[str, Any], width: int) -> list[str]:
+    """Returns missing labels of a chart of placed points, and those that cover something.
+
+    A chart is drawn in a window of ``width`` pixels. All rows with a label column are points.
+    """
+    browser.wait_for(f"document.querySelector('#{chart} svg .role-mark text')", seconds=60.0)
+    browser.wait_for(
+        f"document.querySelector('#{chart} svg').getBoundingClientRect().width <= {width}"
+    )
+    # A resized chart is drawn again after a frame.
+    browser.evaluate("new Promise(done => setTimeout(done, 500))")
+    texts, points = browser.evaluate(TEXTS % chart), browser.evaluate(POINTS % chart)
+    edge = browser.evaluate(f"document.querySelector('#{chart} svg').getBoundingClientRect().right")
+    [rows] = [rows for rows in spec["datasets"].values() if "label" in rows[0]]
+    expected = sorted(it for row in rows for it in names(row["label"]))
+    shown = sorted(it for text, *_ in texts for it in names(text))
+    found = [] if shown == expected else [f"{shown} instead of {expected}"]
+    if len(expected) < len(rows):
+        found.append(f"{len(rows) - len(expected)} points have no name")
+    if len(points) < len(texts):
+        found.append(f"{len(points)} points")
+    for (one, *first), (other, *second) in itertools.combinations(texts, 2):
+        wide = min(first[2], second[2]) - max(first[0], second[0])
+        high = min(first[3], second[3]) - max(first[1], second[1])
+        # Boxes of a text contain 3 px of empty space above and below its digits.
+        if min(wide, high - 3.0) > 0.0:
+            found.append(f"{one} covers {other}")
+    for text, left, top, right, bottom in texts:
+        if left < 0.0 or right > edge + 1.0:
+            found.append(f"{text} is cut")
+        for x, y, radius in points:
+            dx = max(left - x, x - right, 0.0)
+            dy = max(top + 3.0 - y, y - bottom + 3.0, 0.0)
+            if math.hypot(dx, dy) <= radius - 1.0:
+                found.append(f"{text} covers a point")
     return found

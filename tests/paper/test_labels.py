@@ -12,6 +12,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+import layout
 import synthetic
 from access_av.report.labels import COINCIDENT_PX, HEIGHT_PX, WIDTHS_PX, domain, placed
 from access_av.report.paper.evaluation import render
@@ -22,18 +23,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 CHARTS = ("overview", "design-x", "design-y", "design-space")
-# Texts of a chart that are labels of points, with their boxes; those of axes and legend are not.
-TEXTS = """
-(() => [...document.querySelectorAll('#%s svg .mark-text.role-mark text')]
-  .filter(it => it.textContent.trim())
-  .map(it => { const box = it.getBoundingClientRect();
-    return [it.textContent, box.left, box.top, box.right, box.bottom]; }))()
-"""
-POINTS = """
-(() => [...document.querySelectorAll('#%s svg .mark-symbol.role-mark path')]
-  .map(it => { const box = it.getBoundingClientRect();
-    return [(box.left + box.right) / 2, (box.top + box.bottom) / 2, box.width / 2]; }))()
-"""
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -46,7 +35,7 @@ def test_labels_of_random_points_cover_nothing(seed: int) -> None:
     rows = pl.DataFrame({"number": np.arange(1, 15), "x": x, "y": y})
     ends_x, ends_y = domain(x.tolist()), domain(y.tolist())
     found = placed(rows, "number", ("x", ends_x, False), ("y", ends_y, False), height_px)
-    named = [int(it) for text in found["label"] if text for it in text.split(", ")]
+    named = [int(it) for text in found["label"] for it in layout.names(text)]
     assert sorted(named) == list(range(1, 15))
     for width_px in WIDTHS_PX:
         px = width_px * (x - ends_x[0]) / (ends_x[1] - ends_x[0])
@@ -94,26 +83,4 @@ def test_every_point_of_the_page_is_numbered_without_overlap(
     browser, charts = page
     browser.resize(width, 900)
     for name in CHARTS:
-        browser.wait_for(f"document.querySelector('#{name} svg .role-mark text')", seconds=60.0)
-        browser.wait_for(
-            f"document.querySelector('#{name} svg').getBoundingClientRect().width <= {width}"
-        )
-        # A resized chart is drawn again after a frame.
-        browser.evaluate("new Promise(done => setTimeout(done, 500))")
-        texts, points = browser.evaluate(TEXTS % name), browser.evaluate(POINTS % name)
-        [rows] = [rows for rows in charts[name]["datasets"].values() if "label" in rows[0]]
-        expected = [it for row in rows for it in row["label"].split(", ") if it]
-        assert len(expected) == len(rows), name
-        shown = [it for text, *_ in texts for it in text.split(", ")]
-        assert sorted(shown) == sorted(expected), name
-        for (one, *first), (other, *second) in itertools.combinations(texts, 2):
-            wide = min(first[2], second[2]) - max(first[0], second[0])
-            high = min(first[3], second[3]) - max(first[1], second[1])
-            # Boxes of a text contain 3 px of empty space above and below its digits.
-            assert min(wide, high - 3.0) <= 0.0, (name, one, other)
-        assert len(points) >= len(texts)
-        for text, left, top, right, bottom in texts:
-            for x, y, radius in points:
-                dx = max(left - x, x - right, 0.0)
-                dy = max(top + 3.0 - y, y - bottom + 3.0, 0.0)
-                assert np.hypot(dx, dy) > radius - 1.0, (name, text)
+        assert layout.label_faults(browser, name, charts[name], width) == []

@@ -366,6 +366,27 @@ def test_nothing_of_the_pages_overlaps_or_is_cut(results: Path, pages: dict[str,
     assert len(papers) == 2  # dark, and not
 
 
+def test_every_operating_point_is_numbered_without_overlap(results: Path) -> None:
+    if (program := layout.chromium()) is None:
+        pytest.skip("no chromium to measure the page with")
+    page = results / "report.html"
+    found = re.search(r"const charts = (.*?);\n", page.read_text("utf-8"))
+    assert found is not None
+    spec = json.loads(found.group(1))["ways"]
+    [rows] = [rows for rows in spec["datasets"].values() if "label" in rows[0]]
+    points = pl.read_parquet(results / "points.parquet").filter(
+        pl.col("target_error_m").is_finite()
+    )
+    energy_j = sum(points[f"{part}_value_j"] for part in ("estimates", "listening"))
+    drawn = sorted((it["energy_j"], it["error_m"]) for it in rows)
+    expected = sorted(zip(energy_j, points["target_error_m"], strict=True))
+    assert np.allclose(drawn, expected, atol=1e-4)
+    with Browser(program, page.as_uri()) as browser:
+        for width in (1300, 400):
+            browser.resize(width, 900)
+            assert layout.label_faults(browser, "ways", spec, width) == []
+
+
 def test_a_drive_is_played_and_whoever_wants_less_motion_has_the_slider(results: Path) -> None:
     if (program := layout.chromium()) is None:
         pytest.skip("no chromium to play it with")

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import altair as alt
-import numpy as np
 import polars as pl
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 # Colours of Okabe and Ito: distinct on light and dark, in print and for colour-blind readers.
 BLUE, ORANGE, GREEN, GREY, PURPLE = "#2f7ed8", "#d55e00", "#009e73", "#8a8f98", "#b48ead"
@@ -18,8 +14,6 @@ POINTS_PER_LINE = 160
 LEAST_M = 1e-3
 # Size of a map on a wide screen.
 MAP_WIDTH_PX, LEAST_HEIGHT_PX = 1000.0, 220.0
-# Share of a chart's width and height that a short label takes on a screen of 400 px.
-LABEL_SHARES = (0.1, 0.06)
 
 Spec = dict[str, Any]
 
@@ -60,46 +54,6 @@ def to_scale(
         for (low, high), more in zip((x_m, y_m), more_m, strict=True)
     )
     return x, y, round(height_px)
-
-
-def with_labels(
-    points: pl.DataFrame,
-    name: str,
-    across: pl.Expr,
-    upward: pl.Expr,
-    shown: Sequence[tuple[float, float]] = (),
-) -> pl.DataFrame:
-    """Adds a column ``label``: the name, or all names at the first of several close points.
-
-    Parameters
-    ----------
-    points
-        Points of the chart.
-    name
-        Column of the names.
-    across, upward
-        Coordinates of a point in the units of the axes (logarithms on logarithmic axes).
-    shown
-        Further positions that the axes include.
-
-    Examples
-    --------
-    >>> near = pl.DataFrame({"mode": [1, 2, 3], "x": [0.0, 0.01, 1.0], "y": [0.0, 0.01, 1.0]})
-    >>> with_labels(near, "mode", pl.col("x"), pl.col("y"))["label"].to_list()
-    ['1, 2', '', '3']
-    """
-    if points.is_empty():
-        return points.with_columns(label=pl.lit(""))
-    places = points.select(across.alias("x"), upward.alias("y")).to_numpy()
-    reached = np.concatenate([places, np.reshape(shown, (-1, 2))])
-    span = np.ptp(reached, axis=0)
-    near = places / np.where(span > 0.0, span * LABEL_SHARES, 1.0)
-    labels: dict[int, list[str]] = {}
-    for number, text in enumerate(points[name].cast(pl.String)):
-        apart = (it for it in labels if np.all(np.abs(near[it] - near[number]) < 1.0))
-        labels.setdefault(next(apart, number), []).append(text)
-    joined = [", ".join(labels.get(it, ())) for it in range(points.height)]
-    return points.with_columns(label=pl.Series(joined))
 
 
 def time_axis(column: str = "time_s") -> alt.X:

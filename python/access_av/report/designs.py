@@ -11,6 +11,8 @@ import numpy as np
 import polars as pl
 
 from access_av.report.chart import GREEN, GREY, ORANGE, finish, thinned
+from access_av.report.labels import domain, placed
+from access_av.report.labels import layers as labels
 from access_av.report.page import sheet
 from access_av.report.parts import badge, figure, section, source, table, tile, warnings
 from access_av.statistics.percentiles import ends_text
@@ -26,8 +28,9 @@ if TYPE_CHECKING:
 # Maximum number of designs in the chart, in the chart over time, and in the table, ordered by front
 # and energy.
 MOST_DESIGNS, MOST_TRACKS, POINTS_PER_TRACK, MOST_ROWS = 4000, 40, 60, 100
-# Maximum number of labelled points.
+# Maximum number of labelled points: the Pareto front first, then the least energy.
 MOST_NAMES = 30
+ENERGY_ERROR_PX = 320
 
 COMPARED = (
     "All designs use equal runs. The Pareto front contains the designs for which no other design "
@@ -71,6 +74,8 @@ def render_designs(
             "99th percentile of the horizontal error. Orange: Pareto front, with the 95 % interval "
             "of the bootstrap over whole runs. The numbers are those of the table."
         )
+        if known.height > MOST_NAMES:
+            told += f" {MOST_NAMES} of {known.height} designs are numbered, the front first."
         sections.append(section("Energy against error", told, figure("designs")))
         specs["tracks"] = _over_time(driven, known)
         told = "RMS error of one design over its runs. Select the design below the chart."
@@ -144,7 +149,17 @@ def _energy_against_error(drawn: pl.DataFrame) -> Spec:
         # Skip designs without a percentile.
     ).drop_nulls("p99_error_m")
     front = points.filter("on_front")
-    x = alt.X("energy_j:Q", title="energy of a trip / J", scale=alt.Scale(type="log"))
+    others, known = points.filter(~pl.col("on_front")), front.drop_nulls(list(ends))
+    reached = [points["p99_error_m"], *(known[end] for end in ends)]
+    x_domain = domain(points["energy_j"].to_list() or [1.0], log=True)
+    y_domain = domain([value for column in reached for value in column] or [0.0])
+    scale = alt.Scale(type="log", nice=False, domain=x_domain)
+    x = alt.X("energy_j:Q", title="energy of a trip / J", scale=scale)
+    y = alt.Y(
+        "p99_error_m:Q",
+        title="99th percentile of the error / m",
+        scale=alt.Scale(zero=False, nice=False, domain=y_domain),
+    )
     tooltip = [
         alt.Tooltip("design:Q", title="No."),
         alt.Tooltip("choice:N", title="design"),
@@ -155,27 +170,26 @@ def _energy_against_error(drawn: pl.DataFrame) -> Spec:
     ]
 
     def layer(rows: pl.DataFrame, colour: str, opacity: float) -> Any:
-        y = alt.Y(
-            "p99_error_m:Q", title="99th percentile of the error / m", scale=alt.Scale(zero=False)
-        )
         marks = alt.Chart(rows).mark_circle(size=70, color=colour, opacity=opacity)
         return marks.encode(x=x, y=y, tooltip=tooltip)
 
     # Omit an empty layer, which causes a warning of Vega in the console.
-    others, known = points.filter(~pl.col("on_front")), front.drop_nulls(list(ends))
     layers = [] if others.is_empty() else [layer(others, GREY, 0.5)]
     if not known.is_empty():
         rules = alt.Chart(known).mark_rule(color=ORANGE, opacity=0.6)
         layers.append(rules.encode(x=x, y="p99_error_low_m:Q", y2="p99_error_high_m:Q"))
     if not front.is_empty():
-        names = alt.Chart(front.head(MOST_NAMES)).mark_text(dx=9, dy=-7, align="left", fontSize=11)
-        layers += [
-            layer(front, ORANGE, 1.0),
-            names.encode(x=x, y="p99_error_m:Q", text="design:N"),
-        ]
+        layers.append(layer(front, ORANGE, 1.0))
+    number = pl.when(pl.int_range(pl.len()) < MOST_NAMES).then("design")
+    axes = ("energy_j", x_domain, True), ("p99_error_m", y_domain, False)
+    numbered = placed(points.with_columns(number=number), "number", *axes, ENERGY_ERROR_PX)
+    labelled = numbered.filter(pl.col("label") != "")
+    layers += labels(alt.Chart(labelled).encode(x=x, y=y))
     chart: Any = alt.layer(*layers)
     return finish(
-        chart, height=320, description="Energy of a trip against the error of each design"
+        chart,
+        height=ENERGY_ERROR_PX,
+        description="Energy of a trip against the error of each design",
     )
 
 

@@ -61,7 +61,7 @@ def placed(
     points
         The points.
     name
-        Column of the names.
+        Column of the names. A point without a name has no label, but no label covers it.
     x, y
         Column, domain, and whether the scale is logarithmic.
     height_px
@@ -82,6 +82,8 @@ def placed(
     groups = [""] * points.height if group is None else points[group].to_list()
     names: dict[int, list[str]] = {}
     for number, text in enumerate(points[name].cast(pl.String)):
+        if text is None:
+            continue
         close = (
             it
             for it in names
@@ -89,13 +91,34 @@ def placed(
             and np.hypot(*(at[:, it] - at[:, number]).T).max() < COINCIDENT_PX
         )
         names.setdefault(next(close, number), []).append(text)
-    labels = {it: ", ".join(texts) for it, texts in names.items()}
+    labels = {it: listed(texts) for it, texts in names.items()}
     offsets = _offsets(at, labels, height_px)
     return points.with_columns(
         label=pl.Series([labels.get(it, "") for it in range(points.height)], dtype=pl.String),
         dx=pl.Series([offsets.get(it, (0.0, 0.0))[0] for it in range(points.height)]),
         dy=pl.Series([offsets.get(it, (0.0, 0.0))[1] for it in range(points.height)]),
     )
+
+
+def listed(names: Sequence[str]) -> str:
+    """Returns names with commas; three or more consecutive numbers become a range.
+
+    Examples
+    --------
+    >>> listed(["1", "3", "4", "5", "7", "8"])
+    '1, 3–5, 7, 8'
+    >>> listed(["gate", "2"])
+    'gate, 2'
+    """
+    runs: list[list[str]] = []
+    for name in names:
+        last = runs[-1][-1] if runs else ""
+        if last.isdecimal() and name.isdecimal() and int(name) == int(last) + 1:
+            runs[-1].append(name)
+        else:
+            runs.append([name])
+    texts = [f"{it[0]}–{it[-1]}" if len(it) > 2 else ", ".join(it) for it in runs]
+    return ", ".join(texts)
 
 
 def layers(base: alt.Chart) -> tuple[alt.Chart, alt.Chart]:

@@ -10,8 +10,11 @@ import altair as alt
 import polars as pl
 
 from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, finish, thinned
+from access_av.report.labels import domain, placed
+from access_av.report.labels import layers as labels
 from access_av.report.played import heard_of, played, steps_of
 from access_av.report.site_map import Frame, heads_of
+from access_av.report.study_parts import numbered
 from access_av.study.economy import trip_j
 
 if TYPE_CHECKING:
@@ -24,6 +27,8 @@ MARGIN_M = 25.0
 SHARES = (0.5, 1.0, 1.5)
 COLOURS = ("#2f7ed8", "#56b4e9", "#e69f00", "#d55e00")
 STRETCHES = 300
+# Height of the chart of operating points: its labels need space on narrow screens.
+WAYS_PX = 420
 
 
 def road_map(study: Study) -> Spec:
@@ -212,53 +217,66 @@ def signal_along_road(study: Study) -> Spec:
 
 
 def ways_to_operate(study: Study) -> Spec:
-    """Energy of a trip against the target's percentile, the front and the recommended point."""
+    """Energy of a trip against the target's percentile, the front and the recommended point.
+
+    The numbers are those of :func:`access_av.report.study_parts.numbered`.
+    """
+    kinds = ["recommended", "no other is better in both", "another is better"]
     rows = pl.DataFrame(
         [
             {
+                "number": number,
                 "way": f"{point.operation.method}, {point.operation.wake_up}",
                 "mode": f"mode {point.mode} ({point.mode_name})",
                 "energy_j": round(trip_j(point).central, 4),
                 "error_m": round(point.error_m, 4),
-                "kind": "recommended"
+                "kind": kinds[0]
                 if index == study.recommended
-                else "no other is better in both"
+                else kinds[1]
                 if index in study.front
-                else "another is better",
+                else kinds[2],
             }
-            for index, point in enumerate(study.points)
+            for number, (index, point) in enumerate(numbered(study), start=1)
         ]
+    ).filter(pl.col("error_m").is_finite())
+    x_domain = domain(rows["energy_j"].to_list() or [1.0], log=True)
+    y_domain = domain([*rows["error_m"], study.error_m])
+    axes = ("energy_j", x_domain, True), ("error_m", y_domain, False)
+    base = alt.Chart(placed(rows, "number", *axes, WAYS_PX)).encode(
+        x=alt.X(
+            "energy_j:Q",
+            title="energy of a trip / J",
+            scale=alt.Scale(type="log", nice=False, domain=x_domain),
+            axis=alt.Axis(values=_round_values(rows["energy_j"])),
+        ),
+        y=alt.Y(
+            "error_m:Q",
+            title=f"{study.percent:g} % of errors within / m",
+            scale=alt.Scale(zero=False, nice=False, domain=y_domain),
+        ),
+        tooltip=["number:N", "way:N", "mode:N", "energy_j:Q", "error_m:Q"],
     )
-    kinds = ["recommended", "no other is better in both", "another is better"]
-    chart = (
-        alt.Chart(rows)
-        .mark_point(filled=True, opacity=0.9)
-        .encode(
-            x=alt.X(
-                "energy_j:Q",
-                title="energy of a trip / J",
-                scale=alt.Scale(type="log"),
-                axis=alt.Axis(values=_round_values(rows["energy_j"])),
-            ),
-            y=alt.Y("error_m:Q", title=f"{study.percent:g} % of errors within / m"),
-            color=alt.Color(
-                "kind:N",
-                scale=alt.Scale(domain=kinds, range=[ORANGE, BLUE, GREY]),
-                legend=alt.Legend(title=None),
-            ),
-            size=alt.Size(
-                "kind:N", scale=alt.Scale(domain=kinds, range=[180, 90, 45]), legend=None
-            ),
-            tooltip=["way:N", "mode:N", "energy_j:Q", "error_m:Q"],
-        )
+    points = base.mark_point(filled=True, opacity=0.9).encode(
+        color=alt.Color(
+            "kind:N",
+            scale=alt.Scale(domain=kinds, range=[ORANGE, BLUE, GREY]),
+            legend=alt.Legend(title=None, columns=1),
+        ),
+        size=alt.Size("kind:N", scale=alt.Scale(domain=kinds, range=[110, 70, 40]), legend=None),
     )
     target = (
         alt.Chart(pl.DataFrame({"error_m": [study.error_m]}))
         .mark_rule(strokeDash=[5, 4], strokeWidth=1.5)
         .encode(y="error_m:Q")
     )
+    lines, numbers = labels(base)
+    # Points of the front are drawn over the others, the recommended one last.
+    drawn = [points.transform_filter(alt.datum.kind == kind) for kind in reversed(kinds)]
+    chart: Any = alt.layer(target, lines, *drawn, numbers)
     return finish(
-        chart + target, height=300, description="Energy against error, each way to operate"
+        chart,
+        height=WAYS_PX,
+        description="Energy against error of each operating point",
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from access_av.report.study_parts import (
     ends,
     joules_range,
     lost,
+    numbered,
     ok,
     sources,
     watts,
@@ -49,7 +51,12 @@ def operation_section(study: Study) -> str:
         + table(("Key", "Value"), keys)
         + _rivals(study)
         + _composition(study, point, day)
-        + figure("ways", "Each power mode of each operation; dashed: the target.")
+        + figure(
+            "ways",
+            "Each power mode of each operation; dashed: the target. The numbers are those of the "
+            "table of all points.",
+        )
+        + _numbered(study)
         + _points(study),
     )
 
@@ -129,6 +136,23 @@ def _composition(study: Study, point: Point, day: economy.Day) -> str:
             "and wake-up hardly do.</p>"
         )
     return f"<h3>Composition of the energy</h3>{text}" + table(head, rows, numbers=range(1, 4))
+
+
+def _numbered(study: Study) -> str:
+    """Every point of the chart, by energy."""
+    rows = [
+        (
+            str(number),
+            f"{escape(it.operation.method)}, {escape(it.operation.wake_up)}",
+            f"{it.mode} ({escape(it.mode_name)})",
+            f"{economy.trip_j(it).central:.3g} J",
+            f"{it.error_m:.3f} m" if math.isfinite(it.error_m) else "lost",
+        )
+        for number, (_, it) in enumerate(numbered(study), start=1)
+    ]
+    head = ("No.", "Operation", "Power mode", "energy of a trip", f"{study.percent:g} % within")
+    made = table(head, rows, numbers=range(3, 5))
+    return f"<details><summary>All {len(rows)} points of the chart</summary>{made}</details>"
 
 
 def _points(study: Study) -> str:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from access_av.economics.carbon import Range
+    from access_av.study.points import Point
     from access_av.study.study_result import Study
     from access_av.study.trips import Driven
 
@@ -92,3 +93,8 @@ def watts(power_w: Mapping[str, float]) -> str:
     """A range of a power."""
     texts = dict.fromkeys(f"{power_w[extent]:.3g}" for extent in ("low", "value", "high"))
     return " … ".join(texts)
+
+
+def numbered(study: Study) -> list[tuple[int, Point]]:
+    """Returns all operating points with their indices, in the order of their numbers: by energy."""
+    return sorted(enumerate(study.points), key=lambda it: (it[1].energy_j, it[1].error_m))
