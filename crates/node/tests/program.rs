@@ -156,6 +156,11 @@ fn the_state_is_saved_and_resumed_after_a_kill() {
         input.write_all(stands(time_s).as_bytes()).unwrap();
         std::thread::sleep(Duration::from_millis(20));
     }
+    // On a busy computer the state is saved late.
+    let until = Instant::now() + Duration::from_secs(10);
+    while !file.exists() && Instant::now() < until {
+        std::thread::sleep(Duration::from_millis(20));
+    }
     node.process.kill().unwrap();
     node.process.wait().unwrap();
     let saved: Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
