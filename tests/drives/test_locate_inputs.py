@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from access_av import InputError, RecordingError, drives
+from access_av import InputError, RecordingError, Site, Vehicle, drives
+from access_av.drives.recorded import truth_doubt
 from robot import Robot, robot
 
 if TYPE_CHECKING:
@@ -162,6 +164,129 @@ def test_a_truth_of_another_time_is_rejected(
     others, times, says = TRUTHS[kind]
     with pytest.raises(InputError, match=says):
         drives.error_m(drive.poses, whole.truth.with_columns(others, times))
+
+
+SPIKE = pl.int_range(pl.len()) == 200
+# Class, change of the truth's positions, and the cause.
+WRONG_POSITIONS = {
+    "millimetres": (1e3 * pl.col("x_m"), 1e3 * pl.col("y_m"), r"\(millimetres\?\)"),
+    "centimetres": (1e2 * pl.col("x_m"), 1e2 * pl.col("y_m"), r"\(centimetres\?\)"),
+    "kilometres": (1e-3 * pl.col("x_m"), 1e-3 * pl.col("y_m"), r"\(kilometres\?\)"),
+    "constant": (0.0 * pl.col("x_m"), 0.0 * pl.col("y_m"), "extend over 0, those of the drive"),
+    "spike": (pl.col("x_m") + SPIKE * 500.0, pl.col("y_m"), r"jumps by 500 m in 0.05 s at 10.0"),
+    "huge": (pl.col("x_m") + SPIKE * 1e30, pl.col("y_m"), r"jumps by 1e\+30 m in 0.05 s at 10.0"),
+}
+
+
+@pytest.mark.parametrize("kind", WRONG_POSITIONS)
+def test_a_truth_with_impossible_positions_is_rejected(
+    located: tuple[Robot, drives.Drive], kind: str
+) -> None:
+    whole, drive = located
+    x_m, y_m, says = WRONG_POSITIONS[kind]
+    with pytest.raises(InputError, match=says):
+        drives.error_m(drive.poses, whole.truth.with_columns(x_m=x_m, y_m=y_m))
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "says"),
+    [
+        (pl.col("x_m") + 500.0, pl.col("y_m") - 80.0, "turned by -?0.0"),
+        (-pl.col("y_m"), pl.col("x_m"), "turned by -1.5"),
+        (pl.col("y_m"), pl.col("x_m"), "turned by 1.5.*with y reversed before"),
+    ],
+)
+def test_a_truth_in_another_frame_nearby_is_named(
+    located: tuple[Robot, drives.Drive], x_m: pl.Expr, y_m: pl.Expr, says: str
+) -> None:
+    whole, drive = located
+    assert truth_doubt(drive, whole.truth) is None
+    doubt = truth_doubt(drive, whole.truth.with_columns(x_m=x_m, y_m=y_m))
+    assert doubt is not None
+    assert re.search(says, doubt), doubt
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"\x1f\x8b\0", "is compressed"),
+        (b"\x89MCAP0\r\n", "is MCAP, not TUM"),
+        (b"0,1,2,0,0,0,0,1\n", "separated by blanks, with decimal points"),
+        (b"0 1e256 2 0 0 0 0 1\n", "x and y must be within 1e8 m"),
+    ],
+)
+def test_files_that_are_no_trajectory_are_named(tmp_path: Path, content: bytes, says: str) -> None:
+    file = tmp_path / "truth.tum"
+    file.write_bytes(content)
+    with pytest.raises(RecordingError, match=says):
+        drives.read_tum(file)
+    file.write_bytes("0 1 2 0 0 0 0 1\n".encode("utf-16"))
+    assert drives.read_tum(file)["x_m"].to_list() == [1.0]
+
+
+# Class, change of the text of a table, and the cause; `None`: it is read as the table itself.
+NOTATIONS: dict[str, tuple[Callable[[str], str | bytes], str | None]] = {
+    "sep=": (lambda it: "sep=;\r\n" + it.replace(",", ";"), None),
+    "byte order mark, comment": (lambda it: "\ufeff# note\n" + it, None),
+    "indented comment": (lambda it: "  # note\n" + it, None),
+    "decimal commas": (lambda it: it.replace(",", ";").replace(".", ","), None),
+    "UTF-32": (lambda it: it.encode("utf-32"), "is UTF-32"),
+    "commented header": (lambda it: "#" + it, "the header must not begin with #"),
+    "capitals": (lambda it: it.replace("time_s", "TIME_S"), "write time_s instead of TIME_S"),
+    "unit": (
+        lambda it: it.replace("time_s", "time_s [s]"),
+        r"write time_s instead of time_s \[s\]",
+    ),
+    "bars": (lambda it: it.replace(",", "|"), "separate the columns by commas"),
+    "blanks": (lambda it: it.replace(",", "  "), "separate the columns by commas"),
+}
+
+
+@pytest.mark.parametrize("table", ["odometry.csv", "angles.csv"])
+@pytest.mark.parametrize("kind", NOTATIONS)
+def test_tables_are_read_or_rejected_with_the_notation(
+    tmp_path: Path, kind: str, table: str
+) -> None:
+    change, says = NOTATIONS[kind]
+    short = robot(4.0)
+    short.write(tmp_path)
+    files = [tmp_path / name for name in ("odometry.csv", "angles.csv")]
+    site, vehicle = Site.from_toml(short.site()), Vehicle.from_toml(short.vehicle())
+
+    def located() -> drives.Drive:
+        return drives.locate(site, *files, vehicle=vehicle, start=short.start)
+
+    as_given = located()
+    changed = change((tmp_path / table).read_text())
+    (tmp_path / table).write_bytes(changed if isinstance(changed, bytes) else changed.encode())
+    if says is None:
+        assert located().poses.equals(as_given.poses)
+    else:
+        with pytest.raises(RecordingError, match=f"{table}.*{says}"):
+            located()
+
+
+def test_angles_are_sorted_and_repeated_ones_are_left_out(tmp_path: Path) -> None:
+    whole = robot(20.0)
+    as_given = whole.locate(tmp_path)
+    given = whole.angles
+    whole.angles = given.sample(fraction=1.0, shuffle=True, seed=1)
+    drive = whole.locate(tmp_path)
+    assert any("the angles were sorted by time" in it for it in drive.remarks)
+    assert whole.rms_error_m(drive) < whole.rms_error_m(as_given) + 0.02
+    whole.angles = pl.concat([given, given])
+    drive = whole.locate(tmp_path)
+    assert any("has the same angle at" in it for it in drive.remarks)
+    assert drive.poses.equals(as_given.poses)
+
+
+def test_one_row_of_odometry_is_named_as_the_cause(tmp_path: Path) -> None:
+    whole = robot(10.0)
+    whole.odometry = whole.odometry.head(1)
+    with pytest.raises(
+        RecordingError, match=r"odometry\.csv: the odometry contains fewer than two"
+    ):
+        whole.locate(tmp_path)
 
 
 def test_a_slow_truth_is_rejected_with_the_gap_limit(located: tuple[Robot, drives.Drive]) -> None:

@@ -160,6 +160,56 @@ def test_a_position_that_is_none_is_left_out(
     assert driven.rms_error_m(drive) < as_csv_m + SAME_M
 
 
+# Change of one message, and the report; the value is replaced by the messages next to it.
+SPIKES: dict[str, tuple[Callable[[Fields], Fields], str]] = {
+    "speed 1e256": (lambda it: replace(it, speed_mps=1e256), "twist.twist.linear.x is 1e256, far"),
+    "speed 60": (lambda it: replace(it, speed_mps=60.0), "twist.twist.linear.x is 60.000, far"),
+    "side 1e256": (lambda it: replace(it, side_mps=1e256), "twist.twist.linear.y is 1e256, far"),
+    "yaw rate 1e256": (
+        lambda it: replace(it, yaw_rate_radps=1e256), "twist.twist.angular.z is 1e256, far",
+    ),
+    "position 5e7": (lambda it: replace(it, x_m=5e7), "pose.pose.position jumps by"),
+    "speed alone 60": (
+        lambda it: replace(it, x_m=0.0, y_m=0.0, heading_rad=0.0, speed_mps=60.0),
+        "twist.twist.linear.x is 60.000, far",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", SPIKES)
+def test_one_impossible_value_does_not_move_the_vehicle(
+    driven: Robot, fields: list[Fields], as_csv_m: float, tmp_path: Path, kind: str
+) -> None:
+    change, says = SPIKES[kind]
+    is_twist = "alone" in kind
+    spoilt = [replace(it, x_m=0.0, y_m=0.0, heading_rad=0.0) if is_twist else it for it in fields]
+    spoilt[300] = change(spoilt[300])
+    drive = locate(driven, tmp_path, spoilt)
+    assert any(f"message 301: {says}" in it for it in drive.remarks), drive.remarks
+    assert all(len(it) < 300 for it in drive.remarks)
+    assert drive.is_reliable
+    assert driven.rms_error_m(drive) < as_csv_m + SAME_M
+
+
+@pytest.mark.parametrize("value", [0.0, math.nan])
+def test_messages_without_any_motion_are_named(
+    driven: Robot, fields: list[Fields], tmp_path: Path, value: float
+) -> None:
+    empty = [replace(it, x_m=value, y_m=value, speed_mps=value) for it in fields]
+    drive = locate(driven, tmp_path, empty)
+    assert not drive.is_reliable
+    assert any("pose.pose.position never changes" in it for it in drive.diagnoses), drive.diagnoses
+
+
+def test_a_late_first_usable_message_is_named(
+    driven: Robot, fields: list[Fields], tmp_path: Path
+) -> None:
+    late = [replace(it, x_m=math.nan) if k < 100 else it for k, it in enumerate(fields)]
+    drive = locate(driven, tmp_path, late)
+    assert any("its first 5.0 s are not usable" in it for it in drive.remarks)
+    assert not drive.is_reliable
+
+
 @pytest.mark.parametrize("stamps_s", [[0.0], [0.0, 0.0, 0.0], [0.0, 0.1, 0.2], [12.5, 12.6]])
 def test_stamps_before_the_clock_was_set_are_left_out(
     driven: Robot, fields: list[Fields], as_csv_m: float, tmp_path: Path, stamps_s: list[float]

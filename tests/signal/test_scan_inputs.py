@@ -176,6 +176,73 @@ def test_the_wrong_datatype_is_named(tmp_path: Path, full_scale: float) -> None:
         Recording.open(floats)
 
 
+# Class, change of the metadata, and the cause.
+METADATA: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "string": (
+        lambda it: it["captures"][0].update({"core:frequency": "3489.6e6"}),
+        r'core:frequency` is string "3489.6e6"; it must be a number',
+    ),
+    "fraction": (
+        lambda it: it["captures"][0].update({"core:sample_start": 0.5}),
+        "core:sample_start` is .*; it must be an integer of at least 0",
+    ),
+    "one start": (
+        lambda it: it["captures"].append({"core:sample_start": 0, "core:frequency": OTHER_HZ}),
+        r"captures\[1\].core:sample_start` is 0; the previous capture begins at this sample",
+    ),
+    "global index back": (
+        lambda it: (
+            it["captures"][0].update({"core:global_index": 10**6}),
+            it["captures"].append({"core:sample_start": 9, "core:global_index": 5}),
+        ),
+        r"captures\[1\].core:global_index` is 5; it must be at least 1000009",
+    ),
+    "global index as text": (
+        lambda it: it["captures"][0].update({"core:global_index": "5"}),
+        "core:global_index` is .*; it must be an integer",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", METADATA)
+def test_metadata_that_contradict_themselves_are_rejected(tmp_path: Path, kind: str) -> None:
+    change, says = METADATA[kind]
+    file = write(tmp_path / "odd", burst(7), [(0, SSB_HZ)])
+    meta = json.loads(file.read_text())
+    change(meta)
+    file.write_text(json.dumps(meta))
+    with pytest.raises(RecordingError, match=says):
+        Recording.open(file)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("a.wav", b"RIFF\0\0\0\0WAVE", "is WAV; it must be a .sigmf-meta"),
+        ("a.npy", b"\x93NUMPY\x01\0", "is NumPy; it must be"),
+        ("a.h5", b"\x89HDF\r\n", "is HDF5; it must be"),
+        ("a.bin", b"hello", "is in another format; it must be"),
+        ("a.sigmf", b"\x1f\x8b\x08\0", r"is compressed \(gzip\); a SigMF archive is a tar file"),
+        ("b.sigmf", b"hello" * 300, "it is damaged, or not a tar file"),
+    ],
+)
+def test_files_that_are_no_recording_are_named(
+    tmp_path: Path, name: str, content: bytes, says: str
+) -> None:
+    file = tmp_path / name
+    file.write_bytes(content)
+    with pytest.raises(RecordingError, match=says) as error:
+        Recording.open(file)
+    assert str(file) in str(error.value)
+    assert str(error.value).isprintable()
+
+
+def test_metadata_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    file = write(tmp_path / "marked", burst(7), [(0, SSB_HZ)])
+    file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes())
+    assert Recording.open(file).length == burst(7).size
+
+
 @pytest.mark.parametrize("around", [0, 1, 300])
 def test_a_recording_of_one_ssb_is_searched(tmp_path: Path, around: int) -> None:
     samples = burst(9)

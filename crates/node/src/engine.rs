@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use onboard::live::{LiveError, Outcome, SavedState, StreamConfig, TimeCheck};
-use onboard::localize::UpdateReason;
+use onboard::localize::{OdometryVerdict, UpdateReason};
 use onboard::monitor::ActiveFaults;
 use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
@@ -328,9 +328,22 @@ impl Engine {
     ) -> Result<(), LiveError> {
         self.live.set_arrival(self.arrival_s(came));
         self.resume_earlier(sample)?;
-        if let Err(error) = self.live.odometry(sample) {
-            self.refused("odometry", &error);
-            return Ok(());
+        match self.live.odometry(sample) {
+            Ok(OdometryVerdict::DistanceJump { jump_m }) => {
+                let text = format!("distance_m jumps by {jump_m:.4e} m; the speed is used instead");
+                self.event(Level::Warn, "odometry", text);
+            }
+            Ok(OdometryVerdict::YawRateRefused { radps }) => {
+                let text = format!(
+                    "yaw_rate_radps is {radps:.4e}, above vehicle.top_yaw_rate_radps; it is not used; check its unit"
+                );
+                self.event(Level::Warn, "odometry", text);
+            }
+            Ok(_) => {}
+            Err(error) => {
+                self.refused("odometry", &error);
+                return Ok(());
+            }
         }
         if let Some(step) = self.live.take_odometry_step() {
             let text = format!(

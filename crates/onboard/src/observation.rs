@@ -12,6 +12,12 @@ pub const MAX_SNAPSHOTS: usize = 64;
 /// length of an SSB. The minimum burst period is half a frame.
 pub const BURST_S: f64 = 4.9e-3;
 
+/// Maximum distance counter of usable odometry (m), at which doubles resolve 15 nm.
+const MAX_DISTANCE_M: f64 = 1e8;
+
+/// Maximum speed (m/s) and yaw rate (rad/s) of usable odometry, far above those in a wrong unit.
+const MAX_RATE: f64 = 1e6;
+
 /// Wheel odometry at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OdometrySample {
@@ -42,6 +48,14 @@ impl OdometrySample {
             && self.distance_m.is_finite()
             && self.speed_mps.is_finite()
             && self.yaw_rate_radps.is_none_or(f64::is_finite)
+    }
+
+    /// Whether sums of the values keep their resolution, so that one wrong value has no effect
+    /// later.
+    pub fn is_in_range(&self) -> bool {
+        self.distance_m.abs() <= MAX_DISTANCE_M
+            && self.speed_mps.abs() <= MAX_RATE
+            && self.yaw_rate_radps.is_none_or(|it| it.abs() <= MAX_RATE)
     }
 }
 

@@ -29,6 +29,9 @@ pub struct Onboard {
     policy: Box<dyn WakeUpPolicy>,
     wake_up_time_s: f64,
     odometry: Option<OdometrySample>,
+    /// Speed of the previous sample if it was rejected as impossible (m/s).
+    doubted_mps: Option<f64>,
+    top_speed_mps: f64,
     sensed: Vec<SensedSsb>,
     chosen: Vec<bool>,
     executions: Vec<Execution>,
@@ -148,6 +151,13 @@ pub struct Execution {
     pub wake_up_time_s: f64,
 }
 
+/// Maximum acceleration of a vehicle (m/s²) with a margin, for impossible speeds.
+const MAX_ACCELERATION_MPS2: f64 = 30.0;
+/// Maximum deviation of a speed that is attributed to noise and resolution (m/s).
+const SPEED_NOISE_MPS: f64 = 0.5;
+/// Minimum ratio of an impossible speed to the vehicle's top speed.
+const TIMES_TOP_SPEED: f64 = 2.0;
+
 /// Reason for the rejection of an odometry sample; the state is unchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum OdometryDefect {
@@ -157,6 +167,15 @@ pub enum OdometryDefect {
     /// A value is not finite.
     #[error("a value is not a finite number")]
     NotFinite,
+    /// A value is so large that sums of it lose their resolution.
+    #[error("a value is beyond 1e8 m, 1e6 m/s or 1e6 rad/s")]
+    OutOfRange,
+    /// The speed is impossible after that of the previous sample. It is accepted if the next sample
+    /// confirms it.
+    #[error(
+        "its speed is impossible after the previous one, and far above vehicle.top_speed_kmh; check its unit"
+    )]
+    SpeedSpike,
 }
 
 /// During a search for the pose, every angle is used.
@@ -209,6 +228,8 @@ impl Onboard {
             policy,
             wake_up_time_s: 0.0,
             odometry: None,
+            doubted_mps: None,
+            top_speed_mps: vehicle.top_speed_mps(),
             sensed: Vec::with_capacity(heads.len()),
             chosen: Vec::with_capacity(heads.len()),
             executions: Vec::with_capacity(heads.len()),
@@ -240,10 +261,18 @@ impl Onboard {
         if !sample.is_finite() {
             return Ok(Err(OdometryDefect::NotFinite));
         }
+        if !sample.is_in_range() {
+            return Ok(Err(OdometryDefect::OutOfRange));
+        }
         let is_late = |last: OdometrySample| sample.time_s <= last.time_s;
         if self.odometry.is_some_and(is_late) {
             return Ok(Err(OdometryDefect::TimeReversed));
         }
+        if self.is_spike(sample) {
+            self.doubted_mps = Some(sample.speed_mps);
+            return Ok(Err(OdometryDefect::SpeedSpike));
+        }
+        self.doubted_mps = None;
         self.odometry = Some(*sample);
         let Some(monitors) = &mut self.monitors else {
             return self.localizer.odometry(sample).map(Ok);
@@ -252,6 +281,18 @@ impl Onboard {
         let verdict = self.localizer.odometry(&sample)?;
         self.follow_monitors()?;
         Ok(Ok(verdict))
+    }
+
+    /// Whether the speed of a sample is a single impossible value.
+    fn is_spike(&self, sample: &OdometrySample) -> bool {
+        let Some(last) = self.odometry else {
+            return false;
+        };
+        let possible_mps = MAX_ACCELERATION_MPS2 * (sample.time_s - last.time_s) + SPEED_NOISE_MPS;
+        let is_near = |other_mps: f64| (sample.speed_mps - other_mps).abs() <= possible_mps;
+        sample.speed_mps.abs() > TIMES_TOP_SPEED * self.top_speed_mps
+            && !is_near(last.speed_mps)
+            && !self.doubted_mps.is_some_and(is_near)
     }
 
     /// Changes the localizer at the start and end of odometry faults.

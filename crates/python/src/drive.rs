@@ -240,7 +240,10 @@ pub fn locate(
     crate::arrays::look_up(py)?;
     py.detach(|| drive.locate(&site.0, &vehicle.0, smooth))
         .map(|core| LocatedDrive { core })
-        .map_err(replay_error)
+        .map_err(|error| match drive.faulty_file(&error) {
+            Some(file) => RecordingError::new_err(format!("{}: {}", file.display(), brief(error))),
+            None => replay_error(error),
+        })
 }
 
 /// Inputs of a recorded drive.
@@ -255,6 +258,19 @@ struct RecordedDrive<'a> {
 }
 
 impl RecordedDrive<'_> {
+    /// Returns the file that causes an error whose message does not name it.
+    fn faulty_file(&self, error: &ReplayError) -> Option<&Path> {
+        match error {
+            ReplayError::NoOdometry { .. } => Some(self.odometry),
+            ReplayError::TimeUnit { of, .. } if *of == "odometry" => Some(self.odometry),
+            ReplayError::TimeUnit { .. }
+            | ReplayError::NoAngle { .. }
+            | ReplayError::Clocks { .. }
+            | ReplayError::UnknownRadioHeads { .. } => Some(self.recording),
+            _ => None,
+        }
+    }
+
     fn locate(
         &self,
         site: &CoreSite,

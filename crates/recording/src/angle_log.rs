@@ -23,7 +23,7 @@ use onboard::Observed;
 use onboard::burst::OfSsb;
 use onboard::live::AngleObservation;
 use onboard::localize::{AngleMeasurement, MeasurementKind};
-use onboard::observation::SensedSsb;
+use onboard::observation::{BURST_S, SensedSsb};
 use onboard::time_unit::TimeUnit;
 
 const COLUMNS: [&str; 9] = [
@@ -102,16 +102,16 @@ impl OfSsb for LoggedAngle {
     }
 }
 
-/// Usable angles of a file in order, and remarks on the omitted lines.
+/// Usable angles of a file in order of time, and remarks on single lines.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AngleLog {
     /// The angles.
     pub angles: Vec<LoggedAngle>,
-    /// Remarks on the omitted lines.
+    /// Remarks on single lines.
     pub remarks: Vec<AngleRemark>,
 }
 
-/// Omitted item of an angle log.
+/// Remark on an item of an angle log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AngleRemark {
     /// "line" of a CSV file, "row" of a table or "message" of a bag.
@@ -120,15 +120,18 @@ pub struct AngleRemark {
     pub line: usize,
     /// Time of the previous usable angle in seconds.
     pub time_s: f64,
+    /// Whether the item is used nevertheless.
+    pub is_used: bool,
     /// Reason.
     pub message: String,
 }
 
 impl fmt::Display for AngleRemark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let left_out = if self.is_used { "" } else { "left out, " };
         write!(
             f,
-            "angle log {} {}: left out, {}",
+            "angle log {} {}: {left_out}{}",
             self.kind, self.line, self.message
         )
     }
@@ -144,15 +147,9 @@ pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
     if let Some(key) = untold(|name| table.has(name)) {
         return Err(table.missing(key, NEEDED));
     }
-    let mut log = AngleLog::default();
-    for row in table.rows {
-        log.add(
-            "line",
-            row.line,
-            row.values.and_then(|values| angle(&values)),
-        );
-    }
-    Ok(log)
+    let rows = table.rows.into_iter();
+    let items = rows.map(|row| (row.line, row.values.and_then(|values| angle(&values))));
+    Ok(AngleLog::of_items("line", items))
 }
 
 /// Creates an angle log from the columns of a table that was read from `file`, with NaN for missing
@@ -178,13 +175,12 @@ pub fn angle_log_of_columns(
     let wanted = REQUIRED.into_iter().chain(OPTIONAL);
     let wanted: Vec<Option<&Vec<f64>>> = wanted.map(|name| columns.get(name)).collect();
     let rows = wanted.iter().flatten().map(|it| it.len()).max();
-    let mut log = AngleLog::default();
-    for row in 0..rows.unwrap_or(0) {
+    let items = (0..rows.unwrap_or(0)).map(|row| {
         let value = |column: Option<&Vec<f64>>| column?.get(row).copied();
         let known = wanted.iter().map(|it| value(*it).filter(|it| !it.is_nan()));
-        log.add("row", row + 1, angle(&known.collect::<Vec<_>>()));
-    }
-    Ok(log)
+        (row + 1, angle(&known.collect::<Vec<_>>()))
+    });
+    Ok(AngleLog::of_items("row", items))
 }
 
 /// Returns the name of a missing column that is required for angles and standard deviations.
@@ -202,6 +198,71 @@ fn untold(has: impl Fn(&str) -> bool) -> Option<&'static str> {
 }
 
 impl AngleLog {
+    /// Creates a log from the numbered items of a file. Sorts the angles by time, and leaves out
+    /// repeated ones; both is reported.
+    fn of_items(
+        kind: &'static str,
+        items: impl Iterator<Item = (usize, Result<LoggedAngle, String>)>,
+    ) -> Self {
+        let mut log = Self::default();
+        let mut numbered: Vec<(usize, LoggedAngle)> = Vec::new();
+        for (line, read) in items {
+            log.add(kind, line, read);
+            numbered.extend(log.angles.get(numbered.len()).map(|it| (line, *it)));
+        }
+        log.angles.clear();
+        let mut latest_s = f64::NEG_INFINITY;
+        let mut unsorted = numbered.iter().filter(|(_, it)| {
+            let is_early = it.ssb.time_s < latest_s - BURST_S;
+            latest_s = latest_s.max(it.ssb.time_s);
+            is_early
+        });
+        if let Some(&(line, first)) = unsorted.next() {
+            let count = 1 + unsorted.count();
+            log.remarks.push(AngleRemark {
+                kind,
+                line,
+                is_used: true,
+                time_s: first.ssb.time_s,
+                message: format!(
+                    "time_s {} comes after a later time, as in {count} {kind}s altogether; the angles \
+                     were sorted by time",
+                    first.ssb.time_s
+                ),
+            });
+            numbered.sort_by(|(_, a), (_, b)| a.ssb.time_s.total_cmp(&b.ssb.time_s));
+        }
+        for (line, angle) in numbered {
+            // Bit patterns, because a missing phase or angle is NaN.
+            let bits =
+                |it: &LoggedAngle| [it.measured.phase_rad, it.measured.angle_rad].map(f64::to_bits);
+            let burst = log.angles.iter().rev();
+            let mut burst = burst.take_while(|it| it.ssb.time_s == angle.ssb.time_s);
+            let is_repeated = burst.any(|it| {
+                it.ssb.pci == angle.ssb.pci
+                    && it.ssb.ssb_index == angle.ssb.ssb_index
+                    && it.measured.kind == angle.measured.kind
+                    && bits(it) == bits(&angle)
+            });
+            if is_repeated {
+                log.remarks.push(AngleRemark {
+                    kind,
+                    line,
+                    is_used: false,
+                    time_s: angle.ssb.time_s,
+                    message: format!(
+                        "pci {} has the same angle at {} s twice",
+                        angle.ssb.pci, angle.ssb.time_s
+                    ),
+                });
+            } else {
+                log.angles.push(angle);
+            }
+        }
+        log.remarks.sort_by_key(|it| it.line);
+        log
+    }
+
     /// Adds the angle of a line, or a remark with the reason of its omission.
     pub(crate) fn add(
         &mut self,
@@ -216,6 +277,7 @@ impl AngleLog {
                 self.remarks.push(AngleRemark {
                     kind,
                     line,
+                    is_used: false,
                     time_s: last.map_or(f64::NEG_INFINITY, |last| last.measured.time_s),
                     message,
                 });

@@ -32,6 +32,7 @@ pub mod sigmf;
 mod table;
 mod text;
 mod tum;
+mod value_spikes;
 
 pub use angle_file::read_angles;
 pub use angle_log::{

@@ -6,9 +6,15 @@ use onboard::observation::OdometrySample;
 
 use crate::clock_faults::TimeFault;
 use crate::counter_jumps::Jump;
+use crate::value_spikes::{Limits, Spike, replace_spikes};
 
 /// Minimum time step of a gap, in median steps.
 const GAP_STEPS: f64 = 5.0;
+/// Minimum time from the first item of a file to the first usable one (s) that is reported, because
+/// the start pose is applied to the first usable item.
+const LATE_START_S: f64 = 0.5;
+/// Minimum magnitude of a number that is written with an exponent.
+const LARGE: f64 = 1e6;
 
 /// Odometry in order of time, with remarks on single items of the file.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -51,6 +57,15 @@ impl OdometryFields {
         speed: "twist.twist.linear.x",
         yaw_rate: "twist.twist.angular.z",
     };
+}
+
+impl OdometryFields {
+    /// Replaces the names of CSV columns in a text by the names of the file's fields.
+    pub fn named(&self, text: &str) -> String {
+        text.replace(Self::CSV.distance, self.distance)
+            .replace(Self::CSV.speed, self.speed)
+            .replace(Self::CSV.yaw_rate, self.yaw_rate)
+    }
 }
 
 impl Default for OdometryFields {
@@ -137,6 +152,15 @@ pub enum OdometryIssue {
         /// Speed of the neighbouring steps (m/s).
         speed_mps: f64,
     },
+    /// The item is used, but a value is far from its neighbours, whose median is used instead.
+    ValueSpike {
+        /// Name of the field.
+        field: &'static str,
+        /// Value in the file.
+        value: f64,
+        /// Median of the neighbouring values.
+        used: f64,
+    },
     /// Property of the file as a sentence; the item is used.
     Noted(String),
     /// Property of the file that may cause a position error, as a sentence; the item is used.
@@ -202,6 +226,7 @@ impl OdometryIssue {
                 | Self::Derived { .. }
                 | Self::Unused { .. }
                 | Self::DistanceJump { .. }
+                | Self::ValueSpike { .. }
                 | Self::TimeRestored { .. }
                 | Self::Noted(_)
                 | Self::Doubtful(_)
@@ -251,8 +276,14 @@ impl fmt::Display for OdometryRemark {
                 speed_mps,
             } => write!(
                 f,
-                "{field} jumps by {step_m:.3} m; the speed of the steps next to it, {speed_mps:.3} m/s, \
-                 is used instead"
+                "{field} jumps by {} m; the speed of the steps next to it, {speed_mps:.3} m/s, is used \
+                 instead",
+                number(*step_m)
+            ),
+            OdometryIssue::ValueSpike { field, value, used } => write!(
+                f,
+                "{field} is {}, far from the values next to it; their median, {used:.3}, is used instead",
+                number(*value)
             ),
             OdometryIssue::Noted(text)
             | OdometryIssue::Doubtful(text)
@@ -274,6 +305,15 @@ impl fmt::Display for OdometryRemark {
     }
 }
 
+/// Formats a number with three decimals, or with an exponent if it is large.
+pub fn number(value: f64) -> String {
+    if value.abs() < LARGE {
+        format!("{value:.3}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
 /// Collector that decides which items are usable, from their times and values.
 #[derive(Debug)]
 pub struct OdometryCollector {
@@ -282,6 +322,8 @@ pub struct OdometryCollector {
     remarks: Vec<OdometryRemark>,
     /// Number and time (s) of each usable item.
     usable: Vec<(usize, f64)>,
+    /// Time of the first item (s), usable or not.
+    first_s: Option<f64>,
 }
 
 impl OdometryCollector {
@@ -292,6 +334,7 @@ impl OdometryCollector {
             fields,
             remarks: Vec::new(),
             usable: Vec::new(),
+            first_s: None,
         }
     }
 
@@ -305,6 +348,9 @@ impl OdometryCollector {
         values: &[(&'static str, f64)],
     ) -> bool {
         let field = self.fields.time;
+        if time_s.is_finite() && fault.is_none() {
+            self.first_s.get_or_insert(time_s);
+        }
         let named = std::iter::once((field, time_s));
         let mut named = named.chain(values.iter().copied());
         let not_finite = named.find(|(_, value)| !value.is_finite());
@@ -354,6 +400,21 @@ impl OdometryCollector {
         });
     }
 
+    /// Replaces the spikes of a field at the usable items, and reports them.
+    pub fn replace_spikes(&mut self, values: &mut [f64], limits: Limits, field: &'static str) {
+        for Spike { index, value, used } in replace_spikes(&self.times_s(), values, limits) {
+            let Some(&(item, time_s)) = self.usable.get(index) else {
+                continue;
+            };
+            self.remarks.push(OdometryRemark {
+                item,
+                kind: self.kind,
+                time_s,
+                issue: OdometryIssue::ValueSpike { field, value, used },
+            });
+        }
+    }
+
     /// Adds a remark on the file itself.
     pub fn remark(&mut self, issue: OdometryIssue) {
         self.remarks.push(OdometryRemark::of_file(self.kind, issue));
@@ -389,6 +450,17 @@ impl OdometryCollector {
                 issue: OdometryIssue::Gap { gap_s },
             });
         self.remarks.extend(gaps);
+        let start_s = self.usable.first().map(|it| it.1);
+        if let Some((first_s, start_s)) = self.first_s.zip(start_s)
+            && start_s - first_s > LATE_START_S
+        {
+            let text = format!(
+                "its first {:.1} s are not usable; the start pose is that of its first usable {}, at {start_s} s",
+                start_s - first_s,
+                self.kind
+            );
+            self.remark(OdometryIssue::Doubtful(text));
+        }
         self.remarks.sort_by_key(|remark| remark.item);
         OdometryLog {
             samples,

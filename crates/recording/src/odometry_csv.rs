@@ -18,6 +18,7 @@ use crate::error::RecordingError;
 use crate::file as files;
 use crate::odometry::{OdometryCollector, OdometryFields, OdometryIssue, OdometryLog};
 use crate::table::Table;
+use crate::value_spikes::Limits;
 
 const COLUMNS: [&str; 7] = [
     "distance_m",
@@ -27,6 +28,32 @@ const COLUMNS: [&str; 7] = [
     "right_m",
     "left_mps",
     "right_mps",
+];
+
+/// Access to an optional value of a row.
+type Value = fn(&mut Row) -> Option<&mut f64>;
+
+/// Columns whose jumps are replaced.
+const COUNTERS: [(&str, Value); 3] = [
+    ("distance_m", |row| row.distance_m.as_mut()),
+    ("left_m", |row| row.wheels_m.as_mut().map(|[left, _]| left)),
+    ("right_m", |row| {
+        row.wheels_m.as_mut().map(|[_, right]| right)
+    }),
+];
+
+/// Columns whose spikes are replaced.
+const RATES: [(&str, Limits, Value); 4] = [
+    ("speed_mps", Limits::SPEED, |row| row.speed_mps.as_mut()),
+    ("left_mps", Limits::SPEED, |row| {
+        row.wheels_mps.as_mut().map(|[left, _]| left)
+    }),
+    ("right_mps", Limits::SPEED, |row| {
+        row.wheels_mps.as_mut().map(|[_, right]| right)
+    }),
+    ("yaw_rate_radps", Limits::YAW_RATE, |row| {
+        row.yaw_rate_radps.as_mut()
+    }),
 ];
 
 /// Reads odometry of a vehicle without a specified track width, see [`read_wheel_odometry_csv`].
@@ -75,19 +102,20 @@ pub fn read_wheel_odometry_csv(
     } else if !has_distance {
         collector.remark(derived("distance_m", "the speeds"));
     }
-    // Without a speed column, the distance is the only source of speed and yaw rate.
-    if !has_speed {
-        replace(&times_s, &mut rows, &mut collector, "distance_m", |row| {
-            row.distance_m.as_mut()
-        });
+    for (column, value) in COUNTERS {
+        replace(&times_s, &mut rows, &mut collector, column, value);
     }
-    if !has_speed || (wheels_turn && !wheels_mps) {
-        replace(&times_s, &mut rows, &mut collector, "left_m", |row| {
-            row.wheels_m.as_mut().map(|[left, _]| left)
-        });
-        replace(&times_s, &mut rows, &mut collector, "right_m", |row| {
-            row.wheels_m.as_mut().map(|[_, right]| right)
-        });
+    for (column, limits, value) in RATES {
+        let mut values: Vec<f64> = rows
+            .iter_mut()
+            .map(|row| value(row).map_or(f64::NAN, |it| *it))
+            .collect();
+        collector.replace_spikes(&mut values, limits, column);
+        for (row, replaced) in rows.iter_mut().zip(values) {
+            if let Some(value) = value(row) {
+                *value = replaced;
+            }
+        }
     }
     let mut samples: Vec<OdometrySample> = Vec::with_capacity(rows.len());
     let mut before: Option<Row> = None;
@@ -136,7 +164,7 @@ fn replace(
     rows: &mut [Row],
     collector: &mut OdometryCollector,
     column: &'static str,
-    value: fn(&mut Row) -> Option<&mut f64>,
+    value: Value,
 ) {
     let mut given: Vec<(usize, f64, &mut f64)> = times_s
         .iter()

@@ -1,6 +1,7 @@
 //! Tables of numbers with named columns, separated by commas, semicolons or tabs. With semicolons
 //! or tabs, numbers may have a decimal comma.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
@@ -22,6 +23,8 @@ pub struct Table {
     pub rows: Vec<Row>,
     file: String,
     header: StringRecord,
+    /// Fields of the first comment, which may be a header by mistake.
+    commented: Vec<String>,
 }
 
 #[derive(Debug)]
@@ -42,7 +45,7 @@ impl Table {
     pub fn read(file: &Path, required: &[&str], optional: &[&str]) -> Result<Self, RecordingError> {
         let bytes =
             files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
-        let text = text_of(&bytes).map_err(|message| RecordingError::Syntax {
+        let text = text_of(&bytes, "CSV").map_err(|message| RecordingError::Syntax {
             file: file.display().to_string(),
             format: "CSV",
             message,
@@ -60,7 +63,9 @@ impl Table {
         required: &[&str],
         optional: &[&str],
     ) -> Result<Self, RecordingError> {
-        let separator = separator(text);
+        let text = without_hints(text);
+        let text = text.as_ref();
+        let separator = given_separator(text).unwrap_or_else(|| separator(text));
         let mut numbers = Numbers::new(separator);
         let mut reader = ReaderBuilder::new()
             .delimiter(separator as u8)
@@ -77,6 +82,15 @@ impl Table {
             rows: Vec::new(),
             file: file.display().to_string(),
             header: reader.headers().map_err(invalid)?.clone(),
+            commented: text
+                .lines()
+                .find_map(|line| line.strip_prefix('#'))
+                .map(|line| {
+                    line.split(separator)
+                        .map(|it| it.trim().to_owned())
+                        .collect()
+                })
+                .unwrap_or_default(),
         };
         let mut wanted: Vec<(&str, Option<usize>, bool)> = Vec::new();
         let names = required.iter().map(|name| (name, true));
@@ -131,9 +145,73 @@ impl Table {
         RecordingError::Missing {
             file: self.file.clone(),
             key: column.to_owned(),
-            allowed: format!("{allowed}; {named}"),
+            allowed: format!("{allowed}; {named}{}", self.advice(column)),
         }
     }
+
+    /// Returns the advice for a missing column that the file has in another notation.
+    fn advice(&self, column: &str) -> String {
+        let is_other = |name: &&str| {
+            let has_name = |start: &str| start.eq_ignore_ascii_case(column);
+            let rest = name.get(column.len()..).unwrap_or_default();
+            let has_unit = rest.starts_with([' ', '[', '(', '/']);
+            has_name(name) || (has_unit && name.get(..column.len()).is_some_and(has_name))
+        };
+        let alone = (self.header.len() == 1)
+            .then(|| self.header.get(0))
+            .flatten();
+        let has_other_separator =
+            |name: &str| name.contains(column) && name.contains([' ', '|', ':']);
+        if self.commented.iter().any(|name| name == column) {
+            "; the header must not begin with #".to_owned()
+        } else if alone.is_some_and(has_other_separator) {
+            "; separate the columns by commas, semicolons or tabs".to_owned()
+        } else if let Some(name) = self.header.iter().find(is_other) {
+            format!("; write {column} instead of {name}")
+        } else {
+            String::new()
+        }
+    }
+}
+
+/// First line of the CSV files of spreadsheets, which gives the separator; as a comment.
+const SEPARATOR_LINE: &str = "#sep=";
+
+/// Returns a text without byte order mark, and without blanks before comments. The line `sep=;` of
+/// spreadsheets becomes a comment. The number of lines is unchanged.
+fn without_hints(text: &str) -> Cow<'_, str> {
+    let text = text.trim_start_matches('\u{feff}');
+    let first = text.lines().find(|line| !line.trim().is_empty());
+    let is_separator = |line: &str| {
+        let bare = line.trim_matches([' ', '"', '\r']);
+        let name = bare.get(..4).unwrap_or_default();
+        name.eq_ignore_ascii_case("sep=") && bare.chars().count() == 5
+    };
+    let has_hint = first.is_some_and(is_separator);
+    let is_indented = |line: &str| !line.starts_with('#') && line.trim_start().starts_with('#');
+    if !has_hint && !text.lines().any(is_indented) {
+        return Cow::Borrowed(text);
+    }
+    let mut hint = first.filter(|_| has_hint);
+    let lines = text.lines().map(|line| {
+        if hint.take_if(|it| *it == line).is_some() {
+            // A tab must not be trimmed.
+            let separator = line.trim_matches([' ', '"', '\r']).chars().next_back();
+            format!("{SEPARATOR_LINE}{}", separator.unwrap_or(','))
+        } else if is_indented(line) {
+            line.trim_start().to_owned()
+        } else {
+            line.to_owned()
+        }
+    });
+    Cow::Owned(lines.collect::<Vec<String>>().join("\n") + "\n")
+}
+
+/// Returns the separator that the first line gives.
+fn given_separator(text: &str) -> Option<char> {
+    let first = text.lines().find(|line| !line.trim().is_empty())?;
+    let separator = first.strip_prefix(SEPARATOR_LINE)?.chars().next()?;
+    (separator.is_ascii() && separator != '"').then_some(separator)
 }
 
 /// Returns the separator with the most occurrences in the first line.

@@ -5,11 +5,15 @@ use std::path::Path;
 
 use crate::error::RecordingError;
 use crate::file as files;
+use crate::foreign::text_of;
 use onboard::geometry::{Pose, wrap_angle};
 use onboard::time_unit::TimeUnit;
 
 /// Maximum size of a trajectory in bytes: a day of poses at 50 Hz.
 const MOST_BYTES: u64 = 512 << 20;
+
+/// Maximum coordinate of a position (m), larger than in any map projection.
+const MAX_COORDINATE_M: f64 = 1e8;
 
 /// Pose with its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +56,11 @@ pub fn write_tum(file: &Path, poses: &[TimedPose]) -> Result<(), RecordingError>
 /// time is not in seconds.
 pub fn read_tum(file: &Path) -> Result<Vec<TimedPose>, RecordingError> {
     let bytes = files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
-    let text = String::from_utf8_lossy(&bytes);
+    let text = text_of(&bytes, "TUM").map_err(|message| RecordingError::Syntax {
+        file: file.display().to_string(),
+        format: "TUM",
+        message,
+    })?;
     let lines = text
         .trim_start_matches('\u{feff}')
         .lines()
@@ -77,7 +85,13 @@ const NORM_TOLERANCE: f64 = 0.02;
 fn pose(line: &str) -> Result<TimedPose, String> {
     const ALLOWED: &str = "it must be the eight numbers t x y z qx qy qz qw";
     let numbers = line.split_whitespace().map(str::parse);
-    let numbers: Vec<f64> = numbers.collect::<Result<_, _>>().map_err(|_| ALLOWED)?;
+    let numbers: Vec<f64> = numbers.collect::<Result<_, _>>().map_err(|_| {
+        if line.contains([',', ';']) {
+            format!("{ALLOWED}, separated by blanks, with decimal points")
+        } else {
+            ALLOWED.to_owned()
+        }
+    })?;
     let &[time_s, x_m, y_m, z_m, qx, qy, qz, qw] = numbers.as_slice() else {
         return Err(format!("{ALLOWED}, and it is {}", numbers.len()));
     };
@@ -86,6 +100,9 @@ fn pose(line: &str) -> Result<TimedPose, String> {
         .all(|value| value.is_finite())
     {
         return Err("t, x, y and z must be finite".to_owned());
+    }
+    if [x_m, y_m].iter().any(|it| it.abs() > MAX_COORDINATE_M) {
+        return Err("x and y must be within 1e8 m of 0".to_owned());
     }
     if let Some(unit) = TimeUnit::of_epoch(time_s) {
         return Err(format!("t must be in seconds, and is likely in {unit}"));

@@ -207,6 +207,7 @@ def locate(
     if drive.smoothed is not None and drive.smoothed.is_empty() and not _lost(drive):
         raise InputError(f"{vehicle}: --smooth needs localizer.kind = tracker")
     numbers = drives.summary(drive, truth)
+    doubt = None if true is None else drives.truth_doubt(drive, true)
     write_compared(beside, directory)
     drive.write_mcap(directory.path / "drive.mcap")
     drive.write_tum(directory.path / "trajectory.tum")
@@ -227,6 +228,7 @@ def locate(
         "remarks": drive.remarks,
         "diagnoses": drive.diagnoses,
         "suspicions": drive.suspicions,
+        **({} if doubt is None else {"truth": doubt}),
     }
     directory.write_manifest(
         recording=str(recording), odometry=str(odometry), **told, warnings=plant.warnings(carrier)
@@ -237,6 +239,8 @@ def locate(
         print(json_text({**told, **more}))
     else:
         _show(drive, numbers)
+        if doubt is not None:
+            show_warning(f"{truth}: {doubt}")
         show_compared(beside)
         if (operation := Operation.under(carrier, drive.poses)) is not None:
             console.print(f"{operation.in_words()} {operation.what_helps()}".strip())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from access_av import _core
-from access_av.drives import angle_log
+from access_av.drives import angle_log, truth_frame
 from access_av.errors import InputError
 from access_av.run.pairs import STRETCHES, Errors
 from access_av.run.service_levels import INDEPENDENT_S
@@ -26,14 +26,6 @@ MOST_TRUTH_GAP_S = 1.0
 
 # Minimum share of the drive with known truth.
 MIN_COMPARED = 0.5
-
-# Median distance (m) between truth and drive above which they are in different frames.
-OTHER_FRAME_M = 1e4
-
-# Extent of the truth relative to that of the drive below which its unit is not metres, and minimum
-# extent of the drive (m) for this test. A degree is 1e5 m.
-MIN_EXTENT = 1e-3
-MIN_EXTENT_OF_DRIVE_M = 1.0
 
 # Maximum unavailable share of a reliable drive.
 MAX_UNAVAILABLE = 0.2
@@ -376,7 +368,7 @@ def error_m(poses: pl.DataFrame, truth: str | Path | pl.DataFrame) -> pl.DataFra
     RecordingError
         When the file is no TUM trajectory.
     InputError
-        Truth for less than half of the drive, or in another frame.
+        Truth for less than half of the drive, with impossible steps, or in another frame or unit.
     """
     known = poses.filter(~pl.col("searching")).sort("time_s")
     true = truth if isinstance(truth, pl.DataFrame) else read_tum(truth)
@@ -396,7 +388,7 @@ def error_m(poses: pl.DataFrame, truth: str | Path | pl.DataFrame) -> pl.DataFra
     dx = pl.col("x_m") - pl.col("x0") - share * (pl.col("x1") - pl.col("x0"))
     dy = pl.col("y_m") - pl.col("y0") - share * (pl.col("y1") - pl.col("y0"))
     errors = both.select("time_s", error_m=(dx**2 + dy**2).sqrt(), error_x_m=dx, error_y_m=dy)
-    _check_frame(which, known, true, errors)
+    truth_frame.check(which, known, true, errors)
     return errors
 
 
@@ -427,36 +419,24 @@ def _why_apart(known: pl.DataFrame, true: pl.DataFrame) -> str:
     )
 
 
-def _check_frame(which: str, known: pl.DataFrame, true: pl.DataFrame, errors: pl.DataFrame) -> None:
-    """Rejects positions in another frame or unit than the map's."""
-    apart_m = errors["error_m"].median()
-    if isinstance(apart_m, float) and apart_m > OTHER_FRAME_M:
-        x_m, y_m = true["x_m"][0], true["y_m"][0]
-        raise InputError(
-            f"{which}: its first position ({x_m:.0f}, {y_m:.0f}) is in another frame, "
-            f"{apart_m / 1e3:.0f} km from the drive (UTM coordinates?); it must be in metres in "
-            "the frame of the site: subtract the site's origin"
-        )
-
-    def extent_m(of: pl.DataFrame) -> float:
-        places = of.select("x_m", "y_m").to_numpy()
-        spans = places.max(axis=0) - places.min(axis=0)
-        return math.hypot(*spans)
-
-    within = true.filter(pl.col("time_s").is_between(known["time_s"][0], known["time_s"][-1]))
-    if within.is_empty():
-        return
-    drive_m, true_m = extent_m(known), extent_m(within)
-    if drive_m > MIN_EXTENT_OF_DRIVE_M and 0.0 < true_m < MIN_EXTENT * drive_m:
-        raise InputError(
-            f"{which}: its positions extend over {true_m:.2g}, those of the drive over "
-            f"{drive_m:.1f} m (longitude and latitude in degrees?); they must be in metres in the "
-            "frame of the site"
-        )
-
-
 def _interval_s(of: pl.DataFrame) -> str:
     return f"{of['time_s'][0]:.3f} to {of['time_s'][-1]:.3f} s"
+
+
+def truth_doubt(drive: Drive, truth: pl.DataFrame) -> str | None:
+    """Returns the reason to doubt the frame of a truth; ``None`` without one.
+
+    Parameters
+    ----------
+    drive
+        A located drive.
+    truth
+        Truth, as returned by :func:`read_tum`.
+    """
+    known = drive.poses.filter(~pl.col("searching"))
+    if known.is_empty():
+        return None
+    return truth_frame.explanation(known, error_m(drive.poses, truth))
 
 
 def in_stretches(drive: Drive, truth: pl.DataFrame, name: str) -> Errors:

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+# Largest physical cell identity.
+MAX_PCI = 1007
+
 
 def read_road(path: Path) -> Drawn:
     """Reads the columns ``x_m`` and ``y_m``: one point of the road per row.
@@ -41,10 +44,13 @@ def read_heads(path: Path) -> Drawn:
     """
     rows = validation.read(path, "table of radio heads", {"name": pl.String})
     validation.check(rows, str(path), numbers=("x_m", "y_m", "z_m"), other=())
-    known = rows.filter(pl.col("pci").is_not_null()) if "pci" in rows.columns else rows.clear()
-    for value in known.get_column("pci", default=pl.Series(dtype=pl.Int64)):
-        if not isinstance(value, (int, float)) or not float(value).is_integer():
-            raise InputError(f"{path}: pci is {value!r}; a whole number, or nothing, is needed")
+    for index, value in enumerate(rows.get_column("pci", default=pl.Series(dtype=pl.Int64))):
+        is_whole = isinstance(value, (int, float)) and float(value).is_integer()
+        if value is not None and not (is_whole and 0 <= value <= MAX_PCI):
+            raise InputError(
+                f"{path}: pci is {value!r} in {validation.row_name(str(path), index)}; a whole "
+                f"number from 0 to {MAX_PCI}, or nothing, is needed"
+            )
     return Drawn(
         heads=[
             Head(

@@ -22,7 +22,19 @@ DECIMAL_COMMA = r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$"
 THOUSANDS = re.compile(r"[+-]?\d{1,3}([,.'\u2019 \u00a0\u202f]\d{3})+([.,]\d+)?")
 # First line of CSV files that Excel writes or reads: it gives the separator.
 SEPARATOR_LINE = re.compile(rb'"?sep=([,;|\t])"?', re.IGNORECASE)
-WIDE = (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+UTF32 = (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)
+UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+# First bytes of files of other formats.
+OTHER_FORMATS = {
+    b"PAR1": "Parquet",
+    b"PK\x03\x04": "a zip file or a spreadsheet",
+    b"\x1f\x8b": "compressed (gzip)",
+    b"\x28\xb5\x2f\xfd": "compressed (zstd)",
+    b"\x89HDF": "HDF5",
+    b"\x89MCAP0": "MCAP",
+    b"#ROSBAG": "a bag of ROS 1",
+    b"SQLite format 3": "sqlite3",
+}
 
 
 @dataclass(frozen=True)
@@ -48,7 +60,7 @@ class Lines:
 
 
 def read(path: Path, schema: dict[str, Any] | None = None) -> pl.DataFrame:
-    """Reads a CSV file in UTF-8, in the format of the logs of `locate`.
+    """Reads a CSV file in UTF-8 or UTF-16, in the format of the logs of `locate`.
 
     Columns are separated by commas, semicolons or tabs; with semicolons and tabs, numbers may have
     a decimal comma. Blanks around cells, blank lines and lines that begin with ``#`` are ignored.
@@ -108,8 +120,16 @@ def has_thousands_separators(text: str) -> bool:
 
 def _lines(path: Path) -> Lines:
     data: bytes = path.read_bytes()
-    if data.startswith(WIDE) or b"\0" in data[:1000]:
-        raise InputError(f"{path}: UTF-16 or UTF-32 text; save it as CSV UTF-8")
+    for beginning, name in OTHER_FORMATS.items():
+        if data.startswith(beginning):
+            raise InputError(f"{path}: the file is {name}, not CSV; save it as CSV UTF-8")
+    if data.startswith(UTF16) and not data.startswith(UTF32):
+        data = data.decode("utf-16", errors="replace").encode("utf-8")
+    elif data.startswith(UTF32) or b"\0" in data[:1000]:
+        raise InputError(
+            f"{path}: UTF-32 text, UTF-16 without a byte order mark, or binary; save it as "
+            "CSV UTF-8"
+        )
     data = data.removeprefix(codecs.BOM_UTF8)
     try:
         data.decode("utf-8")
@@ -124,7 +144,7 @@ def _lines(path: Path) -> Lines:
     rows: list[bytes] = []
     numbers: list[int] = []
     for number, line in enumerate(data.splitlines(), 1):
-        if not line.strip() or line.startswith(b"#"):
+        if not line.strip() or line.lstrip().startswith(b"#"):
             continue
         if names is None:
             given = SEPARATOR_LINE.fullmatch(line.strip(b" \r"))
@@ -153,8 +173,22 @@ def _header(path: Path, line: bytes, separator: str) -> list[str]:
     names = [it.strip() for it in _cells(path, line, separator, 1)]
     for name in names:
         if name and names.count(name) > 1:
+            if is_number(name):
+                raise InputError(
+                    f"{path}: the first line holds the number {name}; it must name the columns, "
+                    "without #"
+                )
             raise InputError(f"{path}: column {name} is there twice; each may be there once")
     return names
+
+
+def is_number(text: str) -> bool:
+    """Returns whether a cell is a number with a decimal point."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _count(path: Path, line: bytes, separator: str, number: int) -> int:

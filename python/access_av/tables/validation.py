@@ -71,13 +71,12 @@ def check(
     numbers, other = list(numbers), list(other)
     for name in (*other, *numbers):
         if name not in rows.columns:
-            alike = [it for it in rows.columns if it.lower() == name.lower()]
-            hint = f"; write {name} instead of {alike[0]}" if alike else ""
+            hint = _advice(name, rows.columns)
             named = ", ".join(rows.columns)
             raise InputError(f"{where}: column {name} is missing; there are {named}{hint}")
     for name in other:
         if len(empty := rows[name].is_null().arg_true()):
-            raise InputError(f"{where}: {name} is empty in {_row(where, empty[0])}")
+            raise InputError(f"{where}: {name} is empty in {row_name(where, empty[0])}")
     for name in numbers:
         finite = rows[name].cast(pl.Float64, strict=False).is_finite()
         bad = (~finite).fill_null(value=True).arg_true()
@@ -88,11 +87,25 @@ def check(
             grouped = isinstance(value, str) and csv_text.has_thousands_separators(value)
             hint = " without thousands separators" if grouped else ""
             raise InputError(
-                f"{where}: {name} {says} in {_row(where, bad[0])}; a number{hint} is needed"
+                f"{where}: {name} {says} in {row_name(where, bad[0])}; a number{hint} is needed"
             )
 
 
-def _row(where: str, index: int) -> str:
+def _advice(name: str, columns: list[str]) -> str:
+    """Returns the advice for a missing column that a table has in another notation."""
+    for column in columns:
+        start, rest = column[: len(name)], column[len(name) :]
+        is_it = start.lower() == name.lower() and (not rest or rest[0] in " [(/")
+        if is_it and (len(columns) > 1 or "[" in rest or not rest):
+            return f"; write {name} instead of {column}"
+    if len(columns) == 1 and name in columns[0] and any(it in columns[0] for it in " |:"):
+        return "; separate the columns by commas, semicolons or tabs"
+    if any(csv_text.is_number(column) for column in columns):
+        return "; the first line must be the header, without #"
+    return ""
+
+
+def row_name(where: str, index: int) -> str:
     """Returns the line of a CSV file, or the row of another table, counted from 1."""
     path = Path(where)
     if path.suffix.lower() == ".csv" and path.is_file():

@@ -62,15 +62,20 @@ const fn yes() -> bool {
     true
 }
 
+/// Byte order mark of UTF-8.
+const BOM: &[u8] = b"\xef\xbb\xbf";
+
 /// Parses a line; `None` for a blank line.
 ///
 /// # Errors
 /// Description of the error with the key.
 pub fn parse(line: &[u8]) -> Result<Option<Input>, String> {
+    let line = line.strip_prefix(BOM).unwrap_or(line);
     if line.trim_ascii().is_empty() {
         return Ok(None);
     }
-    let value: Value = serde_json::from_slice(line).map_err(|error| error.to_string())?;
+    let value: Value = serde_json::from_slice(line)
+        .map_err(|error| format!("not a JSON object in UTF-8 on one line: {error}"))?;
     let Value::Object(mut message) = value else {
         return Err(format!(
             "not an object; it must be one with the key `type`: {TYPES}"
@@ -101,9 +106,23 @@ fn read<T: DeserializeOwned>(message: Map<String, Value>) -> Result<T, String> {
         if key == "." {
             why.to_string()
         } else {
-            format!("{key}: {why}")
+            format!("{key}: {}", in_words(&why.to_string()))
         }
     })
+}
+
+/// Replaces the names of Rust's types in a message of serde.
+fn in_words(why: &str) -> String {
+    let Some((found, expected)) = why.split_once(", expected ") else {
+        return why.to_owned();
+    };
+    let expected = match expected {
+        "f64" => "a number",
+        "u8" => "an integer from 0 to 255",
+        "u16" => "an integer from 0 to 65535",
+        other => other,
+    };
+    format!("{found}, expected {expected}")
 }
 
 fn odometry(message: &Odometry) -> Input {

@@ -125,9 +125,14 @@ pub fn motion(readings: &[Reading], filled: Filled) -> Motion {
 fn of_twist(readings: &[Reading], is_filled: bool) -> Motion {
     if !is_filled {
         let zeros = vec![0.0; readings.len()];
+        let doubt = format!(
+            "the vehicle does not move: {POSITION} never changes by more than {STANDING_M} m, and {SPEED} is always 0 or \
+             not finite; one of them must be filled, in m or m/s"
+        );
         return Motion {
             distances_m: zeros.clone(),
             speeds_mps: zeros,
+            doubts: vec![doubt],
             ..Motion::default()
         };
     }
@@ -285,10 +290,8 @@ impl<'a> Path<'a> {
         };
         let mut distances_m = self.distances_m(has_twist);
         let times_s: Vec<f64> = self.readings.iter().map(|it| it.time_s).collect();
-        let mut jumps = Vec::new();
+        let jumps = replace_jumps(&times_s, &mut distances_m);
         if meaning == TwistMeaning::Unfilled {
-            // The position is the only source of the speed in this case.
-            jumps = replace_jumps(&times_s, &mut distances_m);
             self.notes.push(format!(
                 "{SPEED} is not filled; the speed is taken from {POSITION}"
             ));

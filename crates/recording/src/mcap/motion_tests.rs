@@ -258,8 +258,10 @@ fn jumps_of_the_pose_do_not_change_the_speed() {
     let motion = resets(true);
     assert_right(&motion, 2e-3, "reset");
     assert_eq!(motion.jumps.len(), 3);
-    // With a separate speed, the localizer replaces the step itself.
-    assert!(resets(false).jumps.is_empty());
+    // A separate speed does not change the distances.
+    let motion = resets(false);
+    assert_right(&motion, 2e-3, "reset with twist");
+    assert_eq!(motion.jumps.len(), 3);
 }
 
 #[test]

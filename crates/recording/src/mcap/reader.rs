@@ -17,6 +17,7 @@ use crate::error::RecordingError;
 use crate::odometry::{
     OdometryCollector, OdometryFields, OdometryIssue, OdometryLog, OdometryRemark,
 };
+use crate::value_spikes::Limits;
 
 /// Name of an item in remarks.
 const KIND: &str = "message";
@@ -81,6 +82,7 @@ pub fn read_odometry_mcap(
             truncated.push(format!("{}: {TRUNCATED}", file.display()));
         }
     }
+    imus.values_mut().for_each(Gyroscope::replace_spikes);
     let topic = one_topic(bag, topic, &topics)?;
     let (readings, motion, mut collector) = used(messages);
     for text in truncated {
@@ -152,6 +154,7 @@ fn used(mut messages: Vec<Message>) -> (Vec<Reading>, Motion, OdometryCollector)
             readings.push(*reading);
         }
     }
+    replace_spikes(&mut readings, &mut collector);
     let motion = motion(&readings, filled);
     for note in &motion.notes {
         collector.remark(OdometryIssue::Noted(note.clone()));
@@ -163,6 +166,34 @@ fn used(mut messages: Vec<Message>) -> (Vec<Reading>, Motion, OdometryCollector)
         collector.report_jump(jump, OdometryFields::ROS.distance);
     }
     (readings, motion, collector)
+}
+
+/// Replaces impossible single values of the twists.
+fn replace_spikes(readings: &mut [Reading], collector: &mut OdometryCollector) {
+    type Value = fn(&mut Reading) -> Option<&mut f64>;
+    let fields: [(&str, Limits, Value); 3] = [
+        (OdometryFields::ROS.speed, Limits::SPEED, |it| {
+            it.linear_mps.first_mut()
+        }),
+        ("twist.twist.linear.y", Limits::SPEED, |it| {
+            it.linear_mps.last_mut()
+        }),
+        (OdometryFields::ROS.yaw_rate, Limits::YAW_RATE, |it| {
+            it.yaw_rate_radps.as_mut()
+        }),
+    ];
+    for (field, limits, value) in fields {
+        let mut values: Vec<f64> = readings
+            .iter_mut()
+            .map(|it| value(it).map_or(f64::NAN, |it| *it))
+            .collect();
+        collector.replace_spikes(&mut values, limits, field);
+        for (reading, replaced) in readings.iter_mut().zip(values) {
+            if let Some(value) = value(reading) {
+                *value = replaced;
+            }
+        }
+    }
 }
 
 /// Restores the times of leading messages whose time stamp was not set, from the recorder's times

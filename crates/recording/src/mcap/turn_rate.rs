@@ -5,6 +5,8 @@
 
 use onboard::geometry::wrap_angle;
 
+use crate::value_spikes::{Limits, replace_spikes};
+
 /// Minimum fraction of a step that readings must cover.
 const LEAST_COVERED: f64 = 0.5;
 /// Minimum interval of two readings, in median intervals, that is a gap without information.
@@ -33,6 +35,16 @@ impl Gyroscope {
         match reading.filter(usable) {
             Some(reading) => self.readings.push(reading),
             None => self.left_out += 1,
+        }
+    }
+
+    /// Replaces impossible single yaw rates by the median of their neighbours; they count as left
+    /// out.
+    pub fn replace_spikes(&mut self) {
+        let (times_s, mut rates): (Vec<f64>, Vec<f64>) = self.readings.iter().copied().unzip();
+        self.left_out += replace_spikes(&times_s, &mut rates, Limits::YAW_RATE).len();
+        for (reading, rate) in self.readings.iter_mut().zip(rates) {
+            reading.1 = rate;
         }
     }
 

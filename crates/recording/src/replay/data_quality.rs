@@ -9,7 +9,7 @@ use onboard::settings::{Site, Vehicle};
 
 use super::error::ReplayError;
 use crate::angle_log::LoggedAngle;
-use crate::odometry::OdometryLog;
+use crate::odometry::{OdometryLog, number};
 
 /// Minimum time without any angle that is reported (s).
 const SILENCE_S: f64 = 20.0;
@@ -128,8 +128,8 @@ pub fn warnings(
     let (turning, all) = (turning.count(), samples.len());
     if 0 < turning && turning < all {
         let text = format!(
-            "odometry: yaw_rate_radps is empty in {} of {all} samples; the yaw change is unknown \
-             there",
+            "odometry: {} is empty in {} of {all} samples; the yaw change is unknown there",
+            odometry.fields.yaw_rate,
             all - turning
         );
         warnings.push((start_s, text));
@@ -173,9 +173,12 @@ fn of_odometry(odometry: &OdometryLog) -> Option<(f64, String)> {
     let ratio = by_distance_m / by_speed_m;
     (by_speed_m > 1.0 && !(0.7..1.5).contains(&ratio)).then(|| {
         let text = format!(
-            "odometry: distances add up to {by_distance_m:.1} m, speeds to {by_speed_m:.1} m; check \
-             the units of {}, {} and {}",
-            odometry.fields.distance, odometry.fields.speed, odometry.fields.time
+            "odometry: distances add up to {} m, speeds to {} m; check the units of {}, {} and {}",
+            number(by_distance_m),
+            number(by_speed_m),
+            odometry.fields.distance,
+            odometry.fields.speed,
+            odometry.fields.time
         );
         (start_s, text)
     })

@@ -14,12 +14,25 @@ use super::clock::LEAST_LATENESS_S;
 use super::error::ReplayError;
 use super::located::{Diagnosis, LocatedDrive, LocatedPose, Remark, gathered};
 use crate::library::load;
-use crate::odometry::OdometryLog;
+use crate::odometry::{OdometryLog, number};
 
 /// Minimum deviation of the odometer's scale that is reported.
 const LEAST_SCALE: f64 = 0.03;
 /// Minimum deviation of the array's mounting that is reported (rad).
 const LEAST_MOUNTING_RAD: f64 = 0.05;
+
+/// Checks that the odometry has two usable samples.
+///
+/// # Errors
+/// [`ReplayError::NoOdometry`].
+pub(super) fn check_odometry(odometry: &OdometryLog) -> Result<(), ReplayError> {
+    if odometry.samples.len() >= 2 {
+        return Ok(());
+    }
+    let mut unused = odometry.remarks.iter().filter(|it| !it.issue.used());
+    let why = unused.next().map(ToString::to_string);
+    Err(ReplayError::NoOdometry { why })
+}
 
 /// Drive that is being located.
 pub struct Replay<'a> {
@@ -52,11 +65,7 @@ impl<'a> Replay<'a> {
         custom: Custom,
         odometry: &'a OdometryLog,
     ) -> Result<Self, ReplayError> {
-        if odometry.samples.len() < 2 {
-            let mut unused = odometry.remarks.iter().filter(|it| !it.issue.used());
-            let why = unused.next().map(ToString::to_string);
-            return Err(ReplayError::NoOdometry { why });
-        }
+        check_odometry(odometry)?;
         let platform: Platform = load(&vehicle.platform.name)?;
         let onboard = Onboard::new(site, vehicle, &platform, start, custom)?;
         Ok(Self {
@@ -299,15 +308,17 @@ impl<'a> Replay<'a> {
                 Ok(OdometryVerdict::DistanceJump { jump_m }) => self.remark(
                     at_s,
                     format!(
-                        "odometry at {at_s} s: the distance jumps by {jump_m:.3} m, the speed was \
-                         used instead"
+                        "odometry at {at_s} s: the distance jumps by {} m, the speed was \
+                         used instead",
+                        number(jump_m)
                     ),
                 ),
                 Ok(OdometryVerdict::YawRateRefused { radps }) => self.remark(
                     at_s,
                     format!(
-                        "odometry at {at_s} s: no vehicle turns by {radps:.1} rad/s, its yaw rate was \
-                         refused; check its unit, or vehicle.top_yaw_rate_radps"
+                        "odometry at {at_s} s: no vehicle turns by {} rad/s, its yaw rate was \
+                         refused; check its unit, or vehicle.top_yaw_rate_radps",
+                        number(radps)
                     ),
                 ),
                 Ok(OdometryVerdict::BeyondMap { by_m }) => {

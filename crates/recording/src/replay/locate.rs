@@ -14,7 +14,7 @@ use onboard::{Custom, Execution};
 use super::clock::{LEAST_LATENESS_S, Lateness, earlier, lateness};
 use super::data_quality::warnings;
 use super::diagnosis::diagnose;
-use super::drive::Replay;
+use super::drive::{Replay, check_odometry};
 use super::error::ReplayError;
 use super::hypotheses::Drive;
 use super::located::{LocatedDrive, LocatedPose};
@@ -39,11 +39,12 @@ pub fn locate_angles(
     smooth: bool,
 ) -> Result<LocatedDrive, ReplayError> {
     let (mut vehicle, start) = starting(site, vehicle, start)?;
-    check_times(odometry, &angles.angles)?;
+    check_odometry(odometry)?;
     if angles.angles.is_empty() {
         let why = angles.remarks.first().map(ToString::to_string);
         return Err(ReplayError::NoAngle { why });
     }
+    check_times(odometry, &angles.angles)?;
     let measurand = vehicle.array.measurand();
     let mut logged = Cow::Borrowed(angles.angles.as_slice());
     let mut late = lateness(&as_given(site, &vehicle, odometry, &logged))?;
@@ -89,6 +90,7 @@ pub fn locate_recording(
         return Err(ReplayError::StartTime { start_time_s });
     }
     let (mut vehicle, start) = starting(site, vehicle, start)?;
+    check_odometry(odometry)?;
     check_times(odometry, &[])?;
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     let file = recording.data_file().display().to_string();
@@ -195,7 +197,8 @@ fn explain(
 ) -> Result<(), ReplayError> {
     replay.drive_on()?;
     let given = as_given(site, vehicle, odometry, angles);
-    for diagnosis in diagnose(&given, replay.located())? {
+    for mut diagnosis in diagnose(&given, replay.located())? {
+        diagnosis.text = odometry.fields.named(&diagnosis.text);
         replay.diagnose(diagnosis);
     }
     Ok(())

@@ -30,7 +30,9 @@ pub enum ScanError {
         source: SearchError,
     },
     /// Neither the recording nor the settings contain a centre frequency.
-    #[error("{file}: no centre frequency; it must be in the recording or be given")]
+    #[error(
+        "{file}: no centre frequency; `captures[0].core:frequency` of the metadata must be in Hz, or it must be given"
+    )]
     NoCentreFrequency {
         /// Path of the recording.
         file: String,

@@ -1,16 +1,21 @@
 //! SigMF archives (`.sigmf`, a tar file with recordings) and collections (`.sigmf-collection`).
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use crate::error::RecordingError;
 use crate::file as files;
+use crate::foreign::format_of;
 
 /// Maximum size of a collection file in bytes: names and hashes of recordings.
 const MAX_COLLECTION_BYTES: u64 = 16 << 20;
 /// Maximum size of the metadata in an archive in bytes: some hours of annotated SSBs.
 const MAX_META_BYTES: u64 = 512 << 20;
+
+/// Number of bytes that determine the format of a file.
+const MAGIC_BYTES: u64 = 16;
 
 /// Byte range of data in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,8 +37,17 @@ pub fn recording_in(archive: &Path) -> Result<(Vec<u8>, Extent), RecordingError>
     let syntax = |source: std::io::Error| RecordingError::Syntax {
         file: archive.display().to_string(),
         format: "SigMF archive (tar)",
-        message: source.to_string(),
+        // The library quotes the bytes of the file.
+        message: format!("it is damaged, or not a tar file ({:?})", source.kind()),
     };
+    let mut start = Vec::new();
+    let opened = files::open(archive).map_err(io)?;
+    let mut first = opened.take(MAGIC_BYTES);
+    first.read_to_end(&mut start).map_err(io)?;
+    if let Some(format) = format_of(&start) {
+        let allowed = "a SigMF archive is a tar file without compression; unpack it";
+        return Err(RecordingError::value(archive, "archive", format, allowed));
+    }
     let mut tar = tar::Archive::new(files::open(archive).map_err(io)?);
     let mut metas: Vec<(String, Vec<u8>)> = Vec::new();
     let mut data: Vec<(String, Extent)> = Vec::new();
@@ -51,7 +65,7 @@ pub fn recording_in(archive: &Path) -> Result<(Vec<u8>, Extent), RecordingError>
                 ));
             }
             let mut text = Vec::new();
-            std::io::Read::read_to_end(&mut entry, &mut text).map_err(syntax)?;
+            entry.read_to_end(&mut text).map_err(syntax)?;
             metas.push((stem.to_owned(), text));
         } else if let Some(stem) = name.strip_suffix(".sigmf-data") {
             let extent = Extent {

@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 use super::frequency;
 use crate::error::RecordingError;
 use crate::file as files;
+use crate::foreign::text_of;
 
 /// Maximum size of a metadata file in bytes: some hours of annotated SSBs.
 const MOST_BYTES: u64 = 512 << 20;
@@ -147,16 +148,43 @@ impl Metadata {
     }
 
     pub(super) fn parse(text: &[u8], file: &Path) -> Result<Self, RecordingError> {
-        let json: Value = serde_json::from_slice(text).map_err(|error| RecordingError::Syntax {
+        let syntax = |message: String| RecordingError::Syntax {
             file: file.display().to_string(),
             format: "JSON",
-            message: error.to_string(),
-        })?;
+            message,
+        };
+        let text = text_of(text, "JSON").map_err(syntax)?;
+        let text = text.trim_start_matches('\u{feff}');
+        let json: Value = serde_json::from_str(text).map_err(|error| syntax(error.to_string()))?;
         let metadata: Self = serde_path_to_error::deserialize(json).map_err(|error| {
             explain(file, &error.path().to_string(), &error.inner().to_string())
         })?;
         metadata.check(file)?;
         Ok(metadata)
+    }
+
+    /// Checks that the numbers of the captures' first samples since the start of the receiver do
+    /// not go back.
+    fn check_global_indices(&self, file: &Path) -> Result<(), RecordingError> {
+        let mut last: Option<(u64, u64)> = None;
+        for (index, capture) in self.captures.iter().enumerate() {
+            let Some(number) = capture.global_index() else {
+                continue;
+            };
+            let start = capture.sample_start;
+            if let Some((last_start, last_number)) = last {
+                let least = last_number.saturating_add(start.saturating_sub(last_start));
+                if number < least {
+                    let allowed = format!(
+                        "it must be at least {least}, by the captures and samples before it"
+                    );
+                    let key = format!("captures[{index}].core:global_index");
+                    return Err(RecordingError::value(file, key, number, allowed));
+                }
+            }
+            last = Some((start, number));
+        }
+        Ok(())
     }
 
     pub(super) fn check(&self, file: &Path) -> Result<(), RecordingError> {
@@ -232,8 +260,41 @@ impl Metadata {
                     allowed,
                 ));
             }
+            if let Some(before) = before {
+                check_frequencies(before, capture).map_err(|allowed| {
+                    RecordingError::value(
+                        file,
+                        key("core:sample_start"),
+                        capture.sample_start,
+                        allowed,
+                    )
+                })?;
+            }
+            let number = capture.other.get("core:global_index");
+            if let Some(value) = number.filter(|it| !it.is_null() && it.as_u64().is_none()) {
+                let allowed = "it must be an integer of at least 0";
+                return Err(RecordingError::value(
+                    file,
+                    key("core:global_index"),
+                    value,
+                    allowed,
+                ));
+            }
         }
+        self.check_global_indices(file)?;
         Ok(())
+    }
+}
+
+/// Checks that two captures with one first sample have one centre frequency.
+fn check_frequencies(before: &Capture, capture: &Capture) -> Result<(), String> {
+    match (before.frequency_hz, capture.frequency_hz) {
+        (Some(a), Some(b)) if before.sample_start == capture.sample_start && a != b => {
+            Err(format!(
+                "the previous capture begins at this sample too, with core:frequency {a} in place of {b}"
+            ))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -271,5 +332,18 @@ fn explain(file: &Path, path: &str, message: &str) -> RecordingError {
         .unwrap_or((message, "another type"));
     let found = found.split_once(": ").map_or(found, |(_, found)| found);
     let key = if path == "." { "(top level)" } else { path };
+    let expected = match expected {
+        "f64" | "f32" => "a number",
+        "u64" | "usize" | "u32" => "an integer of at least 0",
+        "i64" | "i32" => "an integer",
+        "a sequence" => "a list",
+        other if other.starts_with("struct") || other == "a map" => "a JSON object",
+        other => other,
+    };
+    let found = match found {
+        "sequence" => "a list",
+        "map" => "a JSON object",
+        other => other,
+    };
     RecordingError::value(file, key, found, format!("it must be {expected}"))
 }

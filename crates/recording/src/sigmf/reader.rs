@@ -16,6 +16,7 @@ use super::samples::Datatype;
 use super::segment::{self, Segment};
 use crate::error::RecordingError;
 use crate::file as files;
+use crate::foreign::format_of;
 
 /// Number of bytes read from a file at once.
 const BLOCK_BYTES: usize = 1 << 18;
@@ -487,10 +488,39 @@ fn both_halves(path: &Path) -> Result<(PathBuf, PathBuf), RecordingError> {
             present: data,
             missing: meta,
         }),
+        (false, false) if path.is_file() => Err(other_format(path)?),
         (false, false) => Err(RecordingError::NoSuchRecording {
-            file: name.into_owned(),
+            file: if path.is_dir() {
+                path.display().to_string()
+            } else {
+                name.into_owned()
+            },
         }),
     }
+}
+
+/// Number of bytes that determine the format of a file.
+const JUDGED_BYTES: usize = 300;
+
+/// Creates the error for a file that is not of a SigMF recording.
+///
+/// # Errors
+/// [`RecordingError::Io`].
+fn other_format(path: &Path) -> Result<RecordingError, RecordingError> {
+    let failed = |source| RecordingError::io(path, source);
+    let mut bytes = Vec::new();
+    let opened = files::open(path).map_err(failed)?;
+    let mut start = opened.take(JUDGED_BYTES as u64);
+    start.read_to_end(&mut bytes).map_err(failed)?;
+    let is_tar = bytes.get(257..262).is_some_and(|it| it == b"ustar");
+    let found = match format_of(&bytes) {
+        Some(name) => name,
+        None if is_tar => "a tar file; name a SigMF archive .sigmf",
+        None => "in another format",
+    };
+    let allowed = "it must be a .sigmf-meta, .sigmf-data or .sigmf file; for other files, write a .sigmf-meta file, or give \
+                   raw cf32 samples with their rate";
+    Ok(RecordingError::value(path, "recording", found, allowed))
 }
 
 /// Opens data and returns the number of samples per channel too.
