@@ -452,7 +452,7 @@ def test_tables_of_points_are_read_as_a_log_is(tmp_path: Path, text: str, points
         (b"PAR1\0\0", "the file is Parquet, not CSV"),
         (b"\x1f\x8b\0\0", "compressed"),
         (b"#x_m,y_m\n0,0\n100,0\n", "must name the columns, without #"),
-        (b"x_m [m],y_m\n0,0\n100,0\n", "write x_m instead of x_m \\[m\\]"),
+        (b"x_m [m],y_m\n0,0\n100,0\n", "write x_m instead of x_m [m]"),
         (b"x_m|y_m\n0|0\n100|0\n", "separate the columns by commas"),
         (b'x_m,y_m\n"0,0\n100",0\n', "line 2 has a quote that is not closed"),
         (b"", "the file is empty"),

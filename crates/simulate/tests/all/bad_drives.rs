@@ -162,7 +162,7 @@ fn a_gap_and_a_reset_of_the_odometer_are_reported_and_bridged() {
     let located = drive.locate();
     let texts: Vec<&str> = located.remarks.iter().map(|it| it.text.as_str()).collect();
     assert_eq!(texts.len(), 2, "{texts:?}");
-    assert!(texts[0].contains("the distance jumps by -") && texts[0].contains("speed was used"));
+    assert!(texts[0].contains("distance_m jumps by -") && texts[0].contains("is used instead"));
     assert!(
         texts[1].contains("line 501: 1.020 s after the one before"),
         "{}",
