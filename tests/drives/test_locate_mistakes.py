@@ -122,7 +122,7 @@ REMARKED = {
     ),
     "one wild yaw rate": (
         odometry(yaw_rate_radps=pl.when(pl.int_range(pl.len()) == 600).then(20.0).otherwise(YAW)),
-        "no vehicle turns by 20.0 rad/s",
+        "line 602: yaw_rate_radps is 20.000, far from the values next to it",
     ),
     "angles late": (angles(time_s=TIME + 0.1), "later than stated, by the odometry's clock"),
     "twice as far": (
