@@ -118,11 +118,12 @@ fn a_recorded_drive_is_located() {
     let mut stranger = angles[20];
     stranger.ssb.pci = 999;
     angles.insert(20, stranger);
-    // Add an angle that arrives one second late.
-    angles.insert(100, angles[4]);
     let file = dir.join("angles.csv");
     write_angle_log(&file, &angles).unwrap();
-    let angles = read_angle_log(&file).unwrap();
+    let mut angles = read_angle_log(&file).unwrap();
+    // Add an angle that arrives one second late; the reader would leave it out as repeated.
+    let late = angles.angles[4];
+    angles.angles.insert(100, late);
     // A recording has one clock, but the replay of a log searches for a time offset; disable this.
     let (site, mut vehicle) = believed.clone();
     vehicle.receiver.lateness_std_s = Some(0.0);
