@@ -610,3 +610,67 @@ def test_what_each_freedom_of_the_fit_obtains(tables: Tables) -> None:
     assert [row[name] for name in names] == counts
     [e4] = [it["obtained"] for it in gate if it["id"] == "e4_average_saving_percent"]
     close(row["average_saving_percent"], e4)
+
+
+def test_cost_and_carbon_of_the_page(tables: Tables) -> None:
+    """Roadside units, saved energy and emissions, from the shipped prices and emission factors."""
+    folder = ROOT / "python/access_av/economics"
+    cost, carbon = (
+        tomllib.loads((folder / f"{name}.toml").read_text(encoding="utf-8"))
+        for name in ("cost", "carbon")
+    )
+    units, fleet = 4, STATED["day"]["fleet"]
+    # Energy saved in mode 0: fixed MUSIC less adaptive MUSIC, trip after trip.
+    gate = Reading(tables, "gate")
+    trip_j = float((gate.energy_j("Q", "music", 0) - gate.energy_j("R", "music", 0))[0])
+    words = plain(tables.page)
+    found = re.search(
+        r"4 roadside units would cost ([\d,]+) to ([\d,]+) USD and ([\d,]+) USD a year .*?"
+        r"trips of ([\d.]+) s driven (\d+)% of the day, one vehicle saves ([\d.]+) kJ a day .*?"
+        r"saves ([\d.]+) MJ",
+        words,
+    )
+    assert found is not None
+    low, high, yearly, trip_s, duty, vehicle_kj, fleet_mj = (
+        float(it.replace(",", "")) for it in found.groups()
+    )
+    unit = cost["roadside_unit"]
+    assert low == units * unit["capital_usd"]["low"]
+    assert high == units * unit["capital_usd"]["high"]
+    assert yearly == units * unit["yearly_usd"]
+    assert trip_s == pytest.approx(gate.trip_s, abs=0.1)
+    day_j = trip_j * DAY_S * (duty / 100.0) / trip_s
+    # The page rounds the trip to 0.1 s and the share of the day to 1 %.
+    assert vehicle_kj == pytest.approx(day_j / 1e3, rel=0.01)
+    assert fleet_mj == pytest.approx(vehicle_kj * fleet / 1e3, rel=0.01)
+    # Emissions, low to high: power times lifetime times intensity of the grid.
+    grids = {name: it for name, it in carbon["grid"].items() if name != "source"}
+    things = carbon["things"]
+    rows = {cells[0].lower(): cells for cells in rows_of(tables.page, "gCO2e/kWh")}
+    assert rows.keys() == {*grids, "embodied"}
+
+    def spans(cell: str) -> list[float]:
+        central, ends = cell.replace(",", "").rstrip(")").split(" (")
+        least, most = ends.split("–")
+        return [float(it) for it in (least, central, most)]
+
+    for name, intensity in grids.items():
+        cells = rows[name]
+        assert float(cells[1]) == intensity
+        for cell, thing, count in (
+            (cells[2], "roadside_unit", units),
+            (cells[3], "onboard_box", 1),
+        ):
+            power_w, life_h = (things[thing][key] for key in ("power_w", "lifetime_h"))
+            kg = [
+                count * power_w[it] * life_h[it] * intensity / 1e6
+                for it in ("low", "central", "high")
+            ]
+            assert np.allclose(spans(cell), kg, atol=0.51)
+        saved_kg = fleet_mj / 3.6 * 365.0 * intensity / 1e3
+        assert float(cells[4].replace(",", "")) == pytest.approx(saved_kg, rel=0.01, abs=0.51)
+    for cell, thing, count in zip(
+        rows["embodied"][2:4], ("roadside_unit", "onboard_box"), (units, 1), strict=True
+    ):
+        kg = [count * things[thing]["embodied_kg"][it] for it in ("low", "central", "high")]
+        assert np.allclose(spans(cell), kg, atol=0.51)
