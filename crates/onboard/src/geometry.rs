@@ -60,7 +60,8 @@ impl Area {
         }
     }
 
-    /// Returns the bounding box of points, extended by a quarter of its size on each side.
+    /// Returns the bounding box of points, extended by a quarter of its longer side; a shorter side
+    /// is as long as the longer one, because radio heads in a row serve the area on both sides.
     pub fn about(points: impl Iterator<Item = Point>) -> Self {
         let [none, all] = [f64::INFINITY, f64::NEG_INFINITY].map(|it| Point::new(it, it));
         let (from, to) = points.fold((none, all), |(from, to), point| {
@@ -69,10 +70,11 @@ impl Area {
                 Point::new(to.x_m.max(point.x_m), to.y_m.max(point.y_m)),
             )
         });
-        let margin_m = 0.25 * (to.x_m - from.x_m).max(to.y_m - from.y_m);
+        let half_m = 0.75 * (to.x_m - from.x_m).max(to.y_m - from.y_m);
+        let middle = Point::new(0.5 * (from.x_m + to.x_m), 0.5 * (from.y_m + to.y_m));
         Self {
-            from: from.moved([-margin_m; 2]),
-            to: to.moved([margin_m; 2]),
+            from: middle.moved([-half_m; 2]),
+            to: middle.moved([half_m; 2]),
         }
     }
 
@@ -220,16 +222,16 @@ mod tests {
         let area = Area::about(points.into_iter());
         assert_eq!(
             (area.from, area.to),
-            (Point::new(-4.0, -1.0), Point::new(8.0, 7.0))
+            (Point::new(-4.0, -3.0), Point::new(8.0, 9.0))
         );
-        // 12 m by 8 m: the maximum number of squares, and the minimum spacing.
-        assert!((area.spacing_m(24.0, 1.0) - 2.0).abs() < 1e-12);
+        // 12 m by 12 m: the maximum number of squares, and the minimum spacing.
+        assert!((area.spacing_m(36.0, 1.0) - 2.0).abs() < 1e-12);
         assert!((area.spacing_m(1e6, 1.0) - 1.0).abs() < 1e-12);
         let places: Vec<Point> = area.places(2.0).collect();
-        assert_eq!(places.len(), 24);
+        assert_eq!(places.len(), 36);
         assert_eq!(
-            (places[0], places[23]),
-            (Point::new(-3.0, 0.0), Point::new(7.0, 6.0))
+            (places[0], places[35]),
+            (Point::new(-3.0, -2.0), Point::new(7.0, 8.0))
         );
     }
 

@@ -409,6 +409,19 @@ impl GaussianSum {
         })
     }
 
+    /// Returns the odds of the search to another position at which that position no longer keeps the vehicle from
+    /// being located: its contribution to the variances of position and heading is that of a located vehicle.
+    pub(super) fn odds_to_neglect(&self, ekf: &Ekf) -> f64 {
+        let (here, there) = (
+            self.mixture(f64::NEG_INFINITY, 0.0),
+            ekf.pose(f64::NEG_INFINITY),
+        );
+        let [x_m, y_m, turned_rad] = here.pose.offset_of(there.pose);
+        let of_place = (x_m * x_m + y_m * y_m) / (FOUND_STD_M * FOUND_STD_M);
+        let of_heading = turned_rad * turned_rad / (FOUND_STD_RAD * FOUND_STD_RAD);
+        of_place.max(of_heading).max(1.0)
+    }
+
     /// Returns one filter for all remaining hypotheses once they determine the position.
     pub fn found(&self) -> Option<Ekf> {
         let all = self.mixture(f64::NEG_INFINITY, 0.0);

@@ -39,6 +39,8 @@ pub(super) struct Evidence {
     pub is_found: bool,
     /// Whether the search verifies a given start.
     pub is_of_start: bool,
+    /// Whether the filter of a given start and its search have reached one position.
+    pub is_merged: bool,
     /// Whether another start is more probable than the given one.
     pub doubts_start: bool,
     /// Whether the search of a given start has found the reported position.
@@ -87,12 +89,14 @@ impl Phase {
                     // Until one position remains, another one may still be correct. A long search
                     // ends, unless the angles favour another position.
                     by.search == Ordering::Less
-                        && (by.is_found
-                            || (!by.doubts_start && (by.is_patient || by.has_moved_far)))
+                        && (by.agrees || (!by.doubts_start && (by.is_patient || by.has_moved_far)))
                 } else {
                     !is_ahead && (is_confirmed || is_long || by.is_found)
                 };
-                if (is_ahead && by.has_moved) || (by.is_lost && !by.may_mislead) {
+                // Given start and search agree, so that a solution elsewhere has diverged.
+                if by.is_merged && by.is_found && by.has_moved && !by.agrees {
+                    Transition::TakeOver
+                } else if (is_ahead && by.has_moved) || (by.is_lost && !by.may_mislead) {
                     Transition::Report
                 } else if is_over {
                     Transition::End {
@@ -107,9 +111,10 @@ impl Phase {
             Self::Relocalizing { .. } if by.agrees => Transition::End { rests: true },
             Self::Relocalizing { .. } if is_ahead && !by.has_moved => Transition::Stay,
             Self::Relocalizing { .. } if is_ahead && by.is_found => Transition::TakeOver,
+            Self::Relocalizing { .. } if by.is_merged && by.is_found => Transition::TakeOver,
             // The search of a doubtful start continues until one of both is decided.
             Self::Relocalizing { .. }
-                if is_confirmed || (!is_ahead && by.is_found && !by.doubts_start) =>
+                if is_confirmed || (!is_ahead && by.is_found && !by.is_of_start) =>
             {
                 Transition::End { rests: true }
             }
@@ -134,6 +139,7 @@ mod tests {
         search: Ordering::Equal,
         is_found: false,
         is_of_start: false,
+        is_merged: false,
         doubts_start: false,
         agrees: false,
         is_just_reported: false,
@@ -171,6 +177,12 @@ mod tests {
             ..NONE
         };
         let moved = is(|it| it.has_moved = true);
+        let merged = Evidence {
+            is_of_start: true,
+            is_merged: true,
+            is_found: found,
+            ..moved
+        };
         for (phase, evidence, expected) in [
             (Searching, is_lost, Stay),
             (Given, is_lost, Stay),
@@ -205,8 +217,28 @@ mod tests {
             ),
             (
                 Confirming,
-                behind(is(|it| (it.is_of_start, it.is_found) = (true, true))),
+                behind(is(|it| (it.is_of_start, it.agrees) = (true, true))),
                 End { rests: false },
+            ),
+            (
+                Confirming,
+                behind(is(|it| (it.is_of_start, it.is_found) = (true, true))),
+                Stay,
+            ),
+            (Confirming, merged, TakeOver),
+            (
+                Confirming,
+                Evidence {
+                    agrees: true,
+                    ..behind(merged)
+                },
+                End { rests: false },
+            ),
+            (wide, merged, TakeOver),
+            (
+                wide,
+                is(|it| (it.is_of_start, it.is_found) = (true, true)),
+                Stay,
             ),
             (
                 Confirming,

@@ -40,6 +40,8 @@ clone_in_place! {
         pub refutes: bool,
         /// Whether the selected hypothesis explains contradicting angles without a lost vehicle.
         may_mislead: bool,
+        /// Log odds of another start below which a given start is confirmed: those of the integrity risk.
+        confirmed_at: f64,
         /// Log-likelihood of the angles for the filter.
         of_filter: f64,
         /// Distance driven at the start of the search, and since then (m).
@@ -66,6 +68,7 @@ impl RelocalizationTest {
             reported_s: ekf.time_s(),
             refutes: false,
             may_mislead,
+            confirmed_at: f64::NEG_INFINITY,
             of_filter: 0.0,
             since_m: ekf.driven_m(),
             way_m: 0.0,
@@ -77,17 +80,23 @@ impl RelocalizationTest {
         }
     }
 
-    /// Creates the test of a given start against a search everywhere else.
-    pub fn of_start(search: GaussianSum, given: &Ekf) -> Self {
+    /// Creates the test of a given start against a search everywhere else, with the integrity risk of an epoch.
+    pub fn of_start(search: GaussianSum, given: &Ekf, risk: f64) -> Self {
         Self {
             given: Some(Box::new(given.as_stated())),
+            confirmed_at: (risk / (1.0 - risk)).ln(),
             ..Self::new(search, given, false)
         }
     }
 
-    /// Whether the search has confirmed the given start.
-    pub fn confirms_start(&self) -> bool {
+    /// Whether the filter of the given start and the search have reached one position.
+    pub fn is_merged(&self) -> bool {
         (self.given.as_ref()).is_some_and(|given| self.search.is_at(given))
+    }
+
+    /// Whether the probability of another start exceeds the integrity risk.
+    pub fn is_start_open(&self) -> bool {
+        self.is_of_start() && self.log_odds() > self.confirmed_at
     }
 
     /// Whether the search of a given start has found the reported position.
@@ -140,11 +149,13 @@ impl RelocalizationTest {
 
     /// Returns `Greater` if the angles are with certainty more probable at the best position of the
     /// search, `Less` if they are at that of the filter. Independent angles are compared if the
-    /// filter is only to be confirmed, or its hypothesis may mislead. A given start is valid until
-    /// refuted: the result is `Less` once it is the more probable start.
+    /// filter is only to be confirmed, or its hypothesis may mislead. For a given start, the result is
+    /// `Greater` once given start and search together have a small covariance at the search's
+    /// position, and `Less` once the probability of another start is below the integrity risk.
     pub fn compare(&self, is_confirming: bool) -> Ordering {
-        let (ratio, less) = if self.is_of_start() {
-            (self.log_odds(), 0.0)
+        let (ratio, less, greater) = if let Some(given) = &self.given {
+            let greater = self.search.odds_to_neglect(given).ln();
+            (self.log_odds(), self.confirmed_at, greater)
         } else {
             let ratio = self.search.best() - self.of_filter;
             let share = if is_confirming || self.may_mislead {
@@ -152,9 +163,9 @@ impl RelocalizationTest {
             } else {
                 1.0
             };
-            (ratio * share, -CERTAIN)
+            (ratio * share, -CERTAIN, CERTAIN)
         };
-        if ratio > CERTAIN {
+        if ratio > greater {
             Ordering::Greater
         } else if ratio < less {
             Ordering::Less

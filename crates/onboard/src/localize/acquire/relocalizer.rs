@@ -9,7 +9,8 @@
 //! one hypothesis of several, and is confirmed from the first angle on.
 //!
 //! A result of the search replaces the filter only if the same angles are more probable there, so
-//! that a restart never makes the position worse. Meanwhile the covariance covers both; if the
+//! that a restart never makes the position worse, or if search and given start have reached one
+//! position elsewhere. Meanwhile the covariance covers both; if the
 //! filter is refuted, only the nearby search is reported. If the bank restarts by itself meanwhile,
 //! the search ends.
 
@@ -258,7 +259,8 @@ impl Relocalizer {
         let given = solution.ekf();
         let mut search = GaussianSum::as_stated(given.config(), heads);
         search.resume(given);
-        self.test = Some(RelocalizationTest::of_start(search, given));
+        let risk = (self.setup.integrity.unwrap_or_default()).risk_per_epoch();
+        self.test = Some(RelocalizationTest::of_start(search, given, risk));
         self.phase = Phase::Confirming;
     }
 
@@ -319,6 +321,21 @@ impl Relocalizer {
         Some(search)
     }
 
+    /// Raises the protection level to another start whose probability exceeds the integrity risk.
+    fn cover_other_start(&self, estimate: &mut PoseEstimate, test: &RelocalizationTest) {
+        let mut both = *estimate;
+        both.cover(&test.search.pose(estimate.time_s));
+        let (Some(integrity), Some(settings)) = (&mut estimate.integrity, self.setup.integrity)
+        else {
+            return;
+        };
+        integrity.raise(self.setup.quantile.radius(both.principal_variances()));
+        let is_ok = integrity.state == IntegrityState::Ok;
+        if is_ok && integrity.protection_level_m > settings.alert_limit_m {
+            integrity.state = IntegrityState::Degraded;
+        }
+    }
+
     fn evidence(&self, solution: &Solution, now_s: f64) -> Evidence {
         let odometry_s = solution.ekf().time_s();
         let is = |what: &dyn Fn(&RelocalizationTest) -> bool| self.test.as_ref().is_some_and(what);
@@ -331,12 +348,9 @@ impl Relocalizer {
             may_mislead: solution.may_mislead(),
             is_rested: now_s >= self.rests_until_s,
             search,
-            // A given start is confirmed if the search finds its position.
-            is_found: is(&|it| match (it.is_of_start(), search) {
-                (true, Ordering::Less) => it.confirms_start(),
-                _ => it.search.found().is_some(),
-            }),
+            is_found: is(&|it| it.search.found().is_some()),
             is_of_start,
+            is_merged: is(&RelocalizationTest::is_merged),
             doubts_start: self.doubts_start(),
             agrees: is(&|it| it.agrees_with(solution.ekf())),
             is_just_reported: is(&|it| it.reported_s == odometry_s),
@@ -470,6 +484,8 @@ impl Localizer for Relocalizer {
                 integrity.state = IntegrityState::Unavailable;
                 integrity.raise(level_m);
             }
+        } else if let Some(test) = self.test.as_ref().filter(|it| it.is_start_open()) {
+            self.cover_other_start(&mut estimate, test);
         }
         Ok(estimate)
     }
