@@ -39,6 +39,9 @@ const SHORTEST_FRAMES: f64 = 0.5;
 const PROMINENCE: f32 = 40.0;
 /// Minimum power of a line relative to the strongest frame, −100 dB: less may be rounding.
 const ROUNDING: f32 = 1e-10;
+/// Minimum power of a line within the main lobe of a known one, relative to the known one, −40 dB:
+/// what is left of a subtracted line is below −50 dB, and is visible in a band without noise.
+const RESIDUAL: f32 = 1e-4;
 /// Half of the taper's main lobe, in bins of a full frame.
 const LOBE: usize = 4;
 /// Farthest bin of a line's surroundings, in half main lobes.
@@ -78,6 +81,8 @@ struct Line {
     /// Cycles per sample.
     frequency: f64,
     power: f64,
+    /// Median power of the line's bin when it was found.
+    bin_power: f32,
 }
 
 /// Finds lines and subtracts them; owns all buffers.
@@ -187,6 +192,7 @@ impl ToneCanceller {
             self.lines.push(Line {
                 frequency: turns - turns.round(),
                 power: 0.0,
+                bin_power: self.median[bin],
             });
             for _ in 0..CORRECTIONS {
                 for index in 0..self.lines.len() {
@@ -342,7 +348,11 @@ impl ToneCanceller {
         };
         let stands_out = |bin: usize| {
             let power = self.median[bin];
-            if power <= floor || power < at(bin, 1) || power < at(bin, -1) {
+            if power <= floor
+                || power < at(bin, 1)
+                || power < at(bin, -1)
+                || self.is_residual(bin, lobe)
+            {
                 return false;
             }
             let exceeds = |sign: isize| {
@@ -360,6 +370,16 @@ impl ToneCanceller {
         (0..bins)
             .filter(|bin| stands_out(*bin))
             .max_by(|a, b| self.median[*a].total_cmp(&self.median[*b]))
+    }
+
+    /// Whether a bin within half a main lobe of a known line contains what is left of that line.
+    fn is_residual(&self, bin: usize, lobe: usize) -> bool {
+        let bins = self.median.len() as f64;
+        self.lines.iter().any(|line| {
+            let away = line.frequency - bin as f64 / bins;
+            (away - away.round()).abs() * bins <= lobe as f64
+                && self.median[bin] < RESIDUAL * line.bin_power
+        })
     }
 
     /// Corrects a line's frequency by the phase between the tapered halves of the frames.
@@ -533,6 +553,29 @@ mod tests {
         // Four amplitudes and frequencies per antenna and nine stretches: 72 degrees of freedom of unit noise, and
         // as much again for frequencies that come from less than all samples.
         assert!(left < 4.0 * 72.0, "{left}");
+    }
+
+    #[test]
+    fn a_tone_in_an_empty_band_is_one_line() {
+        let mut planner = FftPlanner::new();
+        let mut samples = noise(9, 32_768);
+        planner.plan_fft_forward(32_768).process(&mut samples);
+        // Noise in the lower half of the band only.
+        samples[..16_384].fill(Complex32::ZERO);
+        planner.plan_fft_inverse(32_768).process(&mut samples);
+        let mut samples: Vec<_> = samples.iter().map(|x| x / 32_768.0).collect();
+        let told = [0.2123, 0.4761];
+        for cycles in told {
+            add_tone(&mut samples, cycles, 3.0);
+        }
+        let mut canceller = ToneCanceller::new(1);
+        canceller.detect(&[&samples[..]], 0);
+        let mut found: Vec<_> = canceller.tones(1.0).map(|it| it.frequency_hz).collect();
+        found.sort_by(f64::total_cmp);
+        assert_eq!(found.len(), told.len(), "{found:?}");
+        for (found, told) in found.iter().zip(told) {
+            assert!((found - told).abs() < 1e-6, "{found} {told}");
+        }
     }
 
     #[test]

@@ -2,11 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use crate::air::{Cell, add_noise, phasor, rng, silence, slices};
+use crate::air::{Cell, add_noise, phasor, raised, receivers, rng, silence, slices};
 use nr_ssb::raster::scan;
-use nr_ssb::receiver::{Receiver, ReceiverConfig, Window, WindowReceiver};
+use nr_ssb::receiver::ReceiverConfig;
 use nr_ssb::search::{SearchConfig, Searcher};
 use nr_ssb::{Complex32, SubcarrierSpacing, Tone};
+use num_complex::Complex64;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -90,9 +91,9 @@ fn a_search_finds_what_it_finds_without_tones_and_reports_them() {
 }
 
 /// Squared error of the phase between two antennas, by all pilots.
-fn squared_error(cell: &Cell, gains: [num_complex::Complex64; 2]) -> f64 {
+fn squared_error(cell: &Cell, gains: [Complex64; 2]) -> f64 {
     let sent = cell.gains[1] * cell.gains[0].conj();
-    let sent = num_complex::Complex64::new(f64::from(sent.re), f64::from(sent.im));
+    let sent = Complex64::new(f64::from(sent.re), f64::from(sent.im));
     (gains[1] * gains[0].conj() * sent.conj()).arg().powi(2)
 }
 
@@ -116,7 +117,7 @@ fn phases_between_antennas_are_as_without_tones() {
             let mut look = |_: &_, received: &nr_ssb::search::ReceivedSsb<'_>| {
                 let sum = received.channel[0].iter().zip(&received.channel[1]);
                 let both: Complex32 = sum.map(|(a, b)| a.conj() * b).sum();
-                let both = num_complex::Complex64::new(f64::from(both.re), f64::from(both.im));
+                let both = Complex64::new(f64::from(both.re), f64::from(both.im));
                 *square += squared_error(&cell, [1.0.into(), both]);
             };
             let found = searcher.push_with(&slices(&samples), &mut look).unwrap();
@@ -152,6 +153,8 @@ fn three_periods(seed: u64, above_ssb_db: f64, cycles: f64) -> (Cell, Vec<Vec<Co
 
 #[test]
 fn both_receivers_track_through_tones_and_report_them() {
+    // Noise of 10 dB on 830 elements: 0.011 rad; five standard deviations.
+    const MOST_RAD: f64 = 0.055;
     for (seed, above_ssb_db, cycles) in [
         (1, -300.0, 0.0),
         (1, -10.0, 0.0),
@@ -162,56 +165,101 @@ fn both_receivers_track_through_tones_and_report_them() {
         let (cell, samples) = three_periods(seed, above_ssb_db, cycles);
         let tones = usize::from(above_ssb_db > -100.0);
         let config = ReceiverConfig::new(cell.ssb_freq_hz, SPACING, 2);
-        let mut starts = Vec::new();
-        let mut receiver =
-            Receiver::new(config.clone(), SPACING.base_rate_hz(), cell.ssb_freq_hz).unwrap();
-        for from in (0..samples[0].len()).step_by(10_000) {
-            let to = samples[0].len().min(from + 10_000);
-            let block: Vec<&[Complex32]> = samples.iter().map(|it| &it[from..to]).collect();
-            receiver
-                .push(&block, &mut |ssb| {
-                    let [a, b] = [&ssb.channel[0], &ssb.channel[1]];
-                    let both: Complex32 = a.iter().zip(b).map(|(a, b)| a.conj() * b).sum();
-                    let both = num_complex::Complex64::new(f64::from(both.re), f64::from(both.im));
-                    // Noise of 10 dB on 830 elements: 0.011 rad; five standard deviations.
-                    let error = squared_error(&cell, [1.0.into(), both]).sqrt();
-                    assert!(error < 0.055, "{above_ssb_db} dB: {error}");
-                    starts.push(ssb.sample_start);
-                })
-                .unwrap();
-        }
-        assert_eq!(receiver.tones().len(), tones, "{above_ssb_db} dB");
-        receiver
-            .finish(&mut |ssb| starts.push(ssb.sample_start))
-            .unwrap();
-        assert_eq!(starts.len(), 3, "stream, {above_ssb_db} dB");
+        let error = |both: Complex64| squared_error(&cell, [1.0.into(), both]).sqrt();
 
-        let mut receiver = WindowReceiver::<2>::new(config).unwrap();
-        let mut seen = 0;
-        for number in 0..3 {
-            // A window of 5 ms around each burst.
-            let start = (cell.delay as usize).saturating_sub(300) + number * 153_600;
-            let antennas: Vec<&[Complex32]> = samples
-                .iter()
-                .map(|it| &it[start..start + 40_000])
-                .collect();
-            let window = Window {
-                start: start as i64,
-                antennas: &antennas,
-            };
-            receiver
-                .receive(&window, &mut |it| {
-                    let gains =
-                        |antenna: usize| it.ssb.blocks.iter().map(move |block| block[antenna]);
-                    let both = gains(0).zip(gains(1)).map(|(a, b)| a.conj() * b).sum();
-                    let error = squared_error(&cell, [1.0.into(), both]).sqrt();
-                    assert!(error < 0.055, "{above_ssb_db} dB: {error}");
-                    seen += 1;
-                })
-                .unwrap();
+        let mut errors = Vec::new();
+        let at_hz = [SPACING.base_rate_hz(), cell.ssb_freq_hz];
+        let reported = receivers::stream(config.clone(), at_hz, &samples, &mut |ssb| {
+            let both = ssb.channel[0].iter().zip(&ssb.channel[1]);
+            let both: Complex32 = both.map(|(a, b)| a.conj() * b).sum();
+            errors.push(error(Complex64::new(both.re.into(), both.im.into())));
+        });
+        assert_eq!(reported.len(), tones, "stream, {above_ssb_db} dB");
+        assert_eq!(errors.len(), 3, "stream, {above_ssb_db} dB");
+        assert!(errors.iter().all(|it| *it < MOST_RAD), "{errors:?}");
+
+        let mut errors = Vec::new();
+        let first = (cell.delay as usize).saturating_sub(300);
+        let reported = receivers::windows::<2>(config, (first, 3), &samples, &mut |seen| {
+            let blocks = seen.ssb.blocks.iter();
+            errors.push(error(blocks.map(|[a, b]| a.conj() * b).sum()));
+        });
+        assert_eq!(reported.len(), tones, "window, {above_ssb_db} dB");
+        assert_eq!(errors.len(), 3, "window, {above_ssb_db} dB");
+        assert!(errors.iter().all(|it| *it < MOST_RAD), "{errors:?}");
+    }
+}
+
+/// The stream receiver converts samples of a wider band: tones inside and outside the SSB's band.
+#[test]
+fn a_stream_of_a_wide_band_is_tracked_through_tones() {
+    let rate_hz = 2.0 * SPACING.base_rate_hz();
+    let offset_hz = 1.44e6;
+    // Frequencies from the centre of the recording; DC and 3 MHz are inside the SSB's band.
+    let tones_hz = [0.0, 3e6, -6.5e6];
+    for above_ssb_db in ABOVE_SSB_DB {
+        let (cell, samples) = three_periods(11, -300.0, 0.0);
+        let cycles = offset_hz / rate_hz;
+        let mut wide: Vec<_> = samples.iter().map(|it| raised(it, 2, cycles)).collect();
+        // Noise in all of the band, of the density of that in the SSB's band or less.
+        let mut rng = rng(12);
+        add_noise(&mut wide, 10.0, &mut rng);
+        for hz in tones_hz {
+            add_tone(&mut wide, hz / rate_hz, above_ssb_db, &mut rng);
         }
-        assert_eq!(seen, 3, "window, {above_ssb_db} dB");
-        assert_eq!(receiver.tones().count(), tones, "{above_ssb_db} dB");
+        let config = ReceiverConfig::new(cell.ssb_freq_hz, SPACING, 2);
+        let at_hz = [rate_hz, cell.ssb_freq_hz - offset_hz];
+        let mut starts = Vec::new();
+        let reported = receivers::stream(config, at_hz, &wide, &mut |ssb| {
+            starts.push(0.5 * ssb.sample_start);
+        });
+        let first = cell.ssb_start(cell.ssb_indices[0]);
+        assert_eq!(starts.len(), 3, "{above_ssb_db} dB");
+        for (number, start) in starts.iter().enumerate() {
+            let off = start - first - 153_600.0 * number as f64;
+            assert!(off.abs() < 1.0, "{above_ssb_db} dB: {off}");
+        }
+        for hz in &tones_hz[..2] {
+            let is_reported = |tone: &Tone| (tone.frequency_hz + offset_hz - hz).abs() < 200.0;
+            assert!(
+                reported.iter().any(is_reported),
+                "{above_ssb_db} dB: {reported:?}"
+            );
+        }
+    }
+}
+
+/// A recording that was resampled to twice its rate has a part of the band without noise.
+#[test]
+fn a_scan_finds_cells_in_a_band_that_is_empty_in_part() {
+    let rate_hz = 2.0 * SPACING.base_rate_hz();
+    let offset_hz = 1.44e6;
+    for seed in 0..4 {
+        let (mut cell, _, mut rng) = scene(1000 + seed, 1, 20.0);
+        // Off the synchronization raster.
+        cell.ssb_freq_hz = 3.5001e9;
+        let mut samples = silence(1, 40_000);
+        cell.delay = 1000.0;
+        cell.add_to(&mut samples);
+        add_noise(&mut samples, 20.0, &mut rng);
+        let mut samples = vec![raised(&samples[0], 2, offset_hz / rate_hz)];
+        // Every second one with tones in the empty part and next to the SSB.
+        let tones_hz: &[f64] = if seed % 2 == 0 { &[] } else { &[-5.6e6, 0.0] };
+        for hz in tones_hz {
+            add_tone(&mut samples, hz / rate_hz, 15.0, &mut rng);
+        }
+        let centre_hz = cell.ssb_freq_hz - offset_hz;
+        let finds = scan(&slices(&samples), rate_hz, Some(centre_hz)).unwrap();
+        let found: Vec<_> = finds
+            .iter()
+            .map(|it| (it.point.ssb_freq_hz, it.ssbs[0].pci.get()))
+            .collect();
+        assert_eq!(found, [(cell.ssb_freq_hz, cell.pci)], "{seed}");
+        assert_eq!(
+            nr_ssb::tones(&samples, rate_hz).len(),
+            tones_hz.len(),
+            "{seed}"
+        );
     }
 }
 

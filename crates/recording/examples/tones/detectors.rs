@@ -1,13 +1,13 @@
 //! The search, the scan and the receivers, as one kind of function.
 
 use nr_ssb::Complex32;
-use nr_ssb::receiver::{Receiver, ReceiverConfig, Window, WindowReceiver};
+use nr_ssb::receiver::ReceiverConfig;
 use nr_ssb::search::{SearchConfig, Searcher};
 use recording::scan::{
     ChannelFault, SampleBlock, Scan, ScanSettings, SsbSearch, SsbSearchConfig, scan,
 };
 
-use crate::air::slices;
+use crate::air::{receivers, slices};
 use crate::{SPACING, Scene};
 
 /// SSBs of the cell that were detected, and reported tones.
@@ -85,29 +85,15 @@ fn scan_band(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
 
 fn stream(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
     let config = ReceiverConfig::new(scene.cell.ssb_freq_hz, SPACING, samples.len());
-    let mut receiver = Receiver::new(config, scene.rate_hz(), scene.centre_hz()).unwrap();
+    let at_hz = [scene.rate_hz(), scene.centre_hz()];
     let mut found = Vec::new();
-    let mut tones = Vec::new();
-    for from in (0..samples[0].len()).step_by(10_000) {
-        let to = samples[0].len().min(from + 10_000);
-        let block: Vec<&[Complex32]> = samples.iter().map(|it| &it[from..to]).collect();
-        receiver
-            .push(&block, &mut |ssb| {
-                found.push((ssb.pci.get(), ssb.sample_start / scene.factor as f64));
-            })
-            .unwrap();
-        if !receiver.tones().is_empty() {
-            tones = receiver.tones();
-        }
-    }
-    receiver
-        .finish(&mut |ssb| found.push((ssb.pci.get(), ssb.sample_start / scene.factor as f64)))
-        .unwrap();
+    let tones = receivers::stream(config, at_hz, samples, &mut |ssb| {
+        found.push((ssb.pci.get(), ssb.sample_start / scene.factor as f64));
+    });
     let tones = tones.iter().map(|it| it.frequency_hz + scene.offset_hz);
     scene.detected(&found, tones.collect())
 }
 
-/// Windows of 5 ms around each burst.
 fn window(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
     match samples.len() {
         1 => window_of::<1>(scene, samples),
@@ -118,25 +104,12 @@ fn window(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
 
 fn window_of<const A: usize>(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
     let config = ReceiverConfig::new(scene.cell.ssb_freq_hz, SPACING, A);
-    let mut receiver = WindowReceiver::<A>::new(config).unwrap();
+    let first = (scene.cell.delay as usize).saturating_sub(300);
     let mut found = Vec::new();
-    for number in 0..scene.bursts {
-        let start = (scene.cell.delay as usize).saturating_sub(300) + number * 153_600;
-        let antennas: Vec<&[Complex32]> = samples
-            .iter()
-            .map(|it| &it[start..start + 40_000])
-            .collect();
-        let window = Window {
-            start: start as i64,
-            antennas: &antennas,
-        };
-        receiver
-            .receive(&window, &mut |seen| {
-                found.push((seen.ssb.pci.get(), seen.ssb.sample_start));
-            })
-            .unwrap();
-    }
-    let tones = receiver.tones().map(|it| it.frequency_hz).collect();
+    let tones = receivers::windows::<A>(config, (first, scene.bursts), samples, &mut |seen| {
+        found.push((seen.ssb.pci.get(), seen.ssb.sample_start));
+    });
+    let tones = tones.iter().map(|it| it.frequency_hz).collect();
     scene.detected(&found, tones)
 }
 

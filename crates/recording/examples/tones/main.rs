@@ -62,7 +62,8 @@ impl Scene {
         self.factor as f64 * SPACING.base_rate_hz()
     }
 
-    /// One SSB in each of `bursts` periods of 20 ms; at twice the base rate off the centre if `is_wide`.
+    /// One SSB in each of `bursts` periods of 20 ms in white noise; at twice the base rate off the centre
+    /// if `is_wide`.
     fn new(
         seed: u64,
         (antennas, snr_db): (usize, f64),
@@ -82,7 +83,6 @@ impl Scene {
             };
             burst.add_to(&mut samples);
         }
-        add_noise(&mut samples, snr_db, &mut rng);
         let factor = if is_wide { 2 } else { 1 };
         let offset_hz = if is_wide { 1.44e6 } else { 0.0 };
         let mut scene = Self {
@@ -98,6 +98,9 @@ impl Scene {
                 *samples = raised(samples, factor, cycles);
             }
         }
+        // Amplitudes do not depend on the rate, so that noise of equal density is stronger.
+        let in_band_db = snr_db - 10.0 * (factor as f64).log10();
+        add_noise(&mut scene.samples, in_band_db, &mut rng);
         (scene, rng)
     }
 

@@ -1,6 +1,8 @@
 //! Signals on the air for the receiver's tests: SSBs with delay, frequency offset, antennas, noise.
 #![allow(dead_code, reason = "each test uses its part")]
 
+pub mod receivers;
+
 use std::f64::consts::TAU;
 
 use nr_ssb::{
