@@ -126,6 +126,10 @@ def test_located_drives(tmp_path: Path) -> None:
     log = tmp_path / "angles.csv"
     drive.angles.select(columns.TABLES["angles"].columns[:7]).drop_nulls().write_csv(log)
     assert drives.locate(site, odometry, log, vehicle=vehicle).angles.height > 0
+    ranges = tmp_path / "ranges.csv"
+    ranges.write_text("time_s,pci,range_m,sigma_m\n1.0,1,30.0,5.0\n2.0,2,40.0,\n")
+    of_ranges = _core.Vehicle.load(str(vehicle)).with_overrides({"ranging.sigma_m": 5.0})
+    check("ranges", drives.locate(site, odometry, ranges, vehicle=of_ranges).ranges)
 
 
 def test_bound() -> None:

@@ -27,6 +27,7 @@ pub mod observation;
 mod pipeline;
 pub mod plausible;
 pub mod radio_head;
+pub mod range;
 pub mod receive;
 pub mod road;
 pub mod settings;

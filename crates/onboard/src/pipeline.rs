@@ -13,6 +13,7 @@ use crate::manifold::Measurand;
 use crate::monitor::{ActiveFaults, Change, Fallback, Monitors};
 use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
 use crate::radio_head::RadioHead;
+use crate::range::RangeMeasurement;
 use crate::settings::{Check, Platform, SettingsError, Site, Vehicle, check_together};
 use crate::thermal::ThermalNoise;
 use crate::wake_up::{self, Situation, WakeUpPolicy};
@@ -393,6 +394,32 @@ impl Onboard {
             executions: &self.executions,
             keeps_bound: self.policy.keeps_bound(&now),
         })
+    }
+
+    /// Updates the localizer with a range to the radio head with this PCI and SSB index. The range
+    /// must not be older than the newest odometry.
+    ///
+    /// # Errors
+    /// Errors of a custom localizer.
+    pub fn range(
+        &mut self,
+        pci: u16,
+        ssb_index: u8,
+        measured: &RangeMeasurement,
+    ) -> Result<UpdateVerdict, BoxError> {
+        let Surroundings {
+            heads, excluded, ..
+        } = &self.surroundings;
+        let sends = |head: &&RadioHead| head.sends(pci, ssb_index);
+        let Some(head) = heads.iter().find(sends) else {
+            let reason = if excluded.iter().any(|head| sends(&head)) {
+                UpdateReason::Excluded
+            } else {
+                UpdateReason::UnknownRadioHead
+            };
+            return Ok(UpdateVerdict::unused(reason));
+        };
+        self.localizer.update_range(head, measured)
     }
 
     /// Receives every burst until angles have confirmed the pose again.

@@ -1,6 +1,7 @@
 //! Radio heads of the nominal model.
 
 use crate::geometry::Point;
+use crate::range::{HeadClock, METRES_PER_NS};
 use crate::settings::{HeadArraySettings, RadioHeadSettings, Site, Vehicle};
 
 /// Surveyed radio head and its SSB.
@@ -20,6 +21,8 @@ pub struct RadioHead {
     pub eirp_dbm: f64,
     /// Its array, where it measures angles.
     pub array: Option<HeadArraySettings>,
+    /// Its clock, for one-way delays.
+    pub clock: HeadClock,
 }
 
 impl RadioHead {
@@ -56,6 +59,12 @@ impl From<&RadioHeadSettings> for RadioHead {
             position_std_m: settings.position_std_m,
             eirp_dbm: settings.eirp_dbm,
             array: settings.array,
+            clock: HeadClock {
+                group: settings.clock_group,
+                offset_std_m: settings.clock_offset_std_ns.map(|ns| METRES_PER_NS * ns),
+                wander_m_per_sqrt_s: (settings.clock_wander_ns_per_sqrt_s)
+                    .map(|ns| METRES_PER_NS * ns),
+            },
         }
     }
 }

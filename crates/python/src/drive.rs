@@ -15,7 +15,7 @@ use pyo3::types::PyDict;
 use recording::replay::{self, ReplayError, StartChoice};
 use recording::{
     Datatype, LoggedAngle, OdometryChoice, Recording, TimedPose, angle_log_of_columns,
-    read_angle_log, read_odometry, write_drive_mcap, write_tum,
+    is_range_log, read_angle_log, read_odometry, read_range_log, write_drive_mcap, write_tum,
 };
 use simulate::{SynthError, SynthSettings};
 
@@ -160,7 +160,7 @@ pub fn read_tum(py: Python<'_>, file: PathBuf) -> PyResult<Bound<'_, PyDict>> {
 ///     CSV file with the columns `time_s`, `distance_m`, `speed_mps` and, with a gyroscope,
 ///     `yaw_rate_radps`; or an MCAP file or a rosbag2 folder with `nav_msgs/msg/Odometry`.
 /// recording : path-like
-///     SigMF recording of the array's samples, or CSV log of angles.
+///     SigMF recording of the array's samples, or CSV log of angles or ranges.
 /// angles : dict of ndarray, optional
 ///     Columns of a log of angles that was read from `recording`, float64, NaN for missing values.
 /// topic, imu_topic : str, optional
@@ -278,6 +278,15 @@ impl RecordedDrive<'_> {
         smooth: bool,
     ) -> Result<replay::LocatedDrive, ReplayError> {
         let odometry = read_odometry(self.odometry, &self.choice)?;
+        if self.angles.is_none() && is(self.recording, "csv") && is_range_log(self.recording)? {
+            if smooth {
+                return Err(ReplayError::Custom(
+                    "smoothing needs angles; it does not support ranges".into(),
+                ));
+            }
+            let log = read_range_log(self.recording)?;
+            return replay::locate_ranges(site, vehicle, self.start, &odometry, &log);
+        }
         let angles = match &self.angles {
             Some(columns) => Some(angle_log_of_columns(self.recording, columns)?),
             None if is(self.recording, "csv") => Some(read_angle_log(self.recording)?),
@@ -508,6 +517,36 @@ impl LocatedDrive {
         columns.set_item("mahalanobis_squared", PyArray1::from_iter(py, distance))?;
         let threshold = each().map(|it| or_nan(it.verdict.threshold));
         columns.set_item("threshold", PyArray1::from_iter(py, threshold))?;
+        Ok(columns)
+    }
+
+    /// Ranges, one row each: columns `time_s`, `pci`, `ssb_index`, `range_m`, `range_sigma_m` (NaN
+    /// if that of the vehicle applies), `accepted`, `reason`, `mahalanobis_squared`, `threshold`.
+    #[getter]
+    fn ranges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let columns = PyDict::new(py);
+        let each = || self.core.ranges.iter();
+        let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
+        let column = |value: &dyn Fn(&replay::LocatedRange) -> f64| {
+            PyArray1::from_iter(py, each().map(value))
+        };
+        columns.set_item("time_s", column(&|it| it.range.measured.time_s))?;
+        columns.set_item(
+            "pci",
+            PyArray1::from_iter(py, each().map(|it| it.range.pci)),
+        )?;
+        let indices = each().map(|it| it.range.ssb_index);
+        columns.set_item("ssb_index", PyArray1::from_iter(py, indices))?;
+        columns.set_item("range_m", column(&|it| it.range.measured.range_m))?;
+        let sigma = column(&|it| or_nan(it.range.measured.sigma_m));
+        columns.set_item("range_sigma_m", sigma)?;
+        let accepted = each().map(|it| it.verdict.accepted);
+        columns.set_item("accepted", PyArray1::from_iter(py, accepted))?;
+        let reasons: Vec<&str> = each().map(|it| it.verdict.reason.name()).collect();
+        columns.set_item("reason", reasons)?;
+        let distance = column(&|it| or_nan(it.verdict.mahalanobis_squared));
+        columns.set_item("mahalanobis_squared", distance)?;
+        columns.set_item("threshold", column(&|it| or_nan(it.verdict.threshold)))?;
         Ok(columns)
     }
 

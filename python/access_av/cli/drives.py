@@ -105,7 +105,7 @@ def synth(
 def locate(
     recording: Annotated[
         Path,
-        typer.Option(help="SigMF recording of the array, or angles as CSV or Parquet."),
+        typer.Option(help="SigMF recording of the array, angles (CSV, Parquet) or ranges (CSV)."),
     ],
     odometry: Annotated[
         Path, typer.Option(help="Odometry: CSV, or MCAP or rosbag2 folder with nav_msgs/Odometry.")
@@ -156,6 +156,9 @@ def locate(
 
     Angles, CSV or Parquet: time_s; pci; phase_rad (electrical) and phase_sigma_rad, or angle_rad
     (from the array axis) and angle_sigma_rad; optional ssb_index and snr_db.
+
+    Ranges, CSV: time_s; pci; range_m (two-way) or delay_ns (one-way); optional ssb_index, and
+    sigma_m or delay_sigma_ns, by default ranging.sigma_m of the vehicle. Ranges need a start pose.
 
     Truth, TUM: lines t x y z qx qy qz qw at most 1 s apart; # begins a comment. The truth must
     cover half of the drive. Its orientation is not used.
@@ -213,6 +216,8 @@ def locate(
     drive.write_tum(directory.path / "trajectory.tum")
     directory.write_table("poses.parquet", drive.poses)
     directory.write_table("angles.parquet", drive.angles)
+    if not drive.ranges.is_empty():
+        directory.write_table("ranges.parquet", drive.ranges)
     directory.write_table("findings.parquet", drive.findings)
     if drive.smoothed is not None:
         directory.write_table("smoothed.parquet", drive.smoothed)
@@ -281,8 +286,11 @@ def _show(drive: Drive, numbers: dict[str, float]) -> None:
         show_warning(remark)
     if len(remarks) > MOST_REMARKS:
         show_warning(f"{len(remarks) - MOST_REMARKS} more in report.html")
+    kind, accepted = (
+        ("ranges", "accepted_ranges") if "ranges" in numbers else ("angles", "accepted")
+    )
     console.print(
-        f"{numbers['angles']:.0f} angles, {numbers['accepted']:.0f} accepted, "
+        f"{numbers[kind]:.0f} {kind}, {numbers[accepted]:.0f} accepted, "
         f"in {numbers['duration_s']:.1f} s."
     )
     if "found_s" in numbers:

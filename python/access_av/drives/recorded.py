@@ -171,6 +171,8 @@ class Drive:
         positions.
     angles
         One row per angle: SSB, angle, and its use by the localizer.
+    ranges
+        One row per range: radio head, range, and its use by the localizer.
     remarks
         Faults of the input and other observations; of remarks that differ only in numbers, the
         first one.
@@ -188,6 +190,7 @@ class Drive:
 
     poses: pl.DataFrame
     angles: pl.DataFrame
+    ranges: pl.DataFrame
     remarks: list[str]
     diagnoses: list[str]
     suspicions: list[str]
@@ -268,7 +271,9 @@ def locate(
         ``time_s``, ``pci`` and either ``phase_rad`` (electrical angle) with ``phase_sigma_rad``, or
         ``angle_rad`` (from the array axis) with ``angle_sigma_rad``; optionally ``ssb_index`` and
         ``snr_db``. The standard deviation covers the whole error: the site's ``rician_k_db`` adds
-        nothing.
+        nothing. Or a log of ranges, CSV, with the columns ``time_s``, ``pci`` and either
+        ``range_m`` or ``delay_ns``; optionally ``ssb_index`` and ``sigma_m`` or
+        ``delay_sigma_ns``. Ranges need a start pose.
     vehicle
         Vehicle, or the name or path of a vehicle file. Its wake-up policy is applied.
     topic
@@ -322,10 +327,12 @@ def locate(
         smooth=smooth,
     )
     angles = pl.DataFrame(located.angles).with_columns(pl.col(pl.Float64).fill_nan(None))
+    ranges = pl.DataFrame(located.ranges).with_columns(pl.col(pl.Float64).fill_nan(None))
     smoothed = _poses(located.smoothed) if smooth else None
     return Drive(
         poses=_poses(located.poses),
         angles=angles,
+        ranges=ranges,
         remarks=located.remarks,
         diagnoses=located.diagnoses,
         suspicions=located.suspicions,
@@ -479,6 +486,9 @@ def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:
         "accepted": float(drive.angles["accepted"].sum()),
         "remarks": float(len(drive.remarks)),
     }
+    if not drive.ranges.is_empty():
+        numbers["ranges"] = float(drive.ranges.height)
+        numbers["accepted_ranges"] = float(drive.ranges["accepted"].sum())
     known = drive.poses.filter(~pl.col("searching"))
     if known.height < drive.poses.height and not known.is_empty():
         numbers["found_s"] = float(known["time_s"][0] - drive.poses["time_s"][0])

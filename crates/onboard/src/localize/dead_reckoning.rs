@@ -159,6 +159,7 @@ impl Localizer for DeadReckoning {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::range::HeadClock;
     use crate::road::{Road, Segment};
 
     /// Duration of the paper's trip (s): 300 m with 0.5 m/s² up to 15 km/h and down again.
@@ -199,6 +200,7 @@ mod tests {
             position_std_m: 0.0,
             eirp_dbm: 0.0,
             array: None,
+            clock: HeadClock::default(),
         };
         let mut localizer = DeadReckoning::new(Pose::default(), between, mounting_rad);
         let mut worst_m = 0f64;
@@ -299,6 +301,7 @@ mod tests {
             position_std_m: 0.0,
             eirp_dbm: 0.0,
             array: None,
+            clock: HeadClock::default(),
         };
         let measured = AngleMeasurement {
             kind: MeasurementKind::Angle,

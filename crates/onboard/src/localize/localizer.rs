@@ -4,11 +4,12 @@ use std::any::Any;
 
 use super::ekf::Ekf;
 use super::output::PoseEstimate;
-use super::output::{OdometryVerdict, UpdateVerdict};
+use super::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
 use crate::BoxError;
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+use crate::range::RangeMeasurement;
 
 /// Recovery of a lost localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +43,19 @@ pub trait Localizer: Any + Send {
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> Result<UpdateVerdict, BoxError>;
+
+    /// Updates with a range to a radio head, if ranges are supported.
+    ///
+    /// # Errors
+    /// Errors of the localizer; an error ends the drive.
+    fn update_range(
+        &mut self,
+        head: &RadioHead,
+        measured: &RangeMeasurement,
+    ) -> Result<UpdateVerdict, BoxError> {
+        let _ = (head, measured);
+        Ok(UpdateVerdict::unused(UpdateReason::Unusable))
+    }
 
     /// Returns the estimated pose at `time_s`, which is not before the newest odometry.
     ///
@@ -110,6 +124,14 @@ impl Localizer for Ekf {
         measured: &AngleMeasurement,
     ) -> Result<UpdateVerdict, BoxError> {
         Ok(Self::update(self, head, measured))
+    }
+
+    fn update_range(
+        &mut self,
+        head: &RadioHead,
+        measured: &RangeMeasurement,
+    ) -> Result<UpdateVerdict, BoxError> {
+        Ok(Self::update_range(self, head, measured))
     }
 
     fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {

@@ -14,6 +14,7 @@ use crate::BoxError;
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+use crate::range::RangeMeasurement;
 
 /// Guaranteed maximum delay of an angle, in seconds.
 pub const HISTORY_S: f64 = 0.5;
@@ -64,6 +65,7 @@ enum Event {
     Odometry(OdometrySample),
     /// Angle, and its index in its burst while the burst is processed.
     Angle(RadioHead, AngleMeasurement, Option<usize>),
+    Range(RadioHead, RangeMeasurement),
 }
 
 impl Event {
@@ -71,6 +73,7 @@ impl Event {
         match self {
             Self::Odometry(sample) => sample.time_s,
             Self::Angle(_, measured, _) => measured.time_s,
+            Self::Range(_, measured) => measured.time_s,
         }
     }
 }
@@ -142,6 +145,23 @@ impl History {
         Ok(())
     }
 
+    /// Updates with a range that is not older than the newest odometry; an older one is rejected as
+    /// too late.
+    ///
+    /// # Errors
+    /// Errors of the localizer.
+    pub fn update_range(
+        &mut self,
+        head: &RadioHead,
+        measured: &RangeMeasurement,
+    ) -> Result<UpdateVerdict, BoxError> {
+        let verdict = self.localizer.update_range(head, measured)?;
+        if verdict.reason != UpdateReason::TooLate && measured.time_s.is_finite() {
+            self.remember(Event::Range(*head, *measured));
+        }
+        Ok(verdict)
+    }
+
     fn update_late(&mut self, burst: &mut [AngleUpdate]) -> Result<(), BoxError> {
         for update in &mut *burst {
             let reason = if update.measured.time_s.is_nan() {
@@ -190,6 +210,9 @@ impl History {
                     if let Some(update) = waits.take().and_then(|number| burst.get_mut(number)) {
                         update.verdict = verdict;
                     }
+                }
+                Some(Event::Range(head, measured)) => {
+                    self.localizer.update_range(head, measured)?;
                 }
                 None => {}
             }

@@ -38,6 +38,19 @@ pub struct RadioHeadSettings {
     /// the radio head (`at_head` = 1).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub array: Option<HeadArraySettings>,
+    /// Number of the oscillator that several radio heads share, for one-way delays. Default: an own
+    /// oscillator.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clock_group: Option<u16>,
+    /// Standard deviation of the clock's offset, in nanoseconds, for one-way delays. Default: 3000
+    /// ns, the accuracy of TDD cells (TS 38.133, 7.4.2).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub clock_offset_std_ns: Option<f64>,
+    /// Random walk of the clock, in ns/√s, for one-way delays. Default: 1 ns/√s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e4))]
+    pub clock_wander_ns_per_sqrt_s: Option<f64>,
 }
 
 /// `[radio_heads.array]`

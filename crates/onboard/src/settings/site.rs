@@ -172,6 +172,15 @@ impl RadioHeadSettings {
                 ),
             )?;
         }
+        if let Some(group) = self.clock_group {
+            let members = all.iter().filter(|it| it.clock_group == Some(group));
+            check.that(
+                members.count() > 1,
+                &format!("{key}.clock_group"),
+                group,
+                "no other radio head has this clock_group; leave it out for an own oscillator",
+            )?;
+        }
         for (other_index, other) in all.iter().take(index).enumerate() {
             check.that(
                 self.position_m != other.position_m,

@@ -9,6 +9,7 @@ use super::error::SettingsError;
 use super::integrity::IntegritySettings;
 use super::localizer::LocalizerSettings;
 use super::odometry::{DriveKind, GyroscopeSettings, LaneKeepingSettings, OdometerSettings};
+use super::ranging::RangingSettings;
 use super::receiver::{EstimatorMethod, EstimatorSettings, Pilots, ReceiverSettings};
 use super::site::Site;
 use super::start::StartSettings;
@@ -49,6 +50,10 @@ pub struct Vehicle {
     /// Receiver.
     #[serde(default)]
     pub receiver: ReceiverSettings,
+    /// Ranging to the radio heads, if the vehicle measures ranges or delays. The localizer then
+    /// estimates the states of the ranges.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ranging: Option<RangingSettings>,
     /// Odometer.
     #[serde(default)]
     pub odometer: OdometerSettings,

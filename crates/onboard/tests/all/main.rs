@@ -7,6 +7,7 @@ mod differential;
 mod gap;
 mod live_times;
 mod random_drives;
+mod ranges;
 mod receiver;
 mod recovery;
 mod settings;

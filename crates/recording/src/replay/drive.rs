@@ -12,9 +12,10 @@ use onboard::{Custom, Execution, Onboard};
 
 use super::clock::LEAST_LATENESS_S;
 use super::error::ReplayError;
-use super::located::{Diagnosis, LocatedDrive, LocatedPose, Remark, gathered};
+use super::located::{Diagnosis, LocatedDrive, LocatedPose, LocatedRange, Remark, gathered};
 use crate::library::load;
 use crate::odometry::{OdometryLog, number};
+use crate::range_log::LoggedRange;
 
 /// Minimum deviation of the odometer's scale that is reported.
 const LEAST_SCALE: f64 = 0.03;
@@ -38,6 +39,7 @@ pub(super) fn check_odometry(odometry: &OdometryLog) -> Result<(), ReplayError> 
 pub struct Replay<'a> {
     onboard: Onboard,
     odometry: std::iter::Peekable<std::slice::Iter<'a, OdometrySample>>,
+    ranges: &'a [LoggedRange],
     drive: LocatedDrive,
     /// Whether the localizer was lost at the previous pose.
     was_lost: bool,
@@ -77,6 +79,7 @@ impl<'a> Replay<'a> {
             gaps_m: Vec::new(),
             set_back_s: 0.0,
             odometry: odometry.samples.iter().peekable(),
+            ranges: &[],
             drive: LocatedDrive {
                 remarks: odometry
                     .remarks
@@ -94,6 +97,26 @@ impl<'a> Replay<'a> {
     /// Sets the time offset (s) that was already subtracted from the angles' times.
     pub const fn set_back(&mut self, lateness_s: f64) {
         self.set_back_s = lateness_s;
+    }
+
+    /// Adds ranges in order of time, which are processed between the odometry samples.
+    pub const fn with_ranges(&mut self, ranges: &'a [LoggedRange]) {
+        self.ranges = ranges;
+    }
+
+    /// Processes the ranges before `time_s`.
+    fn ranges_before(&mut self, time_s: f64) -> Result<(), ReplayError> {
+        while let Some((&range, later)) = self.ranges.split_first() {
+            if range.measured.time_s >= time_s {
+                return Ok(());
+            }
+            self.ranges = later;
+            let verdict = (self.onboard).range(range.pci, range.ssb_index, &range.measured);
+            let verdict = verdict.map_err(ReplayError::Custom)?;
+            self.drive.ranges.push(LocatedRange { range, verdict });
+            self.remark_on_loss(range.measured.time_s);
+        }
+        Ok(())
     }
 
     /// Processes SSBs or angles in the given order, with the odometry up to each burst first.
@@ -303,6 +326,7 @@ impl<'a> Replay<'a> {
     fn odometry_until(&mut self, time_s: f64) -> Result<(), ReplayError> {
         while let Some(sample) = self.odometry.next_if(|sample| sample.time_s <= time_s) {
             let at_s = sample.time_s;
+            self.ranges_before(at_s)?;
             let verdict = self.onboard.odometry(sample);
             match verdict.map_err(ReplayError::Custom)? {
                 Ok(OdometryVerdict::DistanceJump { jump_m }) => self.remark(
@@ -359,6 +383,6 @@ impl<'a> Replay<'a> {
                 constants: self.onboard.constants(),
             });
         }
-        Ok(())
+        self.ranges_before(time_s)
     }
 }

@@ -69,6 +69,24 @@ pub enum ReplayError {
         /// Times of the first and the last angle (s).
         angles_s: [f64; 2],
     },
+    /// The log contains no usable range.
+    #[error("the log contains no usable range{}", because(why.as_ref()))]
+    NoRange {
+        /// Defect of the first unusable line.
+        why: Option<String>,
+    },
+    /// Ranges and odometry have no common time.
+    #[error(
+        "no range falls into the odometry's time: odometry is from {} to {} s, ranges from {} to {} s; \
+         both must use one clock, in seconds",
+        odometry_s[0], odometry_s[1], ranges_s[0], ranges_s[1]
+    )]
+    RangeClocks {
+        /// Times of the first and the last odometry sample (s).
+        odometry_s: [f64; 2],
+        /// Times of the first and the last range (s).
+        ranges_s: [f64; 2],
+    },
     /// No angle is from a radio head of the site.
     #[error(
         "none of {angles} angles is from a radio head of the site; check pci and ssb_index in both"

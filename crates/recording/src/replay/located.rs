@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
 use onboard::Execution;
-use onboard::localize::PoseEstimate;
 use onboard::localize::ekf::EstimatedConstants;
+use onboard::localize::{PoseEstimate, UpdateVerdict};
+
+use crate::range_log::LoggedRange;
 
 /// Estimate at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +25,15 @@ pub struct LocatedPose {
     pub is_lost: bool,
     /// Estimated constants of the vehicle.
     pub constants: Option<EstimatedConstants>,
+}
+
+/// Range and its result.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LocatedRange {
+    /// The range.
+    pub range: LoggedRange,
+    /// Verdict of the localizer.
+    pub verdict: UpdateVerdict,
 }
 
 /// Remark on one item of the input.
@@ -70,6 +81,8 @@ pub struct LocatedDrive {
     pub poses: Vec<LocatedPose>,
     /// Results of the angles.
     pub executions: Vec<Execution>,
+    /// Results of the ranges.
+    pub ranges: Vec<LocatedRange>,
     /// Smoothed poses from the first known one; empty unless requested.
     pub smoothed: Vec<LocatedPose>,
     /// Estimated constants of the vehicle at the end of the drive; `None` if the localizer

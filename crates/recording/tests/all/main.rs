@@ -3,6 +3,7 @@
 
 mod common;
 mod diagnosis;
+mod ranges;
 mod recorded_drives;
 mod scan;
 mod sigmf;

@@ -239,15 +239,17 @@ _GLOSSARY = {
     "phase_noise_sigma_rad": ("rad", "Part of phase_sigma_rad caused by receiver noise"),
     "angle_rad": ("rad", "Angle of arrival θ from the array's axis"),
     "resolved": ("true or false", "Whether the standard deviation of the angle is valid"),
-    "accepted": ("true or false", "Whether the localizer used the angle"),
+    "range_m": ("m", "Measured range, or one-way delay times the speed of light"),
+    "range_sigma_m": ("m", "Standard deviation of range_m"),
+    "accepted": ("true or false", "Whether the localizer used the measurement"),
     "reason": (
         "text",
-        "Reason for using or rejecting the angle: consistent, outlier, unusable, unknown radio "
-        "head, too late, excluded",
+        "Reason for using or rejecting the measurement: consistent, outlier, unusable, unknown "
+        "radio head, too late, excluded",
     ),
     "mahalanobis_squared": (
         "1",
-        "Squared Mahalanobis distance between measured and predicted angle",
+        "Squared Mahalanobis distance between measured and predicted value",
     ),
     "threshold": ("1", "Maximum accepted mahalanobis_squared"),
     # Wake-up and energy.

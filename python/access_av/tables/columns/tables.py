@@ -56,6 +56,7 @@ _COVARIANCES = (
     "covariance_x_heading_m_rad", "covariance_y_heading_m_rad",
 )  # fmt: skip
 _ANGLE = ("phase_rad", "phase_sigma_rad", "angle_rad")
+_RANGE = ("range_m", "range_sigma_m")
 _COMPARED = ("mahalanobis_squared", "threshold")
 _RISKS = (
     "asked_risk_per_hour", "risk_per_hour", "risk_per_hour_low", "risk_per_hour_high",
@@ -193,6 +194,16 @@ TABLES: Mapping[str, Table] = {
             "angles for `access-av locate --recording` has some of the first seven: docs/locate.md",
             ("time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "accepted", "reason", *_COMPARED),
             {**dict.fromkeys(_ANGLE, _NO_ANGLE), **dict.fromkeys(_COMPARED, _NOT_COMPARED)},
+        ),
+        Table(
+            "ranges",
+            "A range and its use by the localizer",
+            "`ranges.parquet` of `access-av locate`; `access_av.locate(…).ranges`",
+            ("time_s", "pci", "ssb_index", *_RANGE, "accepted", "reason", *_COMPARED),
+            {
+                "range_sigma_m": "`ranging.sigma_m` of the vehicle applies",
+                **dict.fromkeys(_COMPARED, "the range was not compared with a prediction"),
+            },
         ),
         Table(
             "recorded_angles",

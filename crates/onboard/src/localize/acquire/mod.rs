@@ -2,6 +2,7 @@
 
 mod consistency;
 mod gaussian_sum;
+mod heading_search;
 mod phase;
 mod relocalization_test;
 mod relocalizer;

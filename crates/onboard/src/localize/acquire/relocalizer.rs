@@ -19,6 +19,7 @@ use std::sync::Arc;
 
 use super::consistency::ConsistencyMonitor;
 use super::gaussian_sum::{GaussianSum, LEAST_HEADS};
+use super::heading_search::HeadingSearch;
 use super::phase::{Evidence, Phase, Transition};
 use super::relocalization_test::RelocalizationTest;
 use crate::BoxError;
@@ -33,6 +34,7 @@ use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+use crate::range::RangeMeasurement;
 use crate::road::Road;
 use crate::settings::IntegritySettings;
 
@@ -51,6 +53,9 @@ const PATIENCE_S: f64 = 20.0;
 
 /// Distance after which a confirmation with few angles ends (m).
 const LONG_WAY_M: f64 = 100.0;
+
+/// Standard deviation of the start position (m) in the search for the heading with ranges.
+const START_STD_M: f64 = 1.0;
 
 /// Configuration that is constant during a drive.
 #[derive(Debug)]
@@ -143,6 +148,18 @@ impl Solution {
         }
     }
 
+    fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateVerdict {
+        match self {
+            Self::Bare(ekf) => ekf.update_range(head, measured),
+            Self::Monitored(monitor) => monitor.update_range(head, measured),
+        }
+    }
+
+    /// Whether a bank of filters contradicts the measurements.
+    fn is_contradicted(&self) -> bool {
+        (self.monitor()).is_some_and(|it| it.bank().is_lost())
+    }
+
     fn pose(&self, time_s: f64) -> PoseEstimate {
         match self {
             Self::Bare(ekf) => ekf.pose(time_s),
@@ -171,6 +188,8 @@ clone_in_place! {
         consistency: ConsistencyMonitor,
         /// Test between the solution and a search in parallel, while it runs.
         test: Option<RelocalizationTest>,
+        /// Search for the heading with ranges, while it runs.
+        heading: Option<HeadingSearch>,
         rests_until_s: f64,
         recovered: Option<Recovered>,
         keeps_journal: bool,
@@ -192,6 +211,7 @@ impl Relocalizer {
             Phase::Tracking
         };
         let mut made = Self::new(phase, road, heads, integrity);
+        made.heading = HeadingSearch::new(&ekf, heads, START_STD_M);
         made.solution = Some(Solution::new(ekf, &made.setup, None));
         made
     }
@@ -219,6 +239,7 @@ impl Relocalizer {
             solution: None,
             consistency: ConsistencyMonitor::new(heads),
             test: None,
+            heading: None,
             rests_until_s: f64::NEG_INFINITY,
             recovered: None,
             keeps_journal: false,
@@ -240,6 +261,34 @@ impl Relocalizer {
         (self.solution, self.search) = (Some(solution), None);
         self.end_search();
         self.consistency.reset();
+    }
+
+    /// Updates the search for the heading, and replaces the solution by its result.
+    fn search_heading(&mut self, now_s: f64) {
+        let Some(solution) = &self.solution else {
+            return;
+        };
+        let ekf = solution.ekf();
+        let Some(search) = &self.heading else {
+            if solution.is_contradicted() && now_s >= self.rests_until_s {
+                self.heading = HeadingSearch::new(ekf, &self.setup.heads, NEARBY_M);
+                self.rests_until_s = now_s + REST_S;
+            }
+            return;
+        };
+        if let Some(found) = search.found().cloned() {
+            let from = solution.pose(now_s).pose;
+            let [x_m, y_m, turned_rad] = from.offset_of(found.pose(now_s).pose);
+            self.recovered = Some(Recovered {
+                time_s: now_s,
+                moved_m: x_m.hypot(y_m),
+                turned_rad,
+            });
+            self.track(found, now_s);
+            self.heading = None;
+        } else if search.is_over(ekf) {
+            self.heading = None;
+        }
     }
 
     fn end_search(&mut self) {
@@ -413,6 +462,9 @@ impl Localizer for Relocalizer {
         if let Some(test) = &mut self.test {
             test.odometry(sample);
         }
+        if let Some(heading) = &mut self.heading {
+            heading.odometry(sample);
+        }
         let solution = self.solution.as_mut();
         Ok(solution.map_or(OdometryVerdict::NotFinite, |it| it.odometry(sample)))
     }
@@ -459,6 +511,23 @@ impl Localizer for Relocalizer {
         Ok(verdict)
     }
 
+    fn update_range(
+        &mut self,
+        head: &RadioHead,
+        measured: &RangeMeasurement,
+    ) -> Result<UpdateVerdict, BoxError> {
+        // A search for the position uses angles only.
+        let Some(solution) = &mut self.solution else {
+            return Ok(UpdateVerdict::unused(UpdateReason::Unusable));
+        };
+        if let Some(heading) = &mut self.heading {
+            heading.update(solution.ekf(), head, measured);
+        }
+        let verdict = solution.update_range(head, measured);
+        self.search_heading(measured.time_s);
+        Ok(verdict)
+    }
+
     fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
         let quantile = &self.setup.quantile;
         let Some(solution) = &self.solution else {
@@ -486,6 +555,11 @@ impl Localizer for Relocalizer {
             }
         } else if let Some(test) = self.test.as_ref().filter(|it| it.is_start_open()) {
             self.cover_other_start(&mut estimate, test);
+        }
+        if self.heading.as_ref().is_some_and(HeadingSearch::doubts)
+            && let Some(integrity) = &mut estimate.integrity
+        {
+            integrity.state = IntegrityState::Unavailable;
         }
         Ok(estimate)
     }

@@ -95,17 +95,27 @@ impl<'a> MixtureUpdate<'a> {
 
 /// Bias of one radio head.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct HeadBias {
+pub(super) struct HeadBias {
     size: JumpProcess,
     /// Mean of the bias (rad), and its covariance with the state.
-    mean_rad: f64,
-    state_covariance: [f64; STATES],
+    pub(super) mean_rad: f64,
+    pub(super) state_covariance: [f64; STATES],
     /// Covariance with the newest measurement.
-    cross_with_angle: CrossCovariance,
+    pub(super) cross_with_angle: CrossCovariance,
 }
 
 impl HeadBias {
-    fn along(&self, row: &[f64; STATES]) -> f64 {
+    /// Returns a state that no angle contains.
+    pub(super) fn unused() -> Self {
+        Self {
+            size: JumpProcess::new(0.0),
+            mean_rad: 0.0,
+            state_covariance: [0.0; STATES],
+            cross_with_angle: CrossCovariance::default(),
+        }
+    }
+
+    pub(super) fn along(&self, row: &[f64; STATES]) -> f64 {
         dot(&self.state_covariance, row)
     }
 }
@@ -114,9 +124,12 @@ clone_in_place! {
     /// Biases of all radio heads; empty if they are not estimated.
     #[derive(Debug, PartialEq)]
     pub struct CorrelatedBias {
-        heads: Vec<HeadBias>,
-        /// Covariance matrix of the biases, row by row (rad²).
-        among: Vec<f64>,
+        /// Biases, then the states of the ranges (see [`range_states`](super::range_states)).
+        pub(super) heads: Vec<HeadBias>,
+        /// Number of biases.
+        pub(super) biases: usize,
+        /// Covariance matrix of biases and range states, row by row.
+        pub(super) among: Vec<f64>,
     }
 }
 
@@ -126,19 +139,23 @@ impl CorrelatedBias {
         let count = if probability > 0.0 { radio_heads } else { 0 };
         let unknown = HeadBias {
             size: JumpProcess::new(probability),
-            mean_rad: 0.0,
-            state_covariance: [0.0; STATES],
-            cross_with_angle: CrossCovariance::default(),
+            ..HeadBias::unused()
         };
         Self {
             heads: vec![unknown; count],
+            biases: count,
             among: vec![0.0; count * count],
         }
     }
 
     /// Whether no bias is estimated.
     pub const fn is_empty(&self) -> bool {
-        self.heads.is_empty()
+        self.biases == 0
+    }
+
+    /// Returns the bias of a radio head's angles, if it is estimated.
+    fn bias(&self, head: usize) -> Option<&HeadBias> {
+        self.heads.get(..self.biases)?.get(head)
     }
 
     /// Removes the covariances with the state, which was replaced.
@@ -151,20 +168,20 @@ impl CorrelatedBias {
     /// Whether the bias of a radio head is probably so large that its angles contain almost no
     /// information.
     pub fn is_large(&self, head: usize) -> bool {
-        self.heads.get(head).is_some_and(|error| {
+        self.bias(head).is_some_and(|error| {
             error.size.is_large() || error.mean_rad * error.mean_rad > MOST_VARIANCE
         })
     }
 
     /// Returns the expected variance that biases add to an angle; see [`JumpProcess::variance`].
     pub fn variance(&self, head: usize, travelled_m: f64, predicted_levels: f64) -> f64 {
-        let error = self.heads.get(head);
+        let error = self.bias(head);
         error.map_or(0.0, |error| {
             error.size.variance(travelled_m, predicted_levels)
         })
     }
 
-    fn covariance(&self, one: usize, other: usize) -> f64 {
+    pub(super) fn covariance(&self, one: usize, other: usize) -> f64 {
         let place = one * self.heads.len() + other;
         self.among.get(place).copied().unwrap_or_default()
     }
@@ -188,7 +205,7 @@ impl CorrelatedBias {
         seen: &Innovation,
         row: &[f64; STATES],
     ) -> Option<JumpHypotheses> {
-        let error = self.heads.get(head)?;
+        let error = self.bias(head)?;
         let known = 2.0 * error.along(row) + self.covariance(head, head);
         Some((error.size).weigh(travelled_m, seen, error.mean_rad, known))
     }
@@ -334,7 +351,7 @@ impl CorrelatedBias {
     /// Updates the biases with a scalar measurement of the state, before the state itself is
     /// updated: the bias part of a Kalman update.
     pub fn update(&mut self, belief: &Belief, residual: f64, row: &[f64; STATES], variance: f64) {
-        if self.is_empty() {
+        if self.heads.is_empty() {
             return;
         }
         let cross = belief.cross(row);

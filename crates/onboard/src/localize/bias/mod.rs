@@ -3,6 +3,8 @@
 
 mod correlated_bias;
 mod jump_process;
+mod range_states;
 
 pub use correlated_bias::CorrelatedBias;
 pub(in crate::localize) use jump_process::{JumpHypotheses, MOST_VARIANCE, independent, repeats};
+pub(in crate::localize) use range_states::{CLOCK, DRIFT, FIRST_OFFSET, RANGE_SCALE, RangeTerms};

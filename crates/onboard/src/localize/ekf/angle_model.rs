@@ -136,16 +136,16 @@ pub struct SecondOrder {
 }
 
 /// Line of sight between the array on the vehicle and a radio head.
-struct LineOfSight {
+pub(super) struct LineOfSight {
     /// Bearing of the radio head from the array, in the map frame (rad).
-    bearing_rad: f64,
+    pub bearing_rad: f64,
     /// Horizontal distance, and distance (m).
     ground_m: f64,
-    range_m: f64,
+    pub range_m: f64,
     /// Cosine of the angle between the horizontal line of sight and the vehicle's forward axis.
     along: f64,
     /// Steps of the array by each state, towards the radio head and to the left of that direction.
-    steps: [[f64; STATES]; 2],
+    pub steps: [[f64; STATES]; 2],
     /// Change in the bearing by each state.
     bearing_row: [f64; STATES],
 }
@@ -153,7 +153,7 @@ struct LineOfSight {
 impl LineOfSight {
     /// Line of sight from the array of a vehicle at `pose`; `None` if the radio head is above the array or within it,
     /// where it has no bearing.
-    fn new(
+    pub fn new(
         head: &RadioHead,
         pose: Pose,
         frame: &RoadFrame,
@@ -199,7 +199,7 @@ impl LineOfSight {
     }
 
     /// Cosine of the elevation.
-    fn level(&self) -> f64 {
+    pub fn level(&self) -> f64 {
         self.ground_m / self.range_m
     }
 }
@@ -346,6 +346,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Point, wrap_angle};
     use crate::manifold::scatter_bound;
+    use crate::range::HeadClock;
     use crate::settings::HeadArraySettings;
 
     fn head(x_m: f64, y_m: f64, height_m: f64) -> RadioHead {
@@ -357,6 +358,7 @@ mod tests {
             position_std_m: 0.0,
             eirp_dbm: 0.0,
             array: None,
+            clock: HeadClock::default(),
         }
     }
 

@@ -3,6 +3,7 @@
 use super::angle_model::{AngleModel, ArrayModel};
 use super::motion::{MotionNoise, PathBend, Yaw};
 use crate::gaussian::normal_quantile;
+use crate::range::RangeModel;
 use crate::road::LaneKeeping;
 use crate::settings::{DriveKind, LocalizerSettings, RoadSettings, Site, TrackerSettings, Vehicle};
 
@@ -88,6 +89,8 @@ pub struct EkfConfig {
     /// Prior probability that the angles of a radio head have a time-correlated (multipath) bias; 0 if the filter
     /// estimates no bias.
     pub bias_probability: f64,
+    /// Model of the ranges, if the vehicle measures any.
+    pub ranging: Option<RangeModel>,
     /// Minimum interval between odometry samples that is reported as a gap (s).
     pub gap_s: f64,
     /// Maximum speed of an odometry sample (m/s).
@@ -322,6 +325,7 @@ impl EkfConfig {
                 correlation_m: receiver.phase_bias_correlation_m,
             },
             bias_probability,
+            ranging: (vehicle.ranging.as_ref()).map(|it| RangeModel::new(it, array.position_m)),
             gap_s: 5.0 / odometer.rate_hz,
             top_speed_mps: 1.5 * vehicle.top_speed_mps(),
         };

@@ -100,7 +100,7 @@ impl Ekf {
             map,
             heads: heads.iter().map(head).collect(),
             belief,
-            bias: CorrelatedBias::new(heads.len(), config.bias_probability),
+            bias: Self::biases(&config, heads),
             odometry: None,
             driven_m: 0.0,
             turned_rad: 0.0,
@@ -113,6 +113,15 @@ impl Ekf {
         };
         ekf.update_off_map();
         ekf
+    }
+
+    /// Returns the biases of the angles and the states of the ranges before any measurement.
+    pub(super) fn biases(config: &EkfConfig, heads: &[RadioHead]) -> CorrelatedBias {
+        let mut biases = CorrelatedBias::new(heads.len(), config.bias_probability);
+        if let Some(model) = &config.ranging {
+            biases.add_ranges(model, heads);
+        }
+        biases
     }
 
     pub(super) fn measure(&mut self, residual: f64, row: &[f64; STATES], variance: f64) {

@@ -109,6 +109,7 @@ impl Ekf {
         });
         let last_s = if yaw.is_some() { told_s } else { duration_s };
         self.advance(told, last_s, yaw);
+        self.advance_ranges(reading_m, duration_s);
         if jumped {
             self.add_along_variance(self.config.coasting_variance(duration_s));
         }

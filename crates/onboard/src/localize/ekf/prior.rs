@@ -10,7 +10,6 @@ use super::state::{
     YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
 use crate::geometry::{Pose, wrap_angle};
-use crate::localize::bias::CorrelatedBias;
 use crate::localize::output::InitialPose;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
@@ -114,7 +113,8 @@ impl Ekf {
     /// Estimates a bias of each radio head from now on, with this prior probability; none if it is 0.
     pub(in crate::localize) fn begin_bias(&mut self, probability: f64) {
         self.config.bias_probability = probability;
-        self.bias = CorrelatedBias::new(self.heads.len(), probability);
+        let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
+        self.bias = Self::biases(&self.config, &heads);
     }
 
     /// Removes the assumption of exactness from unspecified constants of the array.

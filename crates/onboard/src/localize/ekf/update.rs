@@ -328,14 +328,14 @@ impl Ekf {
     }
 
     /// Limits scale and time offset to plausible values, whatever the angles indicate.
-    fn keep_bounds(&mut self) {
+    pub(super) fn keep_bounds(&mut self) {
         let mean = &mut self.belief.mean;
         let scale = self.config.odometer_scale;
         mean[SCALE] = mean[SCALE].clamp(0.5 * scale - 1.0, 2.0 * scale - 1.0);
         mean[LATENESS] = mean[LATENESS].clamp(-MOST_LATENESS_S, MOST_LATENESS_S);
     }
 
-    fn verdict(&self, reason: UpdateReason, mahalanobis2: Option<f64>) -> UpdateVerdict {
+    pub(super) fn verdict(&self, reason: UpdateReason, mahalanobis2: Option<f64>) -> UpdateVerdict {
         UpdateVerdict {
             accepted: reason == UpdateReason::Consistent,
             reason,

@@ -21,6 +21,7 @@ use crate::localize::output::{OdometryVerdict, UpdateVerdict};
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+use crate::range::RangeMeasurement;
 use crate::settings::IntegritySettings;
 
 /// Fraction of the risk below which a hypothesis is neglected.
@@ -170,16 +171,30 @@ impl IntegrityMonitor {
     /// Updates with an angle: the test of its radio head, and every filter that uses the radio
     /// head.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
-        self.now_s = self.now_s.max(measured.time_s);
+        self.update_by(measured.time_s, |bank| bank.update(head, measured))
+    }
+
+    /// Updates with a range in the same way.
+    pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateVerdict {
+        self.update_by(measured.time_s, |bank| bank.update_range(head, measured))
+    }
+
+    /// Updates both banks with a measurement at `time_s`.
+    fn update_by(
+        &mut self,
+        time_s: f64,
+        update: impl Fn(&mut Bank) -> UpdateVerdict,
+    ) -> UpdateVerdict {
+        self.now_s = self.now_s.max(time_s);
         let odometry_s = self.ekf().time_s();
         let (solution_id, told) = (self.solution_id(), self.ekf().pose(odometry_s));
-        let verdict = self.bank.update(head, measured);
+        let verdict = update(&mut self.bank);
         self.bank.judge(self.now_s);
         if let Some(bank) = self.bank.rebased(self.now_s) {
             (self.bank, self.restarted) = (bank, None);
         }
         if let Some(restarted) = &mut self.restarted {
-            restarted.bank.update(head, measured);
+            update(&mut restarted.bank);
             restarted.bank.judge(self.now_s);
         }
         self.recover();

@@ -33,12 +33,12 @@ const LEAST_SEPARABLE: usize = 3;
 clone_in_place! {
     /// Filter of a mode, weighted by its posterior probability.
     #[derive(Debug)]
-    struct ModeFilter {
+    pub(super) struct ModeFilter {
         mode: &'static Mode,
         prior: f64,
-        ekf: Ekf,
+        pub(super) ekf: Ekf,
         /// Likelihood ratio to the nominal mode.
-        ratio: LikelihoodRatio,
+        pub(super) ratio: LikelihoodRatio,
         /// Whether the vehicle was at standstill since the filter started.
         at_rest: bool,
     }
@@ -127,19 +127,19 @@ clone_in_place! {
     #[derive(Debug)]
     pub(in crate::localize) struct Bank {
         settings: IntegritySettings,
-        heads: Vec<RadioHead>,
+        pub(super) heads: Vec<RadioHead>,
         faulty: Vec<bool>,
         /// Time at which each radio head last contradicted the filter without it (s).
         disagreed_s: Vec<f64>,
         /// Time of the last unidentified fault (s).
         lost_s: f64,
         /// Filter of all fault-free radio heads with the nominal model.
-        nominal: Ekf,
-        modes: Vec<ModeFilter>,
+        pub(super) nominal: Ekf,
+        pub(super) modes: Vec<ModeFilter>,
         noise: NoiseRatio,
         /// Prior probability of a fault of each radio head.
         head_prior: f64,
-        subsets: Subsets,
+        pub(super) subsets: Subsets,
     }
 }
 
@@ -315,7 +315,12 @@ impl Bank {
     /// deviations.
     fn statistic(&self, head: usize) -> f64 {
         let test = self.subsets.get(head, head).map(|subset| subset.test(head));
-        test.map_or(0.0, |test| self.deviations(head, &test))
+        let of_angles = test.map_or(0.0, |test| self.deviations(head, &test));
+        let ranges = self
+            .subsets
+            .get(head, head)
+            .map(|subset| subset.range_test(head));
+        ranges.map_or(of_angles, |test| test.statistic().max(of_angles))
     }
 
     /// Returns the statistic of a radio head's test with the measured noise.
@@ -363,13 +368,18 @@ impl Bank {
         self.nominal.update_predicted(predicted, measured)
     }
 
-    fn update_subsets(&mut self, number: usize, head: &RadioHead, measured: &AngleMeasurement) {
+    /// Starts the filters without a radio head of which there is a measurement, if there are none.
+    pub(super) fn watch(&mut self, number: usize) {
         let (faulty, noise) = (&self.faulty, &self.noise);
         let keeps = |head: usize, statistic: f64| {
             let is_faulty = faulty.get(head).is_some_and(|it| *it);
             is_faulty || statistic > CLEARED * noise.ratio_of(head).sqrt()
         };
         self.subsets.hear(number, &self.heads, &self.nominal, keeps);
+    }
+
+    fn update_subsets(&mut self, number: usize, head: &RadioHead, measured: &AngleMeasurement) {
+        self.watch(number);
         for subset in self.subsets.iter_mut() {
             if !subset.lacks(number) {
                 subset.ekf.update(head, measured);
@@ -465,9 +475,14 @@ impl Bank {
     fn disagreement_without(&self, left_out: usize) -> f64 {
         (self.subsets.iter())
             .filter(|subset| !subset.is_of_one() && subset.lacks(left_out))
-            .flat_map(|subset| subset.without.iter().zip(&subset.tests))
+            .flat_map(|subset| {
+                let tests = subset.tests.iter().zip(&subset.range_tests);
+                subset.without.iter().zip(tests)
+            })
             .filter(|(head, _)| **head != left_out && !self.is_faulty(**head))
-            .map(|(head, test)| self.deviations(*head, test))
+            .map(|(head, (of_angles, of_ranges))| {
+                self.deviations(*head, of_angles).max(of_ranges.statistic())
+            })
             .fold(0.0, f64::max)
     }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::gaussian::with_outliers;
-use crate::localize::ekf::{Ekf, PredictedMeasurement};
+use crate::localize::ekf::{Ekf, PredictedMeasurement, PredictedRange};
 use crate::localize::output::UpdateReason;
 use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
@@ -78,6 +78,20 @@ impl LikelihoodRatio {
         }
     }
 
+    /// Updates with a range, given the predictions of the mode's filter and of the nominal filter.
+    pub fn update_range(
+        &mut self,
+        predicted: &Result<PredictedRange, UpdateReason>,
+        by_nominal: &Result<PredictedRange, UpdateReason>,
+    ) {
+        if let (Ok(predicted), Ok(by_nominal)) = (predicted, by_nominal)
+            && !(predicted.excluded || by_nominal.excluded)
+        {
+            let ratio = range_density(predicted) / range_density(by_nominal);
+            self.0 = (self.0 + ratio.ln()).max(-CERTAIN);
+        }
+    }
+
     /// Returns the larger ratio.
     pub const fn max(self, other: Self) -> Self {
         Self(self.0.max(other.0))
@@ -139,6 +153,14 @@ pub(in crate::localize) fn log_likelihood_as_stated(
         }
         _ => log_likelihood(ekf, predicted),
     }
+}
+
+/// Span over which a range that is an outlier is uniformly distributed (m).
+const OUTLIER_SPAN_M: f64 = 100.0;
+
+/// Returns the probability density of a range (1/m): Gaussian, or a uniformly distributed outlier.
+pub(in crate::localize) fn range_density(predicted: &PredictedRange) -> f64 {
+    OUTLIERS / OUTLIER_SPAN_M + (1.0 - OUTLIERS) * predicted.innovation.density()
 }
 
 /// Returns the variance (rad²) of an angle without the state covariance, for the first angle of a

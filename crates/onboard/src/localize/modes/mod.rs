@@ -5,11 +5,14 @@ mod bank;
 mod likelihood;
 mod noise_ratio;
 mod odometry_test;
+mod range_update;
 mod subsets;
 mod table;
 
 pub(in crate::localize) use bank::Bank;
-pub(in crate::localize) use likelihood::{CERTAIN, log_likelihood, log_likelihood_as_stated};
+pub(in crate::localize) use likelihood::{
+    CERTAIN, log_likelihood, log_likelihood_as_stated, range_density,
+};
 pub use odometry_test::OdometryTest;
 pub use subsets::HeadTest;
 pub(in crate::localize) use subsets::RECOVERY_S;

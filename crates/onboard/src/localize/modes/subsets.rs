@@ -86,6 +86,8 @@ clone_in_place! {
         /// Indices of the excluded radio heads; equal for a single one.
         pub without: [usize; 2],
         pub tests: [HeadTest; 2],
+        /// Tests of the ranges, in metres.
+        pub range_tests: [HeadTest; 2],
         pub ekf: Ekf,
     }
 }
@@ -100,7 +102,14 @@ impl SubsetFilter {
     }
 
     pub fn test(&self, head: usize) -> HeadTest {
-        let [first, second] = self.tests;
+        self.of(head, self.tests)
+    }
+
+    pub fn range_test(&self, head: usize) -> HeadTest {
+        self.of(head, self.range_tests)
+    }
+
+    const fn of(&self, head: usize, [first, second]: [HeadTest; 2]) -> HeadTest {
         if self.without[0] == head {
             first
         } else {
@@ -221,10 +230,11 @@ impl Subsets {
                 continue;
             };
             let tests = [of_first.test(first), of_second.test(second)];
+            let range_tests = [of_first.range_test(first), of_second.range_test(second)];
             let mut ekf = of_first.ekf.clone();
             exclude(&mut ekf, heads.get(second), true);
             if let Some(filter) = self.filters.get_mut(number) {
-                (filter.tests, filter.ekf) = (tests, ekf);
+                (filter.tests, filter.range_tests, filter.ekf) = (tests, range_tests, ekf);
             }
         }
     }
@@ -238,8 +248,10 @@ impl Subsets {
             return None;
         }
         let statistic = |head| {
-            self.get(head, head)
-                .map_or(0.0, |it| it.test(head).statistic())
+            self.get(head, head).map_or(0.0, |it| {
+                let ranges = it.range_test(head).statistic();
+                it.test(head).statistic().max(ranges)
+            })
         };
         let ends =
             |head: &usize| self.angles - last(head) > LATELY && !keeps(*head, statistic(*head));
@@ -271,12 +283,13 @@ impl Subsets {
         let mut filter = match spare {
             Some(mut spare) => {
                 spare.ekf.clone_from(from);
-                (spare.without, spare.tests) = (without, tests);
+                (spare.without, spare.tests, spare.range_tests) = (without, tests, tests);
                 spare
             }
             None => SubsetFilter {
                 without,
                 tests,
+                range_tests: tests,
                 ekf: from.clone(),
             },
         };

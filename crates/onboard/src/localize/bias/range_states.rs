@@ -1,0 +1,209 @@
+//! States of the ranges, estimated together with the vehicle's state: scale error, offset and drift
+//! of the vehicle's clock, and one offset per radio head. They follow the angles' biases in
+//! [`CorrelatedBias`], so that vehicle, biases and range states remain one Gaussian.
+
+use super::correlated_bias::{CorrelatedBias, HeadBias};
+use crate::gaussian::dot;
+use crate::localize::ekf::state::{Belief, STATES};
+use crate::radio_head::RadioHead;
+use crate::range::RangeModel;
+
+/// Numbers of the states: scale error, vehicle clock (m), its drift (m/s), first offset (m).
+pub(in crate::localize) const RANGE_SCALE: usize = 0;
+pub(in crate::localize) const CLOCK: usize = 1;
+pub(in crate::localize) const DRIFT: usize = 2;
+pub(in crate::localize) const FIRST_OFFSET: usize = 3;
+
+/// Derivative of a range by its four range states: number of the state, and factor.
+pub(in crate::localize) type RangeTerms = [(usize, f64); 4];
+
+impl CorrelatedBias {
+    /// Adds the states of the ranges of these radio heads.
+    pub fn add_ranges(&mut self, model: &RangeModel, heads: &[RadioHead]) {
+        let old = self.heads.len();
+        let count = old + FIRST_OFFSET + heads.len();
+        let mut among = vec![0.0; count * count];
+        for (place, &covariance) in self.among.iter().enumerate() {
+            if let Some(value) = among.get_mut((place / old) * count + place % old) {
+                *value = covariance;
+            }
+        }
+        self.among = among;
+        self.heads.resize(count, HeadBias::unused());
+        self.add_to(RANGE_SCALE, RANGE_SCALE, model.scale_std.powi(2));
+        self.add_to(CLOCK, CLOCK, model.clock_std_m.powi(2));
+        self.add_to(DRIFT, DRIFT, model.drift_std_mps.powi(2));
+        let offset_variance = |head: &RadioHead| {
+            // A surveyed position that is off shifts the ranges of the radio head.
+            model.offset_std_m.powi(2) + head.position_std_m.powi(2)
+        };
+        for (number, head) in heads.iter().enumerate() {
+            let state = FIRST_OFFSET + number;
+            self.add_to(state, state, offset_variance(head));
+        }
+        self.add_clocks(model, heads, 0, 1.0);
+    }
+
+    /// Adds the covariance of the radio heads' clocks: `times` the square of item `of` of
+    /// [`RangeModel::head_clock`]. Radio heads of a clock group share the clock.
+    fn add_clocks(&mut self, model: &RangeModel, heads: &[RadioHead], of: usize, times: f64) {
+        let std_m = |head: &RadioHead| {
+            let clock = model.head_clock(&head.clock);
+            clock.get(of).copied().unwrap_or_default()
+        };
+        for (one, head) in heads.iter().enumerate() {
+            for (other, beside) in heads.iter().enumerate() {
+                let group = head.clock.group;
+                let shares = one == other || (group.is_some() && group == beside.clock.group);
+                if shares {
+                    let covariance = times * std_m(head) * std_m(beside);
+                    self.add_to(FIRST_OFFSET + one, FIRST_OFFSET + other, covariance);
+                }
+            }
+        }
+    }
+
+    fn add_to(&mut self, one: usize, other: usize, covariance: f64) {
+        let place = (self.biases + one) * self.heads.len() + self.biases + other;
+        if let Some(value) = self.among.get_mut(place) {
+            *value += covariance;
+        }
+    }
+
+    /// Returns mean and variance of a range state; zeros if there are none.
+    pub fn range_state(&self, number: usize) -> [f64; 2] {
+        let place = self.biases + number;
+        let mean = self.heads.get(place).map_or(0.0, |it| it.mean_rad);
+        [mean, self.covariance(place, place)]
+    }
+
+    /// Predicts the range states over a distance and a duration.
+    pub fn advance_ranges(
+        &mut self,
+        model: &RangeModel,
+        heads: impl Iterator<Item = RadioHead> + Clone,
+        travelled_m: f64,
+        duration_s: f64,
+    ) {
+        let count = self.heads.len();
+        let (clock, drift) = (self.biases + CLOCK, self.biases + DRIFT);
+        if model.is_one_way {
+            // The clock's offset grows by its drift.
+            if let Some(&from) = self.heads.get(drift)
+                && let Some(to) = self.heads.get_mut(clock)
+            {
+                to.mean_rad += duration_s * from.mean_rad;
+                for (value, by) in to.state_covariance.iter_mut().zip(from.state_covariance) {
+                    *value += duration_s * by;
+                }
+            }
+            for other in 0..count {
+                let by = duration_s * self.covariance(drift, other);
+                if let Some(value) = self.among.get_mut(clock * count + other) {
+                    *value += by;
+                }
+            }
+            for other in 0..count {
+                let by = duration_s * self.covariance(other, drift);
+                if let Some(value) = self.among.get_mut(other * count + clock) {
+                    *value += by;
+                }
+            }
+            let walk = model.drift_walk_mps_per_sqrt_s.powi(2) * duration_s;
+            let wander = model.clock_wander_m_per_sqrt_s.powi(2) * duration_s;
+            self.add_to(CLOCK, CLOCK, wander + walk * duration_s * duration_s / 3.0);
+            self.add_to(CLOCK, DRIFT, 0.5 * walk * duration_s);
+            self.add_to(DRIFT, CLOCK, 0.5 * walk * duration_s);
+            self.add_to(DRIFT, DRIFT, walk);
+            for (one, head) in heads.clone().enumerate() {
+                for (other, beside) in heads.clone().enumerate() {
+                    let group = head.clock.group;
+                    if one == other || (group.is_some() && group == beside.clock.group) {
+                        let [_, mine] = model.head_clock(&head.clock);
+                        let [_, theirs] = model.head_clock(&beside.clock);
+                        let covariance = mine * theirs * duration_s;
+                        self.add_to(FIRST_OFFSET + one, FIRST_OFFSET + other, covariance);
+                    }
+                }
+            }
+        }
+        let walk = model.offset_walk_m_per_sqrt_m.powi(2) * travelled_m.abs();
+        for number in FIRST_OFFSET..count - self.biases {
+            self.add_to(number, number, walk);
+        }
+    }
+
+    /// Returns the variance that the range states add to a range with this state row: their own
+    /// variance, and twice their covariance with the vehicle's part.
+    pub fn range_variance(&self, row: &[f64; STATES], terms: &RangeTerms) -> f64 {
+        let mut variance = 0.0;
+        for &(number, factor) in terms {
+            let place = self.biases + number;
+            let with_state = self.heads.get(place).map_or(0.0, |it| it.along(row));
+            variance += 2.0 * factor * with_state;
+            for &(other, by) in terms {
+                variance += factor * by * self.covariance(place, self.biases + other);
+            }
+        }
+        variance
+    }
+
+    /// Updates state, biases and range states with a range: the Kalman update of the whole
+    /// Gaussian.
+    pub fn take_range(
+        &mut self,
+        belief: &mut Belief,
+        row: &[f64; STATES],
+        terms: &RangeTerms,
+        residual: f64,
+        variance: f64,
+    ) {
+        // Covariance of each state with the predicted range.
+        let mut cross = belief.cross(row);
+        for &(number, factor) in terms {
+            if let Some(state) = self.heads.get(self.biases + number) {
+                for (value, by) in cross.iter_mut().zip(state.state_covariance) {
+                    *value += factor * by;
+                }
+            }
+        }
+        let mut total = variance + dot(row, &cross);
+        for place in 0..self.heads.len() {
+            let mut with_range = self.heads.get(place).map_or(0.0, |it| it.along(row));
+            for &(number, factor) in terms {
+                with_range += factor * self.covariance(place, self.biases + number);
+            }
+            if let Some(state) = self.heads.get_mut(place) {
+                state.cross_with_angle = [with_range; 2];
+            }
+        }
+        for &(number, factor) in terms {
+            let state = self.heads.get(self.biases + number);
+            total += factor * state.map_or(0.0, |it| it.cross_with_angle[0]);
+        }
+        if total <= 0.0 {
+            return; // state and range are exact
+        }
+        for i in 0..STATES {
+            belief.mean[i] += cross[i] / total * residual;
+            for j in i..STATES {
+                belief.covariance[i][j] -= cross[i] * cross[j] / total;
+                belief.covariance[j][i] = belief.covariance[i][j];
+            }
+        }
+        for state in &mut self.heads {
+            let gain = state.cross_with_angle[0] / total;
+            state.mean_rad += gain * residual;
+            for (value, by) in state.state_covariance.iter_mut().zip(cross) {
+                *value -= gain * by;
+            }
+        }
+        let heads = &self.heads;
+        let pairs = (heads.iter()).flat_map(|one| {
+            (heads.iter()).map(|other| one.cross_with_angle[0] * other.cross_with_angle[0])
+        });
+        for (value, product) in self.among.iter_mut().zip(pairs) {
+            *value -= product / total;
+        }
+    }
+}

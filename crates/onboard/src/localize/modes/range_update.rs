@@ -1,0 +1,56 @@
+//! Update of a bank with a range: every filter that uses the radio head, and the test of each
+//! filter without it.
+
+use super::bank::{Bank, ModeFilter};
+use super::likelihood::LikelihoodRatio;
+use crate::localize::ekf::PredictedRange;
+use crate::localize::output::{UpdateReason, UpdateVerdict};
+use crate::radio_head::RadioHead;
+use crate::range::RangeMeasurement;
+
+impl ModeFilter {
+    /// Updates with a range, for which the nominal filter has the given prediction.
+    fn update_range(
+        &mut self,
+        by_nominal: &Result<PredictedRange, UpdateReason>,
+        head: &RadioHead,
+        measured: &RangeMeasurement,
+    ) {
+        let predicted = self.ekf.predict_range(head, measured);
+        self.ratio.update_range(&predicted, by_nominal);
+        self.ekf.update_predicted_range(predicted);
+    }
+}
+
+impl Bank {
+    /// Updates with a range.
+    pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateVerdict {
+        let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
+        if let Some(number) = self.heads.iter().position(is_it) {
+            self.watch(number);
+            for subset in self.subsets.iter_mut() {
+                if !subset.lacks(number) {
+                    subset.ekf.update_range(head, measured);
+                    continue;
+                }
+                let Ok(predicted) = subset.ekf.predict_range(head, measured) else {
+                    continue;
+                };
+                for (mine, test) in subset.without.iter().zip(&mut subset.range_tests) {
+                    if *mine == number {
+                        test.push(&predicted.innovation);
+                    }
+                }
+            }
+        }
+        let predicted = self.nominal.predict_range(head, measured);
+        for it in &mut self.modes {
+            it.update_range(&predicted, head, measured);
+        }
+        let most = (self.modes.iter()).fold(LikelihoodRatio::NONE, |most, it| most.max(it.ratio));
+        for it in &mut self.modes {
+            it.ratio.limit_by(most);
+        }
+        self.nominal.update_predicted_range(predicted)
+    }
+}

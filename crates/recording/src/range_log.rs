@@ -1,0 +1,182 @@
+//! Log of ranges to radio heads, one range per line.
+//!
+//! Columns: `time_s`, `pci` and either `range_m` (two-way range, or a pseudorange in metres) or
+//! `delay_ns` (one-way delay by the clocks of vehicle and radio head). Optional columns are
+//! `ssb_index` (default 0) and the standard deviation of the noise, `sigma_m` or `delay_sigma_ns`
+//! (default: `ranging.sigma_m` of the vehicle).
+
+use std::path::Path;
+
+use onboard::range::{METRES_PER_NS, RangeMeasurement};
+use onboard::time_unit::TimeUnit;
+
+use crate::error::RecordingError;
+use crate::table::Table;
+
+const REQUIRED: [&str; 2] = ["time_s", "pci"];
+const OPTIONAL: [&str; 5] = [
+    "ssb_index",
+    "range_m",
+    "sigma_m",
+    "delay_ns",
+    "delay_sigma_ns",
+];
+
+/// Maximum distance of a range (m).
+const MOST_RANGE_M: f64 = 1e7;
+
+/// Delay (ns) below which a whole log of delays is in seconds: a delay of 10 km is 3e-5 s.
+const LEAST_DELAY_NS: f64 = 1e-3;
+
+/// Range with its radio head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoggedRange {
+    /// Physical cell identity of the radio head.
+    pub pci: u16,
+    /// Index of its SSB.
+    pub ssb_index: u8,
+    /// The range.
+    pub measured: RangeMeasurement,
+}
+
+/// Usable ranges of a file in order of time, and remarks on the omitted lines.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RangeLog {
+    /// The ranges.
+    pub ranges: Vec<LoggedRange>,
+    /// Whether the log has one-way delays (`delay_ns`) instead of ranges (`range_m`).
+    pub has_delays: bool,
+    /// Whether each range has its own standard deviation.
+    pub has_sigma: bool,
+    /// Remarks on the omitted lines: time of the previous usable range, and text.
+    pub remarks: Vec<(f64, String)>,
+}
+
+/// Whether the header of a table has a column of ranges, so that the table is a range log.
+///
+/// # Errors
+/// [`RecordingError`] if the file cannot be read.
+pub fn is_range_log(file: &Path) -> Result<bool, RecordingError> {
+    let table = Table::read(file, &[], &OPTIONAL)?;
+    Ok(table.has("range_m") || table.has("delay_ns"))
+}
+
+/// Reads a range log.
+///
+/// # Errors
+/// [`RecordingError`] if the file cannot be read, lacks a column, or has delays in seconds. Invalid
+/// single lines and a decreasing time are reported as remarks only.
+pub fn read_range_log(file: &Path) -> Result<RangeLog, RecordingError> {
+    let table = Table::read(file, &REQUIRED, &OPTIONAL)?;
+    let has_delays = table.has("delay_ns");
+    if has_delays == table.has("range_m") {
+        let allowed = "there must be either range_m or delay_ns";
+        return Err(table.missing("range_m", allowed));
+    }
+    let sigma = if has_delays {
+        "delay_sigma_ns"
+    } else {
+        "sigma_m"
+    };
+    let mut log = RangeLog {
+        has_delays,
+        has_sigma: table.has(sigma),
+        ..RangeLog::default()
+    };
+    for row in table.rows {
+        match row.values.and_then(|values| range(&values, has_delays)) {
+            Ok(range) => log.ranges.push(range),
+            Err(why) => {
+                let last = log.ranges.last();
+                let last_s = last.map_or(f64::NEG_INFINITY, |it| it.measured.time_s);
+                let text = format!("range log line {}: left out, {why}", row.line);
+                log.remarks.push((last_s, text));
+            }
+        }
+    }
+    let time_s = |it: &LoggedRange| it.measured.time_s;
+    let pairs = || log.ranges.windows(2);
+    let falls = |pair: &&[LoggedRange]| matches!(pair, [one, two] if time_s(two) < time_s(one));
+    if let Some([before, after]) = pairs().find(falls) {
+        let text = format!(
+            "range log: time_s decreases {} times, first from {} to {} s; the ranges were sorted",
+            pairs().filter(falls).count(),
+            time_s(before),
+            time_s(after)
+        );
+        log.remarks.push((time_s(after), text));
+    }
+    log.ranges
+        .sort_by(|one, other| time_s(one).total_cmp(&time_s(other)));
+    let delays_ns = || (log.ranges.iter()).map(|it| it.measured.range_m.abs() / METRES_PER_NS);
+    let is_of_seconds = delays_ns().all(|ns| ns < LEAST_DELAY_NS) && delays_ns().any(|ns| ns > 0.0);
+    if has_delays && is_of_seconds {
+        let most = delays_ns().fold(0.0, f64::max);
+        let allowed = "delays must be in nanoseconds, and these are probably in seconds: multiply \
+                       them by 1e9";
+        return Err(RecordingError::value(file, "delay_ns", most, allowed));
+    }
+    Ok(log)
+}
+
+/// Returns the range of the columns [`REQUIRED`] and [`OPTIONAL`], or the reason why there is none.
+fn range(values: &[Option<f64>], has_delays: bool) -> Result<LoggedRange, String> {
+    let &[
+        time_s,
+        pci,
+        ssb_index,
+        range_m,
+        sigma_m,
+        delay_ns,
+        delay_sigma_ns,
+    ] = values
+    else {
+        return Err("too few columns".to_owned());
+    };
+    let needed = |value: Option<f64>, name: &str| match value {
+        None => Err(format!("{name} is missing")),
+        Some(value) if !value.is_finite() => Err(format!("{name} is not finite")),
+        Some(value) => Ok(value),
+    };
+    let time_s = needed(time_s, "time_s")?;
+    if let Some(unit) = TimeUnit::of_epoch(time_s) {
+        return Err(format!(
+            "time_s {time_s} is not a time of a drive and probably in {unit}; it must be seconds"
+        ));
+    }
+    let whole = |value: f64, name: &str, most: f64| {
+        if value.fract() == 0.0 && (0.0..=most).contains(&value) {
+            Ok(value)
+        } else {
+            Err(format!("{name} {value} is not an integer from 0 to {most}"))
+        }
+    };
+    let pci = whole(needed(pci, "pci")?, "pci", 1007.0)? as u16;
+    let ssb_index = whole(ssb_index.unwrap_or(0.0), "ssb_index", 63.0)? as u8;
+    let (value, sigma, [name, sigma_name], metres) = if has_delays {
+        let names = ["delay_ns", "delay_sigma_ns"];
+        (delay_ns, delay_sigma_ns, names, METRES_PER_NS)
+    } else {
+        (range_m, sigma_m, ["range_m", "sigma_m"], 1.0)
+    };
+    let range_m = metres * needed(value, name)?;
+    if range_m.abs() > MOST_RANGE_M {
+        return Err(format!(
+            "{name} is above {MOST_RANGE_M:e} m; check its unit"
+        ));
+    }
+    let sigma_m = match sigma {
+        Some(sigma) if sigma > 0.0 && sigma.is_finite() => Some(metres * sigma),
+        Some(sigma) => return Err(format!("{sigma_name} {sigma} is not above 0")),
+        None => None,
+    };
+    Ok(LoggedRange {
+        pci,
+        ssb_index,
+        measured: RangeMeasurement {
+            time_s,
+            range_m,
+            sigma_m,
+        },
+    })
+}

@@ -1,0 +1,134 @@
+//! Localization of a recorded drive from ranges.
+
+use onboard::Custom;
+use onboard::localize::UpdateReason;
+use onboard::settings::{Check, LocalizerSettings, RangingKind, RangingSettings, Site, Vehicle};
+
+use super::drive::Replay;
+use super::error::ReplayError;
+use super::located::{Diagnosis, LocatedDrive, LocatedRange};
+use super::start::{StartChoice, starting};
+use super::time_units::check_times;
+use crate::odometry::OdometryLog;
+use crate::range_log::RangeLog;
+
+/// Minimum number of ranges of a radio head whose consistency is reported.
+const LEAST_RANGES: usize = 20;
+
+/// Fraction of rejected ranges of a radio head that is reported.
+const MANY_REJECTED: f64 = 0.3;
+
+/// Locates a drive from logged ranges. The start must be known; its heading may be wrong.
+///
+/// # Errors
+/// [`ReplayError`].
+pub fn locate_ranges(
+    site: &Site,
+    vehicle: &Vehicle,
+    start: StartChoice,
+    odometry: &OdometryLog,
+    log: &RangeLog,
+) -> Result<LocatedDrive, ReplayError> {
+    let vehicle = with_ranging(vehicle, log)?;
+    let (vehicle, start) = starting(site, &vehicle, start)?;
+    let check = Check {
+        file: &vehicle.name,
+    };
+    check.that(
+        vehicle.start.known,
+        "start.pose",
+        "missing",
+        "ranges do not determine the first position: give a start pose",
+    )?;
+    check_times(odometry, &[])?;
+    let times = log.ranges.iter().map(|it| it.measured.time_s);
+    let [first_s, last_s] = times.clone().fold(
+        [f64::INFINITY, f64::NEG_INFINITY],
+        |[first, last], time_s| [first.min(time_s), last.max(time_s)],
+    );
+    if log.ranges.is_empty() {
+        let why = log.remarks.first().map(|(_, text)| text.clone());
+        return Err(ReplayError::NoRange { why });
+    }
+    if !times.clone().any(|time_s| odometry.covers(time_s)) {
+        let odometry_s = odometry.interval_s().unwrap_or([f64::NAN; 2]);
+        return Err(ReplayError::RangeClocks {
+            odometry_s,
+            ranges_s: [first_s, last_s],
+        });
+    }
+    let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
+    for (time_s, text) in &log.remarks {
+        replay.remark(*time_s, text.clone());
+    }
+    replay.with_ranges(&log.ranges);
+    replay.drive_on()?;
+    for text in inconsistent(site, replay.located()) {
+        replay.diagnose(Diagnosis {
+            text,
+            is_of_start: false,
+            is_harmless: true,
+        });
+    }
+    replay.finish()
+}
+
+/// Returns the vehicle with settings of its ranging, and rejects contradictions to the log.
+fn with_ranging(vehicle: &Vehicle, log: &RangeLog) -> Result<Vehicle, ReplayError> {
+    let mut vehicle = vehicle.clone();
+    let default = RangingSettings {
+        kind: if log.has_delays {
+            RangingKind::OneWay
+        } else {
+            RangingKind::TwoWay
+        },
+        ..RangingSettings::default()
+    };
+    let ranging = *vehicle.ranging.get_or_insert(default);
+    let file = vehicle.name.clone();
+    let check = Check { file: &file };
+    check.that(
+        !(log.has_delays && ranging.kind == RangingKind::TwoWay),
+        "ranging.kind",
+        "two-way",
+        "the log has one-way delays (delay_ns), which contain clocks: write kind = \"one-way\"",
+    )?;
+    check.that(
+        log.has_sigma || ranging.sigma_m.is_some(),
+        "ranging.sigma_m",
+        "missing",
+        "the log has no sigma_m: give the standard deviation of a range here",
+    )?;
+    check.that(
+        matches!(vehicle.localizer, LocalizerSettings::Tracker(_)),
+        "localizer.kind",
+        "dead-reckoning",
+        "ranges need localizer.kind = \"tracker\"",
+    )?;
+    Ok(vehicle)
+}
+
+/// Returns a text for every radio head whose ranges mostly contradict the drive.
+fn inconsistent(site: &Site, drive: &LocatedDrive) -> Vec<String> {
+    let mut texts = Vec::new();
+    for head in &site.radio_heads {
+        let of_head =
+            |it: &&LocatedRange| (it.range.pci, it.range.ssb_index) == (head.pci, head.ssb_index);
+        let all = drive.ranges.iter().filter(of_head);
+        let count = all.clone().count();
+        let is_rejected = |it: &&LocatedRange| {
+            let reason = it.verdict.reason;
+            matches!(reason, UpdateReason::Outlier | UpdateReason::Excluded)
+        };
+        let rejected = all.filter(is_rejected).count();
+        if count >= LEAST_RANGES && rejected as f64 > MANY_REJECTED * count as f64 {
+            texts.push(format!(
+                "{rejected} of {count} ranges of pci {} ssb_index {} contradict the drive; check \
+                 position_m of the radio head, and ranging.offset_std_m (and clock_offset_std_ns \
+                 of the radio head), which may be too small for its offset",
+                head.pci, head.ssb_index
+            ));
+        }
+    }
+    texts
+}

@@ -1,0 +1,324 @@
+//! Range logs, and localization from ranges.
+
+use crate::common;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use onboard::geometry::{Pose, wrap_angle};
+use onboard::localize::{IntegrityState, UpdateReason};
+use onboard::range::METRES_PER_NS;
+use onboard::settings::{Site, TomlFile, Vehicle};
+use recording::replay::{LocatedDrive, ReplayError, StartChoice, locate_ranges};
+use recording::{Files, OdometryLog, RangeLog, RecordingError, read_odometry_csv, read_range_log};
+
+fn log_of(name: &str, text: &str) -> Result<RangeLog, RecordingError> {
+    let file = common::scratch(name).join("ranges.csv");
+    fs::write(&file, text).unwrap();
+    read_range_log(&file)
+}
+
+#[test]
+fn ranges_and_delays_are_read() {
+    let log = log_of(
+        "ranges",
+        "time_s,pci,range_m,sigma_m\n0,1,5.5,0.1\n0.5,2,7,\n",
+    )
+    .unwrap();
+    assert!(log.remarks.is_empty() && !log.has_delays);
+    let read: Vec<_> = log.ranges.iter().map(|it| (it.pci, it.measured)).collect();
+    assert_eq!((read[0].0, read[0].1.range_m), (1, 5.5));
+    assert_eq!((read[0].1.sigma_m, read[1].1.sigma_m), (Some(0.1), None));
+
+    let log = log_of("delays", "time_s,pci,delay_ns,delay_sigma_ns\n0,1,100,2\n").unwrap();
+    let measured = log.ranges[0].measured;
+    assert!(log.has_delays);
+    assert!((measured.range_m - 100.0 * METRES_PER_NS).abs() < 1e-12);
+    assert!((measured.sigma_m.unwrap() - 2.0 * METRES_PER_NS).abs() < 1e-12);
+}
+
+#[test]
+fn invalid_ranges_are_reported_one_by_one() {
+    let rows = [
+        "time_s,pci,range_m,sigma_m",
+        "1,1,5,0.1",
+        "0.5,1,7,0.1", // decreasing time
+        "2,1,nan,0.1",
+        "2,1,5,0",
+        "2,1008,5,0.1",
+        "2,1,5e8,0.1",
+        "2,1,6,0.1",
+    ];
+    let log = log_of("ranges-bad", &rows.join("\n")).unwrap();
+    let ranges: Vec<f64> = log.ranges.iter().map(|it| it.measured.range_m).collect();
+    assert_eq!(ranges, [7.0, 5.0, 6.0]);
+    let said: Vec<&str> = log.remarks.iter().map(|it| it.1.as_str()).collect();
+    assert_eq!(said.len(), 5);
+    assert!(
+        said[0].contains("line 4") && said[0].contains("range_m"),
+        "{}",
+        said[0]
+    );
+    let times = "time_s decreases 1 times, first from 1 to 0.5 s";
+    assert!(said[4].contains(times), "{}", said[4]);
+}
+
+#[test]
+fn delays_in_seconds_are_rejected() {
+    let text = "time_s,pci,delay_ns\n0,1,1.1e-7\n1,1,1.2e-7\n";
+    let error = log_of("delays-s", text).unwrap_err().to_string();
+    assert!(
+        error.contains("nanoseconds") && error.contains("delay_ns"),
+        "{error}"
+    );
+}
+
+fn vehicle(text: &str) -> Vehicle {
+    Vehicle::from_toml(text, "vehicle.toml", &Files).unwrap()
+}
+
+fn site(text: &str) -> Site {
+    Site::from_toml(text, "site.toml", &Files).unwrap()
+}
+
+#[test]
+fn settings_that_contradict_the_log_are_rejected() {
+    let plant = site(SITE);
+    let odometry = OdometryLog::default();
+    let delays = log_of("contradiction", "time_s,pci,delay_ns\n0,1,100\n").unwrap();
+    let locate = |log: &RangeLog, ranging: &str| {
+        let carrier = vehicle(&format!("{VEHICLE}{ranging}"));
+        let located = locate_ranges(&plant, &carrier, StartChoice::AsSet, &odometry, log);
+        located.unwrap_err().to_string()
+    };
+    let said = locate(&delays, "[ranging]\nsigma_m = 1.0\nkind = \"two-way\"\n");
+    assert!(
+        said.contains("ranging.kind") && said.contains("one-way"),
+        "{said}"
+    );
+    let said = locate(&delays, "");
+    assert!(said.contains("ranging.sigma_m"), "{said}");
+    let alone = format!("{SITE}clock_group = 3\n");
+    let said = Site::from_toml(&alone, "site.toml", &Files)
+        .unwrap_err()
+        .to_string();
+    assert!(said.contains("clock_group"), "{said}");
+}
+
+const VEHICLE: &str = "name = \"robot\"\ndrive = \"differential\"\n\
+                       [start]\npose = [0.0, 0.0, 0.0]\n";
+const SITE: &str = "name = \"hall\"\n[[radio_heads]]\npci = 1\nposition_m = [30.0, 5.0, 3.0]\n";
+
+/// Folder of the drive, if it exists.
+fn data() -> Option<PathBuf> {
+    common::data_dir().map(|it| it.join("ranges/plaza1"))
+}
+
+fn rows(file: &Path) -> Vec<Vec<f64>> {
+    let text = fs::read_to_string(file).unwrap();
+    let lines = text.lines().skip(1);
+    lines
+        .map(|line| line.split(',').map(|it| it.parse().unwrap()).collect())
+        .collect()
+}
+
+/// Drive of a lawn mower with ranges to four nodes, converted to our formats.
+struct Plaza {
+    site: Site,
+    start: Pose,
+    odometry: OdometryLog,
+    log: RangeLog,
+    /// Time, x and y.
+    truth: Vec<[f64; 3]>,
+}
+
+impl Plaza {
+    fn read(from: &Path, name: &str) -> Self {
+        let truth = rows(&from.join("truth.csv"));
+        let start_s = truth[0][0].floor();
+        let mut odometry = "time_s,distance_m,yaw_rate_radps\n".to_owned();
+        let mut last_s = truth[0][0];
+        for row in rows(&from.join("odometry.csv")) {
+            // The file has the heading change since the previous row.
+            let rate = row[2] / (row[0] - last_s);
+            odometry += &format!("{:.4},{},{rate}\n", row[0] - start_s, row[1]);
+            last_s = row[0];
+        }
+        let mut ranges = "time_s,pci,range_m\n".to_owned();
+        for row in rows(&from.join("ranges.csv")) {
+            ranges += &format!("{:.4},{},{}\n", row[0] - start_s, row[1], row[2]);
+        }
+        let mut plant = "name = \"plaza1\"\n".to_owned();
+        for row in rows(&from.join("nodes.csv")) {
+            let [pci, x_m, y_m] = row[..] else { panic!() };
+            plant +=
+                &format!("[[radio_heads]]\npci = {pci}\nposition_m = [{x_m:?}, {y_m:?}, 0.0]\n");
+        }
+        let folder = common::scratch(name);
+        let file = folder.join("odometry.csv");
+        fs::write(&file, odometry).unwrap();
+        Self {
+            site: site(&plant),
+            start: Pose {
+                x_m: truth[0][1],
+                y_m: truth[0][2],
+                heading_rad: wrap_angle(truth[0][3]),
+            },
+            odometry: read_odometry_csv(&file).unwrap(),
+            log: log_of(&format!("{name}-ranges"), &ranges).unwrap(),
+            truth: (truth.iter())
+                .map(|it| [it[0] - start_s, it[1], it[2]])
+                .collect(),
+        }
+    }
+
+    /// Locates with the data sheet of the radios and of the gyroscope.
+    fn locate(&self, turned_rad: f64) -> LocatedDrive {
+        let carrier = vehicle(
+            "name = \"mower\"\ndrive = \"differential\"\ntop_speed_kmh = 8.0\n\
+             [start]\nposition_std_m = 0.1\nheading_std_rad = 0.05\n\
+             [odometer]\nscale_std = 0.02\nnoise_m_per_sqrt_m = 0.03\nnoise_m_per_sqrt_s = 0.005\n\
+             [gyroscope]\nnoise_rad_per_sqrt_s = 0.001\nbias_std_radps = 0.001\n\
+             [ranging]\nsigma_m = 0.6\nposition_m = [0.0, 0.0, 0.0]\n",
+        );
+        let start = Pose {
+            heading_rad: wrap_angle(self.start.heading_rad + turned_rad),
+            ..self.start
+        };
+        let start = StartChoice::At(start);
+        locate_ranges(&self.site, &carrier, start, &self.odometry, &self.log).unwrap()
+    }
+
+    /// Squared error (m²) and NEES of both axes per pose, and whether the pose is `ok` and whether
+    /// its error exceeds the level; after `from_s`.
+    fn compare(&self, drive: &LocatedDrive, from_s: f64) -> Comparison {
+        let mut sums = Comparison::default();
+        let mut at = 0;
+        for pose in &drive.poses {
+            let estimate = &pose.estimate;
+            while self
+                .truth
+                .get(at + 1)
+                .is_some_and(|it| it[0] < estimate.time_s)
+            {
+                at += 1;
+            }
+            let [Some(before), Some(after)] = [self.truth.get(at), self.truth.get(at + 1)] else {
+                break;
+            };
+            if estimate.time_s < before[0].max(from_s) {
+                continue;
+            }
+            let share = (estimate.time_s - before[0]) / (after[0] - before[0]);
+            let between = |axis: usize| before[axis] + share * (after[axis] - before[axis]);
+            let (dx, dy) = (
+                estimate.pose.x_m - between(1),
+                estimate.pose.y_m - between(2),
+            );
+            let [[xx, xy, _], [_, yy, _], _] = estimate.covariance.unwrap();
+            let error2 = dx * dx + dy * dy;
+            let integrity = estimate.integrity.unwrap();
+            let ok = integrity.state == IntegrityState::Ok;
+            let beyond = ok && error2.sqrt() > integrity.protection_level_m;
+            sums.levels_m.push(integrity.protection_level_m);
+            sums.degraded += f64::from(integrity.state == IntegrityState::Degraded);
+            sums.count += 1.0;
+            sums.error2 += error2;
+            sums.nees += (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
+            sums.ok += f64::from(ok);
+            sums.beyond += f64::from(beyond);
+        }
+        sums
+    }
+}
+
+#[derive(Default)]
+struct Comparison {
+    count: f64,
+    error2: f64,
+    nees: f64,
+    ok: f64,
+    beyond: f64,
+    degraded: f64,
+    levels_m: Vec<f64>,
+}
+
+impl Comparison {
+    fn rms_m(&self) -> f64 {
+        (self.error2 / self.count).sqrt()
+    }
+}
+
+#[test]
+fn a_real_drive_is_located_from_ranges() {
+    let Some(folder) = data() else {
+        return;
+    };
+    let plaza = Plaza::read(&folder, "plaza");
+    let drive = plaza.locate(0.0);
+    // One node of the log is missing from the list of nodes.
+    let unknown =
+        |it: &&recording::replay::LocatedRange| it.verdict.reason == UpdateReason::UnknownRadioHead;
+    let unknown = drive.ranges.iter().filter(unknown).count();
+    let it = plaza.compare(&drive, f64::NEG_INFINITY);
+    println!(
+        "RMS {:.3} m, NEES/2 {:.2}, ok {:.3}, beyond {:.4}, {} ranges, {unknown} unknown",
+        it.rms_m(),
+        0.5 * it.nees / it.count,
+        it.ok / it.count,
+        it.beyond / it.count,
+        drive.ranges.len(),
+    );
+    let mut l = it.levels_m.clone();
+    l.sort_by(f64::total_cmp);
+    println!(
+        "levels {:?} degr {:.3}",
+        [0.1, 0.5, 0.8, 0.9, 0.99].map(|q| l[(q * l.len() as f64) as usize]),
+        it.degraded / it.count
+    );
+    println!("{:?}", drive.remarks);
+    // Required: 0.85 m; a hand-tuned filter without a scale error has 0.87 to 1.26 m.
+    assert!(it.rms_m() < 0.5);
+    assert!((0.5..1.5).contains(&(0.5 * it.nees / it.count)));
+    assert!(it.ok > 0.8 * it.count && it.beyond < 1e-2 * it.count);
+}
+
+#[test]
+fn a_start_with_the_opposite_heading_is_found_again() {
+    let Some(folder) = data() else {
+        return;
+    };
+    let plaza = Plaza::read(&folder, "plaza-turned");
+    let drive = plaza.locate(std::f64::consts::PI);
+    println!("{:?}", drive.remarks);
+    let half_s = 0.5 * plaza.truth.last().unwrap()[0];
+    let late = plaza.compare(&drive, half_s);
+    let all = plaza.compare(&drive, f64::NEG_INFINITY);
+    println!(
+        "second half: RMS {:.3} m, ok {:.3}; all: RMS {:.3}, beyond {:.4}",
+        late.rms_m(),
+        late.ok / late.count,
+        all.rms_m(),
+        all.beyond / all.count
+    );
+    assert!(late.rms_m() < 0.5, "{}", late.rms_m());
+    assert!(all.beyond < 1e-2 * all.count);
+}
+
+#[test]
+fn missing_common_time_is_an_error() {
+    let file = common::scratch("ranges-clock").join("odometry.csv");
+    fs::write(&file, "time_s,distance_m\n0,0\n1,1\n2,2\n").unwrap();
+    let odometry = read_odometry_csv(&file).unwrap();
+    let log = log_of("ranges-late", "time_s,pci,range_m,sigma_m\n100,1,5,0.1\n").unwrap();
+    let located = locate_ranges(
+        &site(SITE),
+        &vehicle(VEHICLE),
+        StartChoice::AsSet,
+        &odometry,
+        &log,
+    );
+    assert!(matches!(
+        located.unwrap_err(),
+        ReplayError::RangeClocks { .. }
+    ));
+}
