@@ -14,6 +14,7 @@ import pytest
 
 from access_av import (
     Scenario,
+    Vehicle,
     bound,
     columns,
     drives,
@@ -128,7 +129,7 @@ def test_located_drives(tmp_path: Path) -> None:
     assert drives.locate(site, odometry, log, vehicle=vehicle).angles.height > 0
     ranges = tmp_path / "ranges.csv"
     ranges.write_text("time_s,pci,range_m,sigma_m\n1.0,1,30.0,5.0\n2.0,2,40.0,\n")
-    of_ranges = _core.Vehicle.load(str(vehicle)).with_overrides({"ranging.sigma_m": 5.0})
+    of_ranges = Vehicle.load(str(vehicle)).with_overrides({"ranging.sigma_m": 5.0})
     check("ranges", drives.locate(site, odometry, ranges, vehicle=of_ranges).ranges)
 
 

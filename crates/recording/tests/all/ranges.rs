@@ -1,11 +1,12 @@
 //! Range logs, and localization from ranges.
 
 use crate::common;
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use onboard::geometry::{Pose, wrap_angle};
-use onboard::localize::{IntegrityState, UpdateReason};
+use onboard::localize::IntegrityState;
 use onboard::range::METRES_PER_NS;
 use onboard::settings::{Site, TomlFile, Vehicle};
 use recording::replay::{LocatedDrive, ReplayError, StartChoice, locate_ranges};
@@ -140,18 +141,21 @@ impl Plaza {
         for row in rows(&from.join("odometry.csv")) {
             // The file has the heading change since the previous row.
             let rate = row[2] / (row[0] - last_s);
-            odometry += &format!("{:.4},{},{rate}\n", row[0] - start_s, row[1]);
+            writeln!(odometry, "{:.4},{},{rate}", row[0] - start_s, row[1]).unwrap();
             last_s = row[0];
         }
         let mut ranges = "time_s,pci,range_m\n".to_owned();
         for row in rows(&from.join("ranges.csv")) {
-            ranges += &format!("{:.4},{},{}\n", row[0] - start_s, row[1], row[2]);
+            writeln!(ranges, "{:.4},{},{}", row[0] - start_s, row[1], row[2]).unwrap();
         }
         let mut plant = "name = \"plaza1\"\n".to_owned();
         for row in rows(&from.join("nodes.csv")) {
             let [pci, x_m, y_m] = row[..] else { panic!() };
-            plant +=
-                &format!("[[radio_heads]]\npci = {pci}\nposition_m = [{x_m:?}, {y_m:?}, 0.0]\n");
+            writeln!(
+                plant,
+                "[[radio_heads]]\npci = {pci}\nposition_m = [{x_m:?}, {y_m:?}, 0.0]"
+            )
+            .unwrap();
         }
         let folder = common::scratch(name);
         let file = folder.join("odometry.csv");
@@ -219,8 +223,6 @@ impl Plaza {
             let integrity = estimate.integrity.unwrap();
             let ok = integrity.state == IntegrityState::Ok;
             let beyond = ok && error2.sqrt() > integrity.protection_level_m;
-            sums.levels_m.push(integrity.protection_level_m);
-            sums.degraded += f64::from(integrity.state == IntegrityState::Degraded);
             sums.count += 1.0;
             sums.error2 += error2;
             sums.nees += (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
@@ -238,8 +240,6 @@ struct Comparison {
     nees: f64,
     ok: f64,
     beyond: f64,
-    degraded: f64,
-    levels_m: Vec<f64>,
 }
 
 impl Comparison {
@@ -255,30 +255,18 @@ fn a_real_drive_is_located_from_ranges() {
     };
     let plaza = Plaza::read(&folder, "plaza");
     let drive = plaza.locate(0.0);
-    // One node of the log is missing from the list of nodes.
-    let unknown =
-        |it: &&recording::replay::LocatedRange| it.verdict.reason == UpdateReason::UnknownRadioHead;
-    let unknown = drive.ranges.iter().filter(unknown).count();
     let it = plaza.compare(&drive, f64::NEG_INFINITY);
     println!(
-        "RMS {:.3} m, NEES/2 {:.2}, ok {:.3}, beyond {:.4}, {} ranges, {unknown} unknown",
+        "RMS {:.3} m, NEES/2 {:.2}, ok {:.3}, beyond {:.4}, {} ranges",
         it.rms_m(),
         0.5 * it.nees / it.count,
         it.ok / it.count,
         it.beyond / it.count,
         drive.ranges.len(),
     );
-    let mut l = it.levels_m.clone();
-    l.sort_by(f64::total_cmp);
-    println!(
-        "levels {:?} degr {:.3}",
-        [0.1, 0.5, 0.8, 0.9, 0.99].map(|q| l[(q * l.len() as f64) as usize]),
-        it.degraded / it.count
-    );
-    println!("{:?}", drive.remarks);
     // Required: 0.85 m; a hand-tuned filter without a scale error has 0.87 to 1.26 m.
     assert!(it.rms_m() < 0.5);
-    assert!((0.5..1.5).contains(&(0.5 * it.nees / it.count)));
+    assert!((0.7..1.5).contains(&(0.5 * it.nees / it.count)));
     assert!(it.ok > 0.8 * it.count && it.beyond < 1e-2 * it.count);
 }
 
@@ -289,7 +277,6 @@ fn a_start_with_the_opposite_heading_is_found_again() {
     };
     let plaza = Plaza::read(&folder, "plaza-turned");
     let drive = plaza.locate(std::f64::consts::PI);
-    println!("{:?}", drive.remarks);
     let half_s = 0.5 * plaza.truth.last().unwrap()[0];
     let late = plaza.compare(&drive, half_s);
     let all = plaza.compare(&drive, f64::NEG_INFINITY);

@@ -81,7 +81,7 @@ impl CorrelatedBias {
     pub fn advance_ranges(
         &mut self,
         model: &RangeModel,
-        heads: impl Iterator<Item = RadioHead> + Clone,
+        heads: &(impl Iterator<Item = RadioHead> + Clone),
         travelled_m: f64,
         duration_s: f64,
     ) {

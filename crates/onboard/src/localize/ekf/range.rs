@@ -158,7 +158,7 @@ impl Ekf {
         if let Some(model) = &self.config.ranging {
             let heads = self.heads.iter().map(|head| head.known);
             self.bias
-                .advance_ranges(model, heads, travelled_m, duration_s);
+                .advance_ranges(model, &heads, travelled_m, duration_s);
         }
     }
 
