@@ -103,7 +103,7 @@ docs: .venv/installed-docs ## Build the documentation site target/docs/site/inde
 
 CHROMIUM ?= chromium
 figures: .venv/installed ## Evaluate the paper with five seeds (10 minutes) and make the figures of README and docs/paper.md
-	$(BIN)/access-av evaluate --seeds 5 --unknowns --out results/paper
+	$(BIN)/access-av evaluate --seeds 5 --sensitivity --out results/paper
 	for name in ablation front sobol; do cp results/paper/$$name.svg docs/paper-$$name.svg; done
 	$(MAKE) --no-print-directory picture REPORT=results/paper/report.html
 

@@ -35,15 +35,15 @@ QUICK: dict[str, list[str]] = {
     "designs": ["short.toml", "--space", "space.toml", "--runs", "1"],
     "choose": ["."],
     "balance": [],
-    "codesign": ["--reading", "keine"],
-    "integrity": ["short.toml", "--mismatch", "keiner"],
+    "codesign": ["--interpretation", "keine"],
+    "integrity": ["short.toml", "--fault", "keiner"],
     "plan": ["short.toml", "--masts", "masts.csv"],
     "import-paths": [
         "paths.csv", "--site", "site.toml", "--carrier-mhz", "3500", "--out", "paths.npz",
     ],
     "survey": ["drive", "--site", "site.toml", "--vehicle", "vehicle.toml"],
     "tune": ["short.toml", "--designs", "2", "--runs", "1", "--max-rms-m", "1"],
-    "readings": [],
+    "interpretations": [],
     "columns": [],
 }  # fmt: skip
 

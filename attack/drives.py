@@ -14,7 +14,7 @@ DRIVE = """\
 import access_av
 found = access_av.simulate("scenario.toml", seed={seed}, threads=1, keep_trajectories=True)
 found.trajectories.write_parquet("trajectories.parquet")
-found.executions.write_parquet("executions.parquet")
+found.aoa_estimates.write_parquet("aoa_estimates.parquet")
 found.steps.write_parquet("steps.parquet")
 found.runs.write_parquet("runs.parquet")
 """
@@ -119,7 +119,7 @@ def _vehicle(random: Random) -> dict[str, Any]:
             (
                 {"policy": "fixed", "interval_ms": 20.0},
                 {"policy": "fixed", "interval_ms": 1000.0},
-                {"policy": "uncertainty", "bound_m": 0.5},
+                {"policy": "uncertainty", "target_error_m": 0.5},
             )
         ),
     }

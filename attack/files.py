@@ -25,7 +25,7 @@ scenario = access_av.Scenario.load({name!r})
 if scenario.size["ssbs"] < 30_000:
     found = access_av.simulate(scenario, threads=1, keep_trajectories=True)
     found.trajectories.write_parquet("trajectories.parquet")
-    found.executions.write_parquet("executions.parquet")
+    found.aoa_estimates.write_parquet("aoa_estimates.parquet")
     found.steps.write_parquet("steps.parquet")
     found.runs.write_parquet("runs.parquet")
     found.integrity, found.consistency
@@ -180,7 +180,7 @@ def _locate(case: Case, random: Random, *changed: str) -> list[str]:
         case.write("bag/metadata.yaml", listed)
         odometry = "bag"
     angles = "angles.parquet" if "angles.parquet" in changed else "angles.csv"
-    options = random.choice(([], [], ["--smooth"], ["--start", "scratch"], ["--start", "0,0,0"]))
+    options = random.choice(([], [], ["--smooth"], ["--start", "unknown"], ["--start", "0,0,0"]))
     return case.access_av(
         "locate", "--recording", angles, "--odometry", odometry,
         "--site", "site.toml", "--vehicle", "vehicle.toml", "--truth", "truth.tum", "--out", "out",

@@ -57,7 +57,7 @@ except BaseException as error:
     if type(error) not in (SystemExit, StopIteration, BaseException): raise
 else:
     found.trajectories.write_parquet("trajectories.parquet")
-    found.executions.write_parquet("executions.parquet")
+    found.aoa_estimates.write_parquet("aoa_estimates.parquet")
 """
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from attack.case import Case
 
-SHORT = 'like = "paper-real-odometry-2"\nname = "short"\n[motion]\nstart_at_m = 296.0\n'
+SHORT = 'extends = "paper-real-odometry-2"\nname = "short"\n[motion]\nstart_at_m = 296.0\n'
 MASTS = "name,x_m,y_m,z_m\nnorth,0,45,8\neast,60,10,8\nsouth,5,-40,8\n"
 PATHS = "x_m,y_m,z_m,pci,gain_re,gain_im,delay_s,azimuth_rad,elevation_rad\n" + "".join(
     f"{x_m},0,1.5,{pci},1e-4,1e-5,{delay_s},0.4,0.1\n"
@@ -28,14 +28,17 @@ PATHS = "x_m,y_m,z_m,pci,gain_re,gain_im,delay_s,azimuth_rad,elevation_rad\n" + 
 SPACE: dict[str, Any] = {
     "vehicle": {
         "platform": {"name": ["jetson-agx-xavier-engine"], "mode": [0, 2]},
-        "wake_up": {"base_ms": [20.0, 80.0], "bound_m": {"low": 0.1, "high": 1.0, "log": True}},
+        "wake_up": {
+            "base_ms": [20.0, 80.0],
+            "target_error_m": {"low": 0.1, "high": 1.0, "log": True},
+        },
     }
 }
 
 
 def held(name: str) -> dict[str, list[Any]]:
     """Returns a table of the results, by name."""
-    text = {"energy_provenance": "fitted", "reading": "gate", "campaign": "adaptive"}
+    text = {"energy_provenance": "fitted", "interpretation": "gate", "campaign": "adaptive"}
     return {
         column: [
             {"text": text.get(column, "music"), "true or false": True}.get(unit, 1.0)

@@ -47,9 +47,9 @@ scale_std = {SCALE_ERROR}
 noise_m_per_sqrt_m = {NOISE_M_PER_SQRT_M}
 noise_m_per_sqrt_s = 0.001
 [receiver]
-lateness_std_s = 1e-3
-phase_bias_share = 1.0
-phase_bias_correlation_m = {CORRELATION_M}
+angle_time_offset_std_s = 1e-3
+correlated_noise_fraction = 1.0
+noise_correlation_distance_m = {CORRELATION_M}
 """
 
 

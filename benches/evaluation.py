@@ -11,7 +11,7 @@ from rich.table import Table
 
 from access_av import simulate
 from access_av.device.platform import Platform
-from access_av.paper.readings import load_all
+from access_av.paper.interpretations import load_all
 from access_av.paper.study import study
 
 

@@ -1,7 +1,7 @@
 """Off the road: the localizer compared with a textbook filter that has the same inputs.
 
     python benches/off_the_road.py                 # every row, 20 drives each
-    python benches/off_the_road.py white late --drives 5 --set receiver.lateness_std_s=0.1
+    python benches/off_the_road.py white late --drives 5 --set receiver.angle_time_offset_std_s=0.1
 
 The simulator and the filter (``tests/hall_drive.py``) depend on docs/locate.md only. The RMS is
 over all drives; with an unknown or wrong start, the first half minute is excluded. The NEES is
@@ -46,7 +46,7 @@ class Case:
     world: dict[str, object]
     road: bool = False
     drive: str = "road"
-    from_scratch: bool = False
+    start_unknown: bool = False
 
 
 def _turned(turn_rad: float) -> dict[str, object]:
@@ -66,7 +66,7 @@ CASES = [
         for road in (False, True)
     ),
     *(
-        Case("scratch", f"from scratch, {drive}", {}, False, drive, from_scratch=True)
+        Case("scratch", f"from scratch, {drive}", {}, False, drive, start_unknown=True)
         for drive in ("road", "differential")
     ),
     *(
@@ -144,8 +144,8 @@ def locate(case: Case, seed: int, settings: list[str]) -> dict[str, float]:
             odometry,
             angles,
             vehicle=access_av.Vehicle.from_toml(vehicle_toml(case, settings)),
-            start=None if case.from_scratch else tuple(map(float, drive.start)),
-            from_scratch=case.from_scratch,
+            start=None if case.start_unknown else tuple(map(float, drive.start)),
+            start_unknown=case.start_unknown,
         )
     poses = located.poses
     at = np.clip(np.round(poses["time_s"].to_numpy() / hall_drive.STEP_S).astype(int), 0, None)
@@ -160,7 +160,7 @@ def locate(case: Case, seed: int, settings: list[str]) -> dict[str, float]:
     textbook = hall_drive.textbook(drive)[0] - drive.truth
     rows = located.angles.filter(pl.col("accepted").not_()).sort("time_s")["time_s"].to_list()
     tenth = rows[9] if len(rows) > 9 else math.inf
-    late = located.findings.filter(pl.col("constant") == "receiver.lateness_s")
+    late = located.findings.filter(pl.col("constant") == "receiver.angle_time_offset_s")
     late_refused = min(tenth, LAP_S) + DISTRUST_S
     refused_s = rows[9] if len(rows) > 9 else 0.0
     wrong_ok = ok & (error > ALERT_LIMIT_M)

@@ -30,7 +30,7 @@ import numpy as np
 RATE_HZ = 50.0
 WAVELENGTHS = 0.5
 BEARING_STD_RAD = 0.02
-LATENESS_S = 0.04
+ANGLE_TIME_OFFSET_S = 0.04
 DATA_SHEET = """
 [odometer]
 scale_std = 0.08
@@ -163,7 +163,7 @@ def textbook_filter(drive: dict, sheet: dict[str, float]) -> np.ndarray:
         covariance[0, 1] += along * c * s
         covariance[1, 0] += along * c * s
         covariance[2, 2] += sheet["yaw_noise"] ** 2 * dt
-        while heard < len(bearings) and bearings[heard, 0] - sheet["lateness"] <= time[k]:
+        while heard < len(bearings) and bearings[heard, 0] - sheet["angle_time_offset"] <= time[k]:
             _, pci, bearing, sigma = bearings[heard]
             heard += 1
             dx = drive["landmarks"][int(pci)][0] - state[0]
@@ -220,7 +220,7 @@ def smoothing_and_mapping(drive: dict, sheet: dict[str, float]) -> np.ndarray | 
         graph.add(gtsam.BetweenFactorPose2(before, here, moved, noise))
         pose = pose.compose(moved)
         values.insert(here, pose)
-        while heard < len(bearings) and bearings[heard, 0] - sheet["lateness"] <= time:
+        while heard < len(bearings) and bearings[heard, 0] - sheet["angle_time_offset"] <= time:
             _, pci, bearing, sigma = bearings[heard]
             heard += 1
             model = gtsam.noiseModel.Robust.Create(
@@ -278,7 +278,8 @@ def sheet_of(drive: dict, defaults: bool) -> str:
         return own.read_text(encoding="utf-8")
     if defaults:
         return ""
-    return f"mounting_std_rad = 0.02\n[receiver]\nlateness_s = {LATENESS_S}\n{DATA_SHEET}"
+    receiver = f"[receiver]\nangle_time_offset_s = {ANGLE_TIME_OFFSET_S}"
+    return f"mounting_std_rad = 0.02\n{receiver}\n{DATA_SHEET}"
 
 
 PEERS = {
@@ -287,7 +288,7 @@ PEERS = {
     "mounting": 0.02,
     "distance_noise": 0.05,
     "yaw_noise": 0.04,
-    "lateness": LATENESS_S,
+    "angle_time_offset": ANGLE_TIME_OFFSET_S,
 }
 
 

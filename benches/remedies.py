@@ -32,7 +32,7 @@ def main() -> None:
     plant = access_av.Plant.load(asked.plant)
     scenario, (_, percent) = plant.scenario(), plant.target
     began_s = time.monotonic()
-    studied = access_av.study_plant(plant, seed=STUDY_SEED, always_mend=True)
+    studied = access_av.study_plant(plant, seed=STUDY_SEED, force_remedies=True)
     single = studied.measured.single
     place = {it.name: number for number, it in enumerate(single, start=1)}
     runs = studied.measured.before.runs

@@ -34,8 +34,8 @@ def main() -> None:
         guarded = all(
             it.scenario.vehicle.alert_limit_m is not None
             for it in [
-                *(found.believed, found.poor),
-                *(one.driven for one in [*found.mended, *found.points]),
+                *(found.nominal, found.poor_los),
+                *(one.driven for one in [*found.remedies, *found.points]),
             ]
         )
         on_front = found.recommended in found.front

@@ -43,7 +43,7 @@ def main() -> int:
             short += fails
             told = ""
             if "channel" in over and fails:
-                seen = {**over["channel"], "line_of_sight_only": True}
+                seen = {**over["channel"], "oracle_nlos_rejection": True}
                 of_told = simulate(
                     scenario.with_overrides({"channel": seen}), runs=asked.runs, seed=asked.seed
                 )

@@ -26,7 +26,7 @@ SLOW = {
     *("test_bags", "test_locate", "test_locate_mistakes", "test_real_drives", "test_survey"),
     *("test_channel", "test_plan", "test_designs", "test_tune", "test_profile"),
     *("test_bound", "test_drive", "test_plug_ins", "test_scatter", "test_truth"),
-    *("test_codesign", "test_outlook", "test_readings", "test_second_implementation"),
+    *("test_codesign", "test_outlook", "test_interpretations", "test_second_implementation"),
     *("test_headline", "test_unknowns", "test_cli", "test_columns"),
     *("test_node", "test_radio", "test_aarch64", "test_live", "test_off_the_road"),
     *("test_fault_campaign", "test_manifold"),

@@ -22,8 +22,8 @@ NODE = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-node
 
 def command(drive: Path, settings: Path, *options: str) -> list[str]:
     """Returns the node's command for a drive that `access-av synth` wrote."""
-    believed = ["--site", str(drive / "site.toml"), "--vehicle", str(drive / "vehicle.toml")]
-    return [str(NODE), *believed, *options, str(settings)]
+    nominal = ["--site", str(drive / "site.toml"), "--vehicle", str(drive / "vehicle.toml")]
+    return [str(NODE), *nominal, *options, str(settings)]
 
 
 def wake_up_every(drive: Path, interval_s: float) -> None:

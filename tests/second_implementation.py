@@ -71,7 +71,7 @@ class Trip:
         return np.asarray(np.arccos(np.angle(rotation) / np.pi))
 
     def drive(self, aoa: np.ndarray, wanted: Wanted) -> tuple[float, np.ndarray]:
-        """Mean executions, and errors (m) of shape (2, runs, SSBs): AoA → AoH → position."""
+        """Mean angle estimates, and errors (m) of shape (2, runs, SSBs): AoA → AoH → position."""
         anchor, heading, since_m = np.zeros((2, len(aoa))), np.zeros(len(aoa)), np.zeros(len(aoa))
         errors, count = np.empty((2, *aoa.shape)), 0
         for k, step_m in enumerate(np.diff(self.s, prepend=0.0)):

@@ -12,8 +12,8 @@ from access_av.device.platform import Figure, PowerMode
 from access_av.paper import ablation, own_design
 from access_av.paper.claims import check_claims
 from access_av.paper.evaluation import Evaluation, _point, cases, outcome_of
+from access_av.paper.interpretations import load
 from access_av.paper.outcome import Drives
-from access_av.paper.readings import load
 from access_av.paper.study import Study
 
 ROWS = [
@@ -57,12 +57,12 @@ def platform() -> SimpleNamespace:
     )
 
 
-def drives(worst_y_m: float, executions: float, *, spread: float = 0.0) -> Drives:
+def drives(worst_y_m: float, aoa_estimates: float, *, spread: float = 0.0) -> Drives:
     """Drives whose error grows to its worst at the end; variants scatter about the first."""
     factors = 1.0 + spread * np.concatenate([[0.0], np.linspace(-2.0, 2.0, 20)])
     curve = worst_y_m * (TIME_S[::5] / TIME_S[-1]) ** 1.5
     return Drives(
-        executions=np.full(21, float(executions)),
+        aoa_estimates=np.full(21, float(aoa_estimates)),
         worst_x_m=worst_y_m / 10 * factors,
         worst_y_m=worst_y_m * factors,
         rms_error_m=worst_y_m * 0.6 * factors,
@@ -80,10 +80,10 @@ def evaluation(
         setting = case.setting
         worst_m = adaptive_worst_m if setting.adaptive else WORST_Y_M[setting.method]
         if setting.adaptive:
-            executions = ADAPTIVE_EXECUTIONS[int(setting.base_wake_up_ms)]
+            aoa_estimates = ADAPTIVE_EXECUTIONS[int(setting.base_wake_up_ms)]
         else:
-            executions = int(80_330 / setting.base_wake_up_ms) + 1
-        found.append((case, drives(worst_m, executions, spread=spread)))
+            aoa_estimates = int(80_330 / setting.base_wake_up_ms) + 1
+        found.append((case, drives(worst_m, aoa_estimates, spread=spread)))
         error_m = worst_m * (TIME_S / TIME_S[-1]) ** 1.5
         errors[setting] = pl.DataFrame(
             {"time_s": TIME_S, "mean_abs_error_x_m": error_m / 10, "mean_abs_error_y_m": error_m}
@@ -95,7 +95,7 @@ def evaluation(
         )
     outcome, refitted = outcome_of(found, board, trip_s)
     return Evaluation(
-        reading=load("gate"),
+        interpretation=load("gate"),
         points=pl.DataFrame(
             [_point(case, outcome, refitted) for case, _ in found], infer_schema_length=None
         ),
@@ -110,28 +110,30 @@ def evaluation(
 
 
 def study(*, controller_gain: float = 0.0) -> Study:
-    """A study of two readings whose controllers gain so much of the RMS error."""
+    """A study of two interpretations whose controllers gain so much of the RMS error."""
     shown = evaluation(spread=0.01)
-    other = replace(shown, reading=load("every-ssb"))
+    other = replace(shown, interpretation=load("every-ssb"))
     constant = drives(0.2 * (1.0 + controller_gain), 430, spread=0.02)
     return Study(
         evaluations=[other, shown],
         claims=[
             claim
             for each in (other, shown)
-            for claim in check_claims(each.outcome, reading=each.reading.name)
+            for claim in check_claims(each.outcome, interpretation=each.interpretation.name)
         ],
         ablations=[
-            ablation.compare(each.reading.name, mode, each.outcome.adaptive[mode], constant, 80.0)
+            ablation.compare(
+                each.interpretation.name, mode, each.outcome.adaptive[mode], constant, 80.0
+            )
             for each in (other, shown)
             for mode in (0, 1, 4, 5)
         ],
         front=[(80.0, drives(0.6, 1005)), (240.0, drives(0.9, 335))],
-        ours=[
+        proposed_vs_paper=[
             own_design.beside(shown, mode.number, drives(0.1, 30), knows_road=True)
             for mode in shown.platform.modes
         ],
-        unknowns=None,
+        sensitivity=None,
         unusable={"broken": "broken.toml: `wake_up.t_max_ms` = 100"},
         duration_s=1.0,
     )

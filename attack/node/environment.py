@@ -179,7 +179,7 @@ def vehicle_toml(motion: Motion, random: np.random.Generator) -> str:
     x_m, y_m = x_m + random.normal(0.0, 0.2), y_m + random.normal(0.0, 0.2)
     heading_rad += random.normal(0.0, 0.02)
     return f"""\
-like = "tugger"
+extends = "tugger"
 name = "campaign"
 [start]
 pose = {{ x_m = {x_m}, y_m = {y_m}, heading_rad = {heading_rad} }}

@@ -34,7 +34,7 @@ PLAYBACK_S = 120.0
 # Wake-up policy of a stream: that of `tugger`, so that the receiver sleeps between bursts.
 SLEEPING = {
     "wake_up.policy": "uncertainty",
-    "wake_up.bound_m": 0.3,
+    "wake_up.target_error_m": 0.3,
     "wake_up.confidence": 0.9,
 }
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["Drive", "odometry_of"]
 
 OVERRIDES = {
-    "vehicle.receiver.lateness_std_s": 0.0,
+    "vehicle.receiver.angle_time_offset_std_s": 0.0,
     "vehicle.wake_up.policy": "fixed",
     "vehicle.wake_up.interval_ms": 20.0,
     "site.rician_k_db": 20.0,

@@ -75,8 +75,8 @@ def main() -> int:
             f'[output.mcap]\nfolder = "{files}"\n[page]\nlisten = "127.0.0.1:0"\n',
             encoding="utf-8",
         )
-        believed = ["--site", str(folder / "site.toml"), "--vehicle", str(folder / "vehicle.toml")]
-        options = [*believed, str(settings)]
+        nominal = ["--site", str(folder / "site.toml"), "--vehicle", str(folder / "vehicle.toml")]
+        options = [*nominal, str(settings)]
         node = Node(arguments.node, options, stdin=subprocess.PIPE)
         assert node.process.stdin is not None
         sent, memory_mib, began = 0, [], time.monotonic()

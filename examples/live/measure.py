@@ -160,10 +160,10 @@ def main() -> None:
         if interval_s:
             fixed = {"wake_up.policy": "fixed", "wake_up.interval_ms": 1e3 * interval_s}
             vehicle = vehicle.with_overrides(fixed)
-        believed = Path(scratch) / "vehicle.toml"
-        believed.write_text(vehicle.to_toml(), encoding="utf-8")
+        nominal = Path(scratch) / "vehicle.toml"
+        nominal.write_text(vehicle.to_toml(), encoding="utf-8")
         site = str(folder / "site.toml")
-        options = ["--site", site, "--vehicle", str(believed), str(settings)]
+        options = ["--site", site, "--vehicle", str(nominal), str(settings)]
         node = Node(arguments.node, options, arguments.core)
         process = node.process.pid
         in_time = arguments.stream_off or arguments.radio
@@ -200,7 +200,9 @@ def main() -> None:
     print(f"memory: {max(memory_mib):.0f} MiB at most, {at}")
     if on_s:
         print(f"radio on: {100 * sum(on_s) / drive_s:.1f} % of the time, {len(on_s)} times")
-    print(f"samples looked at: {100 * told['duty']:.1f} %, angles: {told['energy']['executions']}")
+    print(
+        f"samples looked at: {100 * told['duty']:.1f} %, angles: {told['energy']['aoa_estimates']}"
+    )
     print(f"state: {told['pose']['state']}, {told['pose']['tracked']} SSBs tracked")
     print(f"SSBs found by a search: {told['found_by_search']}, all others where expected")
     print(f"dropped: {told['dropped']}")

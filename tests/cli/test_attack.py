@@ -30,7 +30,7 @@ def test_a_short_attack_finds_nothing(tmp_path: Path) -> None:
     assert "no findings" in done.stdout
 
 
-def test_damaged_parquet_that_ends_who_reads_it_is_refused(tmp_path: Path) -> None:
+def test_damaged_parquet_that_aborts_its_reader_is_rejected(tmp_path: Path) -> None:
     done = attack(tmp_path, "--seed", "2798264004", "--only", "results-13804")
     assert done.returncode == 0, done.stdout + done.stderr
 

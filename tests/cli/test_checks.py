@@ -43,7 +43,7 @@ pci = 13
 ssb_index = 2
 """
 VEHICLE = """
-like = "tugger"
+extends = "tugger"
 name = "cart"
 array = { position_m = [0.5, 0.0, 1.8], mounting_std_rad = 0.01, phase_std_rad = 0.03 }
 """
@@ -226,7 +226,7 @@ def said(overrides: dict[str, object]) -> list[str]:
 
 
 @pytest.mark.parametrize("what", NONSENSE)
-def test_nonsense_is_said_with_what_to_write(what: str) -> None:
+def test_invalid_values_are_rejected_with_a_valid_example(what: str) -> None:
     overrides, key, write = NONSENSE[what]
     told = said(overrides)
     assert any(key in one.split(" is ")[0] and write in one for one in told), told
@@ -359,7 +359,7 @@ UNLIKE = {
 def test_plants_unlike_ours_are_fine(plant: str) -> None:
     site, vehicle, motion = UNLIKE[plant]
     plain = Site.from_toml(f'name = "other"\n{site}')
-    carrier = Vehicle.from_toml(f'like = "default"\nname = "other"\n{vehicle}')
+    carrier = Vehicle.from_toml(f'extends = "default"\nname = "other"\n{vehicle}')
     assert plain.warnings(carrier) == []
     if "road" in site:
         assert plain.warnings() == []
@@ -409,7 +409,7 @@ def test_check_warns_and_goes_on(tmp_path: Path, access_av: Callable[..., Finish
     assert "`platform.name`" in done.err
 
 
-def test_a_run_says_it_first(
+def test_a_run_prints_warnings_first(
     tmp_path: Path, access_av: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In what is printed, in the manifest and in the report."""
@@ -449,7 +449,7 @@ COMMANDS = (
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command[0])
-def test_every_command_says_it_before_all_else(
+def test_every_command_prints_warnings_first(
     command: tuple[str, ...], access_av: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def stop(_: str, warnings: list[SettingsWarning]) -> None:
@@ -478,7 +478,7 @@ def test_german_tables_are_read(tmp_path: Path) -> None:
         validation.read(file, "table of masts", {"name": pl.String})
 
 
-def test_a_warning_tells_its_parts() -> None:
+def test_a_warning_has_file_key_and_reason() -> None:
     [warning] = scenario(**{"vehicle.odometer.scale_std": 0.5}).warnings()
     assert isinstance(warning, SettingsWarning)
     assert (warning.key, warning.value) == ("vehicle.odometer.scale_std", "0.5")
@@ -490,13 +490,13 @@ def test_dead_reckoning_with_two_radio_heads_is_reported_by_varied_commands(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
     off = ("--set", "vehicle.integrity.enabled=false", "--set", "motion.start_at_m=292.0")
-    vary = ("--vary", "vehicle.localizer.kind=dead-reckoning")
+    vary = ("--sweep", "vehicle.localizer.kind=dead-reckoning")
     said = "dead reckoning supports one radio head"
     done = access_av("run", "paper-real-odometry-2", *off, *vary, "--out", tmp_path / "r")
     assert done.code == 0, done.err
     assert " ".join(done.err.split()).count(said) == 1
     (tmp_path / "short.toml").write_text(
-        'like = "paper-real-odometry-2"\n[motion]\nstart_at_m = 292.0\n'
+        'extends = "paper-real-odometry-2"\n[motion]\nstart_at_m = 292.0\n'
     )
     (tmp_path / "space.toml").write_text(
         '[vehicle.localizer]\nkind = ["tracker", "dead-reckoning"]\n'
@@ -511,7 +511,7 @@ def test_dead_reckoning_with_two_radio_heads_is_reported_by_varied_commands(
 
 DEAD_RECKONING = """
 [vehicle]
-like = "tugger"
+extends = "tugger"
 [vehicle.localizer]
 kind = "dead-reckoning"
 [vehicle.integrity]
@@ -530,8 +530,8 @@ def test_dead_reckoning_with_two_radio_heads_is_reported_by_study(
         short_plant.PLANT.replace('vehicle = "tugger"', "") + DEAD_RECKONING, encoding="utf-8"
     )
     other = tmp_path / "other.toml"
-    other.write_text('like = "plant.toml"\n', encoding="utf-8")
-    done = access_av("study", plant, "--compare", other)
+    other.write_text('extends = "plant.toml"\n', encoding="utf-8")
+    done = access_av("study", plant, "--against", other)
     assert done.code == 2
     said = "`vehicle.localizer.kind` is dead-reckoning"
     words = " ".join(done.err.split())

@@ -24,7 +24,8 @@ TRAJECTORY_COLUMNS = {
     "run", "time_s", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "error_x_m", "error_y_m",
 }  # fmt: skip
 COMMANDS = [
-    "evaluate", "readings", "search", "run", "explore", "bound", "aoa", "scan", "synth", "locate",
+    "evaluate", "interpretations", "search", "run", "explore", "bound", "aoa", "scan", "synth",
+    "locate",
     "fit", "columns", "scenario", "platform",
 ]  # fmt: skip
 
@@ -40,7 +41,7 @@ def test_help_lists_every_command(access_av: Cli) -> None:
     "command",
     [
         "evaluate",
-        "readings",
+        "interpretations",
         "search",
         "run",
         "explore",
@@ -72,7 +73,7 @@ def test_help_breaks_a_line_only_where_the_next_word_has_no_room(
             assert len(line) + len(f" {following.split()[0]}") >= 59, line
 
 
-def test_run_writes_what_it_promises(access_av: Cli, tmp_path: Path) -> None:
+def test_run_writes_the_files_that_its_help_lists(access_av: Cli, tmp_path: Path) -> None:
     done = access_av("run", "paper", "--runs", "2", "--seed", "3", "--out", tmp_path / "r")
     assert done.code == 0, done.err
     table = pl.read_parquet(tmp_path / "r/trajectories.parquet")
@@ -80,8 +81,8 @@ def test_run_writes_what_it_promises(access_av: Cli, tmp_path: Path) -> None:
     assert table["run"].unique().sort().to_list() == [0, 1]
     error = table["x_m"] - table["true_x_m"] - table["error_x_m"]
     assert error.abs().max() < 1e-9
-    executions = pl.read_parquet(tmp_path / "r/executions.parquet")
-    assert set(executions.columns) >= {"run", "time_s"}
+    aoa_estimates = pl.read_parquet(tmp_path / "r/aoa_estimates.parquet")
+    assert set(aoa_estimates.columns) >= {"run", "time_s"}
     manifest = json.loads((tmp_path / "r/manifest.json").read_text())
     assert manifest["seed"] == 3
     assert access_av("scenario", "check", tmp_path / "r/scenario.toml").code == 0
@@ -97,7 +98,7 @@ def test_run_writes_what_it_promises(access_av: Cli, tmp_path: Path) -> None:
 def test_run_is_the_same_for_one_and_two_threads(access_av: Cli, tmp_path: Path) -> None:
     for threads in ("1", "2"):
         access_av("run", "paper", "--runs", "3", "--threads", threads, "--out", tmp_path / threads)
-    for name in ("trajectories.parquet", "executions.parquet", "trajectory.tum"):
+    for name in ("trajectories.parquet", "aoa_estimates.parquet", "trajectory.tum"):
         assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
 
 
@@ -118,9 +119,9 @@ def test_evaluation_leaves_its_files(quick_study: Path) -> None:
     names = {path.name for path in (quick_study / "latest").iterdir()}
     assert names == {
         "ablation.svg", "ablations.parquet", "claims.json", "errors.parquet",
-        "evaluation_runs.parquet", "fair.parquet", "resamples.parquet",
-        "fixed_front.parquet", "freedoms.parquet", "front.svg", "manifest.json",
-        "operating_points.parquet", "ours.parquet", "platform.toml",
+        "evaluation_runs.parquet", "equal_information.parquet", "resamples.parquet",
+        "fixed_front.parquet", "fit_degrees_of_freedom.parquet", "front.svg", "manifest.json",
+        "operating_points.parquet", "proposed_vs_paper.parquet", "platform.toml",
         "report.html", "scenario.toml", "snr.parquet",
     }  # fmt: skip
     claims = json.loads((quick_study / "latest/claims.json").read_text())
@@ -146,7 +147,7 @@ def test_explore_answers_from_the_last_evaluation(
 
 def test_output_of_evaluate_fits_one_screen(access_av: Cli, tmp_path: Path) -> None:
     """Verdict, three figures and the path of the report; the report contains everything else."""
-    arguments = ("--reading", "gate", "--runs", "1", "--out", str(tmp_path / "e"))
+    arguments = ("--interpretation", "gate", "--runs", "1", "--out", str(tmp_path / "e"))
     done = access_av("evaluate", *arguments, columns=60)
     assert done.code == 0, done.err
     lines = done.out.splitlines()
@@ -184,7 +185,7 @@ SCENARIO = (
     "[site.road]\nsegments = [{ length_m = 300.0, turn_rad = 0.25 }]\n"
 )
 HEAD = "[[site.radio_heads]]\nposition_m = [205.0, 100.0, 0.0]\n"
-PID = '[vehicle]\nlike = "paper"\n[vehicle.wake_up.due]\nbase_ms = 300.0\n'
+PID = '[vehicle]\nextends = "paper"\n[vehicle.wake_up.trigger]\nbase_ms = 300.0\n'
 
 
 @pytest.mark.parametrize(
@@ -198,7 +199,7 @@ PID = '[vehicle]\nlike = "paper"\n[vehicle.wake_up.due]\nbase_ms = 300.0\n'
         (SCENARIO + HEAD.replace("[205.0, 100.0,", "[0.0, 0.0,"), ["site.radio_heads[0]"]),
         (
             SCENARIO.replace('vehicle = "paper"\n', "") + HEAD + PID,
-            ["vehicle.wake_up.due.position_uncertainty_m", "t_max of 240.0 ms"],
+            ["vehicle.wake_up.trigger.position_uncertainty_m", "t_max of 240.0 ms"],
         ),
         (SCENARIO + HEAD + "[truth.vehicle.array]\nmountin_rad = 1\n",
          ["truth.vehicle.array.mountin_rad", "mounting_rad"]),
@@ -267,7 +268,7 @@ def test_out_that_is_a_file(access_av: Cli, tmp_path: Path) -> None:
     assert "--out takes a directory" in done.err
 
 
-def test_in_a_pipe_progress_is_told_in_lines(
+def test_progress_is_printed_as_lines_in_a_pipe(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("access_av.cli.terminal.FIRST_LINE_S", 0.05)

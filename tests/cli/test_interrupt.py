@@ -54,7 +54,7 @@ LONG: dict[str, list[str]] = {
     "import-paths": [
         "import-paths", "nowhere.csv", "--site", "yard", "--carrier-mhz", "3500", "--out", "x.npz",
     ],
-    "readings": ["readings"],
+    "interpretations": ["interpretations"],
     "chosen": ["chosen", "--runs", "2000"],
     "columns": ["columns"],
     "scenario": ["scenario", "check", *access_av.Scenario.names() * 40],
@@ -82,7 +82,9 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     subprocess.run([sys.executable, "-m", "access_av", *earlier], cwd=folder, check=True)
     masts = "".join(f"mast-{n},{20 * n},{(-1) ** n * 45},8\n" for n in range(-5, 9))
     (folder / "masts.csv").write_text("name,x_m,y_m,z_m\n" + masts)
-    (folder / "space.toml").write_text("[vehicle.wake_up.due]\nbase_ms = [80.0, 100.0, 150.0]\n")
+    (folder / "space.toml").write_text(
+        "[vehicle.wake_up.trigger]\nbase_ms = [80.0, 100.0, 150.0]\n"
+    )
     return folder
 
 

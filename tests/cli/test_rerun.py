@@ -15,7 +15,7 @@ from access_av.tables.inputs import inputs
 from short_plant import PLANT
 
 SCENARIO = """\
-like = "paper-real-odometry-2"
+extends = "paper-real-odometry-2"
 name = "short"
 [motion]
 start_at_m = 285.0
@@ -26,7 +26,7 @@ RECORDED = ("--recording", "drive/iq.sigmf-meta", "--odometry", "drive/odometry.
 COMMANDS = {
     "run": (
         *("run", "short.toml", "--runs", "2", "--set", "site.radio_heads[0].eirp_dbm=5"),
-        *("--vary", "site.rician_k_db=0,20", "--compare", "short.toml"),
+        *("--sweep", "site.rician_k_db=0,20", "--against", "short.toml"),
     ),
     "synth": ("synth", "short.toml"),
     "angles": ("angles", "drive/iq.sigmf-meta", *DRIVE),
@@ -36,8 +36,8 @@ COMMANDS = {
     "plan": ("plan", "short.toml"),
     "designs": ("designs", "short.toml", "--space", "space.toml", "--runs", "2"),
     "tune": ("tune", "short.toml", "--runs", "2", "--designs", "2", "--max-error-m", "3"),
-    "integrity": ("integrity", "short.toml", "--runs", "2", "--mismatch", "none"),
-    "evaluate": ("evaluate", "--reading", "gate", "--runs", "1"),
+    "integrity": ("integrity", "short.toml", "--runs", "2", "--fault", "none"),
+    "evaluate": ("evaluate", "--interpretation", "gate", "--runs", "1"),
     "study": ("study", "plant.toml", "--runs", "2"),
 }
 
@@ -108,9 +108,9 @@ def results(folder: Path, tmp_path: Path) -> Path:
 
 
 def test_differences_are_listed(folder: Path, results: Path) -> None:
-    table = pl.read_parquet(results / "executions.parquet")
+    table = pl.read_parquet(results / "aoa_estimates.parquet")
     moved = table.with_columns(pl.col("time_s") + 0.25)
-    moved.write_parquet(results / "executions.parquet")
+    moved.write_parquet(results / "aoa_estimates.parquet")
     (results / "truth.tum").write_text("0 0 0\n" + (results / "truth.tum").read_text())
     (results / "report.html").unlink()
     (results / "notes.txt").write_text("mine")
@@ -119,7 +119,7 @@ def test_differences_are_listed(folder: Path, results: Path) -> None:
     done = access_av(folder, "rerun", str(results))
     assert done.returncode == 3, done.stderr
     lines = dict(line.split(": ", 1) for line in done.stdout.splitlines() if ": " in line)
-    assert lines["executions.parquet"] == "columns differ: time_s by up to 0.25"
+    assert lines["aoa_estimates.parquet"] == "columns differ: time_s by up to 0.25"
     assert lines["truth.tum"].startswith("line 1: '0 0 0' instead of ")
     assert lines["report.html"] == "only in the new results"
     assert lines["notes.txt"] == "missing in the new results"
@@ -171,7 +171,7 @@ def test_inputs_are_the_files_that_arguments_name(
     for name in ("a.toml", "b.csv", "mine.py", "iq.sigmf-meta", "iq.sigmf-data", "out/c.toml"):
         Path(name).parent.mkdir(exist_ok=True)
         Path(name).write_text(name)
-    arguments = ["run", "a.toml", "--set", "road.file=b.csv", "--compare", "policy=mine.py:P"]
+    arguments = ["run", "a.toml", "--set", "road.file=b.csv", "--against", "policy=mine.py:P"]
     arguments += ["iq.sigmf-meta", "out/c.toml", "yard", "x" * 5000, "\0"]
     found = inputs(arguments, Path("out"))
     assert list(found) == ["a.toml", "b.csv", "mine.py", "iq.sigmf-meta", "iq.sigmf-data"]

@@ -145,7 +145,7 @@ def test_tables_hold_no_nan(name: str) -> None:
     if end_m:
         scenario = scenario.with_overrides({"motion.start_at_m": end_m})
     found = access_av.simulate(scenario, keep_trajectories=True)
-    for table in (found.runs, found.steps, found.trajectories, found.executions):
+    for table in (found.runs, found.steps, found.trajectories, found.aoa_estimates):
         assert table is not None
         for column in table.select(pl.col(pl.Float64)):
             assert column.is_finite().all(), column.name
@@ -202,7 +202,7 @@ def test_drives_too_large(key: str, value: Any) -> None:
 
 def test_what_is_too_large_can_be_meant(access_av: Cli, tmp_path: Path) -> None:
     file = tmp_path / "long.toml"
-    file.write_text('like = "paper"\nmotion.stops = [{ at_m = 100.0, dwell_s = 8e4 }]\n')
+    file.write_text('extends = "paper"\nmotion.stops = [{ at_m = 100.0, dwell_s = 8e4 }]\n')
     refused(access_av("scenario", "check", file), "22", "allow_large", "stops")
     assert access_av("scenario", "check", "--allow-large", file).code == 0
 
@@ -295,9 +295,9 @@ def test_files_without_end(access_av: Cli, drive: Path, tmp_path: Path) -> None:
 
 def test_what_would_never_end(access_av: Cli, tmp_path: Path) -> None:
     one, other = tmp_path / "one.toml", tmp_path / "other.toml"
-    one.write_text(f'like = "{other}"\n')
-    other.write_text(f'like = "{one}"\n')
-    refused(access_av("site", "check", one), "like")
+    one.write_text(f'extends = "{other}"\n')
+    other.write_text(f'extends = "{one}"\n')
+    refused(access_av("site", "check", one), "extends")
     one.write_text("a = " + "[" * 100_000)
     refused(access_av("site", "check", one))
     # A key with a dot in it, in a table that is read as a whole for its tag.
@@ -522,7 +522,7 @@ def test_settings_are_values(kind: Any) -> None:
     assert one != "paper"
 
 
-def test_what_cannot_be_pickled_says_so(drive: Path) -> None:
+def test_objects_that_cannot_be_pickled_are_rejected_with_a_reason(drive: Path) -> None:
     recording = access_av.Recording.open(drive / "iq.sigmf-meta")
     with pytest.raises(TypeError, match="Recording"):
         pickle.dumps(recording)

@@ -33,7 +33,7 @@ from access_av.device.platform import Platform
 from access_av.errors import InputError
 from access_av.report.designs import MOST_NAMES, render_designs
 from access_av.run.campaign import Campaign, CampaignError, Shard, Task, executor
-from access_av.run.result_cache import Parts
+from access_av.run.result_cache import ResultCache
 from browser import Browser
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def contents(path: Path) -> dict[str, bytes]:
 
 @pytest.fixture
 def whole(tmp_path: Path) -> dict[str, bytes]:
-    Campaign(Parts(tmp_path / "whole")).run(tasks())
+    Campaign(ResultCache(tmp_path / "whole")).run(tasks())
     return contents(tmp_path / "whole")
 
 
@@ -117,13 +117,13 @@ def test_same_bytes_whoever_computes(tmp_path: Path, whole: dict[str, bytes]) ->
     assert len(whole) == 12
     for number, pool in enumerate([ThreadPoolExecutor(3), ProcessPoolExecutor(2)]):
         with pool:
-            found = Campaign(Parts(tmp_path / str(number)), pool, 2).run(tasks())
+            found = Campaign(ResultCache(tmp_path / str(number)), pool, 2).run(tasks())
         assert contents(tmp_path / str(number)) == whole
         assert all(np.array_equal(found[i]["x"], part(i)["x"]) for i in range(12))
 
 
 def test_shards_make_the_whole(tmp_path: Path, whole: dict[str, bytes]) -> None:
-    parts = Parts(tmp_path / "shards")
+    parts = ResultCache(tmp_path / "shards")
     first = Campaign(parts, shard=Shard(1, 3)).run(tasks())
     assert sum(each is None for each in first) == 8
     for number in (2, 3):
@@ -139,7 +139,7 @@ def test_bad_shards_are_refused(text: str) -> None:
 
 
 def test_two_campaigns_in_one_directory(tmp_path: Path, whole: dict[str, bytes]) -> None:
-    parts = Parts(tmp_path / "both")
+    parts = ResultCache(tmp_path / "both")
     both = [threading.Thread(target=Campaign(parts).run, args=(tasks(),)) for _ in range(2)]
     for one in both:
         one.start()
@@ -150,10 +150,10 @@ def test_two_campaigns_in_one_directory(tmp_path: Path, whole: dict[str, bytes])
 
 
 @pytest.mark.parametrize("damage", [b"", b"PK\x03\x04", None])
-def test_a_damaged_part_is_said_and_computed_again(
+def test_a_damaged_part_is_reported_and_computed_again(
     tmp_path: Path, whole: dict[str, bytes], damage: bytes | None
 ) -> None:
-    parts = Parts(tmp_path / "whole")
+    parts = ResultCache(tmp_path / "whole")
     name, text = next(iter(whole.items()))
     bits = bytearray(text)
     bits[len(bits) // 2] ^= 0xFF
@@ -166,7 +166,7 @@ def test_a_damaged_part_is_said_and_computed_again(
 def test_a_full_disk_names_the_part_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: dict[str, bytes]
 ) -> None:
-    parts = Parts(tmp_path / "full")
+    parts = ResultCache(tmp_path / "full")
     Campaign(parts, shard=Shard(1, 2)).run(tasks())
 
     def full(_: int) -> None:
@@ -202,7 +202,7 @@ class Dying(Executor):
 def test_workers_that_die_lose_nothing_that_is_finished(
     tmp_path: Path, whole: dict[str, bytes]
 ) -> None:
-    parts = Parts(tmp_path / "dying")
+    parts = ResultCache(tmp_path / "dying")
     with pytest.raises(CampaignError, match=r"workers are gone.*the same command goes on"):
         Campaign(parts, Dying(5), 1).run(tasks())
     assert 0 < len(contents(parts.path)) <= 5
@@ -213,7 +213,7 @@ def test_workers_that_die_lose_nothing_that_is_finished(
 def test_an_error_of_the_task_is_its_own(tmp_path: Path) -> None:
     bad = Task({"bad": 1}, int, ("not a number",))
     with ThreadPoolExecutor(1) as pool, pytest.raises(ValueError, match="invalid literal"):
-        Campaign(Parts(tmp_path), pool, 1).run([bad])
+        Campaign(ResultCache(tmp_path), pool, 1).run([bad])
 
 
 # Forks a campaign, kills it after each of the instants, and then lets it finish.
@@ -222,9 +222,9 @@ import os, signal, sys, time
 from pathlib import Path
 sys.path.insert(0, {tests!r})
 from access_av.run.campaign import Campaign
-from access_av.run.result_cache import Parts
+from access_av.run.result_cache import ResultCache
 from test_designs import tasks
-campaign = Campaign(Parts(Path({parts!r})))
+campaign = Campaign(ResultCache(Path({parts!r})))
 for instant in {instants!r}:
     child = os.fork()
     if child == 0:
@@ -264,7 +264,7 @@ def test_dask_gives_the_same_bytes(tmp_path: Path, whole: dict[str, bytes]) -> N
         executor(cluster.scheduler_address) as (pool, workers),
     ):
         assert workers == 2
-        Campaign(Parts(tmp_path / "dask"), pool, workers).run(tasks())
+        Campaign(ResultCache(tmp_path / "dask"), pool, workers).run(tasks())
     assert contents(tmp_path / "dask") == whole
 
 
@@ -274,7 +274,7 @@ import json, subprocess, sys, threading, time
 from pathlib import Path
 sys.path.insert(0, {tests!r})
 from access_av.run.campaign import Campaign, CampaignError, executor
-from access_av.run.result_cache import Parts
+from access_av.run.result_cache import ResultCache
 from test_designs import tasks
 parts, file = Path({parts!r}), Path({parts!r}) / "scheduler.json"
 parts.mkdir()
@@ -294,7 +294,7 @@ try:
     address = json.loads(file.read_text())["address"]
     threading.Thread(target=kill, daemon=True).start()
     with executor(address) as (pool, count):
-        Campaign(Parts(parts), pool, count).run(tasks(12, 0.2))
+        Campaign(ResultCache(parts), pool, count).run(tasks(12, 0.2))
     print("finished")
 except CampaignError as error:
     print(error)
@@ -325,7 +325,7 @@ def test_of_a_cluster_any_process_may_die(
     assert says in done.stdout, done.stderr
     left = contents(parts)
     assert len(left) == 12 if dies == "worker" else 3 <= len(left) < 12
-    Campaign(Parts(parts)).run(tasks())
+    Campaign(ResultCache(parts)).run(tasks())
     assert contents(parts) == whole
 
 
@@ -341,8 +341,8 @@ def known(energy_j: float, rms_m: float, noise: np.ndarray, own: np.ndarray, lab
         energy_j=np.full(noise.size, energy_j),
         worst_m=3.0 * np.sqrt(square_m2),
         error_m=np.sqrt(square_m2)[:, None] * np.linspace(0.1, 2.0, 40, dtype=np.float32),
-        executions=np.ones(noise.size),
-        listened=np.ones(noise.size),
+        aoa_estimates=np.ones(noise.size),
+        bursts_received=np.ones(noise.size),
         track_s=np.arange(3.0),
         track_m2=np.ones(3),
     )
@@ -403,7 +403,7 @@ def test_designs_are_numbered_without_overlap(count: int, tmp_path: Path) -> Non
             assert layout.label_faults(browser, "designs", spec, width) == []
 
 
-def test_the_table_is_what_is_said_of_it() -> None:
+def test_the_table_has_its_documented_columns() -> None:
     driven = cloud(4, PAIRS)
     driven.append(replace(driven[0], energy_j=np.full(4, np.inf), square_m2=np.full(4, np.inf)))
     rows = rows_of(driven)
@@ -418,7 +418,7 @@ def test_constraints_choose_the_least_energy() -> None:
     assert Constraints(max_energy_j=3.0, max_rms_m=0.15).kept(rows).is_empty()
 
 
-def test_where_nothing_fits_it_says_what_would() -> None:
+def test_an_unreachable_limit_reports_the_reachable_value() -> None:
     rows = rows_of(cloud(20, PAIRS))
     advice = what_to_change(Constraints(max_energy_j=3.0, max_rms_m=0.15), rows)
     assert advice[0].startswith("energy 4 J instead of 3 J: design 3")
@@ -441,7 +441,8 @@ def test_a_design_is_judged_in_the_worst_of_its_worlds(
         rms_m = np.full(runs, (0.9 if scattered else 0.05) if bold else 0.2)
         count = np.full(runs, 10.0 if bold else 40.0)
         return {
-            "executions": count, "listened": count, "rms_error_m": rms_m, "max_error_m": rms_m,
+            "aoa_estimates": count, "bursts_received": count, "rms_error_m": rms_m,
+            "max_error_m": rms_m,
             "error_m": np.repeat(rms_m[:, None], 900, axis=1).astype(np.float32),
             "track_s": np.arange(0.0, 9001.0, 10.0), "track_m2": np.ones(901),
         }  # fmt: skip
@@ -458,7 +459,7 @@ def test_a_design_is_judged_in_the_worst_of_its_worlds(
     )
     assert list(space.worlds) == ["rician_k_db 5", "rician_k_db 15"]
     designs = in_worlds(Scenario.load("paper"), space.grid(), space.worlds)
-    found = search(Campaign(Parts(tmp_path)), designs, runs=3, seed=1)
+    found = search(Campaign(ResultCache(tmp_path)), designs, runs=3, seed=1)
     assert found is not None
     assert found.drives == 2 * 2 * 3
     rows, of_worlds = rows_of(found.driven), rows_of_worlds(found.driven)
@@ -492,7 +493,7 @@ def test_rounds_of_halving() -> None:
 
 
 def by_halving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, halving: bool) -> Found:
-    """120 designs of which the error falls and the executions grow with ``bound``, and a cost."""
+    """Simulates 120 designs: the error falls and the estimates grow with ``bound``; and a cost."""
 
     def pretended(text: str, seed: int, first_run: int, runs: int) -> dict[str, np.ndarray]:
         wake_up = Scenario.from_toml(text)
@@ -506,7 +507,8 @@ def by_halving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, halving: bool
         mine = slice(first_run, first_run + runs)
         count = np.full(runs, 80_000.0 / interval_ms)
         return {
-            "executions": count, "listened": count, "rms_error_m": np.sqrt(square_m2[mine]),
+            "aoa_estimates": count, "bursts_received": count,
+            "rms_error_m": np.sqrt(square_m2[mine]),
             "max_error_m": 3.0 * np.sqrt(square_m2[mine]), "track_s": np.arange(3.0),
             "error_m": np.sqrt(square_m2[mine])[:, None] * np.ones((1, 4), dtype=np.float32),
             "track_m2": np.ones(3),
@@ -527,7 +529,7 @@ def by_halving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, halving: bool
     )
     designs = in_worlds(Scenario.load("paper"), space.grid(), space.worlds)
     assert len(designs) == 120
-    campaign = Campaign(Parts(tmp_path / str(halving)))
+    campaign = Campaign(ResultCache(tmp_path / str(halving)))
     found = search(campaign, designs, runs=20, seed=1, halving=halving)
     assert found is not None
     return found
@@ -558,7 +560,8 @@ def test_optuna_suggests_the_same_designs_again(
         count = np.full(runs, 80_000.0 / wake_up["interval_ms"])
         rms_m = np.full(runs, 1e-3 * wake_up["interval_ms"] ** 0.5)
         return {
-            "executions": count, "listened": count, "rms_error_m": rms_m, "max_error_m": rms_m,
+            "aoa_estimates": count, "bursts_received": count, "rms_error_m": rms_m,
+            "max_error_m": rms_m,
             "error_m": rms_m[:, None], "track_s": np.arange(3.0), "track_m2": np.ones(3),
         }  # fmt: skip
 
@@ -571,7 +574,7 @@ def test_optuna_suggests_the_same_designs_again(
             }
         }
     )
-    campaign = Campaign(Parts(tmp_path))
+    campaign = Campaign(ResultCache(tmp_path))
     tables = [
         rows_of(suggested(campaign, Scenario.load("paper"), space, count=40, runs=2, seed=3).driven)
         for _ in range(2)

@@ -13,7 +13,7 @@ from access_av.designs.space import Dimension
 from access_av.designs.table import Constraints
 from access_av.designs.tune import _around, space_of, tune
 from access_av.run.campaign import Campaign
-from access_av.run.result_cache import Parts
+from access_av.run.result_cache import ResultCache
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,7 +36,7 @@ def short(wake_up: dict[str, Any]) -> Scenario:
 
 @pytest.fixture
 def campaign(tmp_path: Path) -> Campaign:
-    return Campaign(Parts(tmp_path / "parts"))
+    return Campaign(ResultCache(tmp_path / "parts"))
 
 
 def test_least_energy_that_keeps_the_error(campaign: Campaign) -> None:
@@ -45,7 +45,7 @@ def test_least_energy_that_keeps_the_error(campaign: Campaign) -> None:
     found = tune(campaign, scenario, every, designs=6, runs=3)
     assert found.after.rms_m <= 1.0
     # An odometer drifts slowly: few angles are enough.
-    assert found.after.executions.mean() < 0.2 * found.before.executions.mean()
+    assert found.after.aoa_estimates.mean() < 0.2 * found.before.aoa_estimates.mean()
     mean_j, low_j, high_j = found.less[0]
     assert 0.0 < low_j <= mean_j <= high_j
     paired = np.mean(found.before.energy_j - found.after.energy_j)
@@ -69,13 +69,14 @@ def pretended(text: str, _seed: int, _first: int, runs: int) -> dict[str, np.nda
     rms_m = np.full(runs, 0.01 * settings["interval_ms"] ** 0.5)
     count = np.full(runs, 80_000.0 / settings["interval_ms"])
     return {
-        "executions": count, "listened": count, "rms_error_m": rms_m, "max_error_m": 3.0 * rms_m,
+        "aoa_estimates": count, "bursts_received": count, "rms_error_m": rms_m,
+        "max_error_m": 3.0 * rms_m,
         "error_m": rms_m[:, None] * np.linspace(0.1, 2.0, 200, dtype=np.float32),
         "track_s": np.arange(0.0, 2000.0, 10.0), "track_m2": np.ones(200),
     }  # fmt: skip
 
 
-def test_what_cannot_be_bettered_stays(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_optimal_design_is_kept(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     """From a set point that is as late as the error allows, any other takes more energy."""
     monkeypatch.setattr("access_av.designs.driven.simulated", pretended)
     scenario = short({"policy": "fixed", "interval_ms": 400.0})
@@ -103,8 +104,8 @@ def test_a_constraint_that_is_missed_ends_with_exit_code_3(
 ) -> None:
     monkeypatch.setattr("access_av.designs.driven.simulated", pretended)
     (tmp_path / "short.toml").write_text(
-        'like = "paper-real-odometry-2"\n'
-        'vehicle = { like = "tugger", wake_up = { policy = "fixed", interval_ms = 400.0 } }\n'
+        'extends = "paper-real-odometry-2"\n'
+        'vehicle = { extends = "tugger", wake_up = { policy = "fixed", interval_ms = 400.0 } }\n'
     )
     asked = ("tune", tmp_path / "short.toml", "--designs", "4", "--runs", "2")
     missed = access_av(*asked, "--max-error-m", "0.001", "--percentile", "90")
@@ -118,10 +119,10 @@ def test_a_constraint_that_is_missed_ends_with_exit_code_3(
 
 def test_what_is_tuned_is_what_the_policy_has() -> None:
     gated = {dimension.key for dimension in space_of(Scenario.load("paper")).dimensions}
-    assert {"vehicle.wake_up.snr_set_point.offset_db", "vehicle.wake_up.due.kp"} <= gated
+    assert {"vehicle.wake_up.snr_set_point.offset_db", "vehicle.wake_up.trigger.kp"} <= gated
     absolute = {"kind": "absolute", "snr_db": 10.0}
     due = {"policy": "fixed", "interval_ms": 80.0}
-    fixed = short({"policy": "gated", "snr_set_point": absolute, "due": due})
+    fixed = short({"policy": "gated", "snr_set_point": absolute, "trigger": due})
     assert not space_of(fixed).dimensions
 
 
@@ -142,7 +143,7 @@ def test_bad_questions(campaign: Campaign, access_av: Callable[..., Finished]) -
         tune(campaign, none, Constraints(max_rms_m=1.0), designs=2, runs=1)
     due = {"policy": "fixed", "interval_ms": 80.0}
     absolute = {"kind": "absolute", "snr_db": 10.0}
-    empty = short({"policy": "gated", "snr_set_point": absolute, "due": due})
+    empty = short({"policy": "gated", "snr_set_point": absolute, "trigger": due})
     with pytest.raises(InputError, match="nothing to tune"):
         tune(campaign, empty, Constraints(max_rms_m=1.0))
     done = access_av("tune", "yard", "--max-rms-m", "-1")
@@ -151,7 +152,7 @@ def test_bad_questions(campaign: Campaign, access_av: Callable[..., Finished]) -
 
 def test_command(access_av: Callable[..., Finished], tmp_path: Path) -> None:
     (tmp_path / "short.toml").write_text(
-        'like = "paper-real-odometry-2"\n[motion]\nstart_at_m = 290.0\n'
+        'extends = "paper-real-odometry-2"\n[motion]\nstart_at_m = 290.0\n'
     )
     done = access_av(
         "tune", tmp_path / "short.toml", "--max-rms-m", "1", "--designs", "2", "--runs", "2",

@@ -257,7 +257,7 @@ def test_energy_above_idle_lies_in_the_interval(
     assert energy_j.half_width <= 0.02 * energy_j.value
 
 
-def test_noise_between_looks_widens_the_interval_and_is_held_by_it() -> None:
+def test_the_energy_interval_covers_noise_between_samples() -> None:
     rng = np.random.default_rng(2)
     held = 0
     for _ in range(200):

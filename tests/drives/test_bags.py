@@ -84,7 +84,7 @@ def source(drive: Any) -> str:
     return str(said).split("taken from ")[1]
 
 
-def test_the_yaw_rate_is_of_what_tells_it(driven: Robot, tmp_path: Path) -> None:
+def test_the_source_of_the_yaw_rate_is_reported(driven: Robot, tmp_path: Path) -> None:
     """Yaw rates of an IMU, of the orientation and of the odometry give similar positions."""
     told = locate(driven, tmp_path, tmp_path / "odometry.csv")
     as_told_m = driven.rms_error_m(told)

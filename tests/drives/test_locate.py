@@ -162,9 +162,7 @@ def test_samples_without_an_ssb_are_refused(drive: Path, tmp_path: Path) -> None
         )
 
 
-def test_integrity_comes_with_the_poses_unless_the_vehicle_forgoes_it(
-    drive: Path, tmp_path: Path
-) -> None:
+def test_poses_have_integrity_unless_the_monitor_is_disabled(drive: Path, tmp_path: Path) -> None:
     vehicle = tmp_path / "vehicle.toml"
     vehicle.write_text((drive / "vehicle.toml").read_text() + "[integrity]\n")
     poses = locate(drive, vehicle=vehicle).poses
@@ -185,7 +183,9 @@ def test_a_replayed_drive_honours_the_wake_up_policy(drive: Path) -> None:
     assert 20 * some.height <= every.height * 1.2
 
 
-def test_what_cannot_be_located_says_why(access_av: Cli, drive: Path, tmp_path: Path) -> None:
+def test_a_drive_that_cannot_be_located_has_a_reason(
+    access_av: Cli, drive: Path, tmp_path: Path
+) -> None:
     site = tmp_path / "site.toml"
     text = (drive / "site.toml").read_text()
     positions = re.findall(r"position_m = \[[^]]*\]", text)
@@ -243,7 +243,7 @@ def test_the_start_may_be_given_with_the_command(
     told = locate(drive, vehicle=vehicle, start=start).poses
     assert told.equals(given)
     searched = arguments(drive, tmp_path / "out")
-    assert "Position found after" in access_av(*searched, "--start", "scratch").out
+    assert "Position found after" in access_av(*searched, "--start", "unknown").out
     for bad in ("1,2", "1,2,x", "1,2,inf", "1,2,-95.8"):
         done = access_av(*searched, "--start", bad)
         assert done.code == 2
@@ -299,7 +299,7 @@ def test_a_recording_of_two_antennas_is_refused(
 
 
 @pytest.mark.parametrize("by", ["distance", "speed", "speed alone", "distance alone"])
-def test_odometry_is_taken_as_it_is(tmp_path: Path, by: str) -> None:
+def test_odometry_is_used_unchanged(tmp_path: Path, by: str) -> None:
     told = robot()
     rows = told.odometry.sort("time_s")
     turned = (rows["yaw_rate_radps"] / RATE_HZ).cum_sum()
@@ -395,7 +395,7 @@ def test_a_drive_is_located_by_variants_side_by_side(access_av: Cli, tmp_path: P
     command = [
         "locate", "--recording", logged / "angles.csv", "--odometry", logged / "odometry.csv",
         "--site", logged / "site.toml", "--vehicle", logged / "vehicle.toml",
-        "--vary", "vehicle.odometer.scale=1.03", "--compare", other, "--percentile", "90",
+        "--sweep", "vehicle.odometer.scale=1.03", "--against", other, "--percentile", "90",
         "--out", tmp_path / "out",
     ]  # fmt: skip
     refused = access_av(*command)
@@ -425,6 +425,6 @@ def test_a_drive_is_located_by_variants_side_by_side(access_av: Cli, tmp_path: P
     assert (same["delta_m"], same["delta_low_m"], same["delta_high_m"]) == (0.0, 0.0, 0.0)
     assert "Comparison of variants" in (tmp_path / "out" / "report.html").read_text("utf-8")
 
-    refused = access_av(*command, "--vary", "odometer.scale=1.03")
+    refused = access_av(*command, "--sweep", "odometer.scale=1.03")
     assert refused.code == 2
     assert "site. or vehicle." in refused.err

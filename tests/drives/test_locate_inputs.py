@@ -307,7 +307,7 @@ def test_a_truth_of_another_frame_is_rejected(located: tuple[Robot, drives.Drive
         drives.error_m(drive.poses, degrees)
 
 
-def test_a_truth_of_part_of_the_drive_says_so(access_av: Cli, tmp_path: Path) -> None:
+def test_a_truth_of_a_part_of_the_drive_is_reported(access_av: Cli, tmp_path: Path) -> None:
     whole = robot(20.0)
     arguments = whole.write(tmp_path)
     # The orientation of a truth is not used: it may be anything.

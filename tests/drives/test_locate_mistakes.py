@@ -170,7 +170,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_nothing_is_said_of_a_drive_without_mistakes(tmp_path: Path, seed: int) -> None:
+def test_a_correct_drive_has_no_suspicions(tmp_path: Path, seed: int) -> None:
     whole = robot(seed=seed)
     drive = whole.locate(tmp_path)
     assert drive.remarks == []
@@ -179,7 +179,7 @@ def test_nothing_is_said_of_a_drive_without_mistakes(tmp_path: Path, seed: int) 
 
 
 @pytest.mark.parametrize("kind", SUSPECTED)
-def test_how_it_was_meant_is_said(tmp_path: Path, kind: str) -> None:
+def test_the_likely_mistake_is_named(tmp_path: Path, kind: str) -> None:
     spoil, says = SUSPECTED[kind]
     # Kilometres a second take a long search; yaw rates that are refused cannot lead astray at once.
     spoilt = robot({"millimetres": 25.0, "yaw rate in degrees": 90.0}.get(kind, 60.0))
@@ -269,7 +269,7 @@ def test_never_found_is_no_success(access_av: Cli, tmp_path: Path) -> None:
     whole = robot(3.0)
     whole.angles = whole.angles.filter(pci=11)  # of one radio head alone no place is known
     arguments = whole.write(tmp_path)
-    arguments[arguments.index("--start") + 1] = "scratch"
+    arguments[arguments.index("--start") + 1] = "unknown"
     done = access_av(*arguments, "--json")
     assert done.code == 3
     assert json.loads(done.out)["lost_share"] == 1.0

@@ -15,10 +15,10 @@ sys.path.insert(0, str(ROOT / "benches"))
 from off_the_road import Case, locate
 
 # Standard deviation of the time offset that one lap determines (s): with a road, only turns do.
-LATENESS_STD_S = {False: 0.02, True: 0.035}
+ANGLE_TIME_OFFSET_STD_S = {False: 0.02, True: 0.035}
 
 
-def test_the_textbook_filter_is_as_wrong_as_it_says() -> None:
+def test_the_textbook_filter_is_consistent() -> None:
     nees = []
     for seed in range(1, 21):
         drive = simulate(World(seed=seed, outliers=0.0))
@@ -31,17 +31,19 @@ def test_the_textbook_filter_is_as_wrong_as_it_says() -> None:
 
 @pytest.mark.parametrize("road", [False, True])
 @pytest.mark.parametrize("late_s", [0.3, 1.0, -0.3])
-def test_late_angles_are_found_named_and_set_back(road: bool, late_s: float) -> None:
+def test_a_time_offset_of_the_angles_is_estimated_reported_and_corrected(
+    road: bool, late_s: float
+) -> None:
     located = locate(Case("late", "late", {"late_s": late_s}, road), 101, [])
     assert located["exit_named"]
-    assert abs(located["late_s"] - late_s) < 3.0 * LATENESS_STD_S[road]
+    assert abs(located["late_s"] - late_s) < 3.0 * ANGLE_TIME_OFFSET_STD_S[road]
     in_time = locate(Case("late", "in time", {}, road), 101, [])
     assert not in_time["exit_named"]
     assert in_time["late_s"] == 0.0
     assert located["square"] < 1.3**2 * in_time["square"]
 
 
-def test_clocks_that_are_said_to_be_one_are() -> None:
+def test_no_time_offset_is_reported_for_clocks_configured_as_equal() -> None:
     case = Case("late", "late", {"late_s": 1.0})
-    located = locate(case, 101, ["receiver.lateness_std_s=0.0"])
+    located = locate(case, 101, ["receiver.angle_time_offset_std_s=0.0"])
     assert not located["exit_named"]

@@ -82,7 +82,7 @@ def test_what_is_converted_is_the_drive(bench: Any, converted: Path) -> None:
     assert drive["truth"][0, 0] == pytest.approx(0.0, abs=1e-4)
 
 
-def test_the_table_ranks_who_looks_over_who_counts_wheels(
+def test_the_table_ranks_tracking_above_dead_reckoning(
     bench: Any, converted: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bench.table(converted.parent, defaults=False)

@@ -20,7 +20,7 @@ STOPS_S = 26.0
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("drive")
-    changes = {"vehicle.receiver.lateness_std_s": 0.0, "vehicle.acceleration_mps2": 2.0}
+    changes = {"vehicle.receiver.angle_time_offset_std_s": 0.0, "vehicle.acceleration_mps2": 2.0}
     scenario = access_av.Scenario.load("yard").with_overrides(changes)
     drives.log_angles(scenario, directory, duration_s=30.0)
     return directory

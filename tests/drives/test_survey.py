@@ -99,9 +99,9 @@ def test_what_it_writes_locates_better(
 
     def rms_m(site: str) -> float:
         start = vehicle.read_text()
-        believed = tmp_path / "vehicle.toml"
-        believed.write_text((out / "vehicle.toml").read_text() if site != str(plan) else start)
-        drive = drives.locate(site, one / "odometry.csv", one / "angles.csv", vehicle=believed)
+        nominal = tmp_path / "vehicle.toml"
+        nominal.write_text((out / "vehicle.toml").read_text() if site != str(plan) else start)
+        drive = drives.locate(site, one / "odometry.csv", one / "angles.csv", vehicle=nominal)
         error_m = drives.error_m(drive.poses, one / "truth.tum")["error_m"]
         return float(np.sqrt(np.mean(error_m.to_numpy() ** 2)))
 
@@ -121,7 +121,7 @@ def test_what_cannot_be_surveyed_is_named(logged: Path, tmp_path: Path) -> None:
     lost.mkdir()
     for name in ("odometry.csv", "angles.csv"):
         (lost / name).write_bytes((logged / "0" / name).read_bytes())
-    (lost / "vehicle.toml").write_text('like = "tugger"\n')
+    (lost / "vehicle.toml").write_text('extends = "tugger"\n')
     with pytest.raises(InputError, match=r"start.pose"):
         survey(plan, vehicle, [lost])
     noisy = Scenario.load("yard").with_overrides({"vehicle.receiver.snr_noise_db": 1.0})
@@ -129,7 +129,7 @@ def test_what_cannot_be_surveyed_is_named(logged: Path, tmp_path: Path) -> None:
         drives.log_angles(noisy, tmp_path / "noisy")
 
 
-def test_the_command_tells_what_was_not_learnt_and_does_not_fit(
+def test_the_command_reports_parameters_that_were_not_estimated_or_do_not_fit(
     access_av: Callable[..., Finished], logged: Path, tmp_path: Path
 ) -> None:
     short = tmp_path / "short"
@@ -153,7 +153,7 @@ def test_the_command_tells_what_was_not_learnt_and_does_not_fit(
     assert "are outliers and were left out" in done.err
 
 
-def test_odometry_of_two_wheels_says_the_same(logged: Path, tmp_path: Path) -> None:
+def test_odometry_of_two_wheels_gives_equal_poses(logged: Path, tmp_path: Path) -> None:
     half_track_m = 0.3
     one = logged / "0"
     vehicle = Vehicle.load(str(one / "vehicle.toml"))

@@ -6,7 +6,7 @@ from access_av import carbon, cost
 from access_av.paper.statements import paper_numbers
 
 
-def test_four_roadside_units_cost_what_the_paper_says() -> None:
+def test_the_cost_of_four_roadside_units_equals_the_papers() -> None:
     four = cost.roadside_units(4)
     assert (four.capital_low_usd, four.capital_high_usd, four.yearly_usd) == (52e3, 60e3, 9600)
     assert four.total_usd(years=10) == (148e3, 156e3)

@@ -126,7 +126,7 @@ def test_no_two_files_of_a_crate_import_each_other(crate: str) -> None:
         pytest.fail(f"{crate}: " + " -> ".join(error.args[1]))
 
 
-def test_the_page_on_the_house_names_files_that_are_there() -> None:
+def test_the_architecture_page_names_existing_files() -> None:
     page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
     for row in re.findall(r"^\| (?:a|an) .*\|.*\|.*\|.*\|$", page, re.M):
         named = [path for path in re.findall(r"`([\w/.-]+\.(?:rs|toml))`", row) if "=" not in path]

@@ -63,7 +63,7 @@ def test_an_unknown_rule_is_named() -> None:
         margin({"rule": "almost", "stated": 1.0}, 1.0)
 
 
-def test_every_claim_of_the_paper_has_a_finding_or_says_why_not() -> None:
+def test_every_claim_of_the_paper_has_a_finding_or_a_reason() -> None:
     stated = stated_claims()
     testable = [name for name, entry in stated.items() if entry["rule"] != NOT_TESTABLE]
     assert list(FINDINGS) == testable
@@ -88,8 +88,8 @@ FIGURES = {
     "a6": "0.2 m in modes 1 to 3",
     "a9": "Root-MUSIC unable to keep 0.3 m",
     "e1": "627.22, 679.77 and 648.70 J",
-    "e2": "over 1000, 1235 and 1147 executions",
-    "e3": "above 52 %; over 800, 1147 and 1071 executions",
+    "e2": "over 1000, 1235 and 1147 angle estimates",
+    "e3": "above 52 %; over 800, 1147 and 1071 angle estimates",
     "e4": "43.09 %",
     "e5": "398.84 kJ",
     "e6": "39.884 MJ",
@@ -143,7 +143,7 @@ def test_the_deviation_is_the_tolerance_at_which_the_verdict_changes() -> None:
             assert again.met == met, claim.id
 
 
-def test_the_spread_of_single_trips_stands_beside_the_mean() -> None:
+def test_the_spread_of_single_trips_is_reported_with_the_mean() -> None:
     outcome = synthetic.evaluation().outcome
     worst_m = np.linspace(0.1, 0.5, 101)
     adaptive = {
@@ -209,7 +209,7 @@ def test_records_have_the_promised_fields() -> None:
     for record in records:
         assert record["verdict"] in VERDICTS
         assert record["evidence"] in EVIDENCE or record["verdict"] == NOT_TESTABLE
-        assert isinstance(record["turns_with_seed"], bool)
+        assert isinstance(record["seed_sensitive"], bool)
 
 
 def test_evidence_follows_from_what_was_chosen() -> None:
@@ -226,7 +226,7 @@ def test_evidence_follows_from_what_was_chosen() -> None:
     assert free == "by construction", "it is solved for by the factor"
 
 
-def test_a_worse_adaptive_drive_turns_its_claims() -> None:
+def test_a_worse_adaptive_drive_changes_the_verdicts() -> None:
     worse = synthetic.evaluation(adaptive_worst_m=0.4)
     verdicts = {claim.id: claim for claim in check_claims(worse.outcome)}
     assert not verdicts["a1_adaptive_worst_m"].reproduced
@@ -235,27 +235,27 @@ def test_a_worse_adaptive_drive_turns_its_claims() -> None:
 
 
 @pytest.mark.parametrize(("worst_m", "turns"), [(0.1, False), (0.198, True), (0.3, False)])
-def test_a_verdict_near_its_bound_turns_with_the_seed(worst_m: float, turns: bool) -> None:
+def test_a_verdict_near_its_bound_depends_on_the_seed(worst_m: float, turns: bool) -> None:
     found = synthetic.evaluation(adaptive_worst_m=worst_m, spread=0.02)
     claims = {claim.id: claim for claim in check_claims(found.outcome)}
     claim = claims["a6_modes_1_2_3_adaptive_worst_m"]
-    assert claim.turns_with_seed == turns
+    assert claim.seed_sensitive == turns
     assert claim.interval[0] < claim.obtained < claim.interval[1]
 
 
-def test_a_verdict_that_another_seed_does_not_share_turns() -> None:
+def test_a_verdict_that_differs_between_seeds_is_seed_sensitive() -> None:
     good, bad = (
         check_claims(synthetic.evaluation(adaptive_worst_m=worst_m).outcome)
         for worst_m in (0.1, 0.4)
     )
-    assert not any(claim.turns_with_seed for claim in good)
+    assert not any(claim.seed_sensitive for claim in good)
     claims = {claim.id: claim for claim in with_seeds({1: good, 2: bad, 3: good})}
     a1, e2 = claims["a1_adaptive_worst_m"], claims["e2_mode0_executions"]
     assert a1.reproduced
-    assert a1.turns_with_seed
+    assert a1.seed_sensitive
     assert a1.seeds_met == "2/3"
     assert a1.met_by_seed == {1: True, 2: False, 3: True}
-    assert not e2.turns_with_seed
+    assert not e2.seed_sensitive
     assert e2.seeds_met == ""
 
 

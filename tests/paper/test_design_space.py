@@ -24,7 +24,7 @@ def test_answers_come_by_energy(points: pl.DataFrame) -> None:
 
 def test_every_bound_is_kept(points: pl.DataFrame) -> None:
     found = explore(
-        points, Query(max_energy_j=260.0, max_rms_m=0.15, max_worst_m=0.2, max_executions=350)
+        points, Query(max_energy_j=260.0, max_rms_m=0.15, max_worst_m=0.2, max_aoa_estimates=350)
     )
     assert sorted(found["mode"]) == [2, 3]
 

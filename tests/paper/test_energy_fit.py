@@ -17,8 +17,10 @@ def demands() -> dict[int, ModeDemand]:
         number: ModeDemand(
             cpu_hz=mhz * 1e6,
             base_wake_up_s={m: t / 1e3 for m, t in zip(METHODS, times, strict=True)},
-            fixed_executions={m: int(80_330 / t) + 1 for m, t in zip(METHODS, times, strict=True)},
-            adaptive_executions=synthetic.ADAPTIVE_EXECUTIONS[times[0]],
+            fixed_aoa_estimates={
+                m: int(80_330 / t) + 1 for m, t in zip(METHODS, times, strict=True)
+            },
+            adaptive_aoa_estimates=synthetic.ADAPTIVE_EXECUTIONS[times[0]],
         )
         for number, mhz, *times in synthetic.ROWS
     }
@@ -32,14 +34,14 @@ def energies(demands: dict[int, ModeDemand]) -> Energies:
 def test_mode_0_meets_the_stated_sums(demands: dict[int, ModeDemand], energies: Energies) -> None:
     stated = paper_numbers()["energy_j"]
     for method in METHODS:
-        total_j = energies[0][method] * demands[0].fixed_executions[method]
+        total_j = energies[0][method] * demands[0].fixed_aoa_estimates[method]
         assert total_j == pytest.approx(stated["fixed_mode_0"][method], rel=0.05)
-    adaptive_j = energies[0]["music"] * demands[0].adaptive_executions
+    adaptive_j = energies[0]["music"] * demands[0].adaptive_aoa_estimates
     assert adaptive_j == pytest.approx(stated["adaptive_mode_0"], rel=0.05)
 
 
 def test_budgets_are_kept(demands: dict[int, ModeDemand], energies: Energies) -> None:
-    adaptive_j = {m: energies[m]["music"] * d.adaptive_executions for m, d in demands.items()}
+    adaptive_j = {m: energies[m]["music"] * d.adaptive_aoa_estimates for m, d in demands.items()}
     assert adaptive_j[7] == pytest.approx(206.5)
     assert [mode for mode, energy in adaptive_j.items() if energy <= 210.0] == [7]
     assert [mode for mode, energy in adaptive_j.items() if energy <= 260.0] == [2, 3, 6, 7]
@@ -49,7 +51,9 @@ def test_mode_0_draws_most_at_fixed_intervals(
     demands: dict[int, ModeDemand], energies: Energies
 ) -> None:
     for method in METHODS:
-        fixed_j = {m: energies[m][method] * d.fixed_executions[method] for m, d in demands.items()}
+        fixed_j = {
+            m: energies[m][method] * d.fixed_aoa_estimates[method] for m, d in demands.items()
+        }
         assert max(fixed_j, key=fixed_j.__getitem__) == 0
 
 
@@ -58,8 +62,8 @@ def savings(demands: dict[int, ModeDemand], energies: Energies) -> dict[int, lis
         mode: [
             1.0
             - energies[mode]["music"]
-            * demand.adaptive_executions
-            / (energies[mode][method] * demand.fixed_executions[method])
+            * demand.adaptive_aoa_estimates
+            / (energies[mode][method] * demand.fixed_aoa_estimates[method])
             for method in METHODS
         ]
         for mode, demand in demands.items()
@@ -79,7 +83,7 @@ def test_methods_draw_one_power_ratio_in_all_modes(
         assert powers == pytest.approx([powers[0]] * len(powers), rel=1e-12)
 
 
-def test_each_freedom_does_what_it_says(demands: dict[int, ModeDemand]) -> None:
+def test_each_fit_parameter_has_the_described_effect(demands: dict[int, ModeDemand]) -> None:
     none = fit_energy(demands, ())
     for method in METHODS[1:]:
         ratio = none[3][method] / none[3]["music"]

@@ -12,7 +12,7 @@ from access_av.paper.driver import Driver
 from access_av.paper.energy_fit import FREEDOMS, SHIPPED
 from access_av.paper.evaluation import Evaluation, evaluate_with
 from access_av.paper.freedoms import LADDER, ladder, met_halves
-from access_av.paper.readings import load_all
+from access_av.paper.interpretations import load_all
 from access_av.paper.study import Study, judged
 
 if TYPE_CHECKING:
@@ -25,7 +25,9 @@ NONE = "The paper's accuracy and its saving do not hold together under this inte
 @pytest.fixture(scope="module")
 def evaluations() -> list[Evaluation]:
     driver = Driver(Platform.load("jetson-agx-xavier"), runs=12, seed=1)
-    return [evaluate_with(driver, reading) for reading in load_all(["gate", "every-ssb"])]
+    return [
+        evaluate_with(driver, interpretation) for interpretation in load_all(["gate", "every-ssb"])
+    ]
 
 
 def study(evaluations: Sequence[Evaluation], freedoms: Sequence[str]) -> Study:
@@ -36,16 +38,16 @@ def study(evaluations: Sequence[Evaluation], freedoms: Sequence[str]) -> Study:
         claims=claims,
         ablations=[],
         front=[],
-        ours=[],
-        unknowns=None,
+        proposed_vs_paper=[],
+        sensitivity=None,
         unusable={},
         duration_s=0.0,
-        bought=ladder(fitted, claims, "gate"),
+        fit_options=ladder(fitted, claims, "gate"),
     )
 
 
 @pytest.mark.parametrize("taken", [None, *FREEDOMS])
-def test_each_freedom_taken_away_changes_the_sentence_where_it_changes_verdicts(
+def test_the_summary_changes_if_a_removed_fit_parameter_changes_verdicts(
     taken: str | None, evaluations: list[Evaluation]
 ) -> None:
     made = study(evaluations[:1], [name for name in FREEDOMS if name != taken])
@@ -55,16 +57,18 @@ def test_each_freedom_taken_away_changes_the_sentence_where_it_changes_verdicts(
     assert summary.headline(made) == (BOTH if half.energy else NONE)
 
 
-def test_what_a_freedom_buys_is_what_judging_with_it_gives(evaluations: list[Evaluation]) -> None:
+def test_the_effect_of_a_fit_parameter_equals_an_evaluation_with_it(
+    evaluations: list[Evaluation],
+) -> None:
     made = study(evaluations, SHIPPED)
-    assert [each.freedoms for each in made.bought] == list(LADDER)
-    for each in made.bought:
+    assert [each.freedoms for each in made.fit_options] == list(LADDER)
+    for each in made.fit_options:
         there = study(evaluations, each.freedoms)
         claims = there.of("gate")
         assert each.reproduced == sum(claim.reproduced for claim in claims)
         both = [it for it in ("gate", "every-ssb") if all(met_halves(there.of(it)))]
         assert list(each.both) == both
-    [shipped] = [each for each in made.bought if each.is_shipped]
+    [shipped] = [each for each in made.fit_options if each.is_shipped]
     assert not shipped.both
     assert summary.headline(made) == (
         "The paper's accuracy and its saving hold together under none of 2 interpretations"
@@ -78,6 +82,6 @@ def test_a_subset_of_readings_has_a_headline_of_its_own(evaluations: list[Evalua
     for each in evaluations:
         alone = study([each], SHIPPED)
         assert summary.headline(alone) == NONE
-        assert each.reading.title in summary.lead(alone) or "no interpretation" in summary.lead(
+        assert each.interpretation.title in summary.lead(
             alone
-        )
+        ) or "no interpretation" in summary.lead(alone)

@@ -21,7 +21,7 @@ def imperfect() -> SimpleNamespace:
         sys.path.pop(0)
 
 
-def test_calibration_by_known_looks_finds_the_array(imperfect: SimpleNamespace) -> None:
+def test_calibration_with_known_directions_estimates_the_array(imperfect: SimpleNamespace) -> None:
     random = np.random.default_rng(4)
     array = imperfect.imperfect_array(random)
     known = imperfect.looks(random, array, np.full(500, 20.0))
@@ -38,7 +38,9 @@ def test_calibration_by_known_looks_finds_the_array(imperfect: SimpleNamespace) 
     assert errors[0] > 5.0 * errors[2]
 
 
-def test_two_numbers_take_away_what_turns_and_runs_ahead(imperfect: SimpleNamespace) -> None:
+def test_offset_and_scale_correct_an_array_with_linear_phase_errors(
+    imperfect: SimpleNamespace,
+) -> None:
     """An array without coupling and with a phase linear in the antenna has no residual."""
     random = np.random.default_rng(5)
     array = np.diag(np.exp(0.1j * np.arange(imperfect.ELEMENTS)))

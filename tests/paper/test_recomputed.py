@@ -73,14 +73,14 @@ class Tables:
         return np.vstack([np.full(runs, 1 / runs), drawn / runs])
 
 
-class Reading:
-    """One reading: its figures as arrays over the sample (first) and its resamples."""
+class Interpretation:
+    """One interpretation: its figures as arrays over the sample (first) and its resamples."""
 
     def __init__(self, tables: Tables, name: str) -> None:
         self.tables, self.name = tables, name
-        self.points = tables.points.filter(reading=name)
-        self.errors = tables.errors.filter(reading=name)
-        self.runs = tables.runs.filter(reading=name)
+        self.points = tables.points.filter(interpretation=name)
+        self.errors = tables.errors.filter(interpretation=name)
+        self.runs = tables.runs.filter(interpretation=name)
         self.trip_s = float(self.errors["time_s"].max())  # type: ignore[arg-type]
 
     def point(self, campaign: str, method: str, mode: int | None = None) -> dict[str, Any]:
@@ -99,7 +99,9 @@ class Reading:
         return rows.sort("run")
 
     def drawn(self, campaign: str, method: str, mode: int | None = None) -> pl.DataFrame:
-        rows = self.tables.resamples.filter(reading=self.name, campaign=campaign, method=method)
+        rows = self.tables.resamples.filter(
+            interpretation=self.name, campaign=campaign, method=method
+        )
         rows = rows.filter(pl.col("mode").is_null() if mode is None else pl.col("mode") == mode)
         return rows.sort("resample").filter(pl.col("resample") > 0)
 
@@ -119,7 +121,7 @@ class Reading:
 
     def energy_j(self, campaign: str, method: str, mode: int) -> NDArray[np.float64]:
         per_estimate_j = self.point(campaign, method, mode)["energy_per_execution_j"]
-        return per_estimate_j * self.mean_of_runs("executions", campaign, method, mode)
+        return per_estimate_j * self.mean_of_runs("aoa_estimates", campaign, method, mode)
 
     def horizontal_m(self, *case: Any) -> NDArray[np.float64]:
         series = self.series(*case)
@@ -133,11 +135,11 @@ class Reading:
         return np.max([self.worst_of_both("Q", method, mode) for mode in MODES], axis=0)
 
 
-def a1(it: Reading) -> Any:
+def a1(it: Interpretation) -> Any:
     return np.max([it.worst_of_both("R", "music", mode) for mode in MODES], axis=0)
 
 
-def a2(it: Reading) -> Any:
+def a2(it: Interpretation) -> Any:
     found = []
     for mode in MODES:
         ours_m = it.horizontal_m("R", "music", mode)
@@ -148,23 +150,23 @@ def a2(it: Reading) -> Any:
     return np.min(found, axis=0)
 
 
-def a3(it: Reading) -> Any:
+def a3(it: Interpretation) -> Any:
     return np.mean([it.worst_of_both("P", method) for method in METHODS], axis=0)
 
 
-def worst_y(method: str) -> Callable[[Reading], Any]:
-    def found(it: Reading) -> Any:
+def worst_y(method: str) -> Callable[[Interpretation], Any]:
+    def found(it: Interpretation) -> Any:
         fixed = [it.worst("y", "Q", method, mode) for mode in MODES]
         return np.max([it.worst("y", "P", method), *fixed], axis=0)
 
     return found
 
 
-def a6(it: Reading) -> Any:
+def a6(it: Interpretation) -> Any:
     return np.max([it.worst_of_both("R", "music", mode) for mode in (1, 2, 3)], axis=0)
 
 
-def a7(it: Reading) -> Any:
+def a7(it: Interpretation) -> Any:
     found = []
     for mode in MODES:
         for method in METHODS:
@@ -175,30 +177,30 @@ def a7(it: Reading) -> Any:
     return np.min(found, axis=0)
 
 
-def a8(it: Reading) -> Any:
+def a8(it: Interpretation) -> Any:
     others = [it.fixed_worst("music"), it.fixed_worst("root_music"), a1(it)]
     return it.fixed_worst("esprit") / np.max(others, axis=0)
 
 
-def e3(it: Reading) -> Any:
+def e3(it: Interpretation) -> Any:
     means = [np.mean([it.saving(mode, method) for method in METHODS], axis=0) for mode in (6, 7)]
     return np.min(means, axis=0)
 
 
-def e4(it: Reading) -> Any:
+def e4(it: Interpretation) -> Any:
     return np.mean([it.saving(mode, method) for mode in MODES for method in METHODS], axis=0)
 
 
-def e5(it: Reading) -> Any:
+def e5(it: Interpretation) -> Any:
     saved_j = it.energy_j("Q", "music", 0) - it.energy_j("R", "music", 0)
     return saved_j * DAY_S / it.trip_s / 1e3
 
 
-def e7(it: Reading) -> Any:
+def e7(it: Interpretation) -> Any:
     return np.min([it.saving(mode, method) for mode in MODES for method in METHODS], axis=0)
 
 
-def e8(it: Reading) -> Any:
+def e8(it: Interpretation) -> Any:
     ratios = []
     for method in METHODS:
         others = np.max([it.energy_j("Q", method, mode) for mode in MODES if mode], axis=0)
@@ -206,7 +208,7 @@ def e8(it: Reading) -> Any:
     return np.min(ratios, axis=0)
 
 
-def space(it: Reading) -> Any:
+def space(it: Interpretation) -> Any:
     case = ("R", "music")
     return {
         mode: {"energy_j": it.energy_j(*case, mode), "rms_m": it.rms_m(*case, mode)}
@@ -214,8 +216,8 @@ def space(it: Reading) -> Any:
     }
 
 
-def estimates(*modes: int) -> Callable[[Reading], Any]:
-    def found(it: Reading) -> Any:
+def estimates(*modes: int) -> Callable[[Interpretation], Any]:
+    def found(it: Interpretation) -> Any:
         base_ms = {
             method: max(it.point("Q", method, mode)["base_wake_up_ms"] for mode in modes)
             for method in METHODS
@@ -225,7 +227,7 @@ def estimates(*modes: int) -> Callable[[Reading], Any]:
     return found
 
 
-FOUND: dict[str, Callable[[Reading], Any]] = {
+FOUND: dict[str, Callable[[Interpretation], Any]] = {
     "a1_adaptive_worst_m": a1,
     "a2_adaptive_beats_fixed": a2,
     "a3_theoretical_20ms_worst_m": a3,
@@ -321,8 +323,8 @@ def tables(quick_study: Path) -> Tables:
 
 
 @pytest.fixture(scope="module", params=["every-ssb", "gate"])
-def reading(request: pytest.FixtureRequest, tables: Tables) -> Reading:
-    return Reading(tables, request.param)
+def interpretation(request: pytest.FixtureRequest, tables: Tables) -> Interpretation:
+    return Interpretation(tables, request.param)
 
 
 def test_every_claim_is_computed_again() -> None:
@@ -331,11 +333,13 @@ def test_every_claim_is_computed_again() -> None:
 
 
 @pytest.mark.parametrize("name", FOUND)
-def test_claim(name: str, reading: Reading) -> None:
+def test_claim(name: str, interpretation: Interpretation) -> None:
     [claim] = [
-        it for it in reading.tables.claims if (it["reading"], it["id"]) == (reading.name, name)
+        it
+        for it in interpretation.tables.claims
+        if (it["interpretation"], it["id"]) == (interpretation.name, name)
     ]
-    entry, value = CLAIMS[name], FOUND[name](reading)
+    entry, value = CLAIMS[name], FOUND[name](interpretation)
     by = np.atleast_1d(margin(entry, value))
     # Figures and bounds: the sample.
     if entry["rule"] == "modes":
@@ -371,7 +375,7 @@ def test_claim(name: str, reading: Reading) -> None:
     spread = float(np.std(by[1:])) if len(by) > 2 else 0.0
     safe = 2.58 * math.sqrt(2.0) * spread
     if abs(abs(by[0]) - safe) > 1e-6:
-        assert claim["turns_with_seed"] == (abs(by[0]) < safe)
+        assert claim["seed_sensitive"] == (abs(by[0]) < safe)
     if claim["deviation"] is not None:
         assert claim["deviation"] == pytest.approx(
             abs(float(np.atleast_1d(margin({**entry, "tolerance": 0.0}, value))[0])), abs=1e-4
@@ -379,7 +383,7 @@ def test_claim(name: str, reading: Reading) -> None:
 
 
 def test_arithmetic(tables: Tables) -> None:
-    claims = {it["id"].split("_")[0]: it for it in tables.claims if it["reading"] == "gate"}
+    claims = {it["id"].split("_")[0]: it for it in tables.claims if it["interpretation"] == "gate"}
     speed_mps = 15.0 / 3.6
     close(
         claims["x4"]["obtained"],
@@ -409,38 +413,40 @@ def test_arithmetic(tables: Tables) -> None:
     assert claims["x7"]["obtained"] == {"runs": tables.manifest["runs"]}
 
 
-def test_operating_points_and_resamples_follow_from_the_runs(reading: Reading) -> None:
-    for point in reading.points.iter_rows(named=True):
+def test_operating_points_and_resamples_follow_from_the_runs(
+    interpretation: Interpretation,
+) -> None:
+    for point in interpretation.points.iter_rows(named=True):
         case = (point["campaign"], point["method"], point["mode"])
-        runs, drawn = reading.of_runs(*case), reading.drawn(*case)
-        assert runs.height == reading.tables.manifest["runs"]
-        assert point["executions"] == pytest.approx(runs["executions"].mean())
-        assert point["rms_error_m"] == pytest.approx(reading.rms_m(*case)[0], rel=1e-5)
-        assert np.allclose(drawn["rms_error_m"], reading.rms_m(*case)[1:], rtol=1e-5)
-        executions = reading.mean_of_runs("executions", *case)
-        assert np.allclose(drawn["executions"], executions[1:], rtol=1e-9)
+        runs, drawn = interpretation.of_runs(*case), interpretation.drawn(*case)
+        assert runs.height == interpretation.tables.manifest["runs"]
+        assert point["aoa_estimates"] == pytest.approx(runs["aoa_estimates"].mean())
+        assert point["rms_error_m"] == pytest.approx(interpretation.rms_m(*case)[0], rel=1e-5)
+        assert np.allclose(drawn["rms_error_m"], interpretation.rms_m(*case)[1:], rtol=1e-5)
+        aoa_estimates = interpretation.mean_of_runs("aoa_estimates", *case)
+        assert np.allclose(drawn["aoa_estimates"], aoa_estimates[1:], rtol=1e-9)
         for axis in "xy":
-            worst_m = reading.series(*case)[f"mean_abs_error_{axis}_m"].max()
+            worst_m = interpretation.series(*case)[f"mean_abs_error_{axis}_m"].max()
             assert point[f"worst_error_{axis}_m"] == pytest.approx(worst_m)
             # A mean over runs exceeds no run's maximum.
             assert worst_m <= runs[f"max_error_{axis}_m"].max() * (1.0 + 1e-5)
         if point["mode"] is None:
             assert runs["energy_j"].null_count() == runs.height
             continue
-        energy_j = point["energy_per_execution_j"] * runs["executions"].to_numpy()
+        energy_j = point["energy_per_execution_j"] * runs["aoa_estimates"].to_numpy()
         assert np.allclose(runs["energy_j"], energy_j, rtol=1e-9)
         assert point["energy_j"] == pytest.approx(float(energy_j.mean()))
 
 
-def test_shares_of_single_trips_are_over_every_ssb(reading: Reading) -> None:
+def test_shares_of_single_trips_are_over_every_ssb(interpretation: Interpretation) -> None:
     [claim] = [
         it
-        for it in reading.tables.claims
-        if it["reading"] == reading.name and it["id"].startswith("a1_")
+        for it in interpretation.tables.claims
+        if it["interpretation"] == interpretation.name and it["id"].startswith("a1_")
     ]
     trips = []
     for mode in MODES:
-        runs = reading.of_runs("R", "music", mode)
+        runs = interpretation.of_runs("R", "music", mode)
         trips.append(runs.select(pl.max_horizontal("max_error_x_m", "max_error_y_m")).to_numpy())
     share = min(float(np.mean(worst_m <= 0.3)) for worst_m in trips)
     p99_m = max(float(np.quantile(worst_m, 0.99)) for worst_m in trips)
@@ -448,19 +454,19 @@ def test_shares_of_single_trips_are_over_every_ssb(reading: Reading) -> None:
     close(claim["spread"]["worst_error_of_a_trip_p99_m"], p99_m)
 
 
-def test_the_maximum_of_a_run_is_over_every_ssb(reading: Reading) -> None:
+def test_the_maximum_of_a_run_is_over_every_ssb(interpretation: Interpretation) -> None:
     """One drive simulated again, with all its errors: the first run of mode 0."""
     import access_av
-    from access_av.paper.readings import load
+    from access_av.paper.interpretations import load
 
-    scenario = load(reading.name).scenario.with_overrides(
+    scenario = load(interpretation.name).scenario.with_overrides(
         {"vehicle.platform.mode": 0, "vehicle.estimator.method": "music"}
     )
     found = access_av.simulate(
-        scenario, runs=1, seed=reading.tables.manifest["seed"], keep_trajectories=True
+        scenario, runs=1, seed=interpretation.tables.manifest["seed"], keep_trajectories=True
     )
     assert found.trajectories is not None
-    runs = reading.of_runs("R", "music", 0)
+    runs = interpretation.of_runs("R", "music", 0)
     for axis in "xy":
         error_m = (pl.col(f"{axis}_m") - pl.col(f"true_{axis}_m")).abs().max()
         worst_m = found.trajectories.select(error_m).item()
@@ -477,7 +483,7 @@ def test_comparisons_follow_from_the_runs(tables: Tables) -> None:
     ablations = tables.table("ablations")
     assert ablations.height == 8
     for row in ablations.iter_rows(named=True):
-        key = {"reading": row["reading"], "mode": row["mode"]}
+        key = {"interpretation": row["interpretation"], "mode": row["mode"]}
         mine = rms_m(tables.runs.filter(campaign="R", **key))
         constant = rms_m(tables.runs.filter(campaign="constant", **key))
         gain_m = constant - mine
@@ -487,19 +493,21 @@ def test_comparisons_follow_from_the_runs(tables: Tables) -> None:
         assert np.allclose([row[name] for name in names], expected, rtol=1e-4, atol=1e-6)
         least_m = 0.05 * mine[0]
         assert row["matters"] == (1 if low_m > least_m else -1 if high_m < -least_m else 0)
-    shown = {"reading": "gate"}
-    for row in tables.table("ours").iter_rows(named=True):
+    shown = {"interpretation": "gate"}
+    for row in tables.table("proposed_vs_paper").iter_rows(named=True):
         papers = tables.runs.filter(campaign="R", mode=row["mode"], **shown)
         road = "road map" if row["map"] else "no road map"
         ours = tables.runs.filter(campaign="tracker", mode=row["mode"], variant=road, **shown)
         less_m = rms_m(papers) - rms_m(ours)
-        names = ("error_less_m", "error_less_low_m", "error_less_high_m")
+        names = ("rms_error_reduction_m", "rms_error_reduction_low_m", "rms_error_reduction_high_m")
         expected = [less_m[0], *ends(less_m)]
         assert np.allclose([row[name] for name in names], expected, rtol=1e-4, atol=1e-6)
-        means = [float(it["executions"].to_numpy().mean()) for it in (ours, papers)]
-        assert np.allclose([row["executions"], row["papers_executions"]], means)
+        means = [float(it["aoa_estimates"].to_numpy().mean()) for it in (ours, papers)]
+        assert np.allclose([row["aoa_estimates"], row["papers_aoa_estimates"]], means)
         assert row["energy_j"] == pytest.approx(float(ours["energy_j"].to_numpy().mean()))
-    for row in tables.table("fair").filter(pl.col("who") != "bound").iter_rows(named=True):
+    for row in (
+        tables.table("equal_information").filter(pl.col("who") != "bound").iter_rows(named=True)
+    ):
         odometer = "real odometer" if row["real_odometer"] else "exact odometer"
         road = "road map" if row["map"] else "no road map"
         variant = f"{odometer}, {road}, {row['who']}"
@@ -509,7 +517,7 @@ def test_comparisons_follow_from_the_runs(tables: Tables) -> None:
     for row in tables.table("fixed_front").iter_rows(named=True):
         runs = tables.runs.filter(campaign="front", base_wake_up_ms=row["base_wake_up_ms"])
         assert row["rms_error_m"] == pytest.approx(rms_m(runs)[0], rel=1e-4)
-        assert row["executions"] == pytest.approx(float(runs["executions"].to_numpy().mean()))
+        assert row["aoa_estimates"] == pytest.approx(float(runs["aoa_estimates"].to_numpy().mean()))
 
 
 def rows_of(page: str, head: str) -> list[list[str]]:
@@ -530,7 +538,7 @@ def plain(cell: str) -> str:
 
 
 def test_the_page_shows_the_tables(tables: Tables) -> None:
-    gate = [it for it in tables.claims if it["reading"] == "gate"]
+    gate = [it for it in tables.claims if it["interpretation"] == "gate"]
     # Claims: verdict, kind of evidence and deviation.
     shown = rows_of(tables.page, "Verdict")
     assert len(shown) == len(gate)
@@ -539,7 +547,7 @@ def test_the_page_shows_the_tables(tables: Tables) -> None:
         given = claim["evidence"] in ("arithmetic", "by construction")
         words = f"{claim['evidence']}: {claim['verdict']}" if given else claim["verdict"]
         assert cells[5].startswith(words)
-        assert ("turns with the seed" in cells[5]) == claim["turns_with_seed"]
+        assert ("turns with the seed" in cells[5]) == claim["seed_sensitive"]
         if claim["tolerance"] is not None and claim["tolerance"] >= 0.01:
             percent = f"deviation {100 * claim['deviation']:.0f}%"
             assert percent in cells[2]
@@ -562,7 +570,7 @@ def test_the_page_shows_the_tables(tables: Tables) -> None:
     for row, cells in zip(CLAIMS["x2_power_modes"]["stated"], modes, strict=True):
         assert [float(it.split()[0]) for it in cells[1:]] == [float(each) for each in row[1:]]
     # Errors and energies.
-    points = tables.points.filter(reading="gate")
+    points = tables.points.filter(interpretation="gate")
     for cells in rows_of(tables.page, "Worst X / m"):
         method, adaptive = cells[0].removeprefix("Adaptive "), cells[0].startswith("Adaptive")
         label = {"MUSIC": "music", "ESPRIT": "esprit", "Root-MUSIC": "root_music"}[method]
@@ -583,29 +591,29 @@ def test_the_page_shows_the_tables(tables: Tables) -> None:
 
 def test_the_halves_of_the_promise_follow_from_the_verdicts(tables: Tables) -> None:
     for cells, name in zip(
-        rows_of(tables.page, "Accuracy half"), tables.manifest["readings"], strict=True
+        rows_of(tables.page, "Accuracy half"), tables.manifest["interpretations"], strict=True
     ):
         met = {
             it["id"]
             for it in tables.claims
-            if it["reading"] == name and it["verdict"] in ("reproduced", "agrees")
+            if it["interpretation"] == name and it["verdict"] in ("reproduced", "agrees")
         }
         accuracy = met >= {"a1_adaptive_worst_m", "a2_adaptive_beats_fixed"}
         energy = met >= {"e3_mode67_saving_percent", "e4_average_saving_percent"}
         assert [cells[1] == "holds", cells[2] == "holds"] == [accuracy, energy]
-        adaptive = tables.runs.filter(reading=name, campaign="R")
+        adaptive = tables.runs.filter(interpretation=name, campaign="R")
         assert cells[3].endswith(f"{adaptive['longest_gap_s'].max():.2f} s")
 
 
 def test_what_each_freedom_of_the_fit_obtains(tables: Tables) -> None:
     """The shipped row counts the claims as they are listed."""
-    gate = [it for it in tables.claims if it["reading"] == "gate"]
+    gate = [it for it in tables.claims if it["interpretation"] == "gate"]
     counts = [
         sum(it["verdict"] == "reproduced" for it in gate),
         sum(it["verdict"] == "agrees" and it["evidence"] == "by construction" for it in gate),
         sum(it["verdict"] == "agrees" and it["evidence"] == "arithmetic" for it in gate),
     ]
-    row = tables.table("freedoms").row(2, named=True)
+    row = tables.table("fit_degrees_of_freedom").row(2, named=True)
     names = ("claims_reproduced", "agree_by_construction", "agree_by_arithmetic")
     assert [row[name] for name in names] == counts
     [e4] = [it["obtained"] for it in gate if it["id"] == "e4_average_saving_percent"]
@@ -621,7 +629,7 @@ def test_cost_and_carbon_of_the_page(tables: Tables) -> None:
     )
     units, fleet = 4, STATED["day"]["fleet"]
     # Energy saved in mode 0: fixed MUSIC less adaptive MUSIC, trip after trip.
-    gate = Reading(tables, "gate")
+    gate = Interpretation(tables, "gate")
     trip_j = float((gate.energy_j("Q", "music", 0) - gate.energy_j("R", "music", 0))[0])
     words = plain(tables.page)
     found = re.search(

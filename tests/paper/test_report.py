@@ -13,7 +13,7 @@ import synthetic
 from access_av.paper import summary
 from access_av.report import located_charts
 from access_av.report.paper.evaluation import render
-from access_av.report.paper.readings import readings
+from access_av.report.paper.interpretations import interpretations
 from access_av.tables.numbers import number, unsigned_zero, value_text
 from robot import HEADS_M, robot
 
@@ -41,7 +41,7 @@ def test_loads_nothing(page: str) -> None:
 def test_holds_every_chart(page: str) -> None:
     places = set(re.findall(r'class="chart" id="([^"]+)"', page))
     assert places >= {
-        "overview", "design-x", "design-y", "snr", "energy-bars", "executions", "design-space",
+        "overview", "design-x", "design-y", "snr", "energy-bars", "aoa_estimates", "design-space",
         "rsu-cost", "sensor-cost", "ablation", "front",
     }  # fmt: skip
     assert sum(name.startswith("error-") for name in places) == 12
@@ -66,10 +66,12 @@ def test_is_small_enough_to_mail(page: str) -> None:
     ("gain", "said"),
     [(0.0, "makes no difference"), (0.5, "helps"), (-0.5, "harms")],
 )
-def test_says_that_the_controller_matters_only_where_it_does(gain: float, said: str) -> None:
+def test_the_report_states_an_effect_of_the_controller_only_if_it_is_significant(
+    gain: float, said: str
+) -> None:
     """The report distinguishes a constant wake-up time from a controller by their results."""
     study = synthetic.study(controller_gain=gain)
-    text = readings(study)
+    text = interpretations(study)
     assert text.count(f'<td data-label="Algorithm 1">{said}</td>') == 2
     for other in {"makes no difference", "helps", "harms"} - {said}:
         assert other not in text
@@ -83,13 +85,13 @@ def test_sentences_are_made_from_what_was_obtained() -> None:
     assert "only if estimates wait" in summary.headline(both)
     assert "which Algorithm 1 does not say" in summary.lead(both)
     assert "Algorithm 1 makes no difference" in summary.lead(both)
-    without = [replace(claim, reading="every-ssb") for claim in met.values()]
+    without = [replace(claim, interpretation="every-ssb") for claim in met.values()]
     assert "under Algorithm 1 as it stands" in summary.headline(
         replace(study, claims=[*without, *study.of("gate")])
     )
 
 
-def test_an_evaluation_is_told_in_a_line() -> None:
+def test_an_evaluation_has_a_one_line_representation() -> None:
     evaluation = synthetic.evaluation()
     assert len(repr(evaluation)) < 100
     assert len({evaluation, evaluation}) == 1

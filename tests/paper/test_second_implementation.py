@@ -14,8 +14,8 @@ from access_av import Scenario
 from access_av.device.platform import Platform
 from access_av.paper.ablation import fixed
 from access_av.paper.driver import Driver
+from access_av.paper.interpretations import load
 from access_av.paper.outcome import resamples
-from access_av.paper.readings import load
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,7 +40,7 @@ def angles(trip: second.Trip) -> dict[str, np.ndarray]:
     return {"music": trip.music(), "esprit": trip.esprit()}
 
 
-def test_it_is_short_and_knows_nothing_of_the_product() -> None:
+def test_the_second_implementation_is_short_and_independent() -> None:
     text = Path(second.__file__).read_text(encoding="utf-8")
     assert len(text.splitlines()) < 120
     assert "access_av" not in text
@@ -52,7 +52,7 @@ def test_what_the_paper_leaves_open_is_the_same_in_both() -> None:
     assert head["eirp_dbm"] == second.POWER_DBM + 10.0
     assert paper["site"]["carrier_mhz"] * 1e6 == second.CARRIER_HZ
     assert 10.0 ** (paper["site"]["rician_k_db"] / 10.0) == second.RICIAN_K
-    due = paper["vehicle"]["wake_up"]["due"]
+    due = paper["vehicle"]["wake_up"]["trigger"]
     assert due["snr_set_point"]["offset_db"] == second.OFFSET_DB
     assert due["snr_scale_db"] == second.SCALE_DB
 
@@ -91,9 +91,9 @@ def test_both_execute_and_err_alike(
     name: str, driver: Driver, trip: second.Trip, angles: dict[str, np.ndarray]
 ) -> None:
     method, scenario, policy = CASES[name]
-    executions, errors_m = trip.drive(angles[method], policy(trip))
+    aoa_estimates, errors_m = trip.drive(angles[method], policy(trip))
     ours = driver.drive(scenario()).drives
-    assert executions == pytest.approx(float(ours.executions[0]), rel=0.01)
+    assert aoa_estimates == pytest.approx(float(ours.aoa_estimates[0]), rel=0.01)
     square_m2 = np.mean(np.sum(errors_m**2, axis=0), axis=1)
     theirs_m = np.sqrt(resamples(RUNS, 200) @ square_m2)
     differs_m = abs(float(ours.rms_error_m[0] - theirs_m[0]))

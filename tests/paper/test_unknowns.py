@@ -10,7 +10,7 @@ import pytest
 
 from access_av import Scenario
 from access_av.device.platform import Platform
-from access_av.paper import sampled_readings
+from access_av.paper import sampled_interpretations
 from access_av.paper.open_choices import (
     GATE,
     OPEN_CONTROLLER,
@@ -25,7 +25,7 @@ from access_av.paper.open_choices import (
 )
 from access_av.paper.unknowns import sobol
 from access_av.run.campaign import Campaign, Shard
-from access_av.run.result_cache import Parts
+from access_av.run.result_cache import ResultCache
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 BOARD = Platform.load("jetson-agx-xavier")
 
 
-def sample(parts: Path) -> sampled_readings.Sample:
-    found = sampled_readings.sample(Campaign(Parts(parts)), BOARD, **SMALL)
+def sample(parts: Path) -> sampled_interpretations.Sample:
+    found = sampled_interpretations.sample(Campaign(ResultCache(parts)), BOARD, **SMALL)
     assert found is not None
     return found
 
@@ -44,10 +44,10 @@ SMALL = {"worlds": 2, "controllers": 3, "runs": 1}
 
 def drawn(
     margin: np.ndarray, points: np.ndarray, dimensions: tuple[Dimension, ...]
-) -> sampled_readings.Sample:
+) -> sampled_interpretations.Sample:
     nothing = np.zeros(len(points))
     worlds = np.arange(len(points))
-    return sampled_readings.Sample(
+    return sampled_interpretations.Sample(
         dimensions, points, worlds, {"c": margin}, nothing, nothing, nothing
     )
 
@@ -91,7 +91,7 @@ def test_indices_of_a_function_that_is_known() -> None:
 
 def test_a_search_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     judged = []
-    judge = sampled_readings.judge
+    judge = sampled_interpretations.judge
 
     def stops(*arguments: object, **named: object) -> object:
         judged.append(arguments)
@@ -99,7 +99,7 @@ def test_a_search_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.M
             raise KeyboardInterrupt
         return judge(*arguments, **named)
 
-    monkeypatch.setattr(sampled_readings, "judge", stops)
+    monkeypatch.setattr(sampled_interpretations, "judge", stops)
     with pytest.raises(KeyboardInterrupt):
         sample(tmp_path)
     assert len(list(tmp_path.glob("*.npz"))) == 1
@@ -113,9 +113,9 @@ def test_a_search_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.M
 
 def test_shares_of_a_search_make_the_whole(tmp_path: Path) -> None:
     whole = sample(tmp_path / "whole")
-    shares = Parts(tmp_path / "shares")
+    shares = ResultCache(tmp_path / "shares")
     first, last = (
-        sampled_readings.sample(Campaign(shares, shard=Shard(number, 2)), BOARD, **SMALL)
+        sampled_interpretations.sample(Campaign(shares, shard=Shard(number, 2)), BOARD, **SMALL)
         for number in (1, 2)
     )
     assert first is None
@@ -127,12 +127,12 @@ def test_without_a_gate_t_max_is_kept_everywhere(tmp_path: Path) -> None:
     found = sample(tmp_path)
     assert GATE not in found.dimensions
     assert (found.longest_gap_s < 0.26).all()
-    best = sampled_readings.as_reading(found.values(found.best()[0]))
+    best = sampled_interpretations.as_interpretation(found.values(found.best()[0]))
     assert not best.is_gated
     assert best.keeps(float(found.longest_gap_s.max()))
 
 
-def test_the_shipped_world_is_in_the_space() -> None:
+def test_the_shipped_environment_is_in_the_space() -> None:
     paper = json.loads(Scenario.load("paper").to_json())
     values = named(WORLD, SHIPPED_WORLD)
     assert values["eirp_dbm"] == paper["site"]["radio_heads"][0]["eirp_dbm"]
@@ -147,8 +147,10 @@ def test_every_point_of_the_space_is_a_scenario() -> None:
     corners = [np.full(len(dimensions), end) for end in (0.0, 1.0 - 1e-9)]
     for point in [*corners, *latin_hypercube(30, len(dimensions), seed=2)]:
         values = named(dimensions, point.tolist())
-        reading = sampled_readings.as_reading(values)
-        assert reading.is_gated == (values["gate"] != "none")
+        interpretation = sampled_interpretations.as_interpretation(values)
+        assert interpretation.is_gated == (values["gate"] != "none")
         drawn_from = world_changes(values) | controller_changes(values, values)
-        named_alike = {"name": "found", "description": reading.scenario.description}
-        assert reading.scenario == Scenario.load("paper").with_overrides(drawn_from | named_alike)
+        named_alike = {"name": "found", "description": interpretation.scenario.description}
+        assert interpretation.scenario == Scenario.load("paper").with_overrides(
+            drawn_from | named_alike
+        )

@@ -83,7 +83,10 @@ def test_a_traced_line_of_sight_is_that_of_the_geometry(tmp_path: Path) -> None:
     untraced = Scenario.from_toml(
         f"{text}[channel]\nshadowing_std_db = 0.0\n", str(HALL / "scenario.toml")
     )
-    drawn = {"truth.draw": "none", "vehicle.lane_keeping": {"rms_m": 0.0, "wavelength_m": 60.0}}
+    drawn = {
+        "truth.sample_errors": False,
+        "vehicle.lane_keeping": {"rms_m": 0.0, "wavelength_m": 60.0},
+    }
     for fidelity in ("snapshots", "iq"):
         traced = hall.with_overrides(
             {**drawn, "channel.paths": str(tmp_path / "los.npz"), "fidelity": fidelity}
@@ -95,8 +98,8 @@ def test_a_traced_line_of_sight_is_that_of_the_geometry(tmp_path: Path) -> None:
         results = [simulate(it, seed=5, keep_trajectories=True) for it in (traced, free)]
         snrs_db = [result.steps["mean_true_snr_db"].to_numpy() for result in results]
         assert np.abs(snrs_db[0] - snrs_db[1]).max() < 0.3
-        assert all(result.executions is not None for result in results)
-        angles = [result.executions.select("time_s", "pci", "phase_rad") for result in results]
+        assert all(result.aoa_estimates is not None for result in results)
+        angles = [result.aoa_estimates.select("time_s", "pci", "phase_rad") for result in results]
         both = (
             angles[0]
             .with_columns(pl.col("time_s").round(3))
@@ -249,7 +252,7 @@ def test_the_street_can_be_driven(tmp_path: Path, data: Path) -> None:
     assert found["places"] > 1500
     (tmp_path / "drive.toml").write_text(
         'name = "drive"\nsite = "street.toml"\n'
-        '[vehicle]\nlike = "carrier"\nname = "street"\n'
+        '[vehicle]\nextends = "carrier"\nname = "street"\n'
         "[vehicle.array]\nposition_m = [0.0, 0.0, 1.5]\n"
         '[vehicle.wake_up]\npolicy = "fixed"\ninterval_ms = 500.0\n'
         '[channel]\nmodel = "paths"\npaths = "street.npz"\n'
@@ -257,12 +260,12 @@ def test_the_street_can_be_driven(tmp_path: Path, data: Path) -> None:
     result = simulate(str(tmp_path / "drive.toml"), runs=2, seed=1, keep_trajectories=True)
     assert 0.02 < result.rms_error_m < 1.0
     # Beyond the traced part of the road no SSB is received, and the position remains known.
-    assert result.executions is not None
-    assert result.executions["snr_db"].is_finite().all()
+    assert result.aoa_estimates is not None
+    assert result.aoa_estimates["snr_db"].is_finite().all()
     every = Scenario.load(str(tmp_path / "drive.toml")).with_overrides(
         {"vehicle.wake_up.interval_ms": 20.0}
     )
     result = simulate(every, seed=1, keep_trajectories=True)
     assert result.steps["mean_abs_error_x_m"].max() < 3.0
-    assert result.executions is not None
-    assert result.executions["time_s"].max() < result.steps["time_s"].max() - 3.0
+    assert result.aoa_estimates is not None
+    assert result.aoa_estimates["time_s"].max() < result.steps["time_s"].max() - 3.0

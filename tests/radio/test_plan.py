@@ -15,7 +15,7 @@ from access_av.radio.upgrades import next_level
 from access_av.run.campaign import Campaign
 from access_av.run.fault_injection import SIZES, hypotheses, mismatches
 from access_av.run.integrity_campaign import drive
-from access_av.run.result_cache import Parts
+from access_av.run.result_cache import ResultCache
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -77,7 +77,7 @@ def test_new_radio_heads_send_when_others_are_silent() -> None:
     assert [head["ssb_index"] for head in equipped] == [0, 1, 2, 3]
 
 
-def test_the_next_level_is_reached_by_what_is_said_to_reach_it() -> None:
+def test_the_suggested_upgrades_reach_the_next_service_level() -> None:
     planned = plan(YARD)
     found = next_level(YARD, planned)
     assert found is not None
@@ -165,13 +165,13 @@ def test_service_levels_need_time_as_well_as_accuracy() -> None:
     assert [found[0].outcome, found[1].outcome] == ["too few runs"] * 2
 
 
-def test_an_integrity_campaign_goes_on_where_it_stopped(
+def test_an_interrupted_integrity_campaign_is_continued(
     tmp_path: Path, access_av: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "short.toml").write_text(SHORT.to_toml())
     arguments = (
-        "integrity", tmp_path / "short.toml", "--runs", "2", "--mismatch", "none",
-        "--mismatch", "array 1 degree off", "--heads", "2", "--heads", "4",
+        "integrity", tmp_path / "short.toml", "--runs", "2", "--fault", "none",
+        "--fault", "array 1 degree off", "--num-heads", "2", "--num-heads", "4",
         "--out", tmp_path / "out", "--json",
     )  # fmt: skip
     done = access_av(*arguments)
@@ -201,8 +201,8 @@ def test_cases_of_an_integrity_campaign_stand_side_by_side(
 ) -> None:
     (tmp_path / "short.toml").write_text(SHORT.to_toml())
     done = access_av(
-        "integrity", tmp_path / "short.toml", "--runs", "2", "--mismatch", "none",
-        "--mismatch", "array 1 degree off", "--vary", "vehicle.integrity.risk_per_hour=1e-3",
+        "integrity", tmp_path / "short.toml", "--runs", "2", "--fault", "none",
+        "--fault", "array 1 degree off", "--sweep", "vehicle.integrity.risk_per_hour=1e-3",
         "--percentile", "90", "--out", tmp_path / "out", "--json",
     )  # fmt: skip
     assert done.code == 0, done.err
@@ -236,20 +236,24 @@ def test_hypotheses_are_of_three_sizes_and_can_be_driven(tmp_path: Path) -> None
     sized = [hypotheses(SHORT)[f"head height x {size}"] for size in SIZES]
     heights = [next(iter(it["truth.site.radio_heads"].values()))["position_m"][2] for it in sized]
     assert heights == pytest.approx([7.1, 7.3, 8.0])
-    late = SHORT.with_overrides({"vehicle.receiver.lateness_std_s": 0.02})
+    late = SHORT.with_overrides({"vehicle.receiver.angle_time_offset_std_s": 0.02})
     assert [
         next(iter(hypotheses(late)[f"clock late x {size}"].values())) for size in SIZES
     ] == pytest.approx([0.02, 0.06, 0.2])
     chosen = ["two cells swapped", "map shape x 10", "growing slip x 10", "phase drift x 10"]
     chosen += ["clock late x 10", "gain drift x 10"]
-    cases = drive(Campaign(Parts(tmp_path)), SHORT, runs=1, only=chosen)
+    cases = drive(Campaign(ResultCache(tmp_path)), SHORT, runs=1, only=chosen)
     assert cases is not None
     assert [case.mismatch for case in cases] == chosen
 
 
 def test_the_level_grows_as_less_risk_is_asked(tmp_path: Path) -> None:
     cases = drive(
-        Campaign(Parts(tmp_path)), SHORT, runs=2, only=["none"], risks_per_hour=[0.3, 1e-2, 1e-4]
+        Campaign(ResultCache(tmp_path)),
+        SHORT,
+        runs=2,
+        only=["none"],
+        risks_per_hour=[0.3, 1e-2, 1e-4],
     )
     assert cases is not None
     levels = [float(case.trajectories["protection_level_m"].median()) for case in cases]
@@ -266,7 +270,7 @@ def test_the_level_grows_as_less_risk_is_asked(tmp_path: Path) -> None:
         ("risk_per_hour", "1e-5", "below integrity.risk_per_hour"),
         ("fault_probability.array", "0.4", "below integrity.risk_per_hour"),
         ("fault_probability.radio_head", "0.6", "between 0.000000001 and 0.5"),
-        ("fault_probability.gate", "0.1", "all_radio_heads"),
+        ("fault_probability.gate", "0.1", "site_frame_offset"),
         ("risk_per_hour", "0", "between 0.000000001 and 1"),
     ],
 )
@@ -283,7 +287,7 @@ def test_faults_that_the_risk_cannot_bear_are_refused(
 
 def test_every_mismatch_can_be_driven(tmp_path: Path) -> None:
     known = mismatches(SHORT)
-    kept = Campaign(Parts(tmp_path))
+    kept = Campaign(ResultCache(tmp_path))
     assert {"none", "all heads 2 m off", "three heads hidden"} <= known.keys()
     cases = drive(kept, SHORT, runs=1)
     assert cases is not None

@@ -44,10 +44,10 @@ def walled() -> Scenario:
 
 def test_no_angle_is_taken_through_a_wall(walled: Scenario) -> None:
     found = simulate(walled, runs=1, seed=3, keep_trajectories=True)
-    assert found.executions is not None
+    assert found.aoa_estimates is not None
     assert found.trajectories is not None
     places = found.trajectories.select("time_s", "true_x_m").sort("time_s")
-    taken = found.executions.filter(pci=GATE_PCI).sort("time_s")
+    taken = found.aoa_estimates.filter(pci=GATE_PCI).sort("time_s")
     taken = taken.join_asof(places, on="time_s", strategy="nearest")
     straight = taken.filter(pl.col("true_x_m") < 190.0)["true_x_m"].to_numpy()
     assert len(straight) > 100
@@ -57,15 +57,15 @@ def test_no_angle_is_taken_through_a_wall(walled: Scenario) -> None:
 
 def test_the_channel_loses_the_direct_wave_behind_it() -> None:
     """A vehicle without the wall in its site receives the radio head weakly, and has errors."""
-    as_told = {"truth.draw": "none", "site.rician_k_db": 60.0}
+    as_told = {"truth.sample_errors": False, "site.rician_k_db": 60.0}
     open_air = trip(**as_told)
     behind = trip(**as_told, **{"truth.site.walls": [WALL]})
     assert behind.resolved() != open_air.resolved()
     levels = {}
     for name, scenario in (("open", open_air), ("behind", behind)):
         found = simulate(scenario, runs=1, seed=3, keep_trajectories=True)
-        assert found.executions is not None
-        levels[name] = found.executions.filter(pci=GATE_PCI).select("time_s", "snr_db")
+        assert found.aoa_estimates is not None
+        levels[name] = found.aoa_estimates.filter(pci=GATE_PCI).select("time_s", "snr_db")
     both = levels["open"].join(levels["behind"], on="time_s", suffix="_behind")
     lost_db = (both["snr_db"] - both["snr_db_behind"]).to_numpy()
     # Concrete at 3.5 GHz: 19 dB of a wave that is all of what comes; elsewhere nothing.
@@ -73,7 +73,7 @@ def test_the_channel_loses_the_direct_wave_behind_it() -> None:
     assert (np.abs(lost_db) < 1e-9).mean() > 0.4
 
 
-def test_the_bound_hears_what_the_vehicle_hears(walled: Scenario) -> None:
+def test_the_bound_uses_the_radio_heads_that_the_vehicle_receives(walled: Scenario) -> None:
     x_m = np.arange(0.0, 190.0, 3.7)
     y_m = np.zeros_like(x_m)
     open_db, walled_db = (Bound(it).snr_db(x_m, y_m) for it in (trip(), walled))

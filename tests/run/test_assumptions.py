@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from access_av import Scenario
-from access_av.run.assumptions import flattering
+from access_av.run.assumptions import optimistic_assumptions
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     "name",
     ["yard", "campus-handover", "yard-array-off", "yard-heads-off", "yard-odometer-noisy"],
 )
-def test_what_is_shipped_for_plants_is_guarded_and_takes_nothing_as_exact(name: str) -> None:
+def test_shipped_plants_are_monitored_and_without_exact_values(name: str) -> None:
     scenario = Scenario.load(name)
-    assert flattering(scenario) == []
+    assert optimistic_assumptions(scenario) == []
     settings = json.loads(scenario.resolved().to_json())
     assert settings["vehicle"]["integrity"]["enabled"]
     assert settings["vehicle"]["array"]["position_m"][2] > 0.0
@@ -43,12 +43,12 @@ def test_what_is_shipped_for_plants_is_guarded_and_takes_nothing_as_exact(name: 
             {f"site.radio_heads[{head}].position_std_m": 0.0 for head in range(4)},
             "site.radio_heads",
         ),
-        ({"truth.draw": "none"}, "truth.draw"),
+        ({"truth.sample_errors": False}, "truth.sample_errors"),
         ({"vehicle.platform.name": "jetson-agx-xavier"}, "vehicle.platform"),
     ],
 )
 def test_each_is_named_with_its_key(changes: dict[str, object], named: str) -> None:
-    [found] = flattering(Scenario.load("yard").with_overrides(changes))
+    [found] = optimistic_assumptions(Scenario.load("yard").with_overrides(changes))
     assert f"({named}" in found
 
 
@@ -65,4 +65,4 @@ def test_the_paper_and_dead_reckoning_by_many_heads_are_named(
     many = Scenario.load("yard").with_overrides(
         {"vehicle.localizer.kind": "dead-reckoning", "vehicle.wake_up": {"policy": "fixed"}}
     )
-    assert any("4 radio heads" in what for what in flattering(many))
+    assert any("4 radio heads" in what for what in optimistic_assumptions(many))

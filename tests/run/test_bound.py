@@ -52,7 +52,7 @@ def test_map_covers_road_and_heads(four_heads: ErrorBound) -> None:
     assert site["bound_m"].null_count() < site.height
 
 
-def test_four_times_the_looks_halve_what_the_angles_leave_open() -> None:
+def test_four_times_the_angles_halve_the_error_bound() -> None:
     core = _core.Bound(Scenario.load("paper-real-odometry-4"))
     x_m, y_m = np.array([120.0]), np.array([10.0])
     once, fourfold = (core.at(x_m, y_m, looks, 0.0)[0] for looks in (10.0, 40.0))
@@ -99,7 +99,7 @@ def test_page_loads_nothing_and_names_the_heads(four_heads: ErrorBound) -> None:
         assert name in markup
 
 
-def test_command_writes_what_it_promises(
+def test_the_command_writes_the_files_that_its_help_lists(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
     done = access_av("bound", "yard", "--map-step-m", "25", "--out", tmp_path / "b", columns=80)

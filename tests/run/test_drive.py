@@ -31,7 +31,7 @@ def guarded() -> Simulation:
     return simulate(GUARDED, runs=2, seed=4, keep_trajectories=True)
 
 
-def test_guarded_tracker_states_levels(guarded: Simulation) -> None:
+def test_a_monitored_tracker_reports_protection_levels(guarded: Simulation) -> None:
     table, integrity = guarded.trajectories, guarded.integrity
     assert table is not None
     assert integrity is not None
@@ -65,12 +65,12 @@ def test_page_has_every_chart_and_loads_nothing(guarded: Simulation) -> None:
     assert "Service levels" in page
     specs = json.loads(page.split("const charts = ")[1].split(";\n")[0])
     places = set(re.findall(r'class="chart" id="([^"]+)"', page))
-    assert set(specs) == places == {"map", "error", "executions", "stanford"}
+    assert set(specs) == places == {"map", "error", "aoa_estimates", "stanford"}
     markup = re.sub(r"(<script>).*?(</script>)", r"\1\2", page, flags=re.DOTALL)
     assert not re.search(r"<(link|img|iframe|script)[^>]*\b(src|href)=", markup)
     assert not re.search(r"@import|url\(|https?:", markup)
     # Bars between two times stand on zero and on each other.
-    assert specs["executions"]["encoding"]["x"]["bin"] == "binned"
+    assert specs["aoa_estimates"]["encoding"]["x"]["bin"] == "binned"
     counted = specs["stanford"]["datasets"].values()
     assert guarded.trajectories is not None
     epochs = sum(row.get("epochs", 0) for rows in counted for row in rows)
@@ -98,7 +98,7 @@ def test_page_needs_trajectories() -> None:
         render_drive(Scenario.load("paper"), simulate("paper", runs=1), seed=1)
 
 
-def test_run_tells_percentiles_and_integrity(
+def test_run_prints_percentiles_and_integrity(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
     done = access_av(
@@ -134,7 +134,7 @@ def test_percentiles_are_those_of_the_trajectories() -> None:
     assert result.mean_error_m == pytest.approx(error_m.mean())
 
 
-def test_a_simulation_is_told_in_a_line_and_can_be_kept_in_a_set() -> None:
+def test_a_simulation_has_a_one_line_representation_and_a_hash() -> None:
     result = simulate("paper", runs=2)
     assert len(repr(result)) < 100
     assert result == result
@@ -163,7 +163,7 @@ def test_what_is_not_relied_on_has_a_reason_each() -> None:
     assert Operation.of(unwatched, 1.5) is None
 
 
-def test_a_start_from_scratch_says_when_it_was_found(
+def test_an_unknown_start_reports_the_time_until_the_first_pose(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
     changes = {"vehicle.start.known": False, "motion.start_at_m": 200.0}

@@ -1,4 +1,4 @@
-"""Plug-ins of files: in ``--compare`` and in the space of ``designs``."""
+"""Plug-ins of files: in ``--against`` and in the space of ``designs``."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class EveryTenth:
         self.count += 1
         return self.count % 10 == 0
 """
-SCENARIO = 'like = "paper-real-odometry-2"\nname = "short"\n[motion]\nstart_at_m = 285.0\n'
+SCENARIO = 'extends = "paper-real-odometry-2"\nname = "short"\n[motion]\nstart_at_m = 285.0\n'
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_compare_takes_plug_ins(access_av: Callable[..., Finished], folder: Path) -> None:
     texts = ["estimator=mine.py:Mine", "policy=mine.py:EveryTenth"]
-    compare = [part for text in texts for part in ("--compare", text)]
+    compare = [part for text in texts for part in ("--against", text)]
     done = access_av("run", "short.toml", "--runs", "2", *compare, "--out", "out")
     assert done.code == 0, done.err
     rows = pl.read_parquet(folder / "out/compared.parquet")
@@ -91,15 +91,15 @@ def test_designs_take_plug_ins(access_av: Callable[..., Finished], folder: Path)
     row = rows.filter(
         pl.col("choice").str.contains("Mine") & pl.col("choice").str.contains("EveryTenth")
     ).row(0, named=True)
-    assert row["executions"] == both["executions"].to_numpy().mean()
+    assert row["aoa_estimates"] == both["aoa_estimates"].to_numpy().mean()
     assert row["energy_j"] == pytest.approx(float(both["energy_j"].to_numpy().mean()))
     # Another content of the file is another design: nothing is taken from the parts.
     (folder / "mine.py").write_text(MINE.replace("% 10", "% 5"))
     done = access_av("designs", *arguments[:-1], "again")
     assert done.code == 0, done.err
     more = pl.read_parquet(folder / "again/designs.parquet")
-    assert (more["executions"] > rows["executions"]).sum() == 2
-    assert (more["executions"] == rows["executions"]).sum() == 2
+    assert (more["aoa_estimates"] > rows["aoa_estimates"]).sum() == 2
+    assert (more["aoa_estimates"] == rows["aoa_estimates"]).sum() == 2
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_what_is_no_plug_in_is_named(
         plug_in_files.load("estimator", text)
     (folder / "space.toml").write_text(f'estimator = ["{text}"]\n')
     for arguments in (
-        ("run", "short.toml", "--compare", f"estimator={text}"),
+        ("run", "short.toml", "--against", f"estimator={text}"),
         ("designs", "short.toml", "--space", "space.toml", "--runs", "1"),
     ):
         done = access_av(*arguments, columns=200)

@@ -42,17 +42,18 @@ def bartlett(snapshots: np.ndarray) -> float:
     return float(angles_rad[(abs(steering.conj() @ snapshots) ** 2).sum(axis=1).argmax()])
 
 
-def test_without_sigma_the_bound_is_taken_and_said_once() -> None:
+def test_without_sigma_the_bound_is_used_and_reported_once() -> None:
     with pytest.warns(UserWarning, match="Cramer-Rao") as said:
         result = access_av.simulate(SHORT, runs=3, keep_trajectories=True, estimator=bartlett)
     assert len(said) == 1
-    assert result.executions is not None
-    accepted = result.executions["accepted"]
+    assert result.aoa_estimates is not None
+    accepted = result.aoa_estimates["accepted"]
     assert accepted.mean() > 0.9  # type: ignore[operator]
     built_in = access_av.simulate(SHORT, runs=3, keep_trajectories=True)
-    assert built_in.executions is not None
+    assert built_in.aoa_estimates is not None
     sigmas = [
-        table["phase_sigma_rad"].median() for table in (result.executions, built_in.executions)
+        table["phase_sigma_rad"].median()
+        for table in (result.aoa_estimates, built_in.aoa_estimates)
     ]
     # The bound at the sensed SNR is what maximum likelihood states, fading aside.
     assert 0.8 < sigmas[0] / sigmas[1] < 1.25  # type: ignore[operator]
@@ -99,22 +100,22 @@ class Stating:
         return bartlett(snapshots), 0.02
 
 
-def test_an_estimator_is_billed_what_it_states_and_never_what_another_takes() -> None:
+def test_the_energy_of_a_plug_in_estimator_is_its_own_specification() -> None:
     board = access_av.Platform.load("jetson-agx-xavier-engine")
 
     def joules(column: str, **stated: Any) -> list[float | None]:
         runs = access_av.simulate(SHORT, estimator=lambda: Stating(**stated), platform=board).runs
-        return [runs[column].item(), runs["executions"].item()]
+        return [runs[column].item(), runs["aoa_estimates"].item()]
 
     assert joules("energy_j")[0] is None
-    energy_j, executions = joules("energy_executions_j", energy_per_execution_j=0.01)
-    assert energy_j == pytest.approx(0.01 * executions)
+    energy_j, aoa_estimates = joules("energy_aoa_estimates_j", energy_per_execution_j=0.01)
+    assert energy_j == pytest.approx(0.01 * aoa_estimates)
     # The energy is proportional to the processor time.
     one, two = (
-        joules("energy_executions_j", time_per_execution_s=time_s)[0] for time_s in (1e-3, 2e-3)
+        joules("energy_aoa_estimates_j", time_per_execution_s=time_s)[0] for time_s in (1e-3, 2e-3)
     )
     assert two == pytest.approx(2.0 * one)
-    assert 0.1 < one / (1e-3 * executions) < 30.0, "watts of a core"
+    assert 0.1 < one / (1e-3 * aoa_estimates) < 30.0, "watts of a core"
 
 
 @pytest.mark.parametrize(
@@ -131,21 +132,21 @@ def test_costs_that_cannot_be_are_refused(stated: dict[str, Any], named: str) ->
         access_av.simulate(SHORT, estimator=lambda: Stating(**stated))
 
 
-def test_a_method_that_the_platform_does_not_know_says_which_key_to_set() -> None:
+def test_an_unknown_method_names_the_platform_key_to_set() -> None:
     scenario = access_av.Scenario.load("paper").with_overrides(
         {"vehicle.estimator.method": "maximum-likelihood"}
     )
-    with pytest.raises(access_av.SettingsError, match=r"`wake_up\.due\.base_ms`") as refused:
+    with pytest.raises(access_av.SettingsError, match=r"`wake_up\.trigger\.base_ms`") as refused:
         access_av.simulate(scenario)
     assert "what an estimate takes" in str(refused.value)
-    stated = scenario.with_overrides({"vehicle.wake_up.due.base_ms": 20.0})
+    stated = scenario.with_overrides({"vehicle.wake_up.trigger.base_ms": 20.0})
     assert access_av.simulate(stated).runs["energy_j"].item() is None
 
 
 def test_no_angle_is_no_error() -> None:
     result = access_av.simulate(SHORT, keep_trajectories=True, estimator=lambda _: None)
-    assert result.executions is not None
-    assert set(result.executions["reason"]) == {"unusable"}
+    assert result.aoa_estimates is not None
+    assert set(result.aoa_estimates["reason"]) == {"unusable"}
 
 
 def raising(*_: Any) -> Any:
@@ -179,10 +180,10 @@ def test_a_policy_sees_the_situation_and_decides() -> None:
             return [ssb.pci == 2 for ssb in situation.sensed]
 
     result = access_av.simulate(SHORT, keep_trajectories=True, policy=Policy)
-    assert result.executions is not None
-    assert set(result.executions["pci"]) == {2}
-    assert set(result.executions["wake_up_time_s"]) == {0.5}
-    assert result.executions.height == len(seen) == result.runs["listened"][0]
+    assert result.aoa_estimates is not None
+    assert set(result.aoa_estimates["pci"]) == {2}
+    assert set(result.aoa_estimates["wake_up_time_s"]) == {0.5}
+    assert result.aoa_estimates.height == len(seen) == result.runs["bursts_received"][0]
     first = seen[0]
     assert [head.pci for head in first.heads] == [1, 2]
     assert first.heads[0].x_m == 205.0
@@ -223,7 +224,7 @@ class Smoothed:
 def driven(threads: int, **plug_ins: Any) -> dict[str, bytes]:
     """Bytes of all tables of six runs."""
     result = access_av.simulate(SHORT, runs=6, threads=threads, keep_trajectories=True, **plug_ins)
-    tables = {name: getattr(result, name) for name in ("runs", "trajectories", "executions")}
+    tables = {name: getattr(result, name) for name in ("runs", "trajectories", "aoa_estimates")}
     return {name: table.write_ipc(None).getvalue() for name, table in tables.items()}
 
 
@@ -363,7 +364,7 @@ def with_pose(pose: Any) -> type[Standing]:
     return type("Other", (Standing,), {"pose": lambda self, time_s: pose})
 
 
-def test_a_localizer_stands_in_for_the_built_in_one() -> None:
+def test_a_plug_in_localizer_replaces_the_built_in_one() -> None:
     result = access_av.simulate(SHORT, keep_trajectories=True, localizer=Standing)
     assert result.trajectories is not None
     moved = result.trajectories["x_m"].n_unique()
@@ -386,7 +387,7 @@ def test_poses_that_cannot_be_are_refused(pose: Any, named: str) -> None:
         access_av.simulate(SHORT, localizer=with_pose(pose))
 
 
-def test_late_angles_go_to_copies_of_a_localizer() -> None:
+def test_late_angles_are_processed_by_copies_of_a_localizer() -> None:
     class Filter(Standing):
         """Remembers in which order things came."""
 
@@ -403,8 +404,8 @@ def test_late_angles_go_to_copies_of_a_localizer() -> None:
 
     late = SHORT.with_overrides({"ssb_latency_ms": 70.0, "vehicle.wake_up.interval_ms": 200.0})
     result = access_av.simulate(late, keep_trajectories=True, localizer=Filter)
-    assert result.executions is not None
-    assert set(result.executions["reason"]) == {"consistent"}
+    assert result.aoa_estimates is not None
+    assert set(result.aoa_estimates["reason"]) == {"consistent"}
 
 
 @pytest.mark.parametrize("make", [access_av.Site, access_av.Vehicle, access_av.Scenario])

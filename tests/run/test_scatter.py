@@ -16,7 +16,7 @@ def test_used_angles_are_near_the_bound(k_db: float, most: float) -> None:
         {"site.rician_k_db": k_db, "vehicle.integrity.enabled": False}
     )
     result = access_av.simulate(scenario, runs=3, seed=5, keep_trajectories=True)
-    looks = result.executions.join(result.trajectories, on=["run", "time_s"])
+    looks = result.aoa_estimates.join(result.trajectories, on=["run", "time_s"])
     heads = {
         head["pci"]: head["position_m"]
         for head in json.loads(scenario.site.to_json())["radio_heads"]

@@ -31,13 +31,13 @@ def anees(name: str, runs: int, changes: Mapping[str, object] = MappingProxyType
     return consistency.anees
 
 
-def test_with_everything_drawn_as_stated_it_is_as_wrong_as_it_says() -> None:
+def test_the_localizer_is_consistent_with_errors_of_the_specified_deviations() -> None:
     # 60 runs: the interval of 500, 0.90 to 0.96, and half as wide again three times over.
     assert 0.8 < anees("yard", 60) < 1.15
 
 
 @pytest.mark.parametrize("name", ["yard-array-off", "yard-heads-off"])
-def test_a_world_that_is_not_as_believed_shows(name: str) -> None:
+def test_a_difference_between_truth_and_model_changes_the_results(name: str) -> None:
     assert anees(name, 4, EXACT) > 5.0
 
 

@@ -266,7 +266,7 @@ def test_examples_in_docstrings_run(name: str | None) -> None:
     assert doctest.DocTestRunner().run(example).failed == 0
 
 
-def test_coherent_sources_are_told_apart_by_subarrays() -> None:
+def test_coherent_sources_are_resolved_by_subarrays() -> None:
     rng = np.random.default_rng(5)
     angles = np.radians([60, 100])
     steering = np.exp(1j * np.pi * np.cos(angles) * np.arange(6)[:, None])

@@ -45,7 +45,7 @@ def azimuth_errors_deg(cells: list[nr.Cell], recording: Recording) -> dict[int, 
     return errors
 
 
-def test_a_scan_tells_azimuth_and_elevation(circle: Path) -> None:
+def test_a_scan_reports_azimuth_and_elevation(circle: Path) -> None:
     recording = Recording.open(circle / "iq")
     cells = [cell for cell in nr.scan_as_recorded(recording).cells if cell.mib_bits]
     errors = azimuth_errors_deg(cells, recording)

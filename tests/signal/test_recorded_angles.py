@@ -80,7 +80,7 @@ def test_json_has_the_promised_keys(access_av: Callable[..., Finished], tmp_path
     assert access_av("aoa", str(tmp_path / "array"), columns=60).code == 0
 
 
-def test_what_is_missing_is_said(tmp_path: Path) -> None:
+def test_missing_parts_are_reported(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no `annotations`"):
         estimate_bursts(write(tmp_path / "a", [20.0], annotations=[]))
     silent = {"core:datatype": "cf32_le", "core:sample_rate": 1e6, "core:version": "1.2.0"}

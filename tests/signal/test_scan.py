@@ -94,7 +94,7 @@ def test_searchers_of_several_threads_do_not_disturb_each_other() -> None:
     assert [cell.sfn for [cell] in found] == [0, 1, 2, 3]
 
 
-def test_a_searcher_says_what_it_cannot_use() -> None:
+def test_a_searcher_rejects_invalid_input_with_a_reason() -> None:
     with pytest.raises(RecordingError, match="below the 3840000 Hz"):
         nr.Searcher(1e6, centre_frequency_hz=0, ssb_freq_hz=0, scs_khz=15, antennas=1)
     for wrong, message in (
@@ -183,7 +183,7 @@ def test_channels_come_with_the_cells_searched_and_tracked_alike() -> None:
         receiver.push(samples)
 
 
-def test_search_says_what_it_cannot_use() -> None:
+def test_search_rejects_invalid_input_with_a_reason() -> None:
     samples = array_burst()
     with pytest.raises(RecordingError, match="below the 3840000 Hz"):
         nr.search(samples, 1e6, centre_frequency_hz=SSB_HZ)
@@ -212,7 +212,7 @@ def test_noise_holds_no_cell(access_av: Cli, tmp_path: Path) -> None:
     assert "no SSB found" in access_av("scan", file, *options).out
 
 
-def test_nothing_found_says_where_was_looked_and_what_to_try(
+def test_an_empty_scan_reports_the_searched_range_and_a_hint(
     access_av: Cli, tmp_path: Path
 ) -> None:
     file = tmp_path / "noise.cf32"
@@ -225,9 +225,7 @@ def test_nothing_found_says_where_was_looked_and_what_to_try(
 
 
 @pytest.mark.parametrize("scenario", ["yard", "paper-real-odometry-4"])
-def test_synthesized_drives_are_scanned_without_being_told_anything(
-    scenario: str, tmp_path: Path
-) -> None:
+def test_synthesized_drives_are_scanned_without_parameters(scenario: str, tmp_path: Path) -> None:
     # At 3500.0 MHz: on no raster at all.
     drive = synthesize(scenario, tmp_path, duration_s=0.1)
     site = json.loads(Scenario.load(scenario).site.to_json())
@@ -237,9 +235,7 @@ def test_synthesized_drives_are_scanned_without_being_told_anything(
     assert {cell.ssb_freq_hz for cell in cells} == {3.5e9}
 
 
-def test_real_recordings_are_scanned_without_being_told_anything(
-    access_av: Cli, data: Path
-) -> None:
+def test_real_recordings_are_scanned_without_parameters(access_av: Cli, data: Path) -> None:
     for name in ("oai-n78", "singtel-n1"):
         file = data / "captures" / f"{name}.sigmf-meta"
         [annotation] = json.loads(file.read_text())["annotations"]
@@ -253,7 +249,7 @@ def test_real_recordings_are_scanned_without_being_told_anything(
         assert abs(cell["sample_start"] - annotation["core:sample_start"]) <= 6
 
 
-def test_annotated_calibration_and_spacing_are_believed(access_av: Cli, data: Path) -> None:
+def test_annotated_calibration_and_spacing_are_used(access_av: Cli, data: Path) -> None:
     file = data / "captures" / "semireal4_singtel-n1_day1_array1.sigmf-meta"
     cells = json.loads(access_av("scan", file, "--json").out)
     errors_deg = []
@@ -267,7 +263,7 @@ def test_annotated_calibration_and_spacing_are_believed(access_av: Cli, data: Pa
     assert np.mean(errors_deg) < 1.3 * 2.2
 
 
-def test_what_a_receiver_hears_has_angles_as_good_as_they_say() -> None:
+def test_angles_of_received_cells_agree_with_their_standard_deviations() -> None:
     carrier: dict[str, Any] = {"centre_frequency_hz": 3.7008e9, "ssb_freq_hz": 3.7008e9}
     receiver = nr.Receiver(7.68e6, scs_khz=30, antennas=4, **carrier)
     rng, cells = np.random.default_rng(24), []

@@ -159,7 +159,7 @@ def test_a_consistent_localizer_is_found_consistent() -> None:
     assert found.predicted_rms_error_m == pytest.approx(found.rms_error_m, rel=0.05)
 
 
-def test_one_too_sure_of_itself_is_found_out() -> None:
+def test_an_overconfident_localizer_is_detected() -> None:
     found = Consistency.of(drives(np.random.default_rng(3), runs=20, steps=200, stretch=1.5))
     assert found.anees == pytest.approx(2.25, rel=0.1)
     assert found.in_band is not None
@@ -202,7 +202,7 @@ def test_the_start_can_be_left_out_and_searching_counts_nowhere() -> None:
     assert Consistency.of(searching).rms_error_m < 10.0  # type: ignore[operator]
 
 
-def test_without_covariances_only_errors_are_told() -> None:
+def test_without_covariances_only_errors_are_reported() -> None:
     table = drives(np.random.default_rng(5), runs=2, steps=10).with_columns(
         pl.lit(None, pl.Float64).alias(f"covariance_{axes}_m2") for axes in ("xx", "xy", "yy")
     )

@@ -42,8 +42,8 @@ def made(real: Driven, name: str, scenario: _core.Scenario, level_m: float, seed
         scenario=scenario,
         errors_m=errors_m,
         levels_m=np.full(errors_m.shape, np.nan, dtype=np.float32),
-        executions=np.full(RUNS, 100),
-        listened=np.full(RUNS, 50),
+        aoa_estimates=np.full(RUNS, 100),
+        bursts_received=np.full(RUNS, 50),
         seeds=np.full(RUNS, seed),
         duration_s=600.0,
         integrity=None,
@@ -124,10 +124,12 @@ def test_seeds_agree_or_the_difference_is_judged(
         count = 150 if interval_ms is None else bursts[interval_ms]
         # Drives of different operations do not resemble each other.
         found = made(real, name, scenario, level_m, seed + count)
-        return replace(found, listened=np.full(RUNS, count), executions=np.full(RUNS, 3 * count))
+        return replace(
+            found, bursts_received=np.full(RUNS, count), aoa_estimates=np.full(RUNS, 3 * count)
+        )
 
-    believed = made(real, "as it is", PLANT.scenario(), 0.2, 1)
-    found = operate(PLANT, Targets.of(PLANT), believed, RUNS, 1, simulate, lambda _: None)
+    nominal = made(real, "as it is", PLANT.scenario(), 0.2, 1)
+    found = operate(PLANT, Targets.of(PLANT), nominal, RUNS, 1, simulate, lambda _: None)
     assert found.point is not None
     assert found.chosen in found.front
     assert found.agreement is agreement

@@ -58,7 +58,7 @@ def test_drawings_give_the_same_plant_or_name_what_they_leave_out(
     drawing.document.saveas(file)
     # The scale by hand: what $INSUNITS says is only proposed.
     scale = ("--metres-per-unit", repr(unit_m))
-    options = [f"--{it}={file}" for it in ("road", "heads", "walls")]
+    options = [f"--{it}={file}" for it in ("road", "heads-file", "walls")]
     site, done = new(access_av, tmp_path, *options, *scale)
     its = course(site["road"])
     assert apart_m(its, truth) < SAME_M
@@ -120,7 +120,7 @@ def test_maps_give_the_same_plant(
     assert moved.length_m == pytest.approx(np.hypot(*np.diff(truth, axis=0).T).sum(), abs=SAME_M)
 
 
-def test_a_map_without_walls_asked_for_names_what_it_leaves_out(
+def test_an_import_without_walls_lists_the_skipped_entities(
     access_av: Callable[..., Any], tmp_path: Path
 ) -> None:
     pytest.importorskip("pyproj", reason="the extra `geo` is not installed")
@@ -133,7 +133,7 @@ def test_a_map_without_walls_asked_for_names_what_it_leaves_out(
         {"type": "LineString", "coordinates": [[11.575, 48.137], [11.576, 48.138]]},
     ]
     file.write_text(json.dumps(held), "utf-8")
-    _, done = new(access_av, tmp_path, "--road", file, "--heads", file)
+    _, done = new(access_av, tmp_path, "--road", file, "--heads-file", file)
     for what in ("Polygon: 1", "Feature without a geometry: 1", "CircularString: 1"):
         assert f"Not imported: {file}: {what}" in done.out
     assert f"Not imported: {file}: LineString: 1" in done.out
@@ -349,10 +349,10 @@ def test_flat_radio_heads_are_warned_of(
     table = tmp_path / "flat.csv"
     table.write_text("x_m,y_m,z_m\n5,5,0\n9,5,0\n", "utf-8")
     for heads in (file, table):
-        _, done = new(access_av, tmp_path, "--heads", heads, "--metres-per-unit", "1")
+        _, done = new(access_av, tmp_path, "--heads-file", heads, "--metres-per-unit", "1")
         assert "all radio heads are at height 0 m" in done.err
     table.write_text("x_m,y_m,z_m\n5,5,0\n9,5,6\n", "utf-8")
-    _, done = new(access_av, tmp_path, "--heads", table)
+    _, done = new(access_av, tmp_path, "--heads-file", table)
     assert "height 0 m" not in done.err.replace("at height 0 m, as", "")
 
 
@@ -394,7 +394,7 @@ def test_nothing_of_the_example_remains_in_an_imported_plant(
     pytest.importorskip("pyproj", reason="the extra `geo` is not installed")
     source, file = tmp_path / "plant.geojson", tmp_path / "new.toml"
     plans.write_map(source, plans.CORNERS, None, MUNICH, kind="features")
-    options = [f"--{it}={source}" for it in parts]
+    options = [f"--{it.replace('heads', 'heads-file')}={source}" for it in parts]
     done = access_av("new", kind, file, *options, "--origin", "48.137,11.575", columns=500)
     assert done.code == 0, done.err
     text = file.read_text("utf-8")

@@ -74,10 +74,10 @@ def test_a_road_is_the_same_after_it_was_written_and_read(
     site.write_text(bends.to_toml(), "utf-8")
     written, again = tmp_path / file, tmp_path / "again.toml"
     origin = ("--origin", "48.1,11.5") if file.startswith("degrees") else ()
-    german = ("--german",) if file.startswith("german") else ()
-    assert access_av("export", site, written, *origin, *german).code == 0
+    decimal_comma = ("--decimal-comma",) if file.startswith("german") else ()
+    assert access_av("export", site, written, *origin, *decimal_comma).code == 0
     heads = written.with_name(f"{written.stem}-heads.csv") if file.endswith("csv") else written
-    new = access_av("new", "site", again, "--road", written, "--heads", heads, *origin)
+    new = access_av("new", "site", again, "--road", written, "--heads-file", heads, *origin)
     assert new.code == 0, new.err
     read_again = json.loads(Site.load(str(again)).to_json())
     assert apart_m(course(read_again), reference) < SAME_M
@@ -131,7 +131,7 @@ def test_a_drawing_gives_the_same_road(
     drawn, site = tmp_path / "plant.dxf", tmp_path / "site.toml"
     drawing(drawn)
     layers = ("--road-layer", "WAY", "--heads-layer", "CELLS")
-    files = ("--road", drawn, "--heads", drawn)
+    files = ("--road", drawn, "--heads-file", drawn)
     # From the start to the end of the first straight: 200 m.
     scale = ("--two-points", "0,0,200000,0", "--length-m", "200")
     done = access_av("new", "site", site, *files, *layers, *scale)
@@ -220,7 +220,7 @@ def test_files_that_are_no_plant_are_named(
     if heads is not None:
         its = tmp_path / "heads.geojson"
         its.write_text(json.dumps(heads), "utf-8")
-        more = ("--heads", its)
+        more = ("--heads-file", its)
     done = access_av("new", "plant", tmp_path / "new.toml", "--road", file, *more, columns=500)
     assert done.code == 2
     assert said in done.err
@@ -232,7 +232,7 @@ def test_names_with_markup_stay_names(access_av: Callable[..., Any], tmp_path: P
     heads = tmp_path / "heads.geojson"
     heads.write_text(geojson.text(Drawn(heads=[Head(name, 60.0, 25.0, 8.0, 5)]), None), "utf-8")
     file = tmp_path / "new.toml"
-    assert access_av("new", "site", file, "--heads", heads).code == 0
+    assert access_av("new", "site", file, "--heads-file", heads).code == 0
     assert json.loads(Site.load(str(file)).to_json())["radio_heads"][0]["name"] == name
 
 
@@ -279,7 +279,7 @@ def test_walls_are_the_same_after_they_were_written_and_read(
     (tmp_path / "site.toml").write_text(walled.to_toml(), "utf-8")
     assert access_av("export", tmp_path / "site.toml", file, *origin).code == 0
     done = access_av(
-        "new", "site", again, *(f"--{it}={file}" for it in ("road", "heads", "walls")), *origin
+        "new", "site", again, *(f"--{it}={file}" for it in ("road", "heads-file", "walls")), *origin
     )
     assert done.code == 0, done.err
     walls = json.loads(Site.load(str(again)).to_json())["walls"]
@@ -404,6 +404,6 @@ def test_pictures_that_cannot_be_used_are_named(
     assert not (tmp_path / "site.toml").exists()
 
 
-def test_a_jpeg_says_its_size_in_its_frame(tmp_path: Path) -> None:
+def test_the_size_of_a_jpeg_is_read_from_its_frame_header(tmp_path: Path) -> None:
     (tmp_path / "plan.jpg").write_bytes(JPEG)
     assert size_px(tmp_path / "plan.jpg") == (300, 200)

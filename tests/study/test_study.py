@@ -19,7 +19,7 @@ import layout
 from access_av import Plant, Scenario, SettingsError, drives, simulate, study_plant
 from access_av.errors import InputError
 from access_av.run.error_bound import along_route
-from access_av.run.pairs import Errors
+from access_av.run.pairs import ErrorSamples
 from access_av.statistics.paired import paired_difference
 from access_av.study.compare import beside_first
 from access_av.study.compare import table as compared_table
@@ -92,7 +92,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("study")
     (folder / "short.toml").write_text(PLANT, "utf-8")
     command = ["access-av", "study", str(folder / "short.toml"), "--runs", str(RUNS)]
-    more = ["--always-mend", "--vary", "site.rician_k_db=3", "--out", str(folder / "out")]
+    more = ["--force-remedies", "--sweep", "site.rician_k_db=3", "--out", str(folder / "out")]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", [*command, *more])
         with pytest.raises(SystemExit) as stopped:
@@ -136,7 +136,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     commands = {
         "run": ["run", folder / "short.toml", "--runs", "2"],
         "bound": ["bound", folder / "short.toml"],
-        "integrity": ["integrity", folder / "short.toml", "--runs", "1", "--mismatch", "none"],
+        "integrity": ["integrity", folder / "short.toml", "--runs", "1", "--fault", "none"],
         "locate": located,
     }
     for name, command in commands.items():
@@ -178,7 +178,7 @@ def percentile(values: Any, percent: float) -> float:
 def test_percentiles_and_shares_are_those_of_the_errors(
     results: Path, said: dict[str, Any], page: str
 ) -> None:
-    for key, variant in (("believed", "as it is"), ("poor", "poor line of sight")):
+    for key, variant in (("nominal", "as it is"), ("poor_los", "poor line of sight")):
         found = errors(results, variant)
         assert said[key]["runs"] == len(found)
         assert said[key]["target_error_m"] == pytest.approx(percentile(found, 90.0))
@@ -240,7 +240,7 @@ def test_energy_is_joules_times_trips_times_vehicles(results: Path, said: dict[s
     assert parts["receiver"] == pytest.approx(chosen["listening_value_j"][0] * 40 * 6 / 3600.0)
 
 
-def test_energy_of_a_trip_is_what_the_platform_says_of_its_drives(results: Path) -> None:
+def test_the_energy_of_a_trip_follows_from_the_platform_and_its_drives(results: Path) -> None:
     from access_av.device.platform import Platform
 
     points = pl.read_parquet(results / "points.parquet").filter("recommended")
@@ -248,10 +248,12 @@ def test_energy_of_a_trip_is_what_the_platform_says_of_its_drives(results: Path)
     assert few.height == points["runs"][0]
     vehicle = Scenario.load(str(results / "recommended.toml")).vehicle
     platform = Platform.load("jetson-agx-xavier-engine").core
-    executions, listened = (
-        round(few[name].to_numpy().mean()) for name in ("executions", "listened")
+    aoa_estimates, bursts_received = (
+        round(few[name].to_numpy().mean()) for name in ("aoa_estimates", "bursts_received")
     )
-    energy = platform.energy_j(vehicle, executions, listened, few["duration_s"][0], "value")
+    energy = platform.energy_j(
+        vehicle, aoa_estimates, bursts_received, few["duration_s"][0], "value"
+    )
     assert energy is not None
     assert points["estimates_value_j"][0] == pytest.approx(energy[0])
     assert points["listening_value_j"][0] == pytest.approx(energy[1])
@@ -337,7 +339,9 @@ def test_places_are_those_of_the_road(results: Path, said: dict[str, Any], page:
     heads = np.array([[10.0, 20.0], [60.0, 10.0]])
     away = heads - [at["x_m"], at["y_m"]]
     known = ((away[:, 1] / (away**2).sum(axis=1)) ** 2).sum()
-    assert at["dilution_of_degree_m"] == pytest.approx(np.radians(1.0) / np.sqrt(known), rel=1e-3)
+    assert at["along_road_error_per_degree_m"] == pytest.approx(
+        np.radians(1.0) / np.sqrt(known), rel=1e-3
+    )
 
 
 def test_variants_stand_side_by_side(results: Path, page: str) -> None:
@@ -414,7 +418,7 @@ def test_a_drive_is_played_and_whoever_wants_less_motion_has_the_slider(results:
         browser.wait_for(f"!{told}.startsWith('0.0 s: ')")
 
 
-def test_the_played_drive_is_the_first_one(results: Path) -> None:
+def test_the_animated_drive_is_the_first_one(results: Path) -> None:
     text = (results / "report.html").read_text("utf-8")
     specs = json.loads(re.findall(r"const charts = (\{.*\});\n", text)[0])
     [steps] = [
@@ -503,7 +507,7 @@ def test_each_target_is_judged_on_its_stretch_and_all_by_the_worst(
     route = along_route(Plant.from_toml(PLANT).scenario())
     rows = pl.read_parquet(results / "targets.parquet")
     drives = pl.read_parquet(results / "drives.parquet")
-    for key, variant in (("believed", "as it is"), ("poor", "poor line of sight")):
+    for key, variant in (("nominal", "as it is"), ("poor_los", "poor line of sight")):
         table = pl.read_parquet(results / "errors.parquet").filter(variant=variant)
         time_s = table.filter(run=0).sort("time_s")["time_s"]
         along_m = np.interp(time_s, route["time_s"], route["along_m"])
@@ -531,7 +535,7 @@ def test_reliability_is_counted_from_the_drives(
 ) -> None:
     drives = pl.read_parquet(results / "drives.parquet")
     steps = ("ok_steps", "level_steps", "suspected_steps", "unavailable_steps")
-    named = [("as it is", said["believed"]), ("poor line of sight", said["poor"])]
+    named = [("as it is", said["nominal"]), ("poor line of sight", said["poor_los"])]
     named += [(it["name"], it) for it in said["remedies"]]
     for variant, figures in named:
         mine = drives.filter(variant=variant)
@@ -541,7 +545,7 @@ def test_reliability_is_counted_from_the_drives(
         reasons = ("level", "suspected", "contradicted")
         for reason, column in zip(reasons, steps[1:], strict=True):
             assert figures["not_ok_shares"][reason] == pytest.approx(sums[column] / total)
-        assert figures["beyond_level_while_ok"] == mine["exceedances"].sum()
+        assert figures["integrity_failures"] == mine["exceedances"].sum()
         found = errors(results, variant)
         lost_s = (found > 5.0).mean(axis=1) * mine["duration_s"][0]
         assert figures["lost_runs"] == int((lost_s > 5.0).sum()) == mine["is_lost"].sum()
@@ -574,14 +578,14 @@ def test_the_recommended_point_is_entered_as_a_file_that_run_accepts(
     counts = []
     for seed, runs in drives.group_by("seed", maintain_order=True).len().iter_rows():
         again = simulate(Scenario.load(str(file)), runs=runs, seed=seed, errors_every=5)
-        counts += again.runs["executions"].to_list()
+        counts += again.runs["aoa_estimates"].to_list()
         assert again.errors_m is not None
         mine = errors(results, points["variant"][0])[drives["seed"].to_numpy() == seed]
         assert pytest.approx(mine, rel=1e-5) == np.hypot(*again.errors_m.T).T
         trip_j = said["recommended"]["trip_j"]
         energy_j = again.runs["energy_j"].mean()
         assert trip_j["low"] <= energy_j <= trip_j["high"]
-    assert counts == drives["executions"].to_list()
+    assert counts == drives["aoa_estimates"].to_list()
 
 
 def test_rivals_are_compared_in_pairs_and_equivalent_ones_named(
@@ -631,7 +635,7 @@ def test_modes_that_change_the_wake_up_are_driven_apart() -> None:
 
     def driven(scenario: Scenario, mode: int) -> list[int]:
         in_mode = scenario.with_overrides({"vehicle.platform.mode": mode})
-        return simulate(in_mode, runs=2).runs["executions"].to_list()
+        return simulate(in_mode, runs=2).runs["aoa_estimates"].to_list()
 
     assert driven(scenario, 1) == driven(scenario, 2) == driven(scenario, 3)
     assert driven(fixed, 0) == driven(fixed, 5)
@@ -647,7 +651,7 @@ def places_of(dilution_m: list[float | None], visible: list[int]) -> pl.DataFram
             "y_m": np.zeros(count),
             "target_error_m": np.where(np.arange(count) == 150, 1.0, 0.1),
             "bound_m": np.full(count, 0.1),
-            "dilution_of_degree_m": pl.Series(dilution_m, dtype=pl.Float64),
+            "along_road_error_per_degree_m": pl.Series(dilution_m, dtype=pl.Float64),
             "heads_visible": visible,
             "best_snr_db": np.full(count, 20.0),
         }
@@ -739,7 +743,7 @@ def test_nothing_unguarded_is_studied() -> None:
 
 
 @pytest.mark.parametrize("name", Plant.names())
-def test_each_shipped_plant_is_told_a_point_of_the_front(name: str) -> None:
+def test_each_shipped_plant_gets_a_recommended_point_of_the_pareto_front(name: str) -> None:
     """On the last stretch of its road; `benches/shipped_plants.py` drives all of it."""
     plant = Plant.load(name)
     road_m = along_route(plant.scenario())["along_m"].max()
@@ -749,21 +753,19 @@ def test_each_shipped_plant_is_told_a_point_of_the_front(name: str) -> None:
     assert found.recommended in found.front
     assert found.point is not None
     assert found.recommendation.agreement in Agreement
-    driven = [found.believed, found.poor, *(it.driven for it in found.mended)]
+    driven = [found.nominal, found.poor_los, *(it.driven for it in found.remedies)]
     driven += [it.driven for it in found.points]
     assert all(it.scenario.vehicle.alert_limit_m is not None for it in driven)
     assert all(it.ok_share is not None for it in driven)
 
 
-def test_the_command_names_what_it_cannot_use(
-    access_av: Callable[..., Any], tmp_path: Path
-) -> None:
+def test_the_command_names_invalid_input(access_av: Callable[..., Any], tmp_path: Path) -> None:
     assert access_av("study", tmp_path).code == 2
     (tmp_path / "file").write_text("", "utf-8")
     done = access_av("study", "bends", "--out", tmp_path / "file")
     assert done.code == 2
     assert "is a file" in done.err
-    done = access_av("study", "bends", "--vary", "site.rician_k_db", "--out", tmp_path / "out")
+    done = access_av("study", "bends", "--sweep", "site.rician_k_db", "--out", tmp_path / "out")
     assert done.code == 2
     assert "KEY=a,b,c" in done.err
 
@@ -794,9 +796,9 @@ def test_whoever_closes_the_pipe_still_gets_the_files(
     assert {"report.html", "study.json", "manifest.json", "plant.toml"} <= written
 
 
-def errors_of(name: str, errors_m: np.ndarray) -> Errors:
+def errors_of(name: str, errors_m: np.ndarray) -> ErrorSamples:
     """Ten drives of 100 s."""
-    return Errors(name=name, errors_m=errors_m, duration_s=100.0)
+    return ErrorSamples(name=name, errors_m=errors_m, duration_s=100.0)
 
 
 def test_a_lost_drive_is_stated_first_in_its_row() -> None:

@@ -24,10 +24,10 @@ from access_av import (
     statistics,
 )
 from access_av.device.platform import Platform
-from access_av.paper.sampled_readings import sample
+from access_av.paper.sampled_interpretations import sample
 from access_av.paper.unknowns import sobol
 from access_av.run.campaign import Campaign
-from access_av.run.result_cache import Parts
+from access_av.run.result_cache import ResultCache
 from conftest import ROOT
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def test_simulation(scenario: str, changes: dict[str, object]) -> None:
     found = simulate(
         Scenario.load(scenario).with_overrides(changes), runs=1, keep_trajectories=True
     )
-    for name in ("steps", "runs", "trajectories", "executions"):
+    for name in ("steps", "runs", "trajectories", "aoa_estimates"):
         check(name, getattr(found, name))
     assert found.trajectories is not None
     check("nees", statistics.nees(found.trajectories))
@@ -142,9 +142,10 @@ def test_bound() -> None:
 
 
 def test_evaluation(quick_study: Path) -> None:
-    names = ("operating_points", "errors", "snr", "ablations", "fixed_front", "ours", "fair",
+    names = ("operating_points", "errors", "snr", "ablations", "fixed_front", "proposed_vs_paper",
+             "equal_information",
              "evaluation_runs", "resamples",
-             "freedoms")  # fmt: skip
+             "fit_degrees_of_freedom")  # fmt: skip
     for name in names:
         check(name, pl.read_parquet(quick_study / "latest" / f"{name}.parquet"))
     check("claims", json.loads((quick_study / "latest/claims.json").read_text()))
@@ -154,19 +155,19 @@ def test_chosen(access_av: Callable[..., Finished]) -> None:
     done = access_av("chosen", "--runs", "1", "--json")
     assert done.code == 0, done.err
     found = json.loads(done.out)
-    check("chosen", found)
+    check("assumptions", found)
     shipped = [one for one in found if one["is_shipped"]]
-    assert len({one["rms_error_m"] for one in shipped}) == 1, "the same reading each time"
+    assert len({one["rms_error_m"] for one in shipped}) == 1, "the same interpretation each time"
     assert len(found) > 2 * len(shipped) - 1, "each has an alternative"
 
 
 def test_unknowns() -> None:
     platform = Platform.load("jetson-agx-xavier")
     with tempfile.TemporaryDirectory() as parts:
-        kept = Campaign(Parts(Path(parts)))
+        kept = Campaign(ResultCache(Path(parts)))
         drawn = sample(kept, platform, worlds=2, controllers=2, runs=1, everything=True)
     assert drawn is not None
-    check("unknowns", pl.DataFrame([vars(it) for it in sobol(drawn, 1, count=3).indices]))
+    check("sensitivity", pl.DataFrame([vars(it) for it in sobol(drawn, 1, count=3).indices]))
 
 
 def test_cells_and_bursts(access_av: Callable[..., Finished], data: Path) -> None:
@@ -188,9 +189,9 @@ def test_cells_without_a_recording() -> None:
 
 
 def test_command(access_av: Callable[..., Finished]) -> None:
-    done = access_av("columns", "executions", columns=100)
+    done = access_av("columns", "aoa_estimates", columns=100)
     assert done.code == 0
-    for name in columns.TABLES["executions"].columns:
+    for name in columns.TABLES["aoa_estimates"].columns:
         assert re.search(rf"^ {name} ", done.out, flags=re.MULTILINE)
     assert "no angle could be estimated" in done.out
     told = json.loads(access_av("columns", "--json").out)
@@ -202,4 +203,4 @@ def test_command(access_av: Callable[..., Finished]) -> None:
     assert access_av("columns", columns=60).code == 0
     wrong = access_av("columns", "executiones")
     assert wrong.code == 2
-    assert "executions" in wrong.err
+    assert "aoa_estimates" in wrong.err

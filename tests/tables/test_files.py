@@ -47,7 +47,7 @@ def test_latest_points_to_the_newest(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert json.loads((tmp_path / "results/latest/claims.json").read_text()) == []
 
 
-def test_a_directory_elsewhere_is_used_as_it_is_and_leaves_no_link(
+def test_another_output_directory_is_used_without_a_latest_link(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -68,7 +68,7 @@ def test_a_named_directory_under_results_is_the_latest_too(
     assert (tmp_path / "results/latest/table.parquet").samefile(directory.path / "table.parquet")
 
 
-def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
+def test_an_existing_file_that_blocks_the_output_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(NotADirectoryError, match="--out takes a directory"):
         ResultsDirectory.create("run", tmp_path / "file")

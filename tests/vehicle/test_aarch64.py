@@ -33,8 +33,8 @@ def poses(command: list[str | Path], drive: Path, folder: Path, sources: str) ->
     odometry = f'odometry.file = "{drive}/odometry.csv"\n'
     text = f'name = "played"\npace = "fast"\n{odometry}{sources}output.tum = "{tum}"\n'
     settings.write_text(text, encoding="utf-8")
-    believed = ["--site", drive / "site.toml", "--vehicle", drive / "vehicle.toml"]
-    subprocess.run([*command, *believed, settings], check=True, timeout=120)
+    nominal = ["--site", drive / "site.toml", "--vehicle", drive / "vehicle.toml"]
+    subprocess.run([*command, *nominal, settings], check=True, timeout=120)
     return tum.read_bytes()
 
 

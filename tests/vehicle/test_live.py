@@ -29,13 +29,13 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One second of samples: a vehicle with one clock, without monitor, receives every SSB."""
     out = tmp_path_factory.mktemp("live")
     scenario = access_av.Scenario.load("paper-real-odometry-2").with_overrides(
-        {"vehicle.integrity.enabled": False, "vehicle.receiver.lateness_std_s": 0.0}
+        {"vehicle.integrity.enabled": False, "vehicle.receiver.angle_time_offset_std_s": 0.0}
     )
     access_av.synthesize(scenario, out, duration_s=1.0, continuous=True)
     return out
 
 
-def believed(directory: Path) -> tuple[access_av.Site, access_av.Vehicle]:
+def nominal(directory: Path) -> tuple[access_av.Site, access_av.Vehicle]:
     vehicle = access_av.Vehicle.load(str(directory / "vehicle.toml"))
     return (
         access_av.Site.load(str(directory / "site.toml")),
@@ -49,7 +49,7 @@ def antennas(directory: Path) -> np.ndarray:
 
 
 def test_samples_as_they_come_make_the_poses_of_locate(drive: Path) -> None:
-    site, vehicle = believed(drive)
+    site, vehicle = nominal(drive)
     recording, odometry_file = drive / "iq.sigmf-meta", drive / "odometry.csv"
     located = access_av.locate(site, odometry_file, recording, vehicle=vehicle)
     samples, odometry = antennas(drive), pl.read_csv(odometry_file)
@@ -70,18 +70,18 @@ def test_samples_as_they_come_make_the_poses_of_locate(drive: Path) -> None:
             row = next(rows, None)
         live.samples(first / RATE_HZ, samples[:, first : first + block])
         angles += live.outcomes()
-    live.settle()
+    live.flush()
     angles += live.outcomes()
     assert [it.phase_rad for it in angles] == located.angles["phase_rad"].to_list()
     assert [it.accepted for it in angles] == located.angles["accepted"].to_list()
     assert len(poses) > 40
     assert poses == list(located.poses.select("x_m", "y_m", "heading_rad").iter_rows())
     assert sum(head.accepted + head.refused for head in live.heads()) == len(angles)
-    assert live.energy().executions == len(angles)
+    assert live.energy().aoa_estimates == len(angles)
 
 
-def test_samples_missing_untold_cost_no_accuracy(drive: Path) -> None:
-    site, vehicle = believed(drive)
+def test_unreported_gaps_do_not_reduce_the_accuracy(drive: Path) -> None:
+    site, vehicle = nominal(drive)
     samples, odometry = antennas(drive), pl.read_csv(drive / "odometry.csv")
     lost = round(7e-3 * RATE_HZ)
     at = round(0.45 * RATE_HZ)
@@ -95,7 +95,7 @@ def test_samples_missing_untold_cost_no_accuracy(drive: Path) -> None:
                 row = rows.pop(0)
                 live.odometry(row["time_s"], row["speed_mps"], distance_m=row["distance_m"])
             live.samples(first / RATE_HZ, given[:, first : first + block])
-        live.settle()
+        live.flush()
         angles.append({(it.pci, round(it.time_s, 3)): it for it in live.outcomes()})
         poses.append(live.status(float(odometry["time_s"][-1])).pose)
     whole, cut = angles
@@ -110,7 +110,7 @@ def test_samples_missing_untold_cost_no_accuracy(drive: Path) -> None:
 
 
 def test_what_cannot_be_is_refused_and_changes_nothing(drive: Path) -> None:
-    site, vehicle = believed(drive)
+    site, vehicle = nominal(drive)
     with pytest.raises(ValueError, match="both"):
         access_av.Live(site, vehicle, rate_hz=RATE_HZ)
     with pytest.raises(ValueError, match="0 Hz"):
@@ -137,7 +137,7 @@ def test_what_cannot_be_is_refused_and_changes_nothing(drive: Path) -> None:
 
 
 def test_time_stamps_are_validated_against_arrivals_and_predecessors(drive: Path) -> None:
-    site, vehicle = believed(drive)
+    site, vehicle = nominal(drive)
     live = access_av.Live(site, vehicle)
 
     def drives(time_s: float, arrival_s: float) -> None:

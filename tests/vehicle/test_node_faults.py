@@ -146,7 +146,7 @@ def valid(messages: list[dict[str, Any]]) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_the_broker_says_not_localized_after_the_node_has_ended(
+def test_the_broker_publishes_not_localized_after_the_node_has_ended(
     start: Callable[[Broker], Driven], number: signal.Signals
 ) -> None:
     broker = Broker()

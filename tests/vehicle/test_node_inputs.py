@@ -32,7 +32,7 @@ pytestmark = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("faults")
-    changes = {"vehicle.receiver.lateness_std_s": 0.0, "vehicle.acceleration_mps2": 2.0}
+    changes = {"vehicle.receiver.angle_time_offset_std_s": 0.0, "vehicle.acceleration_mps2": 2.0}
     scenario = access_av.Scenario.load("yard").with_overrides(changes)
     access_av.synthesize(scenario, folder, duration_s=DURATION_S)
     return folder

@@ -36,7 +36,7 @@ pytestmark = pytest.mark.skipif(
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recorded drive that begins in motion."""
     folder = tmp_path_factory.mktemp("reports")
-    changes = {"vehicle.receiver.lateness_std_s": 0.0, "vehicle.acceleration_mps2": 2.0}
+    changes = {"vehicle.receiver.angle_time_offset_std_s": 0.0, "vehicle.acceleration_mps2": 2.0}
     scenario = access_av.Scenario.load("yard").with_overrides(changes)
     access_av.synthesize(scenario, folder, duration_s=DURATION_S)
     return folder

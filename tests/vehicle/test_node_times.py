@@ -44,7 +44,7 @@ Message = dict[str, Any]
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("drive")
-    one_clock = {"vehicle.receiver.lateness_std_s": 0.0}
+    one_clock = {"vehicle.receiver.angle_time_offset_std_s": 0.0}
     scenario = access_av.Scenario.load("yard").with_overrides(one_clock)
     log_angles(scenario, folder, duration_s=DURATION_S)
     wake_up_every(folder, 0.02)

@@ -37,13 +37,13 @@ def can_soapy(settings: Path, options: list[str]) -> bool:
 def test_a_radio_is_on_for_the_bursts_alone(tmp_path: Path) -> None:
     settings = tmp_path / "node.toml"
     drive = tmp_path / "drive"
-    believed = ["--site", "yard", "--vehicle", "carrier"]
+    nominal = ["--site", "yard", "--vehicle", "carrier"]
     stub = (
         'name = "radio"\nmessages = ["-"]\n[samples]\nsource = "soapy"\ndevice = "driver=replay"\n'
     )
     stub += "[samples.stream]\nrate_msps = 3.84\ncentre_mhz = 3500.0\nantennas = [0, 1, 2, 3]\n"
     settings.write_text(stub, encoding="utf-8")
-    if not can_soapy(settings, believed):
+    if not can_soapy(settings, nominal):
         pytest.skip(f"{NODE} is built without the feature `soapy`; `make test-radio` builds it")
     access_av.synthesize("yard", drive, duration_s=DURATION_S, continuous=True)
     wake_up_every(drive, INTERVAL_S)

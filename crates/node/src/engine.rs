@@ -18,14 +18,14 @@ use onboard::{Custom, Live};
 use crate::angle_watch::AngleWatch;
 use crate::clock::DriveClock;
 use crate::events::Collapse;
-use crate::gate::{Gate, Windows};
+use crate::gate::{BurstWindows, RxWindow};
 use crate::inbox::{Block, Command, Inbox, Input, Level};
 use crate::interruption::Interruptions;
 use crate::sink::{By, Distributor, PoseRecord, Record};
 use crate::state::{self, StateStore};
-use crate::statistics::{Punctuality, SourceHealth};
+use crate::statistics::{LatencyStats, SourceHealth};
 use crate::supervisor::Watchdog;
-use crate::web::Board;
+use crate::web::StatusBoard;
 
 /// Maximum interval between two checks of the time without input.
 pub(crate) const TICK: Duration = Duration::from_millis(50);
@@ -38,7 +38,7 @@ const STATUS_S: f64 = 1.0;
 const ARRIVALS: usize = 64;
 
 /// Configuration of the pipeline.
-pub struct Setup {
+pub struct NodeConfig {
     /// Site.
     pub site: Site,
     /// Vehicle.
@@ -49,7 +49,7 @@ pub struct Setup {
     pub stream: Option<StreamConfig>,
 }
 
-impl Setup {
+impl NodeConfig {
     /// Whether site, vehicle and platform are equal.
     fn is_of_same_files(&self, other: &Self) -> bool {
         self.site == other.site && self.vehicle == other.vehicle && self.platform == other.platform
@@ -71,7 +71,7 @@ impl Setup {
 }
 
 /// Function that loads site, vehicle and platform again.
-pub type Load = Box<dyn Fn() -> anyhow::Result<Setup> + Send>;
+pub type Load = Box<dyn Fn() -> anyhow::Result<NodeConfig> + Send>;
 
 /// Request to load site and vehicle again, for example by SIGHUP.
 pub struct Reload {
@@ -91,14 +91,14 @@ struct Earlier {
 
 /// Pipeline with its clocks, monitors, events and outputs, independent of the kind of input.
 pub struct Engine {
-    setup: Setup,
+    setup: NodeConfig,
     live: Live,
     records: Arc<Distributor>,
-    board: Arc<Board>,
-    punctuality: Arc<Punctuality>,
+    board: Arc<StatusBoard>,
+    latency_stats: Arc<LatencyStats>,
     clock: DriveClock,
-    gate: Arc<Gate>,
-    windows: Windows,
+    gate: Arc<RxWindow>,
+    windows: BurstWindows,
     sleeps: bool,
     interruptions: Interruptions,
     /// Number of gaps that were detected from the SSBs.
@@ -135,24 +135,24 @@ impl Engine {
     /// Creates the engine at the start of a drive.
     ///
     /// # Errors
-    /// Errors of [`Setup::live`].
+    /// Errors of [`NodeConfig::live`].
     pub fn new(
-        setup: Setup,
+        setup: NodeConfig,
         records: Arc<Distributor>,
-        board: Arc<Board>,
-        punctuality: Arc<Punctuality>,
-        gate: Arc<Gate>,
+        board: Arc<StatusBoard>,
+        latency_stats: Arc<LatencyStats>,
+        gate: Arc<RxWindow>,
         sleeps: bool,
     ) -> Result<Self, LiveError> {
         Ok(Self {
             live: setup.live()?,
-            windows: Windows::new(&setup.site),
+            windows: BurstWindows::new(&setup.site),
             period_s: setup.site.ssb.period_s(),
             pending: Block::default(),
             setup,
             records,
             board,
-            punctuality,
+            latency_stats,
             clock: DriveClock::default(),
             gate,
             sleeps,
@@ -262,7 +262,7 @@ impl Engine {
             self.tick()?;
         }
         self.receive(true)?;
-        self.live.settle()?;
+        self.live.flush()?;
         self.publish_heard(None)?;
         self.save()
     }
@@ -363,10 +363,10 @@ impl Engine {
         if let Some(came) = came {
             let now = Instant::now();
             let seconds = |since: Instant| now.saturating_duration_since(since).as_secs_f64();
-            self.punctuality.odometry_to_pose.add(seconds(came));
+            self.latency_stats.odometry_to_pose.add(seconds(came));
             if let Some((last_s, last)) = self.last_pose {
                 let jitter_s = (seconds(last) - (sample.time_s - last_s)).abs();
-                self.punctuality.jitter.add(jitter_s);
+                self.latency_stats.jitter.add(jitter_s);
             }
             self.last_pose = Some((sample.time_s, now));
         }
@@ -452,7 +452,7 @@ impl Engine {
     }
 
     /// Continues with another site and vehicle at the current pose.
-    fn swap(&mut self, setup: Setup, mut live: Live) -> Result<(), LiveError> {
+    fn swap(&mut self, setup: NodeConfig, mut live: Live) -> Result<(), LiveError> {
         let state = self.live.saved_state()?;
         let excluded = self.live.heads().iter().filter(|it| it.is_excluded);
         for pci in excluded.map(|it| it.head.pci) {
@@ -474,7 +474,7 @@ impl Engine {
         if let Some(store) = &self.store {
             store.set_fingerprint(state::fingerprint(&setup.site, &setup.vehicle));
         }
-        self.windows = Windows::new(&setup.site);
+        self.windows = BurstWindows::new(&setup.site);
         self.period_s = setup.site.ssb.period_s();
         (self.setup, self.live) = (setup, live);
         self.pending.antennas.iter_mut().for_each(Vec::clear);
@@ -523,15 +523,15 @@ impl Engine {
         let mut last: Option<Outcome> = None;
         while let Some(outcome) = self.live.next_outcome() {
             if came.is_some() {
-                let end_s = outcome.execution.ssb.time_s + self.windows.ssb_s();
+                let end_s = outcome.angle_result.ssb.time_s + self.windows.ssb_s();
                 if let Some(arrived) = self.arrival_of(end_s) {
                     let late = Instant::now().saturating_duration_since(arrived);
-                    self.punctuality.ssb_to_pose.add(late.as_secs_f64());
+                    self.latency_stats.ssb_to_pose.add(late.as_secs_f64());
                 }
             }
             self.records.put(Record::Verdict(outcome));
-            let ssb = &outcome.execution.ssb;
-            if outcome.execution.verdict.reason == UpdateReason::UnknownRadioHead {
+            let ssb = &outcome.angle_result.ssb;
+            if outcome.angle_result.verdict.reason == UpdateReason::UnknownRadioHead {
                 self.report_unknown(ssb.pci, ssb.ssb_index);
             }
             last = Some(outcome);

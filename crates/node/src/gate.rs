@@ -11,13 +11,13 @@ const GUARD_S: f64 = 4e-4;
 
 /// Time interval of required samples, set by the pipeline and read by the sources.
 #[derive(Debug)]
-pub struct Gate {
+pub struct RxWindow {
     is_open: AtomicBool,
     from_s: AtomicU64,
     until_s: AtomicU64,
 }
 
-impl Default for Gate {
+impl Default for RxWindow {
     fn default() -> Self {
         Self {
             is_open: AtomicBool::new(true),
@@ -27,7 +27,7 @@ impl Default for Gate {
     }
 }
 
-impl Gate {
+impl RxWindow {
     /// Opens the gate for all samples.
     pub fn open(&self) {
         self.is_open.store(true, Ordering::Release);
@@ -52,7 +52,7 @@ impl Gate {
 
 /// Calculator of the interval of a burst from the time of one of its SSBs.
 #[derive(Debug, Clone, Copy)]
-pub struct Windows {
+pub struct BurstWindows {
     symbol_s: f64,
     /// SSB pattern. For 30 kHz case C is used; the SSBs of case B differ by at most four symbols,
     /// for which [`GUARD_S`] is sufficient.
@@ -61,7 +61,7 @@ pub struct Windows {
     symbols: [usize; 2],
 }
 
-impl Windows {
+impl BurstWindows {
     /// Creates the calculator for the SSBs of a site.
     pub fn new(site: &Site) -> Self {
         let spacing_khz = site.ssb.subcarrier_spacing_khz;
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn a_window_contains_every_ssb_of_its_burst() {
         let site = Site::from_library("yard", &Shipped).unwrap();
-        let windows = Windows::new(&site);
+        let windows = BurstWindows::new(&site);
         // SSBs of indices 0 and 3 begin at symbols 2 and 22 at 15 kHz (case A), and are 4 symbols long.
         let symbol_s = 1e-3 / 14.0;
         for (index, symbol) in [(0, 2.0), (1, 8.0), (3, 22.0)] {
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn the_gate_returns_the_interval_that_was_set() {
-        let gate = Gate::default();
+        let gate = RxWindow::default();
         assert_eq!(gate.wanted(), None);
         gate.set([1.0, 2.0]);
         assert_eq!(gate.wanted(), Some([1.0, 2.0]));

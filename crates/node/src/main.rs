@@ -8,16 +8,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use access_av_node::clock::unix_s;
-use access_av_node::engine::{Engine, Reload, Setup};
+use access_av_node::engine::{Engine, NodeConfig, Reload};
 use access_av_node::inbox::Level;
 use access_av_node::playback;
 use access_av_node::settings::{NodeSettings, PageSettings};
 use access_av_node::sink::{self, Distributor};
 use access_av_node::source::{self, Sources};
 use access_av_node::state::{self, StateStore};
-use access_av_node::statistics::Punctuality;
+use access_av_node::statistics::LatencyStats;
 use access_av_node::supervisor;
-use access_av_node::web::{self, Board, Counters};
+use access_av_node::web::{self, Counters, StatusBoard};
 use anyhow::{Context, Result};
 use clap::Parser;
 use onboard::live::StreamConfig;
@@ -123,13 +123,13 @@ fn setup_of(
     settings: &NodeSettings,
     (site, vehicle, platform): (Site, Vehicle, Platform),
     stream: Option<StreamConfig>,
-) -> Setup {
+) -> NodeConfig {
     // The specified standard deviations of logged angles are the total errors.
     let (site, vehicle) = match settings.samples {
         None => as_stated(&site, &vehicle),
         Some(_) => (site, vehicle),
     };
-    Setup {
+    NodeConfig {
         site,
         vehicle,
         platform,
@@ -138,7 +138,7 @@ fn setup_of(
 }
 
 /// Creates the request that loads site and vehicle again after SIGHUP.
-fn reload(arguments: &Arguments, settings: &NodeSettings, setup: &Setup) -> Reload {
+fn reload(arguments: &Arguments, settings: &NodeSettings, setup: &NodeConfig) -> Reload {
     let (arguments, settings) = (arguments.clone(), settings.clone());
     let (stream, antennas) = (setup.stream, setup.vehicle.array.elements);
     Reload {
@@ -159,7 +159,7 @@ fn reload(arguments: &Arguments, settings: &NodeSettings, setup: &Setup) -> Relo
 }
 
 /// Returns the report of a dry run.
-fn report(settings: &NodeSettings, setup: &Setup) -> String {
+fn report(settings: &NodeSettings, setup: &NodeConfig) -> String {
     let mut lines = Vec::new();
     let (site, vehicle) = (&setup.site, &setup.vehicle);
     if let Some(stream) = setup.stream {
@@ -172,7 +172,7 @@ fn report(settings: &NodeSettings, setup: &Setup) -> String {
             site.carrier_mhz,
         ));
     }
-    for warning in onboard::plausible::of_both(site, vehicle) {
+    for warning in onboard::plausible::of_site_and_vehicle(site, vehicle) {
         lines.push(format!("warning: {warning}"));
     }
     let outputs = &settings.output;
@@ -194,7 +194,7 @@ fn report(settings: &NodeSettings, setup: &Setup) -> String {
 fn drive(
     arguments: &Arguments,
     settings: &NodeSettings,
-    setup: Setup,
+    setup: NodeConfig,
     mut sources: Sources,
 ) -> Result<()> {
     let is_playback = settings.is_playback();
@@ -206,15 +206,15 @@ fn drive(
     let reload = reload(arguments, settings, &setup);
     let reload_requested = Arc::clone(&reload.requested);
     let fingerprint = state::fingerprint(&setup.site, &setup.vehicle);
-    let punctuality = Arc::new(Punctuality::default());
+    let latency_stats = Arc::new(LatencyStats::default());
     let page_s = settings.page.as_ref().map_or(1.0, |it| 1.0 / it.rate_hz);
-    let board = Arc::new(Board::new(
+    let board = Arc::new(StatusBoard::new(
         &settings.name,
         Duration::from_secs_f64(page_s),
         Counters {
             inbox: Arc::clone(&sources.inbox),
             records: Arc::clone(&records),
-            punctuality: Arc::clone(&punctuality),
+            latency_stats: Arc::clone(&latency_stats),
             sources: sources.health.clone(),
             rate_hz: sources.stream.map_or(0.0, |it| it.rate_hz),
         },
@@ -226,7 +226,7 @@ fn drive(
         setup,
         Arc::clone(&records),
         Arc::clone(&board),
-        punctuality,
+        latency_stats,
         gate,
         settings.sleep && !is_playback,
     )?;
@@ -290,7 +290,7 @@ fn drive(
 /// Serves the web page, if configured, and handles signals in a separate thread.
 fn serve(
     page: Option<&PageSettings>,
-    board: &Arc<Board>,
+    board: &Arc<StatusBoard>,
     stop: &Arc<AtomicBool>,
     reload_requested: Arc<AtomicBool>,
 ) -> Result<()> {

@@ -54,9 +54,9 @@ pub fn play(
         player.odometry(sample)?;
     }
     if !stop.load(Ordering::Acquire) {
-        player.hear_before(f64::INFINITY)?;
+        player.process_until(f64::INFINITY)?;
     }
-    player.engine.live_mut().settle()?;
+    player.engine.live_mut().flush()?;
     player.engine.publish_heard(None)?;
     Ok(())
 }
@@ -75,7 +75,7 @@ struct Player<'a> {
 
 impl Player<'_> {
     fn odometry(&mut self, sample: &OdometrySample) -> Result<()> {
-        self.hear_before(sample.time_s)?;
+        self.process_until(sample.time_s)?;
         self.wait_for(sample.time_s);
         self.came("odometry", 1);
         self.engine.odometry(sample, None)?;
@@ -84,7 +84,7 @@ impl Player<'_> {
     }
 
     /// Processes every burst that began before `time_s`.
-    fn hear_before(&mut self, time_s: f64) -> Result<()> {
+    fn process_until(&mut self, time_s: f64) -> Result<()> {
         self.hear_angles_before(time_s)?;
         while let Some(blocks) = &mut self.blocks
             && let Some(next_s) = blocks.next_s()
@@ -102,9 +102,9 @@ impl Player<'_> {
             let ends = next_s.is_none_or(|next_s| next_s > block_s + length_s + 1e-8);
             live.receive(block_s, &antennas)?;
             if ends {
-                live.end_stretch()?;
+                live.end_segment()?;
             }
-            live.hear_before(time_s)?;
+            live.process_until(time_s)?;
             self.engine.publish_heard(None)?;
             let samples = self.samples.first().map_or(0, Vec::len);
             self.came("samples", samples as u64);
@@ -114,7 +114,7 @@ impl Player<'_> {
                 self.engine.tick()?;
             }
         }
-        self.engine.live_mut().hear_before(time_s)?;
+        self.engine.live_mut().process_until(time_s)?;
         Ok(self.engine.publish_heard(None)?)
     }
 
@@ -129,7 +129,7 @@ impl Player<'_> {
                     .live_mut()
                     .angle(&AngleObservation::from(angle))?;
             }
-            self.engine.live_mut().settle()?;
+            self.engine.live_mut().flush()?;
             self.engine.publish_heard(None)?;
             self.came("angles", burst.len() as u64);
             self.angles = later;

@@ -260,7 +260,7 @@ impl SourceHealth {
 
 /// Latencies of the node.
 #[derive(Debug, Default)]
-pub struct Punctuality {
+pub struct LatencyStats {
     /// Latency from the arrival of an SSB's last sample to the pose with its angle.
     pub ssb_to_pose: Histogram,
     /// Latency from the arrival of odometry to its pose.

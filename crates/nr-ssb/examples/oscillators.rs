@@ -98,7 +98,7 @@ fn trial(spacing: SubcarrierSpacing, period_s: f64, ppm: f64, seed: u64) -> [(He
             let blocks: Vec<&[Complex32]> =
                 antennas.iter().map(|it| &it[ends[0]..ends[1]]).collect();
             let mut take =
-                |ssb: &nr_ssb::receiver::HeardSsb| note(0, ssb.sample_start, ssb.ssb_index);
+                |ssb: &nr_ssb::receiver::TrackedSsb| note(0, ssb.sample_start, ssb.ssb_index);
             stream.push(&blocks, &mut take).unwrap();
         }
         // The receiver is on only around the burst.

@@ -6,14 +6,14 @@ use crate::observation::{BURST_S, SensedSsb, SsbObservation};
 use crate::pipeline::{Observed, SsbSource};
 
 /// Item that contains one SSB.
-pub trait OfSsb {
+pub trait HasSsb {
     /// Returns the SSB.
     fn ssb(&self) -> &SensedSsb;
     /// Returns the observation from which the pipeline obtains an angle.
     fn observed(&self) -> Observed<'_>;
 }
 
-impl OfSsb for SsbObservation {
+impl HasSsb for SsbObservation {
     fn ssb(&self) -> &SensedSsb {
         &self.ssb
     }
@@ -23,7 +23,7 @@ impl OfSsb for SsbObservation {
     }
 }
 
-impl OfSsb for (SensedSsb, AngleMeasurement) {
+impl HasSsb for (SensedSsb, AngleMeasurement) {
     fn ssb(&self) -> &SensedSsb {
         &self.0
     }
@@ -36,9 +36,9 @@ impl OfSsb for (SensedSsb, AngleMeasurement) {
 /// Received burst.
 pub struct Burst<'a, T>(pub &'a [T]);
 
-impl<T: OfSsb> SsbSource for Burst<'_, T> {
+impl<T: HasSsb> SsbSource for Burst<'_, T> {
     fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
-        sensed.extend(self.0.iter().map(OfSsb::ssb));
+        sensed.extend(self.0.iter().map(HasSsb::ssb));
         Ok(())
     }
 
@@ -49,7 +49,7 @@ impl<T: OfSsb> SsbSource for Burst<'_, T> {
 }
 
 /// Returns the number of leading SSBs that belong to one burst: within half a frame of the first.
-pub fn first_burst<T: OfSsb>(ssbs: &[T]) -> usize {
+pub fn first_burst<T: HasSsb>(ssbs: &[T]) -> usize {
     let Some(first_s) = ssbs.first().map(|first| first.ssb().time_s) else {
         return 0;
     };
@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bursts_every_half_frame_are_told_apart() {
+    fn bursts_of_both_half_frames_are_distinguished() {
         let ssb = |time_s| {
             let mut observation = SsbObservation::new(4);
             observation.restart(SensedSsb {

@@ -50,7 +50,7 @@ pub enum EstimateCost {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Energy {
     /// Energy of the angle estimates.
-    pub executions_j: f64,
+    pub aoa_estimates_j: f64,
     /// Energy of the reception of SSBs; 0 if the platform does not include it.
     pub listening_j: f64,
     /// Idle energy of the board; 0 if the platform does not include it.
@@ -60,7 +60,7 @@ pub struct Energy {
 impl Energy {
     /// Returns the total energy.
     pub fn total_j(&self) -> f64 {
-        self.executions_j + self.listening_j + self.idle_j
+        self.aoa_estimates_j + self.listening_j + self.idle_j
     }
 }
 
@@ -160,24 +160,29 @@ impl EnergyModel {
 
     /// Returns the energy of the reception of a burst in units of one estimate; `None` if an
     /// estimate has no energy.
-    pub fn listening_in_executions(&self) -> Option<f64> {
+    pub fn listening_in_aoa_estimates(&self) -> Option<f64> {
         (self.per_execution_j > 0.0).then(|| self.per_listening_j / self.per_execution_j)
     }
 
     /// Returns the energy of a run from its numbers of estimates and received bursts, and its
     /// duration.
-    pub fn of_run(&self, executions: usize, listened: usize, duration_s: f64) -> Energy {
+    pub fn run_energy(
+        &self,
+        aoa_estimates: usize,
+        bursts_received: usize,
+        duration_s: f64,
+    ) -> Energy {
         let idle_j = match self.sleep {
             Some(sleep) if self.idle_w > 0.0 => {
                 // Bursts without time for a suspend keep the board awake.
-                let awake_s = (listened as f64 * sleep.awake_s).min(duration_s);
+                let awake_s = (bursts_received as f64 * sleep.awake_s).min(duration_s);
                 awake_s * self.idle_w + (duration_s - awake_s) * sleep.power_w
             }
             _ => duration_s * self.idle_w,
         };
         Energy {
-            executions_j: executions as f64 * self.per_execution_j,
-            listening_j: listened as f64 * self.per_listening_j,
+            aoa_estimates_j: aoa_estimates as f64 * self.per_execution_j,
+            listening_j: bursts_received as f64 * self.per_listening_j,
             idle_j,
         }
     }
@@ -259,7 +264,7 @@ mod tests {
     #[test]
     fn papers_mode_0() {
         let model = model(&platform("jetson-agx-xavier"), Extent::Value);
-        let energy = model.of_run(1005, 4018, 80.33);
+        let energy = model.run_energy(1005, 4018, 80.33);
         assert!(
             (energy.total_j() / 627.22 - 1.0).abs() < 0.005,
             "{energy:?}"
@@ -273,7 +278,7 @@ mod tests {
         let counted = platform("jetson-agx-xavier")
             .with_overrides([("receiver.counted", Value::Boolean(true))], &Shipped)
             .unwrap();
-        let energy = model(&counted, Extent::Value).of_run(0, 100, 10.0);
+        let energy = model(&counted, Extent::Value).run_energy(0, 100, 10.0);
         let receiver = &counted.receiver;
         let on_ms = receiver.on_time_ms + receiver.settling_ms.as_ref().unwrap().value;
         let radio_j = 100.0 * on_ms * 1e-3 * receiver.power_w.as_ref().unwrap().value;
@@ -322,11 +327,11 @@ mod tests {
     fn cycles_make_time_and_energy() {
         let platform = Platform::from_toml(CONTROLLED, "test", &Shipped).unwrap();
         let model = model(&platform, Extent::Value);
-        let energy = model.of_run(10, 100, 10.0);
+        let energy = model.run_energy(10, 100, 10.0);
         // Core power 0.5 W · 2³ = 4 W; an estimate takes 2 ms of it, a burst 1 ms of it and 10 ms
         // of 1 W.
         assert!(
-            (energy.executions_j - 10.0 * 8e-3).abs() < 1e-12,
+            (energy.aoa_estimates_j - 10.0 * 8e-3).abs() < 1e-12,
             "{energy:?}"
         );
         assert!(
@@ -339,24 +344,28 @@ mod tests {
     }
 
     #[test]
-    fn what_an_estimator_of_the_users_own_takes_is_what_it_states() {
+    fn a_custom_estimator_has_the_energy_that_it_specifies() {
         let platform = Platform::from_toml(CONTROLLED, "test", &Shipped).unwrap();
-        let executions_j = |cost| {
+        let aoa_estimates_j = |cost| {
             let model = EnergyModel::with_cost(cost, &vehicle(), &platform, Extent::Value);
             let model = model.unwrap();
-            model.map(|model| model.of_run(10, 100, 10.0).executions_j)
+            model.map(|model| model.run_energy(10, 100, 10.0).aoa_estimates_j)
         };
         let close = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-12;
-        assert!(close(executions_j(EstimateCost::EnergyJ(0.3)), 3.0));
+        assert!(close(aoa_estimates_j(EstimateCost::EnergyJ(0.3)), 3.0));
         // The power of a core is 4 W.
-        assert!(close(executions_j(EstimateCost::TimeS(0.01)), 0.4));
-        assert_eq!(executions_j(EstimateCost::Unknown), None);
+        assert!(close(aoa_estimates_j(EstimateCost::TimeS(0.01)), 0.4));
+        assert_eq!(aoa_estimates_j(EstimateCost::Unknown), None);
     }
 
     #[test]
     fn ranges_hold_the_value_between_them() {
         let platform = Platform::from_toml(CONTROLLED, "test", &Shipped).unwrap();
-        let total_j = |extent| model(&platform, extent).of_run(10, 100, 10.0).listening_j;
+        let total_j = |extent| {
+            model(&platform, extent)
+                .run_energy(10, 100, 10.0)
+                .listening_j
+        };
         assert!((total_j(Extent::Low) - 100.0 * (3e-3 + 4e-3)).abs() < 1e-12);
         assert!((total_j(Extent::High) - 100.0 * (40e-3 + 4e-3)).abs() < 1e-12);
     }
@@ -368,9 +377,9 @@ mod tests {
             "supply_efficiency = {{ value = 0.8, provenance = \"assumed\", source = \"test\" }}\n{text}"
         );
         let platform = Platform::from_toml(&supplied, "test", &Shipped).unwrap();
-        let energy = model(&platform, Extent::Value).of_run(10, 100, 10.0);
+        let energy = model(&platform, Extent::Value).run_energy(10, 100, 10.0);
         assert!(
-            (energy.executions_j - 10.0 * 8e-3 / 0.8).abs() < 1e-12,
+            (energy.aoa_estimates_j - 10.0 * 8e-3 / 0.8).abs() < 1e-12,
             "{energy:?}"
         );
         assert!((energy.idle_j - 40.0).abs() < 1e-12, "{energy:?}");
@@ -386,12 +395,12 @@ mod tests {
         let platform = Platform::from_toml(&text, "test", &Shipped).unwrap();
         let model = model(&platform, Extent::Value);
         // Awake time per burst: 87 + 10 + 1 + 2 = 100 ms.
-        let energy = model.of_run(10, 10, 10.0);
+        let energy = model.run_energy(10, 10, 10.0);
         assert!(
             (energy.idle_j - (4.0 + 9.0 * 0.5)).abs() < 1e-9,
             "{energy:?}"
         );
-        let busy = model.of_run(500, 500, 10.0);
+        let busy = model.run_energy(500, 500, 10.0);
         assert!((busy.idle_j - 40.0).abs() < 1e-9, "{busy:?}");
     }
 }

@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn an_area_is_about_its_points_and_its_squares_cover_it() {
+    fn an_area_contains_its_points_and_is_covered_by_its_squares() {
         let points = [
             Point::new(-2.0, 1.0),
             Point::new(6.0, 5.0),

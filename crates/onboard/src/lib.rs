@@ -3,7 +3,7 @@
 //!
 //! The pose is estimated from the angle of arrival at the vehicle's antenna array, wheel odometry
 //! and the known positions of the radio heads. A wake-up policy determines when an angle is
-//! estimated. [`Onboard`] is the pipeline, identical in simulation, replay and on the vehicle. Its
+//! estimated. [`Pipeline`] is the pipeline, identical in simulation, replay and on the vehicle. Its
 //! nominal model of plant and vehicle is in [`settings`]. This crate does not access the truth of a
 //! simulation, and uses no random numbers, threads or files.
 //!
@@ -38,7 +38,9 @@ pub mod wake_up;
 pub mod walls;
 
 pub use live::Live;
-pub use pipeline::{Custom, Execution, Heard, Observed, OdometryDefect, Onboard, SsbSource};
+pub use pipeline::{
+    AngleResult, BurstResult, Custom, Observed, OdometryDefect, Pipeline, SsbSource,
+};
 
 /// Error of user code.
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;

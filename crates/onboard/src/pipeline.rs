@@ -6,8 +6,8 @@ use crate::geometry::Pose;
 use crate::link_budget::LinkBudget;
 use crate::localize::ekf::EstimatedConstants;
 use crate::localize::{
-    self, AngleMeasurement, AngleUpdate, Ekf, History, Integrity, IntegrityState, Localizer,
-    OdometryVerdict, PoseEstimate, Recovered, UpdateReason, UpdateVerdict,
+    self, AngleMeasurement, AngleUpdate, Ekf, Integrity, IntegrityState, Localizer,
+    OdometryVerdict, OutOfSequenceBuffer, PoseEstimate, Recovered, UpdateReason, UpdateVerdict,
 };
 use crate::manifold::Measurand;
 use crate::monitor::{ActiveFaults, Change, Fallback, Monitors};
@@ -20,13 +20,13 @@ use crate::wake_up::{self, Situation, WakeUpPolicy};
 use crate::walls::Walls;
 
 /// Pipeline on the vehicle. Nothing is allocated after initialisation.
-pub struct Onboard {
-    surroundings: Surroundings,
+pub struct Pipeline {
+    visibility_model: VisibilityModel,
     thermal: ThermalNoise,
     measurand: Measurand,
-    lateness_s: f64,
+    angle_time_offset_s: f64,
     estimator: Box<dyn AngleEstimator>,
-    localizer: History,
+    localizer: OutOfSequenceBuffer,
     policy: Box<dyn WakeUpPolicy>,
     wake_up_time_s: f64,
     odometry: Option<OdometrySample>,
@@ -35,7 +35,7 @@ pub struct Onboard {
     top_speed_mps: f64,
     sensed: Vec<SensedSsb>,
     chosen: Vec<bool>,
-    executions: Vec<Execution>,
+    aoa_estimates: Vec<AngleResult>,
     /// Updates for the localizer.
     burst: Vec<AngleUpdate>,
     /// Sensor monitors, if the vehicle has integrity monitoring and a built-in localizer.
@@ -45,7 +45,7 @@ pub struct Onboard {
 }
 
 /// Model that is constant during a drive.
-struct Surroundings {
+struct VisibilityModel {
     heads: Vec<RadioHead>,
     /// Radio heads that the user has excluded.
     excluded: Vec<RadioHead>,
@@ -56,9 +56,9 @@ struct Surroundings {
     height_m: f64,
 }
 
-impl Surroundings {
+impl VisibilityModel {
     /// Updates the radio heads in line of sight of the estimated position.
-    fn look(&mut self, time_s: f64, localizer: &History) -> Result<(), BoxError> {
+    fn look(&mut self, time_s: f64, localizer: &OutOfSequenceBuffer) -> Result<(), BoxError> {
         if self.walls.is_empty() || is_searching(localizer.localizer()) {
             return Ok(());
         }
@@ -74,7 +74,7 @@ impl Surroundings {
         &'a self,
         time_s: f64,
         odometry: Option<OdometrySample>,
-        localizer: &'a History,
+        localizer: &'a OutOfSequenceBuffer,
     ) -> Situation<'a> {
         let newest_s = odometry.map_or(time_s, |sample| sample.time_s);
         Situation {
@@ -130,18 +130,18 @@ pub enum Observed<'a> {
 
 /// Result of a burst.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Heard<'a> {
+pub struct BurstResult<'a> {
     /// Whether the burst was received.
-    pub listened: bool,
+    pub receiver_on: bool,
     /// Estimated angles.
-    pub executions: &'a [Execution],
+    pub aoa_estimates: &'a [AngleResult],
     /// Whether the error remains below the policy's target until the next burst, if there is one.
     pub keeps_bound: Option<bool>,
 }
 
 /// Estimated angle and its result.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Execution {
+pub struct AngleResult {
     /// The SSB.
     pub ssb: SensedSsb,
     /// Angle; `None` if the snapshots contain none.
@@ -184,7 +184,7 @@ fn is_searching(localizer: &dyn Localizer) -> bool {
     localizer.hypotheses().is_some() || localizer.is_lost()
 }
 
-impl Onboard {
+impl Pipeline {
     /// Creates the pipeline of a vehicle at a site, at 0 s and `start`, or with a search if the
     /// vehicle's settings specify an unknown start.
     ///
@@ -223,9 +223,9 @@ impl Onboard {
         Ok(Self {
             thermal: ThermalNoise::new(site, vehicle),
             measurand: vehicle.array.measurand(),
-            lateness_s: vehicle.receiver.lateness_s,
+            angle_time_offset_s: vehicle.receiver.angle_time_offset_s,
             estimator,
-            localizer: History::new(localizer),
+            localizer: OutOfSequenceBuffer::new(localizer),
             policy,
             wake_up_time_s: 0.0,
             odometry: None,
@@ -233,12 +233,12 @@ impl Onboard {
             top_speed_mps: vehicle.top_speed_mps(),
             sensed: Vec::with_capacity(heads.len()),
             chosen: Vec::with_capacity(heads.len()),
-            executions: Vec::with_capacity(heads.len()),
+            aoa_estimates: Vec::with_capacity(heads.len()),
             burst: Vec::with_capacity(heads.len()),
             monitors: is_monitored.then(|| Box::new(Monitors::new(site, vehicle, heads.len()))),
             faults: ActiveFaults::default(),
             keeps_journal: false,
-            surroundings: Surroundings {
+            visibility_model: VisibilityModel {
                 excluded: Vec::with_capacity(heads.len()),
                 walls: Walls::new(site),
                 seen: Vec::with_capacity(heads.len()),
@@ -320,7 +320,7 @@ impl Onboard {
             }
             Change::End => (monitors.fallback.end(&estimate)?, newest),
         };
-        self.localizer = History::new(localizer);
+        self.localizer = OutOfSequenceBuffer::new(localizer);
         self.localizer.odometry(&first)?;
         Ok(())
     }
@@ -336,15 +336,21 @@ impl Onboard {
     ///
     /// # Errors
     /// Errors of the source or of user code.
-    pub fn hear(&mut self, time_s: f64, source: &mut dyn SsbSource) -> Result<Heard<'_>, BoxError> {
+    pub fn process_burst(
+        &mut self,
+        time_s: f64,
+        source: &mut dyn SsbSource,
+    ) -> Result<BurstResult<'_>, BoxError> {
         self.sensed.clear();
-        self.executions.clear();
+        self.aoa_estimates.clear();
         self.burst.clear();
-        let listened = self.listens(time_s)?;
+        let receiver_on = self.listens(time_s)?;
         let is_wanted = self.is_wanted(time_s);
-        let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
+        let now = self
+            .visibility_model
+            .at(time_s, self.odometry, &self.localizer);
         let searching = is_searching(now.localizer);
-        if listened {
+        if receiver_on {
             if let Some(monitors) = &mut self.monitors {
                 monitors.received(time_s);
             }
@@ -358,7 +364,7 @@ impl Onboard {
             if is_wanted {
                 self.chosen.fill(true);
             }
-            if !searching && !self.surroundings.walls.is_empty() {
+            if !searching && !self.visibility_model.walls.is_empty() {
                 // The angle of a wave through a wall contains no information about the radio head.
                 for (chosen, ssb) in self.chosen.iter_mut().zip(&self.sensed) {
                     *chosen &= now.head(ssb).is_some();
@@ -378,8 +384,8 @@ impl Onboard {
             if self.monitors.as_deref().is_none_or(are_right) {
                 self.localizer.update(&mut self.burst)?;
                 for update in &self.burst {
-                    if let Some(execution) = self.executions.get_mut(update.number) {
-                        execution.verdict = update.verdict;
+                    if let Some(angle_result) = self.aoa_estimates.get_mut(update.number) {
+                        angle_result.verdict = update.verdict;
                     }
                 }
                 self.monitor_angles(time_s)?;
@@ -388,10 +394,12 @@ impl Onboard {
                 self.follow_monitors()?;
             }
         }
-        let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
-        Ok(Heard {
-            listened,
-            executions: &self.executions,
+        let now = self
+            .visibility_model
+            .at(time_s, self.odometry, &self.localizer);
+        Ok(BurstResult {
+            receiver_on,
+            aoa_estimates: &self.aoa_estimates,
             keeps_bound: self.policy.keeps_bound(&now),
         })
     }
@@ -407,9 +415,9 @@ impl Onboard {
         ssb_index: u8,
         measured: &RangeMeasurement,
     ) -> Result<UpdateVerdict, BoxError> {
-        let Surroundings {
+        let VisibilityModel {
             heads, excluded, ..
-        } = &self.surroundings;
+        } = &self.visibility_model;
         let sends = |head: &&RadioHead| head.sends(pci, ssb_index);
         let Some(head) = heads.iter().find(sends) else {
             let reason = if excluded.iter().any(|head| sends(&head)) {
@@ -452,8 +460,8 @@ impl Onboard {
     }
 
     /// Returns the angles of the last received burst.
-    pub fn executions(&self) -> &[Execution] {
-        &self.executions
+    pub fn aoa_estimates(&self) -> &[AngleResult] {
+        &self.aoa_estimates
     }
 
     /// Whether the policy currently requests the burst at `time_s`.
@@ -463,20 +471,22 @@ impl Onboard {
     pub fn listens(&mut self, time_s: f64) -> Result<bool, BoxError> {
         let is_wanted = self.is_wanted(time_s);
         let newest_s = self.odometry.map_or(time_s, |sample| sample.time_s);
-        self.surroundings
+        self.visibility_model
             .look(newest_s.max(time_s), &self.localizer)?;
-        let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
+        let now = self
+            .visibility_model
+            .at(time_s, self.odometry, &self.localizer);
         Ok(is_wanted || is_searching(now.localizer) || self.policy.listens(&now)?)
     }
 
     /// Excludes the angles of a cell from now on, or includes them again; returns `false` if the
     /// site does not have the cell.
     pub fn exclude(&mut self, pci: u16, excluded: bool) -> bool {
-        let Surroundings {
+        let VisibilityModel {
             heads,
             excluded: out,
             ..
-        } = &mut self.surroundings;
+        } = &mut self.visibility_model;
         let known = heads.iter().chain(out.iter()).any(|head| head.pci == pci);
         let (from, to) = if excluded { (heads, out) } else { (out, heads) };
         to.extend(from.extract_if(.., |head| head.pci == pci));
@@ -488,7 +498,7 @@ impl Onboard {
     /// # Errors
     /// Errors of a custom localizer.
     pub fn replace_localizer(&mut self, localizer: Box<dyn Localizer>) -> Result<(), BoxError> {
-        self.localizer = History::new(localizer);
+        self.localizer = OutOfSequenceBuffer::new(localizer);
         if let Some(newest) = &self.odometry {
             self.localizer.odometry(newest)?;
         }
@@ -531,12 +541,12 @@ impl Onboard {
     /// Stores the angle of an SSB for the localizer, which processes those of a burst together.
     fn collect(&mut self, ssb: SensedSsb, measured: Option<AngleMeasurement>) {
         let measured = measured.map(|measured| AngleMeasurement {
-            time_s: measured.time_s - self.lateness_s,
+            time_s: measured.time_s - self.angle_time_offset_s,
             ..measured
         });
-        let Surroundings {
+        let VisibilityModel {
             heads, excluded, ..
-        } = &self.surroundings;
+        } = &self.visibility_model;
         let sends = |head: &&RadioHead| head.sends(ssb.pci, ssb.ssb_index);
         let head = heads.iter().find(sends);
         let reason = match head {
@@ -547,13 +557,13 @@ impl Onboard {
         let verdict = UpdateVerdict::unused(reason);
         if let (Some(&head), Some(measured)) = (head, measured) {
             self.burst.push(AngleUpdate {
-                number: self.executions.len(),
+                number: self.aoa_estimates.len(),
                 head,
                 measured,
                 verdict,
             });
         }
-        self.executions.push(Execution {
+        self.aoa_estimates.push(AngleResult {
             ssb,
             measured,
             verdict,
@@ -600,8 +610,8 @@ impl Onboard {
     /// estimates them.
     pub fn constants(&self) -> Option<EstimatedConstants> {
         let mut constants = self.localizer.localizer().ekf()?.constants();
-        constants.lateness_s.stated += self.lateness_s;
-        constants.lateness_s.found += self.lateness_s;
+        constants.angle_time_offset_s.stated += self.angle_time_offset_s;
+        constants.angle_time_offset_s.found += self.angle_time_offset_s;
         Some(constants)
     }
 

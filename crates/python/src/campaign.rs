@@ -5,15 +5,15 @@ use std::sync::atomic::AtomicBool;
 
 use ::simulate::scenario::Scenario as CoreScenario;
 use ::simulate::{
-    Campaign, CampaignOptions, IntegritySummary, MeasurementTraces, RunRecord, RunSummary,
-    Simulation, SimulationError, Step, StepStatistics,
+    Campaign, CampaignOptions, IntegritySummary, MeasurementTraces as CoreMeasurementTraces,
+    RunRecord, RunSummary, Simulation, SimulationError, Step, StepStatistics,
 };
 use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use onboard::energy::EstimateCost;
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
 use onboard::settings::EstimatorMethod;
-use onboard::{BoxError, Custom, Execution};
+use onboard::{AngleResult, BoxError, Custom};
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -44,7 +44,7 @@ pub struct SimulationResult {
     /// protection levels were reported.
     integrity: Option<(Py<PyDict>, f64)>,
     /// Angle estimates, one row each; `None` unless requested.
-    executions: Option<Py<PyDict>>,
+    aoa_estimates: Option<Py<PyDict>>,
     /// Quantiles of the horizontal error over all runs and SSBs in metres, by probability, from a
     /// histogram with 5.9 % wide bins.
     error_quantiles_m: Py<PyDict>,
@@ -164,8 +164,8 @@ fn result(
             .then(|| trajectories(py, &campaign.records))
             .transpose()?,
         integrity: integrity(py, campaign)?,
-        executions: keep_trajectories
-            .then(|| executions(py, &campaign.records))
+        aoa_estimates: keep_trajectories
+            .then(|| aoa_estimates(py, &campaign.records))
             .transpose()?,
         error_quantiles_m: error_quantiles(py, campaign)?,
         errors_m: errors_every.map(|_| errors(py, campaign)).transpose()?,
@@ -178,10 +178,10 @@ fn result(
 /// The traces can be processed with another localizer or wake-up policy. The result equals that of
 /// a new campaign bit by bit, in a small fraction of the computing time.
 #[pyclass(frozen, module = "access_av._core")]
-pub struct Tapes(MeasurementTraces);
+pub struct MeasurementTraces(CoreMeasurementTraces);
 
 #[pymethods]
-impl Tapes {
+impl MeasurementTraces {
     /// Record the first runs with the angles of the given methods. Return `None` if an SSB depends
     /// on the reception of other SSBs.
     #[staticmethod]
@@ -211,7 +211,7 @@ impl Tapes {
                 threads,
                 ..CampaignOptions::default()
             };
-            MeasurementTraces::record(&simulation, &methods, &options)
+            CoreMeasurementTraces::record(&simulation, &methods, &options)
         });
         Ok(tapes.map_err(python_error)?.map(Self))
     }
@@ -361,15 +361,21 @@ fn run_table(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
     let table = PyDict::new(py);
     let runs = &campaign.runs;
     table.set_item("run", column(py, runs, |run| run.run))?;
-    table.set_item("executions", column(py, runs, |run| run.executions as u64))?;
-    table.set_item("listened", column(py, runs, |run| run.listened as u64))?;
+    table.set_item(
+        "aoa_estimates",
+        column(py, runs, |run| run.aoa_estimates as u64),
+    )?;
+    table.set_item(
+        "bursts_received",
+        column(py, runs, |run| run.bursts_received as u64),
+    )?;
     let columns: [Column<RunSummary>; 10] = [
         ("longest_gap_s", |run| run.longest_gap_s),
         ("energy_j", |run| {
             run.energy.map_or(f64::NAN, |energy| energy.total_j())
         }),
-        ("energy_executions_j", |run| {
-            run.energy.map_or(f64::NAN, |energy| energy.executions_j)
+        ("energy_aoa_estimates_j", |run| {
+            run.energy.map_or(f64::NAN, |energy| energy.aoa_estimates_j)
         }),
         ("energy_listening_j", |run| {
             run.energy.map_or(f64::NAN, |energy| energy.listening_j)
@@ -463,60 +469,70 @@ fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
 }
 
 /// Creates the table of angle estimates. Angles are NaN if the estimator found none.
-fn executions(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
+fn aoa_estimates(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
     let table = PyDict::new(py);
-    let rows = || records.iter().flat_map(|record| record.executions.iter());
+    let rows = || {
+        records
+            .iter()
+            .flat_map(|record| record.aoa_estimates.iter())
+    };
     let runs = records
         .iter()
-        .flat_map(|record| record.executions.iter().map(|_| record.run));
+        .flat_map(|record| record.aoa_estimates.iter().map(|_| record.run));
     table.set_item("run", column(py, runs, |run| run))?;
     table.set_item(
         "time_s",
-        column(py, rows(), |execution| execution.ssb.time_s),
+        column(py, rows(), |angle_result| angle_result.ssb.time_s),
     )?;
-    table.set_item("pci", column(py, rows(), |execution| execution.ssb.pci))?;
+    table.set_item(
+        "pci",
+        column(py, rows(), |angle_result| angle_result.ssb.pci),
+    )?;
     table.set_item(
         "ssb_index",
-        column(py, rows(), |execution| execution.ssb.ssb_index),
+        column(py, rows(), |angle_result| angle_result.ssb.ssb_index),
     )?;
-    let columns: [Column<Execution>; 8] = [
-        ("snr_db", |execution| execution.ssb.snr_db),
-        ("phase_rad", |execution| {
-            measured(execution, |angle| angle.phase_rad)
+    let columns: [Column<AngleResult>; 8] = [
+        ("snr_db", |angle_result| angle_result.ssb.snr_db),
+        ("phase_rad", |angle_result| {
+            measured(angle_result, |angle| angle.phase_rad)
         }),
-        ("phase_sigma_rad", |execution| {
-            measured(execution, |angle| angle.phase_sigma_rad)
+        ("phase_sigma_rad", |angle_result| {
+            measured(angle_result, |angle| angle.phase_sigma_rad)
         }),
-        ("angle_rad", |execution| {
-            measured(execution, |angle| angle.angle_rad)
+        ("angle_rad", |angle_result| {
+            measured(angle_result, |angle| angle.angle_rad)
         }),
-        ("estimator_snr_db", |execution| {
-            measured(execution, |angle| angle.snr_db)
+        ("estimator_snr_db", |angle_result| {
+            measured(angle_result, |angle| angle.snr_db)
         }),
         ("mahalanobis_squared", |e| {
             e.verdict.mahalanobis_squared.unwrap_or(f64::NAN)
         }),
-        ("threshold", |execution| {
-            execution.verdict.threshold.unwrap_or(f64::NAN)
+        ("threshold", |angle_result| {
+            angle_result.verdict.threshold.unwrap_or(f64::NAN)
         }),
-        ("wake_up_time_s", |execution| execution.wake_up_time_s),
+        ("wake_up_time_s", |angle_result| angle_result.wake_up_time_s),
     ];
     for (name, value) in columns {
         table.set_item(name, column(py, rows(), value))?;
     }
-    let resolved = |e: &Execution| e.measured.as_ref().is_some_and(|angle| angle.resolved);
+    let resolved = |e: &AngleResult| e.measured.as_ref().is_some_and(|angle| angle.resolved);
     table.set_item("resolved", column(py, rows(), resolved))?;
     table.set_item(
         "accepted",
-        column(py, rows(), |execution| execution.verdict.accepted),
+        column(py, rows(), |angle_result| angle_result.verdict.accepted),
     )?;
-    let reasons = PyList::new(py, rows().map(|execution| execution.verdict.reason.name()))?;
+    let reasons = PyList::new(
+        py,
+        rows().map(|angle_result| angle_result.verdict.reason.name()),
+    )?;
     table.set_item("reason", reasons)?;
     Ok(table.unbind())
 }
 
-fn measured(execution: &Execution, value: fn(&AngleMeasurement) -> f64) -> f64 {
-    execution.measured.as_ref().map_or(f64::NAN, value)
+fn measured(angle_result: &AngleResult, value: fn(&AngleMeasurement) -> f64) -> f64 {
+    angle_result.measured.as_ref().map_or(f64::NAN, value)
 }
 
 fn error_quantiles(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {

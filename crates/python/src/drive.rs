@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use numpy::{PyArray1, PyReadonlyArray1};
-use onboard::Execution;
+use onboard::AngleResult;
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
 use onboard::localize::ekf::EstimatedConstant;
@@ -169,7 +169,7 @@ pub fn read_tum(py: Python<'_>, file: PathBuf) -> PyResult<Bound<'_, PyDict>> {
 ///     Time of the recording's first sample according to the odometry's clock.
 /// start : tuple of float, optional
 ///     Initial pose (x in metres, y in metres, heading in radians) instead of the vehicle's.
-/// from_scratch : bool
+/// start_unknown : bool
 ///     Whether to search for the initial pose along the road, even if the vehicle has one.
 /// smooth : bool
 ///     Whether to smooth the poses from the end of the drive, which fills `smoothed`.
@@ -181,7 +181,7 @@ pub fn read_tum(py: Python<'_>, file: PathBuf) -> PyResult<Bound<'_, PyDict>> {
 #[pyfunction]
 #[pyo3(signature = (
     site, vehicle, odometry, recording, *, angles = None, topic = None, imu_topic = None,
-    start_time_s = 0.0, start = None, from_scratch = false, smooth = false
+    start_time_s = 0.0, start = None, start_unknown = false, smooth = false
 ))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // Python's keywords
 pub fn locate(
@@ -195,7 +195,7 @@ pub fn locate(
     imu_topic: Option<&str>,
     start_time_s: f64,
     start: Option<[f64; 3]>,
-    from_scratch: bool,
+    start_unknown: bool,
     smooth: bool,
 ) -> PyResult<LocatedDrive> {
     let pose = start.map(|[x_m, y_m, heading_rad]| Pose {
@@ -208,14 +208,14 @@ pub fn locate(
             "`start` must be three finite numbers",
         ));
     }
-    if start.is_some() && from_scratch {
+    if start.is_some() && start_unknown {
         return Err(PyValueError::new_err(
-            "give either `start` or `from_scratch`",
+            "give either `start` or `start_unknown`",
         ));
     }
     let start = match pose {
         Some(pose) => StartChoice::At(pose),
-        None if from_scratch => StartChoice::Unknown,
+        None if start_unknown => StartChoice::Unknown,
         None => StartChoice::AsSet,
     };
     let owned = |it: &PyReadonlyArray1<'_, f64>| it.as_array().to_vec();
@@ -418,7 +418,7 @@ impl LocatedDrive {
                     ("gyroscope.bias_radps", "rad/s", it.yaw_rate_bias_radps),
                     ("array.mounting_rad", "rad", it.mounting_rad),
                     ("array.phase_rad", "rad", it.phase_rad),
-                    ("receiver.lateness_s", "s", it.lateness_s),
+                    ("receiver.angle_time_offset_s", "s", it.angle_time_offset_s),
                 ]
             });
         let columns = PyDict::new(py);
@@ -483,10 +483,10 @@ impl LocatedDrive {
     /// `phase_sigma_rad`, `angle_rad`, `accepted`, `reason`, `mahalanobis_squared`, `threshold`.
     #[getter]
     fn angles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let angles = &self.core.executions;
+        let angles = &self.core.aoa_estimates;
         let columns = PyDict::new(py);
         let measured = |value: fn(&AngleMeasurement) -> f64| {
-            let of = move |it: &Execution| it.measured.as_ref().map_or(f64::NAN, value);
+            let of = move |it: &AngleResult| it.measured.as_ref().map_or(f64::NAN, value);
             PyArray1::from_iter(py, angles.iter().map(of))
         };
         let each = || angles.iter();

@@ -60,9 +60,7 @@ mod _core {
     #[pymodule]
     mod nr {
         #[pymodule_export]
-        use crate::nr::{
-            Cell, Observables, Receiver, Scan, Searcher, build_burst, scan, search,
-        };
+        use crate::nr::{Cell, Observables, Receiver, Scan, Searcher, build_burst, scan, search};
         use pyo3::prelude::*;
 
         #[pymodule_init]
@@ -75,7 +73,7 @@ mod _core {
     #[pymodule_export]
     use crate::bound::ErrorBound;
     #[pymodule_export]
-    use crate::campaign::{SimulationResult, Tapes, simulate};
+    use crate::campaign::{MeasurementTraces, SimulationResult, simulate};
     #[pymodule_export]
     use crate::channel::{channel_drops, check_paths};
     #[pymodule_export]

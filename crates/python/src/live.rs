@@ -123,8 +123,8 @@ pub struct LiveOutcome {
 
 impl From<CoreOutcome> for LiveOutcome {
     fn from(outcome: CoreOutcome) -> Self {
-        let (ssb, verdict) = (outcome.execution.ssb, outcome.execution.verdict);
-        let (measured, pose) = (outcome.execution.measured, outcome.after.pose);
+        let (ssb, verdict) = (outcome.angle_result.ssb, outcome.angle_result.verdict);
+        let (measured, pose) = (outcome.angle_result.measured, outcome.after.pose);
         Self {
             time_s: ssb.time_s,
             pci: ssb.pci,
@@ -188,9 +188,9 @@ pub struct LiveEnergy {
     /// Time since the first input in seconds.
     duration_s: f64,
     /// Number of angle estimates.
-    executions: usize,
+    aoa_estimates: usize,
     /// Number of bursts received.
-    listened: usize,
+    bursts_received: usize,
     /// Time for which the receiver was on for these bursts, in seconds.
     on_time_s: f64,
     /// Energy of angle estimates, receiver and idle board in joules; `None` if the platform has no
@@ -378,7 +378,7 @@ impl Live {
     }
 
     /// Add an angle that was estimated elsewhere. The angles of a burst are processed together as
-    /// soon as odometry, a later angle or `settle` shows that the burst is complete.
+    /// soon as odometry, a later angle or `flush` shows that the burst is complete.
     ///
     /// Parameters
     /// ----------
@@ -447,8 +447,8 @@ impl Live {
     }
 
     /// Process the received part of a burst without waiting for the rest.
-    fn settle(&self, py: Python<'_>) -> PyResult<()> {
-        py.detach(|| self.core().settle()).map_err(live_error)
+    fn flush(&self, py: Python<'_>) -> PyResult<()> {
+        py.detach(|| self.core().flush()).map_err(live_error)
     }
 
     /// Return the results of the angles since the last call, oldest first, at most 256.
@@ -519,8 +519,8 @@ impl Live {
         let energy = self.core().energy();
         LiveEnergy {
             duration_s: energy.duration_s,
-            executions: energy.executions,
-            listened: energy.listened,
+            aoa_estimates: energy.aoa_estimates,
+            bursts_received: energy.bursts_received,
             on_time_s: energy.on_time_s,
             total_j: energy.energy.map(|it| it.total_j()),
         }

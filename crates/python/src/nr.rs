@@ -14,7 +14,7 @@ pub use searcher::Searcher;
 use std::f64::consts::FRAC_PI_2;
 
 use channel::{Blocks, Channel, Covariance};
-use nr_ssb::receiver::HeardSsb;
+use nr_ssb::receiver::TrackedSsb;
 use nr_ssb::search::DetectedSsb;
 use nr_ssb::{Lmax, SubcarrierSpacing};
 use num_complex::{Complex32, Complex64};
@@ -168,7 +168,7 @@ macro_rules! cell {
 impl Cell {
     /// Returns the SSB of a receiver as a cell; the ratio converts samples to the input rate.
     fn heard(
-        ssb: &HeardSsb,
+        ssb: &TrackedSsb,
         ssb_freq_hz: f64,
         spacing: SubcarrierSpacing,
         samples_per_base: f64,

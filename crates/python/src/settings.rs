@@ -183,7 +183,7 @@ toml_file! {
         let Some(vehicle) = vehicle else {
             return Ok(told(plausible::of_site(&self.0)));
         };
-        let mut found = plausible::of_both(&self.0, &vehicle.0);
+        let mut found = plausible::of_site_and_vehicle(&self.0, &vehicle.0);
         found.extend(platform_warnings(&vehicle.0).map_err(settings_error)?);
         Ok(told(found))
     }
@@ -316,24 +316,24 @@ toml_file! {
     /// Platform: validated figures of the onboard computer.
     Platform(CorePlatform), "platform",
 
-    /// Return the energy of a run in joules: `(executions, listening, idle, boundary)`, for numbers
+    /// Return the energy of a run in joules: `(aoa_estimates, listening, idle, boundary)`, for numbers
     /// of angle estimates and received SSB bursts and a duration in seconds, with the vehicle's
     /// method and power mode. `extent` is "value", or "low" or "high" for the end of every figure's
     /// range. `None` if the platform has no figure for the method.
-    #[pyo3(signature = (vehicle, executions, listened, duration_s, extent = "value"))]
+    #[pyo3(signature = (vehicle, aoa_estimates, bursts_received, duration_s, extent = "value"))]
     fn energy_j(
         &self,
         vehicle: &Vehicle,
-        executions: usize,
-        listened: usize,
+        aoa_estimates: usize,
+        bursts_received: usize,
         duration_s: f64,
         extent: &str,
     ) -> PyResult<Option<(f64, f64, f64, String)>> {
         let model = EnergyModel::new(&vehicle.0, &self.0, extent_of(extent)?);
         Ok(model.map_err(settings_error)?.map(|model| {
-            let energy = model.of_run(executions, listened, duration_s);
+            let energy = model.run_energy(aoa_estimates, bursts_received, duration_s);
             let boundary = model.boundary.to_string();
-            (energy.executions_j, energy.listening_j, energy.idle_j, boundary)
+            (energy.aoa_estimates_j, energy.listening_j, energy.idle_j, boundary)
         }))
     }
 

@@ -7,7 +7,7 @@ use onboard::observation::SensedSsb;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use recording::replay::{Met, as_stated, innovations};
+use recording::replay::{InnovationRecord, as_stated, innovations};
 use recording::{AngleLog, OdometryChoice, OdometryLog, read_angle_log, read_odometry};
 
 use crate::drive::replay_error;
@@ -116,8 +116,8 @@ impl LoggedDrive {
                 innovations(&site, &vehicle, &self.odometry, angles, used.as_deref())
             })
             .map_err(replay_error)?;
-        let number = |value: fn(&Met) -> f64| {
-            let of = move |it: &Option<Met>| it.as_ref().map_or(f64::NAN, value);
+        let number = |value: fn(&InnovationRecord) -> f64| {
+            let of = move |it: &Option<InnovationRecord>| it.as_ref().map_or(f64::NAN, value);
             PyArray1::from_iter(py, met.iter().map(of))
         };
         let used = met.iter().map(|it| it.is_some_and(|it| it.used));

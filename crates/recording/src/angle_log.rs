@@ -20,7 +20,7 @@ use crate::error::RecordingError;
 use crate::file as files;
 use crate::table::Table;
 use onboard::Observed;
-use onboard::burst::OfSsb;
+use onboard::burst::HasSsb;
 use onboard::live::AngleObservation;
 use onboard::localize::{AngleMeasurement, MeasurementKind};
 use onboard::observation::{BURST_S, SensedSsb};
@@ -92,7 +92,7 @@ impl From<&LoggedAngle> for AngleObservation {
     }
 }
 
-impl OfSsb for LoggedAngle {
+impl HasSsb for LoggedAngle {
     fn ssb(&self) -> &SensedSsb {
         &self.ssb
     }

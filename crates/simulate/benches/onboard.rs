@@ -24,7 +24,7 @@ fn main() {
     divan::main();
 }
 
-fn believed(site: &str) -> (Site, Vehicle) {
+fn nominal(site: &str) -> (Site, Vehicle) {
     let site = Site::from_library(site, &Shipped).unwrap();
     (
         site,
@@ -63,7 +63,7 @@ fn samples(site: &Site) -> Vec<Vec<Complex32>> {
 
 #[divan::bench(args = ["pss", "pss+sss", "ssb"])]
 fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
-    let (site, vehicle) = believed("trip-1");
+    let (site, vehicle) = nominal("trip-1");
     let vehicle = vehicle
         .with_overrides([("receiver.pilots", pilots.into())], &Shipped)
         .unwrap();
@@ -102,8 +102,8 @@ fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
 /// Angle to pose, with and without a map, and with an estimate of correlated angle errors.
 #[divan::bench(args = [(true, false), (false, false), (true, true)])]
 fn angle_to_pose(bencher: divan::Bencher, (map, estimates_bias): (bool, bool)) {
-    let (site, mut vehicle) = believed("trip-2");
-    vehicle.receiver.phase_bias_probability = Some(if estimates_bias { 0.75 } else { 0.0 });
+    let (site, mut vehicle) = nominal("trip-2");
+    vehicle.receiver.multipath_bias_probability = Some(if estimates_bias { 0.75 } else { 0.0 });
     let road = site.build_road().unwrap().unwrap();
     let heads = RadioHead::heard(&site, &vehicle);
     let config = EkfConfig::new(&site, &vehicle);
@@ -145,7 +145,7 @@ fn angle_to_pose(bencher: divan::Bencher, (map, estimates_bias): (bool, bool)) {
 /// integrity monitoring.
 #[divan::bench(args = [true, false])]
 fn burst_to_pose(bencher: divan::Bencher, guarded: bool) {
-    let (site, mut vehicle) = believed("trip-4");
+    let (site, mut vehicle) = nominal("trip-4");
     vehicle.integrity = guarded.then(IntegritySettings::default);
     let road = site.build_road().unwrap().unwrap();
     let heads = RadioHead::heard(&site, &vehicle);

@@ -36,7 +36,7 @@ const CLASSES: [(&str, f64, f64); 3] = [
 ];
 
 /// One received SSB.
-struct Heard {
+struct BurstResult {
     k_db: f64,
     seen: Observables,
     delay_error_m: f64,
@@ -59,7 +59,7 @@ fn main() -> Result<()> {
                     heard.extend(received(channel, khz, snr_db, count as u64, *seed)?);
                 }
                 for (name, least, most) in CLASSES {
-                    let of_class = |it: &&Heard| (least..most).contains(&it.k_db);
+                    let of_class = |it: &&BurstResult| (least..most).contains(&it.k_db);
                     row(
                         &format!("{channel},{khz},{snr_db},{name}"),
                         &heard.iter().filter(of_class).collect::<Vec<_>>(),
@@ -71,20 +71,22 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-fn row(name: &str, all: &[&Heard]) {
-    let found: Vec<&Heard> = all
+fn row(name: &str, all: &[&BurstResult]) {
+    let found: Vec<&BurstResult> = all
         .iter()
         .copied()
         .filter(|it| it.seen.delay.multipath != Multipath::Uncertain)
         .collect();
     let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
-    let of = |of: fn(&Heard) -> f64| mean(found.iter().map(|it| of(it)).collect());
-    let is_from_phase = |it: &&&Heard| it.seen.range_rate.source == RateSource::PhaseDifference;
+    let of = |of: fn(&BurstResult) -> f64| mean(found.iter().map(|it| of(it)).collect());
+    let is_from_phase =
+        |it: &&&BurstResult| it.seen.range_rate.source == RateSource::PhaseDifference;
     let from_phase: Vec<f64> = (found.iter().filter(is_from_phase))
         .map(|it| (it.rate_error_m_s / it.seen.range_rate.sigma_m_s).powi(2))
         .collect();
-    let share =
-        |is: fn(&Heard) -> bool| all.iter().filter(|it| is(it)).count() as f64 / all.len() as f64;
+    let share = |is: fn(&BurstResult) -> bool| {
+        all.iter().filter(|it| is(it)).count() as f64 / all.len() as f64
+    };
     println!(
         "{name},{},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2}",
         all.len(),
@@ -102,7 +104,13 @@ fn row(name: &str, all: &[&Heard]) {
 }
 
 /// Receives SSBs of a drive in one channel model.
-fn received(channel: &str, khz: f64, snr_db: f64, count: u64, seed: u64) -> Result<Vec<Heard>> {
+fn received(
+    channel: &str,
+    khz: f64,
+    snr_db: f64,
+    count: u64,
+    seed: u64,
+) -> Result<Vec<BurstResult>> {
     let scenario = changed(
         "yard",
         [
@@ -177,7 +185,7 @@ fn received(channel: &str, khz: f64, snr_db: f64, count: u64, seed: u64) -> Resu
             let moved_m = distance_m(time_s) - distance_m(time_s - interval_s);
             let cfo_hz = cfos_hz.get(head).copied().unwrap_or(0.0);
             let rate_m_s = moved_m / interval_s - wavelength_m * cfo_hz;
-            heard.push(Heard {
+            heard.push(BurstResult {
                 k_db: k_db(channel, &here),
                 seen,
                 delay_error_m: (seen.delay.first_path_start - start) * metre,

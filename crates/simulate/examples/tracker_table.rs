@@ -96,11 +96,11 @@ fn main() -> Result<()> {
     }
 
     println!("\npaper, worst mean |error| along the track (m)");
-    println!("              paper's method    tracker, map      no map    executions");
+    println!("              paper's method    tracker, map      no map    aoa_estimates");
     println!("wake-up           X      Y        X      Y        X      Y");
     for (name, policy) in policies() {
         let mut worst = Vec::new();
-        let mut executions = 0.0;
+        let mut aoa_estimates = 0.0;
         for localizer in [
             vec![],
             vec![("vehicle.localizer.kind", Value::from("tracker"))],
@@ -112,7 +112,7 @@ fn main() -> Result<()> {
             let settings = policy.iter().cloned().chain(localizer);
             let campaign = drive(changed("paper", settings)?)?;
             worst.extend(campaign.worst_mean_abs_error_m());
-            executions = campaign.mean_executions();
+            aoa_estimates = campaign.mean_aoa_estimates();
         }
         print!("{name:12}");
         for pair in worst.chunks(2) {
@@ -121,7 +121,7 @@ fn main() -> Result<()> {
             }
             print!("   ");
         }
-        println!(" {executions:8.0}");
+        println!(" {aoa_estimates:8.0}");
     }
     Ok(())
 }

@@ -20,8 +20,8 @@ struct Policy {
 
 struct Outcome {
     p90_m: f64,
-    executions: f64,
-    listened: f64,
+    aoa_estimates: f64,
+    bursts_received: f64,
     out_of_reach: f64,
 }
 
@@ -35,19 +35,19 @@ fn main() -> Result<()> {
     }
 
     println!("yard, {runs} runs of each, seeds {seeds:?}");
-    println!("policy                 p90 m  executions    receptions  target unreachable");
+    println!("policy                 p90 m  aoa_estimates    receptions  target unreachable");
     for policy in &policies {
         println!(
             "{:20} {:7.3} {:11.0} {:13.0} {:17.1} %",
             policy.name,
             policy.mean(|it| it.p90_m),
-            policy.mean(|it| it.executions),
-            policy.mean(|it| it.listened),
+            policy.mean(|it| it.aoa_estimates),
+            policy.mean(|it| it.bursts_received),
             100.0 * policy.mean(|it| it.out_of_reach),
         );
     }
     println!("\nratios: mean, minimum and maximum over the seeds");
-    println!("policy               against             share of executions      p90 over p90");
+    println!("policy               against             share of aoa_estimates      p90 over p90");
     let (driven, references): (Vec<_>, Vec<_>) = policies.iter().partition(|policy| {
         matches!(
             policy.scenario.vehicle.wake_up,
@@ -56,7 +56,7 @@ fn main() -> Result<()> {
     });
     for policy in driven {
         for reference in &references {
-            let share = policy.against(reference, |it| it.executions);
+            let share = policy.against(reference, |it| it.aoa_estimates);
             let error = policy.against(reference, |it| it.p90_m);
             println!("{:20} {:18} {share}   {error}", policy.name, reference.name);
         }
@@ -89,12 +89,12 @@ fn policies() -> Result<Vec<Policy>> {
 
 fn drive(scenario: &Scenario, runs: usize, seed: u64) -> Result<Outcome> {
     let campaign = campaign(scenario, seed, runs)?;
-    let listened: usize = campaign.runs.iter().map(|run| run.listened).sum();
+    let bursts_received: usize = campaign.runs.iter().map(|run| run.bursts_received).sum();
     let out_of_reach: usize = campaign.runs.iter().map(|run| run.out_of_reach).sum();
     Ok(Outcome {
         p90_m: campaign.errors.quantile_m(0.9).unwrap_or(f64::NAN),
-        executions: campaign.mean_executions(),
-        listened: listened as f64 / runs as f64,
+        aoa_estimates: campaign.mean_aoa_estimates(),
+        bursts_received: bursts_received as f64 / runs as f64,
         out_of_reach: out_of_reach as f64 / (runs * campaign.steps.len()) as f64,
     })
 }

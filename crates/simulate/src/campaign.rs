@@ -91,9 +91,9 @@ pub struct RunSummary {
     /// Number of the run.
     pub run: u64,
     /// Number of angle estimates.
-    pub executions: usize,
+    pub aoa_estimates: usize,
     /// Number of SSB bursts received.
-    pub listened: usize,
+    pub bursts_received: usize,
     /// Number of SSBs at which no selection of angles could meet the target error of an
     /// uncertainty-driven wake-up policy.
     pub out_of_reach: usize,
@@ -273,20 +273,27 @@ fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
         final_error_m = error_m;
     }
     let duration_s = record.steps.last().map_or(0.0, |step| step.time_s);
-    let executions = record.executions.as_slice();
-    let times_s = executions.iter().map(|execution| execution.ssb.time_s);
+    let aoa_estimates = record.aoa_estimates.as_slice();
+    let times_s = aoa_estimates
+        .iter()
+        .map(|angle_result| angle_result.ssb.time_s);
     let gaps_s = times_s
         .clone()
         .zip(times_s.skip(1))
         .map(|(before, after)| after - before);
     RunSummary {
         run: record.run,
-        executions: record.executions.len(),
-        listened: record.listened,
+        aoa_estimates: record.aoa_estimates.len(),
+        bursts_received: record.bursts_received,
         out_of_reach: record.out_of_reach,
         longest_gap_s: gaps_s.fold(0.0, f64::max),
-        energy: energy
-            .map(|model| model.of_run(record.executions.len(), record.listened, duration_s)),
+        energy: energy.map(|model| {
+            model.run_energy(
+                record.aoa_estimates.len(),
+                record.bursts_received,
+                duration_s,
+            )
+        }),
         rms_error_m: (squares_m2 / f64::from(count)).sqrt(),
         max_error_m,
         final_error_m,

@@ -59,8 +59,8 @@ impl Campaign {
     }
 
     /// Returns the mean number of angle estimates per run.
-    pub fn mean_executions(&self) -> f64 {
-        mean(self.runs.iter().map(|run| run.executions as f64))
+    pub fn mean_aoa_estimates(&self) -> f64 {
+        mean(self.runs.iter().map(|run| run.aoa_estimates as f64))
     }
 }
 

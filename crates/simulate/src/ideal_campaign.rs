@@ -36,8 +36,8 @@ impl IdealFilter {
         RunRecord {
             run,
             steps: self.run(seed, run).enumerate().map(step).collect(),
-            executions: Vec::new(),
-            listened: 0,
+            aoa_estimates: Vec::new(),
+            bursts_received: 0,
             constants: None,
             out_of_reach: 0,
         }

@@ -151,8 +151,8 @@ mod tests {
         RunRecord {
             run: 0,
             steps: steps.iter().enumerate().map(step).collect(),
-            executions: Vec::new(),
-            listened: 0,
+            aoa_estimates: Vec::new(),
+            bursts_received: 0,
             constants: None,
             out_of_reach: 0,
         }

@@ -26,7 +26,7 @@ pub struct IqBurstReception<'a> {
     /// True path of the vehicle.
     pub path: &'a Path,
     /// Time stamp minus time of reception of an SSB, in seconds.
-    pub lateness_s: f64,
+    pub angle_time_offset_s: f64,
     /// Channels of the radio heads.
     pub channels: &'a [HeadChannel],
     /// Mean SNR of each radio head (dB).
@@ -73,7 +73,7 @@ impl IqReception {
 
 impl SsbSource for IqBurstReception<'_> {
     fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
-        let state = |time_s| self.path.heard_at(time_s, self.lateness_s);
+        let state = |time_s| self.path.heard_at(time_s, self.angle_time_offset_s);
         self.reception
             .receive(self.number, state, self.channels, self.snrs_db)?;
         sensed.extend(self.reception.observations.iter().map(|it| it.ssb));

@@ -10,7 +10,7 @@ use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
 use onboard::observation::{OdometrySample, SensedSsb, SsbObservation};
 use onboard::settings::EstimatorMethod;
-use onboard::{BoxError, Custom, Observed, Onboard, SsbSource, estimator};
+use onboard::{BoxError, Custom, Observed, Pipeline, SsbSource, estimator};
 use rayon::prelude::*;
 
 use crate::campaign::{Campaign, CampaignOptions, thread_pool};
@@ -162,7 +162,7 @@ impl MeasurementTrace {
             }
             let vehicle = truth
                 .path
-                .heard_at(time_s, truth.vehicle.receiver.lateness_s);
+                .heard_at(time_s, truth.vehicle.receiver.angle_time_offset_s);
             let mut strongest_db = f64::NEG_INFINITY;
             for (index, channel) in channels.iter_mut().enumerate() {
                 let snr_db = channel.next_snr_db(&vehicle);
@@ -200,7 +200,7 @@ impl MeasurementTrace {
         let (site, vehicle) = (&scenario.site, &scenario.vehicle);
         let platform = simulation.platform();
         let custom = Custom::default();
-        let mut onboard = Onboard::new(site, vehicle, platform, self.told_start, custom)?;
+        let mut onboard = Pipeline::new(site, vehicle, platform, self.told_start, custom)?;
         let mut record = RunRecord::new(self.run, self.bursts.len());
         let mut silence = SsbObservation::new(vehicle.array.elements.into());
         let mut odometry = self.odometry.iter().peekable();
@@ -219,7 +219,7 @@ impl MeasurementTrace {
                 angles: angles.get(here).unwrap_or_default(),
                 silence: &mut silence,
             };
-            let heard = onboard.hear(time_s, &mut played);
+            let heard = onboard.process_burst(time_s, &mut played);
             record.add(&heard.map_err(SimulationError::of_drive)?);
             record.add_step(&onboard, time_s, burst.truth, burst.snr_db)?;
         }

@@ -4,7 +4,7 @@ use onboard::geometry::Pose;
 use onboard::localize::ekf::EstimatedConstants;
 use onboard::localize::{Integrity, IntegrityState};
 use onboard::monitor::ActiveFaults;
-use onboard::{Execution, Heard, Onboard};
+use onboard::{AngleResult, BurstResult, Pipeline};
 
 use crate::error::SimulationError;
 
@@ -80,9 +80,9 @@ pub struct RunRecord {
     /// One step per SSB.
     pub steps: Vec<Step>,
     /// Angle estimates.
-    pub executions: Vec<Execution>,
+    pub aoa_estimates: Vec<AngleResult>,
     /// Number of SSB bursts received.
-    pub listened: usize,
+    pub bursts_received: usize,
     /// Estimated constants of the vehicle at the end of the run; `None` if the localizer estimates
     /// none.
     pub constants: Option<EstimatedConstants>,
@@ -106,35 +106,35 @@ impl RunRecord {
         Self {
             run,
             steps: Vec::with_capacity(steps),
-            executions: Vec::with_capacity(steps),
-            listened: 0,
+            aoa_estimates: Vec::with_capacity(steps),
+            bursts_received: 0,
             constants: None,
             out_of_reach: 0,
         }
     }
 
     /// Adds the results of a burst.
-    pub(crate) fn add(&mut self, heard: &Heard<'_>) {
-        self.listened += usize::from(heard.listened);
-        self.executions.extend_from_slice(heard.executions);
+    pub(crate) fn add(&mut self, heard: &BurstResult<'_>) {
+        self.bursts_received += usize::from(heard.receiver_on);
+        self.aoa_estimates.extend_from_slice(heard.aoa_estimates);
         self.out_of_reach += usize::from(heard.keeps_bound == Some(false));
     }
 
     /// Adds the true and estimated poses at an SSB.
     pub(crate) fn add_step(
         &mut self,
-        onboard: &Onboard,
+        onboard: &Pipeline,
         time_s: f64,
         truth: Pose,
         snr_db: f64,
     ) -> Result<(), SimulationError> {
-        let believed = onboard.pose(time_s).map_err(SimulationError::Custom)?;
+        let nominal = onboard.pose(time_s).map_err(SimulationError::Custom)?;
         self.steps.push(Step {
             time_s,
             truth,
-            estimate: believed.pose,
-            covariance: believed.covariance,
-            integrity: believed.integrity,
+            estimate: nominal.pose,
+            covariance: nominal.covariance,
+            integrity: nominal.integrity,
             searching: onboard.searching().is_some(),
             snr_db,
             faults: *onboard.faults(),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use onboard::geometry::Pose;
 use onboard::settings::{Platform, SettingsError};
-use onboard::{BoxError, Custom, Onboard, SsbSource};
+use onboard::{BoxError, Custom, Pipeline, SsbSource};
 
 use crate::channel::HeadChannel;
 use crate::error::SimulationError;
@@ -39,7 +39,7 @@ impl Simulation {
         let steps = (world.duration_s() / scenario.site.ssb.period_s()).ceil() as usize + 1;
         // Report all errors of the pipeline before the first run.
         let (site, vehicle) = (&scenario.site, &scenario.vehicle);
-        Onboard::new(site, vehicle, &platform, Pose::default(), Custom::default())?;
+        Pipeline::new(site, vehicle, &platform, Pose::default(), Custom::default())?;
         Ok(Self {
             world,
             platform,
@@ -115,7 +115,7 @@ impl Simulation {
 
 /// State of a run.
 struct Drive {
-    onboard: Onboard,
+    onboard: Pipeline,
     path: Path,
     odometer: Odometer,
     channels: Vec<HeadChannel>,
@@ -127,7 +127,7 @@ struct Drive {
     /// Reusable buffers of processed bursts.
     spare: Vec<Vec<f64>>,
     latency_s: f64,
-    lateness_s: f64,
+    angle_time_offset_s: f64,
     strongest_db: f64,
 }
 
@@ -146,7 +146,7 @@ impl Drive {
         let scenario = simulation.scenario();
         let mut truth = simulation.world.draw(streams);
         let start = truth.told_start;
-        let onboard = Onboard::new(
+        let onboard = Pipeline::new(
             &scenario.site,
             &scenario.vehicle,
             &simulation.platform,
@@ -168,14 +168,14 @@ impl Drive {
             on_the_way: VecDeque::new(),
             spare: Vec::new(),
             latency_s: 1e-3 * scenario.ssb_latency_ms,
-            lateness_s: truth.vehicle.receiver.lateness_s,
+            angle_time_offset_s: truth.vehicle.receiver.angle_time_offset_s,
             strongest_db: f64::NEG_INFINITY,
         })
     }
 
     /// Sends burst number `number` with the time stamp `time_s`.
     fn send(&mut self, number: usize, time_s: f64) {
-        let vehicle = self.path.heard_at(time_s, self.lateness_s);
+        let vehicle = self.path.heard_at(time_s, self.angle_time_offset_s);
         let mut snrs_db = self.spare.pop().unwrap_or_default();
         let next_snr_db = |channel: &mut HeadChannel| channel.next_snr_db(&vehicle);
         snrs_db.extend(self.channels.iter_mut().map(next_snr_db));
@@ -230,7 +230,7 @@ impl Drive {
                 reception,
                 number: burst.number,
                 path: &self.path,
-                lateness_s: self.lateness_s,
+                angle_time_offset_s: self.angle_time_offset_s,
                 channels: &self.channels,
                 snrs_db: &burst.snrs_db,
             };
@@ -246,7 +246,7 @@ impl Drive {
             };
             &mut by_snapshots
         };
-        let heard = self.onboard.hear(burst.vehicle.time_s, source);
+        let heard = self.onboard.process_burst(burst.vehicle.time_s, source);
         record.add(&heard.map_err(SimulationError::of_drive)?);
         let mut snrs_db = burst.snrs_db;
         snrs_db.clear();

@@ -95,7 +95,7 @@ pub fn synthesize(
     let mut drawn = World::new(scenario)?.draw(streams);
     let mut channels = HeadChannel::all(&mut drawn, streams);
     let path = drawn.path;
-    let heard_at = |time_s| path.heard_at(time_s, drawn.vehicle.receiver.lateness_s);
+    let heard_at = |time_s| path.heard_at(time_s, drawn.vehicle.receiver.angle_time_offset_s);
     let end_s = path
         .duration_s()
         .min(settings.duration_s.unwrap_or(f64::INFINITY));

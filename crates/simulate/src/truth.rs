@@ -159,8 +159,9 @@ impl World {
         }
         let mut clock = streams.generator(Purpose::Clock, 0);
         let receiver = &mut vehicle.receiver;
-        let lateness_std_s = factor * receiver.lateness_std_s.unwrap_or_default();
-        receiver.lateness_s += lateness_std_s * clock.sample::<f64, _>(StandardNormal);
+        let angle_time_offset_std_s = factor * receiver.angle_time_offset_std_s.unwrap_or_default();
+        receiver.angle_time_offset_s +=
+            angle_time_offset_std_s * clock.sample::<f64, _>(StandardNormal);
 
         let keeping = vehicle.lane_keeping.process();
         let path = Path::new(self.road.clone(), self.motion.clone(), keeping, streams);

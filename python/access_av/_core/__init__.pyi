@@ -20,6 +20,7 @@ __all__ = [
     "LiveStatus",
     "LocatedDrive",
     "LoggedDrive",
+    "MeasurementTraces",
     "Plant",
     "Platform",
     "RadioHead",
@@ -32,7 +33,6 @@ __all__ = [
     "SimulationResult",
     "Site",
     "Situation",
-    "Tapes",
     "Vehicle",
     "__version__",
     "aoa",
@@ -131,8 +131,8 @@ class LiveHead:
 @final
 class LiveEnergy:
     duration_s: Final[float]
-    executions: Final[int]
-    listened: Final[int]
+    aoa_estimates: Final[int]
+    bursts_received: Final[int]
     on_time_s: Final[float]
     total_j: Final[float | None]
 
@@ -178,7 +178,7 @@ class Live:
     ) -> None: ...
     def clock_step(self) -> float | None: ...
     def clock_disagreement_s(self) -> float | None: ...
-    def settle(self) -> None: ...
+    def flush(self) -> None: ...
     def outcomes(self) -> list[LiveOutcome]: ...
     def set_pose(
         self,
@@ -243,8 +243,8 @@ class Platform(_Settings):
     def energy_j(
         self,
         vehicle: Vehicle,
-        executions: int,
-        listened: int,
+        aoa_estimates: int,
+        bursts_received: int,
         duration_s: float,
         extent: str = "value",
     ) -> tuple[float, float, float, str] | None: ...
@@ -283,7 +283,7 @@ class SimulationResult:
     runs: Final[dict[str, NDArray[Any]]]
     trajectories: Final[dict[str, NDArray[Any]] | None]
     integrity: Final[tuple[dict[str, NDArray[np.float64]], float] | None]
-    executions: Final[dict[str, Any] | None]
+    aoa_estimates: Final[dict[str, Any] | None]
     error_quantiles_m: Final[dict[float, float]]
     errors_m: Final[NDArray[np.float32] | None]
     levels_m: Final[NDArray[np.float32] | None]
@@ -329,7 +329,7 @@ def simulate(
 ) -> SimulationResult: ...
 
 @final
-class Tapes:
+class MeasurementTraces:
     @staticmethod
     def record(
         scenario: Scenario,
@@ -339,7 +339,7 @@ class Tapes:
         methods: Sequence[str],
         platform: Platform | None = None,
         threads: int | None = None,
-    ) -> Tapes | None: ...
+    ) -> MeasurementTraces | None: ...
     def serve(self, scenario: Scenario, *, platform: Platform | None = None) -> bool: ...
     def simulate(
         self,
@@ -409,7 +409,7 @@ def locate(
     imu_topic: str | None = None,
     start_time_s: float = 0.0,
     start: tuple[float, float, float] | None = None,
-    from_scratch: bool = False,
+    start_unknown: bool = False,
     smooth: bool = False,
 ) -> LocatedDrive: ...
 

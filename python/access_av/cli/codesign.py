@@ -17,7 +17,9 @@ app = typer.Typer()
     epilog="Example: [bold]access-av codesign --runs 20[/]",
 )
 def codesign(
-    reading: Annotated[str, typer.Option(help="Name of an interpretation of the paper.")] = "gate",
+    interpretation: Annotated[
+        str, typer.Option(help="Name of an interpretation of the paper.")
+    ] = "gate",
     runs: Runs = 100,
     seed: Seed = 1,
     threads: Threads = None,
@@ -25,16 +27,16 @@ def codesign(
 ) -> None:
     """Compare tracker, policy and engine with the paper's adaptive point in each power mode.
 
-    Energies of a trip include executions and receiver. Ranges cover all parameter ranges of the
-    platform files. Second row of each mode: with the paper's energy per execution. Third row: with
-    the energy of this project's cycles at the clock of the mode. The share is the energy relative
-    to the paper's, at the worst end of the range.
+    Energies of a trip include angle estimates and receiver. Ranges cover all parameter ranges of
+    the platform files. Second row of each mode: with the paper's energy per execution. Third row:
+    with the energy of this project's cycles at the clock of the mode. The share is the energy
+    relative to the paper's, at the worst end of the range.
     """
     from access_av.paper.codesign import compare
     from access_av.tables.results_directory import json_text
 
     with progress("Driving") as tick:
-        found = compare(reading, runs=runs, seed=seed, threads=threads, progress=tick)
+        found = compare(interpretation, runs=runs, seed=seed, threads=threads, progress=tick)
     if as_json:
         records = [
             {
@@ -47,8 +49,8 @@ def codesign(
         ]
         print(json_text(records))
         return
-    head = ["mode", "point", "RMS m", "executions", "received", "energy J", "share ≤"]
-    made = table(head, title=f"Interpretation {reading}, {runs} runs, seed {seed}", text=2)
+    head = ["mode", "point", "RMS m", "angle estimates", "received", "energy J", "share ≤"]
+    made = table(head, title=f"Interpretation {interpretation}, {runs} runs, seed {seed}", text=2)
     for each in found:
         for name, point, share in (
             ("paper", each.paper, ""),
@@ -60,8 +62,8 @@ def codesign(
                 str(each.mode) if name == "paper" else "",
                 name,
                 f"{point.rms_error_m:.3f}",
-                f"{point.executions:.0f}",
-                f"{point.listened:.0f}",
+                f"{point.aoa_estimates:.0f}",
+                f"{point.bursts_received:.0f}",
                 f"{value_j:.3g} ({low_j:.3g}…{high_j:.3g})",
                 share,
             )

@@ -91,7 +91,7 @@ def designs(
     from access_av.errors import InputError
     from access_av.report.designs import render_designs
     from access_av.run.campaign import Campaign, Shard, executor
-    from access_av.run.result_cache import Parts
+    from access_av.run.result_cache import ResultCache
     from access_av.tables.results_directory import RESULTS, ResultsDirectory, json_text
 
     chosen = load_scenario(scenario)
@@ -109,7 +109,7 @@ def designs(
             said |= {str(it) for it in new}
             announce(f"{space}: {worlds[0].label}", new)
     with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
-        campaign = Campaign(Parts(RESULTS / "parts"), pool, workers, share)
+        campaign = Campaign(ResultCache(RESULTS / "parts"), pool, workers, share)
         found = (
             search(campaign, every, runs=runs, seed=seed, halving=halving, progress=tick)
             if optuna is None
@@ -226,8 +226,8 @@ def _show(rows: pl.DataFrame, title: str, percent: float = 99.0) -> None:
         ("(95 %)", lambda row: ends_text(row[low], row[high])),
         ("RMS m", lambda row: _known(row["rms_error_m"])),
         ("median m", lambda row: _known(row["p50_error_m"])),
-        ("executions", lambda row: _known(row["executions"])),
-        ("received", lambda row: _known(row["listened"])),
+        ("angle estimates", lambda row: _known(row["aoa_estimates"])),
+        ("received", lambda row: _known(row["bursts_received"])),
     ]
     while True:
         made = table([head for head, _ in columns], title=title)

@@ -128,7 +128,7 @@ def locate(
         str | None,
         typer.Option(
             metavar="X,Y,HEADING",
-            help="Start pose in m, m, rad, or the word scratch.",
+            help="Start pose in m, m, rad, or the word unknown.",
             show_default="of the vehicle file",
         ),
     ] = None,
@@ -166,7 +166,7 @@ def locate(
     Site, TOML: radio_heads with pci and position_m; optional road with polyline_m, segments, or
     file (GeoJSON or CSV). docs/locate.md has examples of sites and vehicles.
 
-    --vary changes a key that begins with site. or vehicle.; --compare names another vehicle. Both
+    --sweep changes a key that begins with site. or vehicle.; --against names another vehicle. Both
     locate the drive again, compare the errors with --truth, and write compared.parquet.
 
     Exit code 0: located. 2: unusable input. 3: not reliable (never found, unavailable for more than
@@ -180,13 +180,13 @@ def locate(
     from access_av.run.operation import Operation
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
-    from_scratch = start is not None and start.strip() == "scratch"
-    pose = None if start is None or from_scratch else _pose(start)
+    start_unknown = start is not None and start.strip() == "unknown"
+    pose = None if start is None or start_unknown else _pose(start)
     plant, carrier = load_site_and_vehicle(site, vehicle, pose)
     others = {name: load_site_and_vehicle(site, name, pose) for name in compare or ()}
     beliefs = variants((plant, carrier), vary, others, _changed)
     if len(beliefs) > 1 and truth is None:
-        raise InputError("--vary, --compare: add --truth FILE, because the errors are compared")
+        raise InputError("--sweep, --against: add --truth FILE, because the errors are compared")
     true = None if truth is None else drives.read_tum(truth)
     directory = ResultsDirectory.create("locate", out)
     located = dict[str, Drive]()
@@ -201,7 +201,7 @@ def locate(
                 imu_topic=imu_topic,
                 start_time_s=start_time_s,
                 start=pose,
-                from_scratch=from_scratch,
+                start_unknown=start_unknown,
                 smooth=smooth and not located,
             )
             tick(len(located), len(beliefs))
@@ -261,7 +261,9 @@ def _changed(belief: tuple[Site, Vehicle], keys: dict[str, Any]) -> tuple[Site, 
     for key, value in keys.items():
         part, _, rest = key.partition(".")
         if part not in parts or not rest:
-            raise InputError(f"--vary {key}: keys of a recorded drive begin with site. or vehicle.")
+            raise InputError(
+                f"--sweep {key}: keys of a recorded drive begin with site. or vehicle."
+            )
         parts[part][rest] = value
     site, vehicle = belief
     return site.with_overrides(parts["site"]), vehicle.with_overrides(parts["vehicle"])
@@ -341,7 +343,7 @@ def _pose(text: str) -> tuple[float, float, float]:
     except ValueError as error:
         raise InputError(
             f"--start {text}: write x and y in metres and the heading in radians, as 12.5,-3,0.1, "
-            "or the word scratch"
+            "or the word unknown"
         ) from error
     if not all(map(math.isfinite, (x_m, y_m, heading_rad))):
         raise InputError(f"--start {text}: the numbers must be finite")

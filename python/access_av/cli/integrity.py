@@ -39,14 +39,14 @@ app = typer.Typer()
 
 @app.command(
     epilog="Example: [bold]access-av integrity yard --channel 'as set' --channel inf-sh "
-    "--heads 2 --heads 4 --out results/yard-integrity[/]",
+    "--num-heads 2 --num-heads 4 --out results/yard-integrity[/]",
 )
 def integrity(
     scenario: ScenarioArgument,
     runs: Runs = 20,
     seed: Seed = 1,
     threads: Threads = None,
-    mismatch: Annotated[
+    fault: Annotated[
         list[str] | None,
         typer.Option(help="Difference of truth and model; repeatable.", show_default="all"),
     ] = None,
@@ -58,7 +58,8 @@ def integrity(
         typer.Option(help="'as set', K=5 (a true Rician K of 5 dB), umi, inf-sl, …; repeatable."),
     ] = None,
     heads: Annotated[
-        list[int] | None, typer.Option(min=1, help="Number of received radio heads; repeatable.")
+        list[int] | None,
+        typer.Option("--num-heads", min=1, help="Number of received radio heads; repeatable."),
     ] = None,
     risk: Annotated[
         list[float] | None,
@@ -84,7 +85,7 @@ def integrity(
     divided by error. ≤ is the upper end of a 95 % interval. A narrow terminal omits the last ones.
 
     Writes integrity.parquet, report.html (table and Stanford diagrams), parts/ and manifest.json.
-    --vary and --compare repeat every case and write compared.parquet.
+    --sweep and --against repeat every case and write compared.parquet.
     """
     import polars as pl
 
@@ -93,7 +94,7 @@ def integrity(
     from access_av.run import integrity_campaign
     from access_av.run.campaign import Campaign, Shard, executor
     from access_av.run.fault_injection import hypotheses as sized
-    from access_av.run.result_cache import Parts
+    from access_av.run.result_cache import ResultCache
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
     chosen = load_scenario(scenario)
@@ -102,16 +103,16 @@ def integrity(
     directory = ResultsDirectory.create("integrity", out)
     share = Shard.parse(shard)
     if hypotheses:
-        mismatch = [*(mismatch or ()), *sized(chosen)]
+        fault = [*(fault or ()), *sized(chosen)]
     with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
-        campaign = Campaign(Parts(directory.path / "parts"), pool, workers, share)
+        campaign = Campaign(ResultCache(directory.path / "parts"), pool, workers, share)
         driven = {
             label: integrity_campaign.drive(
                 campaign,
                 variant,
                 runs=runs,
                 seed=seed,
-                only=mismatch,
+                only=fault,
                 channel_names=channel or ("as set",),
                 heads=heads,
                 risks_per_hour=risk,
@@ -155,8 +156,8 @@ def _beside(cases: Sequence[Case], percents: list[float]) -> list[Compared]:
         of_case.setdefault((case.mismatch, case.channel, seen[kind]), []).append(case)
         seen[kind] += 1
     found = []
-    for (mismatch, channel, _), its in of_case.items():
-        where = "" if len(of_case) == 1 else f"{mismatch}, {channel}, {its[0].heads} radio heads: "
+    for (fault, channel, _), its in of_case.items():
+        where = "" if len(of_case) == 1 else f"{fault}, {channel}, {its[0].heads} radio heads: "
         found += beside_first([it.errors(f"{where}{it.variant}") for it in its], percents)
     return found
 

@@ -26,7 +26,8 @@ Road = Annotated[
 Heads = Annotated[
     Path | None,
     typer.Option(
-        help="Radio heads: CSV (x_m, y_m, z_m, name, pci), GeoJSON or DXF (points, blocks)."
+        "--heads-file",
+        help="Radio heads: CSV (x_m, y_m, z_m, name, pci), GeoJSON or DXF (points, blocks).",
     ),
 ]
 Walls = Annotated[
@@ -284,7 +285,7 @@ _site_command(
     "Write a plant file: site, vehicle, fleet, prices and required accuracy.",
     "--road road.geojson",
 )
-_site_command("site", "Write a site file: road, radio heads and walls.", "--heads heads.csv")
+_site_command("site", "Write a site file: road, radio heads and walls.", "--heads-file heads.csv")
 
 
 @app.command(epilog="Example: [bold]access-av new vehicle mine.toml[/]")
@@ -315,8 +316,8 @@ def export(
     ],
     file: Annotated[Path, typer.Argument(help="File to write: .geojson or .csv.")],
     origin: OriginText = None,
-    german: Annotated[
-        bool, typer.Option("--german", help="CSV with semicolons and decimal commas.")
+    decimal_comma: Annotated[
+        bool, typer.Option("--decimal-comma", help="CSV with semicolons and decimal commas.")
     ] = False,
 ) -> None:
     """Export a site's road, radio heads and walls.
@@ -340,8 +341,8 @@ def export(
         console.print(f"Written: {file}", soft_wrap=True)
     elif file.suffix.lower() == ".csv":
         beside = file.with_name(f"{file.stem}-heads.csv")
-        write_whole(file, csv_file.road_text(drawn.road_m, german=german))
-        write_whole(beside, csv_file.heads_text(drawn.heads, german=german))
+        write_whole(file, csv_file.road_text(drawn.road_m, decimal_comma=decimal_comma))
+        write_whole(beside, csv_file.heads_text(drawn.heads, decimal_comma=decimal_comma))
         console.print(f"Written: {file}, {beside}", soft_wrap=True)
     else:
         raise InputError(f"{file}: its name must end in .geojson, .json or .csv")

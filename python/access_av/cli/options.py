@@ -57,11 +57,9 @@ PercentileOption = Annotated[
 ]
 Vary = Annotated[
     list[str] | None,
-    typer.Option("--vary", metavar="KEY=a,b,c", help="Compare values of a key; repeatable."),
+    typer.Option("--sweep", metavar="KEY=a,b,c", help="Compared values of a key; repeatable."),
 ]
-Compare = Annotated[
-    list[str] | None, typer.Option("--compare", help="Compare with another file; repeatable.")
-]
+Compare = Annotated[list[str] | None, typer.Option("--against", help="Compared file; repeatable.")]
 Percents = Annotated[
     list[float] | None,
     typer.Option(
@@ -134,8 +132,8 @@ def read_scenario(name: str, *, allow_large: bool) -> Scenario:
     """Loads a scenario without printing warnings."""
     if not allow_large:
         return Scenario.load(name)
-    like = str(Path(name).absolute()) if Path(name).exists() else name
-    return Scenario.from_toml(f"like = {json.dumps(like)}\nallow_large = true\n", name)
+    base = str(Path(name).absolute()) if Path(name).exists() else name
+    return Scenario.from_toml(f"extends = {json.dumps(base)}\nallow_large = true\n", name)
 
 
 def look_for_underlay(site: Site) -> None:

@@ -1,4 +1,4 @@
-"""Commands ``evaluate``, ``readings``, ``chosen``, ``search``, ``explore`` and ``fit``."""
+"""Commands ``evaluate``, ``interpretations``, ``chosen``, ``search``, ``explore`` and ``fit``."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from access_av.cli.terminal import console, progress, show_points, table
 
 app = typer.Typer()
 
-ReadingOption = Annotated[
+InterpretationOption = Annotated[
     str, typer.Option(help="Interpretation: name, or path of a scenario file.")
 ]
 
@@ -35,7 +35,7 @@ ReadingOption = Annotated[
     epilog="Example: [bold]access-av evaluate --runs 20 --out results/quick[/]",
 )
 def evaluate(
-    reading: Annotated[
+    interpretation: Annotated[
         list[str] | None,
         typer.Option(help="Interpretation: name, or path of a scenario file; repeatable."),
     ] = None,
@@ -48,10 +48,10 @@ def evaluate(
     seeds: Annotated[
         int, typer.Option(min=1, help="Number of seeds for the claims, starting at --seed.")
     ] = 1,
-    unknowns: Annotated[
+    sensitivity: Annotated[
         bool,
         typer.Option(
-            "--unknowns", help="Also a sensitivity analysis of the claims (takes minutes)."
+            "--sensitivity", help="Also a sensitivity analysis of the claims (takes minutes)."
         ),
     ] = False,
     claims: Annotated[
@@ -70,10 +70,10 @@ def evaluate(
     from access_av.cli.paper_tables import show_study
     from access_av.report.paper import results
     from access_av.run.campaign import Campaign, executor
-    from access_av.run.result_cache import Parts
+    from access_av.run.result_cache import ResultCache
     from access_av.tables.results_directory import RESULTS
 
-    names = [*(reading or []), *([scenario] if scenario else [])]
+    names = [*(interpretation or []), *([scenario] if scenario else [])]
     with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
         made, directory = results.run(
             names,
@@ -83,7 +83,9 @@ def evaluate(
             seeds=seeds,
             threads=threads,
             out=out,
-            unknowns=Campaign(Parts(RESULTS / "parts"), pool, workers) if unknowns else None,
+            unknowns=Campaign(ResultCache(RESULTS / "parts"), pool, workers)
+            if sensitivity
+            else None,
             stated=None if claims is None else _claims(claims),
             progress=tick,
         )
@@ -105,7 +107,7 @@ def _claims(path: Path) -> dict[str, Any]:
     for name, entry in found.items():
         if not isinstance(entry, dict):
             raise InputError(f"{path}: claims.{name}: must be a table")
-        needed = {"says", "where", "unit", "rule", "stated"}
+        needed = {"statement", "paper_section", "unit", "rule", "stated"}
         if missing := sorted(needed - entry.keys()):
             raise InputError(f"{path}: claims.{name}: {', '.join(missing)} missing")
         if not {"rests_on", "evidence"} & entry.keys():
@@ -114,15 +116,15 @@ def _claims(path: Path) -> dict[str, Any]:
 
 
 @app.command(
-    epilog="Example: [bold]access-av readings gate-t-max[/]",
+    epilog="Example: [bold]access-av interpretations gate-t-max[/]",
 )
-def readings(
+def interpretations(
     name: Annotated[
         str | None, typer.Argument(help="Interpretation to print as a scenario.")
     ] = None,
 ) -> None:
     """List the interpretations of the paper, or print one with all default values."""
-    from access_av.paper import readings as known
+    from access_av.paper import interpretations as known
 
     if name is not None:
         print(known.load(name).scenario.to_toml(), end="")
@@ -146,7 +148,7 @@ def chosen(
     """Print the open choices of the paper: chosen value, reason, and effect of alternatives.
 
     One choice is changed at a time, in the shipped interpretation and mode 0. The command access-av
-    evaluate --unknowns evaluates joint changes.
+    evaluate --sensitivity evaluates joint changes.
     """
     from dataclasses import asdict
 
@@ -195,15 +197,15 @@ def search(
     """
     from access_av.cli.paper_tables import show_search
     from access_av.device.platform import Platform
-    from access_av.paper.sampled_readings import as_toml, confirmed, sample
+    from access_av.paper.sampled_interpretations import as_toml, confirmed, sample
     from access_av.run.campaign import Campaign, Shard, executor
-    from access_av.run.result_cache import Parts
+    from access_av.run.result_cache import ResultCache
     from access_av.tables.results_directory import RESULTS, write_whole
 
     board = Platform.load(platform)
     share = Shard.parse(shard)
     with progress("Worlds") as tick, executor(dask, threads) as (pool, workers):
-        campaign = Campaign(Parts(RESULTS / "parts"), pool, workers, share)
+        campaign = Campaign(ResultCache(RESULTS / "parts"), pool, workers, share)
         found = sample(
             campaign,
             board,
@@ -221,7 +223,7 @@ def search(
     if out is not None:
         best = checked[0].values if checked else found.values(found.best()[0])
         write_whole(out, as_toml(best))
-        console.print(f"Reading: {out}", soft_wrap=True)
+        console.print(f"Interpretation: {out}", soft_wrap=True)
 
 
 def _finite(value: float | None) -> float | None:
@@ -245,12 +247,12 @@ def explore(
         float | None, _bound("Maximum RMS error over track and runs, in m.")
     ] = None,
     max_worst_m: Annotated[float | None, _bound("Maximum mean error in X and Y, in m.")] = None,
-    max_executions: Annotated[
+    max_aoa_estimates: Annotated[
         float | None, _bound("Maximum number of angle estimates per trip.")
     ] = None,
     mode: Annotated[list[int] | None, typer.Option(help="Power mode; repeatable.")] = None,
     fixed: Annotated[bool, typer.Option("--fixed", help="Also fixed wake-up times.")] = False,
-    reading: ReadingOption = "gate",
+    interpretation: InterpretationOption = "gate",
     results: Annotated[
         Path | None, typer.Option(help="Results folder of evaluate.", show_default="results/latest")
     ] = None,
@@ -268,10 +270,10 @@ def explore(
     from access_av.tables.results_directory import json_text
 
     with progress("Operating points") as tick:
-        points = operating_points(results, reading, progress=tick)
+        points = operating_points(results, interpretation, progress=tick)
     if not fixed:
         points = points.filter(adaptive=True)
-    bounds = (max_energy_j, max_rms_m, max_worst_m, max_executions, mode, max_error_m)
+    bounds = (max_energy_j, max_rms_m, max_worst_m, max_aoa_estimates, mode, max_error_m)
     query = Query(*bounds) if percentile is None else Query(*bounds, percentile)
     found = answer(points, query)
     if as_json:
@@ -299,7 +301,7 @@ def explore(
     epilog="Example: [bold]access-av fit --runs 100 --out fitted.toml[/]",
 )
 def fit(
-    reading: ReadingOption = "gate",
+    interpretation: InterpretationOption = "gate",
     platform: PlatformOption = "jetson-agx-xavier",
     runs: Runs = 100,
     seed: Seed = 1,
@@ -310,8 +312,8 @@ def fit(
 ) -> None:
     """Fit the energy per execution of each mode and method to the paper's figures.
 
-    Simulates the number of executions of each setting, then solves for the energies that agree with
-    the sums in the paper. The "fitted" values of the shipped platform come from this command.
+    Simulates the number of angle estimates of each setting, then solves for the energies that agree
+    with the sums in the paper. The "fitted" values of the shipped platform come from this command.
     """
     from access_av.paper import study
     from access_av.paper.energy_fit import numbers
@@ -319,9 +321,9 @@ def fit(
     from access_av.signal.methods import label
     from access_av.tables.results_directory import write_whole
 
-    with progress("Counting executions") as tick:
+    with progress("Counting angle estimates") as tick:
         fitted = study.fit_platform(
-            reading, platform, runs=runs, seed=seed, threads=threads, progress=tick
+            interpretation, platform, runs=runs, seed=seed, threads=threads, progress=tick
         )
     made = table(["mode", *map(label, METHODS)], title="Energy per execution in J, fitted")
     for mode in fitted.modes:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from access_av.paper.chosen import Effect
-    from access_av.paper.sampled_readings import Confirmed, Sample
+    from access_av.paper.sampled_interpretations import Confirmed, Sample
     from access_av.paper.study import Study
 
 
@@ -22,7 +22,7 @@ def show_study(study: Study) -> None:
     The report and the tables contain everything else.
     """
     console.print(f"{summary.headline(study)}.", style="bold")
-    title = f"Adaptive MUSIC, interpretation “{study.shown.reading.title}”"
+    title = f"Adaptive MUSIC, interpretation “{study.shown.interpretation.title}”"
     made = table(["figure", "paper", "obtained", "verdict"], title=title, text=1)
     for each in summary.main_figures(study):
         made.add_row(each.name, each.stated, each.obtained, each.verdict)
@@ -36,7 +36,15 @@ def show_study(study: Study) -> None:
 def show_chosen(effects: Sequence[Effect], runs: int) -> None:
     """Prints the open choices of the paper, the chosen values, and the effect of alternatives."""
     made = table(
-        ["choice", "value", "executions", "maximum m", "RMS m", "80 ms: RMS", "every SSB: RMS"],
+        [
+            "choice",
+            "value",
+            "angle estimates",
+            "maximum m",
+            "RMS m",
+            "80 ms: RMS",
+            "every SSB: RMS",
+        ],
         title=f"Single changes, mode 0 of the shipped interpretation, {runs} runs",
         text=2,
     )
@@ -44,7 +52,7 @@ def show_chosen(effects: Sequence[Effect], runs: int) -> None:
         made.add_row(
             each.what if each.is_shipped else "",
             each.value if each.is_shipped else f"instead {each.value}",
-            f"{each.executions:.0f}",
+            f"{each.aoa_estimates:.0f}",
             f"{each.worst_error_m:.2f}",
             f"{each.rms_error_m:.3f} ± {each.rms_std_m:.3f}",
             f"{each.fixed_rms_m:.3f}",
@@ -57,14 +65,14 @@ def show_search(found: Sample, checked: Sequence[Confirmed]) -> None:
     """Prints the best interpretations of a search, and their confirmation by more runs."""
     held = found.held()
     made = table(
-        ["claims met", "executions", "maximum m", "drawn values"],
+        ["claims met", "angle estimates", "maximum m", "drawn values"],
         title=f"Best of {len(held)} interpretations ({len(found.margins)} claims)",
     )
     for index in found.best()[:8]:
         drawn = ", ".join(f"{name} {value_text(it)}" for name, it in found.values(index).items())
         made.add_row(
             f"{held[index]:.0f}",
-            f"{found.executions[index]:.0f}",
+            f"{found.aoa_estimates[index]:.0f}",
             f"{found.worst_error_m[index]:.2f}",
             drawn,
         )

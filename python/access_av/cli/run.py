@@ -48,16 +48,16 @@ def run(
 ) -> None:
     """Simulate one scenario and write its trajectories.
 
-    Writes trajectories.parquet, executions.parquet, trajectory.tum and truth.tum (the first run),
-    report.html, scenario.toml with all default values, and manifest.json. With --vary or --compare
-    also compared.parquet. --compare estimator=FILE.py:NAME compares with a plug-in; policy and
-    localizer are possible, too.
+    Writes trajectories.parquet, aoa_estimates.parquet, trajectory.tum and truth.tum (the first
+    run), report.html, scenario.toml with all default values, and manifest.json. With --sweep or
+    --against also compared.parquet. --against estimator=FILE.py:NAME compares with a plug-in;
+    policy and localizer are possible, too.
     """
     import polars as pl
 
     from access_av.report.compared import compared_section
     from access_av.report.drive import render_drive
-    from access_av.run.assumptions import energy_boundary, flattering, in_words
+    from access_av.run.assumptions import energy_boundary, in_words, optimistic_assumptions
     from access_av.run.simulation import simulate
     from access_av.tables.results_directory import ResultsDirectory, tum_trajectory
 
@@ -74,10 +74,10 @@ def run(
         result = simulate(
             chosen, runs=runs, seed=seed, threads=threads, keep_trajectories=True, progress=tick
         )
-    if result.trajectories is None or result.executions is None:  # keep_trajectories is set
+    if result.trajectories is None or result.aoa_estimates is None:  # keep_trajectories is set
         raise RuntimeError("the simulation kept no trajectories")
     directory.write_table("trajectories.parquet", result.trajectories)
-    directory.write_table("executions.parquet", result.executions)
+    directory.write_table("aoa_estimates.parquet", result.aoa_estimates)
     first = result.trajectories.filter(run=0)
     known = first.filter(~pl.col("searching"))
     for name, poses, prefix in (("trajectory.tum", known, ""), ("truth.tum", first, "true_")):
@@ -89,7 +89,7 @@ def run(
     page = render_drive(chosen, result, seed, compared_section(beside))
     directory.write_text("report.html", page)
     directory.write_text("scenario.toml", chosen.resolved().to_toml())
-    assumed = flattering(chosen)
+    assumed = optimistic_assumptions(chosen)
     directory.write_manifest(
         repeat=("run", "scenario.toml", "--runs", runs, "--seed", seed),
         scenario=chosen.name,

@@ -1,4 +1,4 @@
-"""Variants of ``--vary`` and ``--compare``: simulation and output."""
+"""Variants of ``--sweep`` and ``--against``: simulation and output."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def announce_new(name: str, changed: _core.Scenario, baseline: _core.Scenario) -
 
 
 def plug_ins_of(compare: Sequence[str] | None) -> dict[str, dict[str, Any]]:
-    """Returns the plug-ins of ``--compare ROLE=FILE.py:NAME`` by role, by their labels."""
+    """Returns the plug-ins of ``--against ROLE=FILE.py:NAME`` by role, by their labels."""
     from access_av.run.plug_in_files import ROLES, load
 
     found = {}

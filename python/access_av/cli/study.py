@@ -47,8 +47,8 @@ def study(
     seed: Seed = 1,
     threads: Threads = None,
     out: Out = None,
-    always_mend: Annotated[
-        bool, typer.Option("--always-mend", help="Simulate remedies even if the target is met.")
+    force_remedies: Annotated[
+        bool, typer.Option("--force-remedies", help="Simulate remedies even if the target is met.")
     ] = False,
     vary: Vary = None,
     compare: Compare = None,
@@ -60,7 +60,7 @@ def study(
     Writes report.html, study.json, recommended.toml (for access-av run), errors.parquet,
     drives.parquet, targets.parquet, places.parquet, places.csv, points.parquet,
     trajectories.parquet (the run that the report plays), plant.toml with all default values, and
-    manifest.json. With --vary or --compare also compared.parquet.
+    manifest.json. With --sweep or --against also compared.parquet.
     """
     from access_av.report.compared import compared_section
     from access_av.report.study import render_study
@@ -81,14 +81,19 @@ def study(
     directory = ResultsDirectory.create(f"study-{chosen.name}", out)
     with progress("Driving") as tick:
         found = study_plant(
-            chosen, runs=runs, seed=seed, threads=threads, always_mend=always_mend, progress=tick
+            chosen,
+            runs=runs,
+            seed=seed,
+            threads=threads,
+            force_remedies=force_remedies,
+            progress=tick,
         )
     for name, rows in found.tables().items():
         directory.write_table(f"{name}.parquet", rows)
     directory.write_text("places.csv", found.places.write_csv(float_precision=4))
     directory.write_json("study.json", found.summary())
     asked = percentile or [50.0, found.percent]
-    beside = side_by_side(scenarios, asked, found.believed.runs, seed, threads)
+    beside = side_by_side(scenarios, asked, found.nominal.runs, seed, threads)
     write_compared(beside, directory)
     combined = combinations(vary or ())
     directory.write_text("report.html", render_study(found, compared_section(beside, combined)))
@@ -96,7 +101,7 @@ def study(
         directory.write_text("recommended.toml", point)
     directory.write_text("plant.toml", chosen.to_toml())
     directory.write_manifest(
-        repeat=("study", "plant.toml", "--seed", seed, "--runs", found.believed.runs),
+        repeat=("study", "plant.toml", "--seed", seed, "--runs", found.nominal.runs),
         plant=chosen.name,
         seed=seed,
         warnings=chosen.warnings(),
@@ -112,7 +117,7 @@ def study(
             f"Worst place {number}: {place.along_m:.0f} m along the road, "
             f"{place.error_m:.2f} m: {place.why}."
         )
-    if found.mended:
+    if found.remedies:
         made = table(
             [
                 "measure", "lost drives", f"{found.percent:g} % within / m", "difference / m",
@@ -120,7 +125,7 @@ def study(
             ],
             text=1,
         )  # fmt: skip
-        for it in found.mended:
+        for it in found.remedies:
             delta, low, high = it.delta_m
             made.add_row(
                 it.name,

@@ -164,7 +164,7 @@ def plain(text: str) -> str:
 
 def show_points(points: pl.DataFrame, title: str = "") -> None:
     """Prints operating points as a table."""
-    head = ["mode", "method", "energy J", "RMS m", "worst X m", "worst Y m", "executions"]
+    head = ["mode", "method", "energy J", "RMS m", "worst X m", "worst Y m", "angle estimates"]
     if is_narrow():
         head = ["mode", "method", "J", "RMS m", "X m", "Y m"]
     made = table(head, title=title, text=2)
@@ -176,14 +176,14 @@ def show_points(points: pl.DataFrame, title: str = "") -> None:
             f"{point['rms_error_m']:.3f}",
             f"{point['worst_error_x_m']:.3f}",
             f"{point['worst_error_y_m']:.3f}",
-            f"{point['executions']:.0f}",
+            f"{point['aoa_estimates']:.0f}",
         ]
         made.add_row(*cells[: len(head)])
     console.print(made)
 
 
 def show_simulation(result: Simulation, title: str, energy_boundary: str | None) -> None:
-    """Prints errors, executions and energy of a simulation as a table."""
+    """Prints errors, angle estimates and energy of a simulation as a table."""
     from access_av.run.service_levels import reached_in_words
 
     steps, runs = result.steps, result.runs
@@ -198,7 +198,7 @@ def show_simulation(result: Simulation, title: str, energy_boundary: str | None)
         "maximum mean error along the track, X / m": (steps["mean_abs_error_x_m"].max(), ""),
         "maximum mean error along the track, Y / m": (steps["mean_abs_error_y_m"].max(), ""),
         "duration / s": (steps["time_s"].max(), ""),
-        "executions (angles estimated)": (runs["executions"].mean(), ""),
+        "angle estimates": (runs["aoa_estimates"].mean(), ""),
         f"energy / J, {energy_boundary or 'not counted'}": (runs["energy_j"].mean(), ""),
     }
     if runs["found_s"].fill_null(1.0).max() != 0.0:

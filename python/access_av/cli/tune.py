@@ -75,7 +75,7 @@ def tune(
     from access_av.designs.tune import space_of
     from access_av.designs.tune import tune as search
     from access_av.run.campaign import Campaign, executor
-    from access_av.run.result_cache import Parts
+    from access_av.run.result_cache import ResultCache
     from access_av.tables.results_directory import RESULTS, ResultsDirectory, json_text
 
     chosen = load_scenario(
@@ -84,7 +84,7 @@ def tune(
     constraints = Constraints(max_energy_j, max_rms_m, max_worst_m, max_error_m, percentile)
     with progress("Tuning") as tick, executor(dask, threads) as (pool, workers):
         found = search(
-            Campaign(Parts(RESULTS / "parts"), pool, workers),
+            Campaign(ResultCache(RESULTS / "parts"), pool, workers),
             chosen,
             constraints,
             designs=designs,
@@ -164,7 +164,7 @@ def _show(found: Tuned, space: Space) -> None:
     for each in zip(*(it.percentiles(SHOWN_PERCENTS) for it in both), strict=True):
         name = f"{each[0].percent:g}th percentile of the error / m (95 %)"
         made.add_row(name, *(f"{it.value:.3f} ({it.interval})" for it in each))
-    made.add_row("executions", *(f"{it.executions.mean():.0f}" for it in both))
+    made.add_row("angle estimates", *(f"{it.aoa_estimates.mean():.0f}" for it in both))
     console.print(made)
     if not found.is_better:
         console.print("No improvement found: the policy is unchanged.")

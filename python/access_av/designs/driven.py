@@ -98,8 +98,8 @@ class Driven:
     energy_j: NDArray[np.float64]
     worst_m: NDArray[np.float64]
     error_m: NDArray[np.float32]
-    executions: NDArray[np.float64]
-    listened: NDArray[np.float64]
+    aoa_estimates: NDArray[np.float64]
+    bursts_received: NDArray[np.float64]
     track_s: NDArray[np.float64]
     track_m2: NDArray[np.float64]
     worlds: tuple[Driven, ...] = ()
@@ -171,7 +171,7 @@ def designs_of(
     ]
     for values in choices:
         try:
-            # Tables first: `vehicle.wake_up` before `vehicle.wake_up.bound_m`.
+            # Tables first: `vehicle.wake_up` before `vehicle.wake_up.target_error_m`.
             settings, plug_ins = split(values)
             for role, text in plug_ins.items():
                 load(role, text)
@@ -247,7 +247,7 @@ def simulated(
     if found.errors_m is None:  # keep_trajectories is set
         raise RuntimeError("the simulation kept no errors")
     error_m = np.hypot(found.errors_m[..., 0], found.errors_m[..., 1])
-    columns = ["executions", "listened", "rms_error_m", "max_error_m"]
+    columns = ["aoa_estimates", "bursts_received", "rms_error_m", "max_error_m"]
     columns += ["energy_j"] if "estimator" in factories else []
     track = slice(None, None, TRACK_EVERY)
     return {
@@ -260,18 +260,18 @@ def simulated(
 
 def joined(design: Design, parts: Sequence[Part]) -> Driven:
     """Joins the parts of a design, and adds the energy of each run."""
-    executions, listened, rms_m, worst_m = (
+    aoa_estimates, bursts_received, rms_m, worst_m = (
         np.concatenate([part[name] for part in parts])
-        for name in ("executions", "listened", "rms_error_m", "max_error_m")
+        for name in ("aoa_estimates", "bursts_received", "rms_error_m", "max_error_m")
     )
-    weights = np.array([part["executions"].size for part in parts], dtype=np.float64)
+    weights = np.array([part["aoa_estimates"].size for part in parts], dtype=np.float64)
     track_s = parts[0]["track_s"]
     track_m2 = np.average([part["track_m2"] for part in parts], axis=0, weights=weights)
     core, vehicle = design.platform.core, design.scenario.vehicle
     duration_s = float(track_s[-1])
     energies = [
         core.energy_j(vehicle, int(estimated), int(heard), duration_s)
-        for estimated, heard in zip(executions, listened, strict=True)
+        for estimated, heard in zip(aoa_estimates, bursts_received, strict=True)
     ]
     energy_j = np.array([np.inf if each is None else sum(each[:3]) for each in energies])
     if "estimator" in design.plug_ins:
@@ -283,8 +283,8 @@ def joined(design: Design, parts: Sequence[Part]) -> Driven:
         energy_j=energy_j,
         worst_m=np.nan_to_num(worst_m, nan=np.inf),
         error_m=np.concatenate([part["error_m"] for part in parts]),
-        executions=executions,
-        listened=listened,
+        aoa_estimates=aoa_estimates,
+        bursts_received=bursts_received,
         track_s=track_s,
         track_m2=track_m2,
     )

@@ -26,7 +26,7 @@ class Query:
         Maximum root mean square of the horizontal error over the track and the runs.
     max_worst_m
         Maximum along the track, in X and in Y, of the mean absolute error over the runs.
-    max_executions
+    max_aoa_estimates
         Maximum number of angle estimates in one trip.
     modes
         Permitted power modes.
@@ -37,7 +37,7 @@ class Query:
     max_energy_j: float | None = None
     max_rms_m: float | None = None
     max_worst_m: float | None = None
-    max_executions: float | None = None
+    max_aoa_estimates: float | None = None
     modes: Sequence[int] | None = None
     max_error_m: float | None = None
     percentile: float = 99.0
@@ -55,7 +55,7 @@ class Query:
                 ("RMS error", self.max_rms_m, "m"),
                 (f"{self.percentile:g} % of errors", self.max_error_m, "m"),
                 ("worst error", self.max_worst_m, "m"),
-                ("executions", self.max_executions, ""),
+                ("aoa_estimates", self.max_aoa_estimates, ""),
             )
             if bound is not None
         ]
@@ -93,7 +93,7 @@ def explore(points: pl.DataFrame, query: Query) -> pl.DataFrame:
         column(query.percentile): query.max_error_m,
         "worst_error_x_m": query.max_worst_m,
         "worst_error_y_m": query.max_worst_m,
-        "executions": query.max_executions,
+        "aoa_estimates": query.max_aoa_estimates,
     }
     kept = points.filter(pl.col("energy_j").is_not_null())
     for name, bound in bounds.items():

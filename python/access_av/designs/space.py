@@ -168,8 +168,9 @@ def shown(values: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> shown({"vehicle.wake_up.bound_m": 0.25, "vehicle.platform": {"name": "a", "mode": 2}})
-    'bound_m 0.25, platform a 2'
+    >>> platform = {"name": "a", "mode": 2}
+    >>> shown({"vehicle.wake_up.target_error_m": 0.25, "vehicle.platform": platform})
+    'target_error_m 0.25, platform a 2'
     """
     return ", ".join(f"{key.rpartition('.')[2]} {_shown(value)}" for key, value in values.items())
 

@@ -66,8 +66,8 @@ def row_of(one: Driven) -> dict[str, Any]:
         "rms_error_m": _known(one.rms_m),
         **as_columns(one.percentiles()),
         "p90_max_error_m": _known(one.p90_worst_m),
-        "executions": float(one.executions.mean()),
-        "listened": float(one.listened.mean()),
+        "aoa_estimates": float(one.aoa_estimates.mean()),
+        "bursts_received": float(one.bursts_received.mean()),
     }
 
 

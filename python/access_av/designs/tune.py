@@ -46,10 +46,10 @@ GATE: Range = ("snr_set_point.offset_db", -5.0, 9.0)
 RANGES: dict[str, list[Range]] = {
     "fixed": [("interval_ms", 20.0, 5000.0)],
     "pid": PID,
-    "gated": [GATE, *((f"due.{key}", low, high) for key, low, high in PID)],
+    "gated": [GATE, *((f"trigger.{key}", low, high) for key, low, high in PID)],
     "uncertainty": [
-        ("bound_m", 0.05, 2.0),
-        ("least_gain_m2", 1e-6, 0.1),
+        ("target_error_m", 0.05, 2.0),
+        ("min_variance_reduction_m2", 1e-6, 0.1),
         ("snr_headroom_db", 0.0, 12.0),
     ],
 }
@@ -90,8 +90,8 @@ def space_of(scenario: Scenario) -> Space:
     Examples
     --------
     >>> from access_av import Scenario
-    >>> [dimension.key for dimension in space_of(Scenario.load("yard")).dimensions]
-    ['vehicle.wake_up.bound_m', 'vehicle.wake_up.least_gain_m2', 'vehicle.wake_up.snr_headroom_db']
+    >>> [dimension.key.split('.')[-1] for dimension in space_of(Scenario.load("yard")).dimensions]
+    ['target_error_m', 'min_variance_reduction_m2', 'snr_headroom_db']
     """
     policy = json.loads(scenario.resolved().vehicle.to_json())["wake_up"]
     found = []
@@ -102,7 +102,7 @@ def space_of(scenario: Scenario) -> Space:
         # Skip set points of another kind, and gains of fixed wake-up times.
         if key.endswith("offset_db") and table.get("kind") != "expected":
             continue
-        if key.startswith("due.") and policy["due"]["policy"] != "pid":
+        if key.startswith("trigger.") and policy["trigger"]["policy"] != "pid":
             continue
         found.append(Dimension(f"vehicle.wake_up.{key}", (), low, high, low > 0.0))
     return Space(tuple(found))

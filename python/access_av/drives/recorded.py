@@ -11,7 +11,7 @@ import polars as pl
 from access_av import _core
 from access_av.drives import angle_log, truth_frame
 from access_av.errors import InputError
-from access_av.run.pairs import STRETCHES, Errors
+from access_av.run.pairs import STRETCHES, ErrorSamples
 from access_av.run.service_levels import INDEPENDENT_S
 
 if TYPE_CHECKING:
@@ -251,7 +251,7 @@ def locate(
     imu_topic: str | None = None,
     start_time_s: float = 0.0,
     start: tuple[float, float, float] | None = None,
-    from_scratch: bool = False,
+    start_unknown: bool = False,
     smooth: bool = False,
 ) -> Drive:
     """Locates a recorded drive.
@@ -286,7 +286,7 @@ def locate(
         Start pose (x in metres, y in metres, heading in radians) in place of the vehicle's.
         Without a start pose the vehicle is searched for, with at least two radio heads along a road
         and three elsewhere.
-    from_scratch
+    start_unknown
         Whether to search for the vehicle even if its file has a start pose.
     smooth
         Whether to add the smoothed trajectory, which uses all angles for every pose.
@@ -323,7 +323,7 @@ def locate(
         imu_topic=imu_topic,
         start_time_s=start_time_s,
         start=start,
-        from_scratch=from_scratch,
+        start_unknown=start_unknown,
         smooth=smooth,
     )
     angles = pl.DataFrame(located.angles).with_columns(pl.col(pl.Float64).fill_nan(None))
@@ -446,7 +446,7 @@ def truth_doubt(drive: Drive, truth: pl.DataFrame) -> str | None:
     return truth_frame.explanation(known, error_m(drive.poses, truth))
 
 
-def in_stretches(drive: Drive, truth: pl.DataFrame, name: str) -> Errors:
+def in_stretches(drive: Drive, truth: pl.DataFrame, name: str) -> ErrorSamples:
     """Splits the errors of a drive into sections, for comparison of variants of the drive.
 
     An error that is constant during the drive, such as a displaced site plan, is common to all
@@ -475,7 +475,7 @@ def in_stretches(drive: Drive, truth: pl.DataFrame, name: str) -> Errors:
     count = max(1, int(duration_s / INDEPENDENT_S))
     epochs = every.height // count
     errors_m = errors_m[: count * epochs].reshape(count, epochs)
-    return Errors(name=name, errors_m=errors_m, duration_s=duration_s / count, rows=STRETCHES)
+    return ErrorSamples(name=name, errors_m=errors_m, duration_s=duration_s / count, rows=STRETCHES)
 
 
 def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:

@@ -247,7 +247,7 @@ class _Model:
         self.before, self.stds_before = np.array(before), np.array(stds)
         self.steps = np.where(np.arange(len(keys)) < 2 * len(heads), STEP_M, STEP_RAD)
 
-    def believed(self, values: Numbers, stds: Numbers) -> tuple[_core.Site, _core.Vehicle]:
+    def nominal(self, values: Numbers, stds: Numbers) -> tuple[_core.Site, _core.Vehicle]:
         """Returns site and vehicle with these parameters and standard deviations."""
         count = len(self.heads)
         places, place_stds = values[: 2 * count].reshape(-1, 2), stds[: 2 * count].reshape(-1, 2)
@@ -280,7 +280,7 @@ class _Problem:
 
     def meet(self, values: Numbers, stds: Numbers, used: list[Flags] | None) -> list[Met]:
         """Returns innovations, variances and outlier flags of each drive."""
-        site, vehicle = self.model.believed(values, stds)
+        site, vehicle = self.model.nominal(values, stds)
 
         def drive(index: int) -> Met:
             logged = self.drives[index]
@@ -346,7 +346,7 @@ def _identify(problem: _Problem) -> Survey:
     # Accept both coordinates of a position, or none.
     places = learnt[: 2 * len(model.heads)].reshape(-1, 2)
     places[:] = places.any(axis=1, keepdims=True)
-    site, vehicle = model.believed(
+    site, vehicle = model.nominal(
         np.where(learnt, values, model.before), np.where(learnt, stds, model.stds_before)
     )
     columns = (model.keys, model.before, model.stds_before, values, stds)

@@ -16,25 +16,25 @@ from typing import TYPE_CHECKING
 from access_av.lazy import attach
 
 if TYPE_CHECKING:
-    from access_av.paper import claims, energy_fit, evaluation, readings, study
+    from access_av.paper import claims, energy_fit, evaluation, interpretations, study
     from access_av.paper.claims import Claim, check_claims
     from access_av.paper.energy_fit import fit_energy
     from access_av.paper.evaluation import Evaluation, evaluate
-    from access_av.paper.readings import Reading
+    from access_av.paper.interpretations import Interpretation
     from access_av.paper.statements import paper_numbers
 
 __all__ = [
     "Claim",
     "Evaluation",
-    "Reading",
+    "Interpretation",
     "check_claims",
     "claims",
     "energy_fit",
     "evaluate",
     "evaluation",
     "fit_energy",
+    "interpretations",
     "paper_numbers",
-    "readings",
     "study",
 ]
 
@@ -45,11 +45,11 @@ if not TYPE_CHECKING:
             "access_av.paper.claims": ["Claim", "check_claims"],
             "access_av.paper.energy_fit": ["fit_energy"],
             "access_av.paper.evaluation": ["Evaluation", "evaluate"],
-            "access_av.paper.readings": ["Reading"],
+            "access_av.paper.interpretations": ["Interpretation"],
             "access_av.paper.statements": ["paper_numbers"],
         },
         modules={
             name: f"access_av.paper.{name}"
-            for name in ("claims", "energy_fit", "evaluation", "readings", "study")
+            for name in ("claims", "energy_fit", "evaluation", "interpretations", "study")
         },
     )

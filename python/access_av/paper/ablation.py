@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from access_av._core import Scenario
     from access_av.paper.driver import Driver
     from access_av.paper.evaluation import Evaluation
+    from access_av.paper.interpretations import Interpretation
     from access_av.paper.outcome import Drives
-    from access_av.paper.readings import Reading
 
 # Intervals of the front, in ms: from every SSB to beyond the paper's t_max.
 FRONT_MS = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 150.0, 180.0, 240.0, 320.0, 480.0, 1000.0)
@@ -35,7 +35,7 @@ class Ablation:
     ----------
     constant_ms
         The constant wake-up time.
-    executions, constant_executions
+    aoa_estimates, constant_aoa_estimates
         With the controller and with the constant.
     rms_error_m, constant_rms_m
         RMS errors of both.
@@ -50,11 +50,11 @@ class Ablation:
         Drives with the constant.
     """
 
-    reading: str
+    interpretation: str
     mode: int
     constant_ms: float
-    executions: float
-    constant_executions: float
+    aoa_estimates: float
+    constant_aoa_estimates: float
     rms_error_m: float
     constant_rms_m: float
     gain_m: float
@@ -69,7 +69,7 @@ class Ablation:
 
 
 def ablate(driver: Driver, evaluation: Evaluation) -> list[Ablation]:
-    """The ablation of a reading in every power mode that drives differently."""
+    """The ablation of an interpretation in every power mode that drives differently."""
     found = []
     base_seen = set()
     for case in cases(driver.platform):
@@ -78,27 +78,27 @@ def ablate(driver: Driver, evaluation: Evaluation) -> list[Ablation]:
             continue
         base_seen.add(base_ms)
         drives = evaluation.outcome.adaptive[mode.number]
-        reading = evaluation.reading
-        constant_ms, constant = (_gated if reading.is_gated else _fixed)(
-            driver, reading, drives, base_ms
+        interpretation = evaluation.interpretation
+        constant_ms, constant = (_gated if interpretation.is_gated else _fixed)(
+            driver, interpretation, drives, base_ms
         )
-        found.append(compare(reading.name, mode.number, drives, constant, constant_ms))
+        found.append(compare(interpretation.name, mode.number, drives, constant, constant_ms))
     return found
 
 
 def compare(
-    reading: str, mode: int, drives: Drives, constant: Drives, constant_ms: float
+    interpretation: str, mode: int, drives: Drives, constant: Drives, constant_ms: float
 ) -> Ablation:
     """Drives with the controller against drives with the constant, on the same runs."""
     gains_m = constant.rms_error_m - drives.rms_error_m
     low_m, high_m = np.quantile(gains_m[1:], (0.025, 0.975)) if len(gains_m) > 1 else (0.0, 0.0)
     least_m = LEAST_SHARE * float(drives.rms_error_m[0])
     return Ablation(
-        reading=reading,
+        interpretation=interpretation,
         mode=mode,
         constant_ms=constant_ms,
-        executions=float(drives.executions[0]),
-        constant_executions=float(constant.executions[0]),
+        aoa_estimates=float(drives.aoa_estimates[0]),
+        constant_aoa_estimates=float(constant.aoa_estimates[0]),
         rms_error_m=float(drives.rms_error_m[0]),
         constant_rms_m=float(constant.rms_error_m[0]),
         gain_m=float(gains_m[0]),
@@ -109,9 +109,9 @@ def compare(
     )
 
 
-def front(driver: Driver, reading: Reading) -> list[tuple[float, Drives]]:
-    """MUSIC at fixed intervals from the shortest to the longest, in the reading's world."""
-    return [(ms, driver.drive(fixed(reading.scenario, ms)).drives) for ms in FRONT_MS]
+def front(driver: Driver, interpretation: Interpretation) -> list[tuple[float, Drives]]:
+    """MUSIC at fixed intervals from the shortest to the longest, in the interpretation's world."""
+    return [(ms, driver.drive(fixed(interpretation.scenario, ms)).drives) for ms in FRONT_MS]
 
 
 def fixed(scenario: Scenario, interval_ms: float) -> Scenario:
@@ -124,41 +124,43 @@ def fixed(scenario: Scenario, interval_ms: float) -> Scenario:
     )
 
 
-def _fixed(driver: Driver, reading: Reading, drives: Drives, _: float) -> tuple[float, Drives]:
-    """A fixed interval of as many executions: the nearest in number, a whole number of SSBs."""
+def _fixed(
+    driver: Driver, interpretation: Interpretation, drives: Drives, _: float
+) -> tuple[float, Drives]:
+    """Returns the multiple of the SSB period with the nearest number of angle estimates."""
     period_ms = paper_numbers()["wake_up"]["ssb_period_ms"]
-    gap_ms = 1e3 * driver.trip_s / (float(drives.executions[0]) - 0.5)
-    wanted = float(drives.executions[0])
+    gap_ms = 1e3 * driver.trip_s / (float(drives.aoa_estimates[0]) - 0.5)
+    wanted = float(drives.aoa_estimates[0])
     near = [period_ms * max(1, gap_ms // period_ms + more) for more in (0, 1)]
-    found = {ms: driver.drive(fixed(reading.scenario, ms)).drives for ms in near}
-    best_ms = min(found, key=lambda ms: abs(float(found[ms].executions[0]) - wanted))
+    found = {ms: driver.drive(fixed(interpretation.scenario, ms)).drives for ms in near}
+    best_ms = min(found, key=lambda ms: abs(float(found[ms].aoa_estimates[0]) - wanted))
     return best_ms, found[best_ms]
 
 
 def _gated(
-    driver: Driver, reading: Reading, drives: Drives, base_ms: float
+    driver: Driver, interpretation: Interpretation, drives: Drives, base_ms: float
 ) -> tuple[float, Drives]:
     """A constant behind the same gate: of those that an SSB period apart, the nearest in number.
 
     More is never due than at the base wake-up time, and less the longer the constant is.
     """
     period_ms = paper_numbers()["wake_up"]["ssb_period_ms"]
-    latest_ms = reading.wake_up.get("latest_ms", np.inf)
-    wanted = float(drives.executions[0])
+    latest_ms = interpretation.wake_up.get("latest_ms", np.inf)
+    wanted = float(drives.aoa_estimates[0])
     best_ms, best = base_ms, None
     constant_ms = base_ms
     while constant_ms <= latest_ms:
-        scenario = reading.scenario.with_overrides(
+        scenario = interpretation.scenario.with_overrides(
             {
                 "vehicle.estimator.method": "music",
-                "vehicle.wake_up.due": fixed_interval(reading.scenario, constant_ms),
+                "vehicle.wake_up.trigger": fixed_interval(interpretation.scenario, constant_ms),
             }
         )
         found = driver.drive(scenario).drives
-        executions = float(found.executions[0])
-        if best is None or abs(executions - wanted) < abs(float(best.executions[0]) - wanted):
+        aoa_estimates = float(found.aoa_estimates[0])
+        if best is None or abs(aoa_estimates - wanted) < abs(float(best.aoa_estimates[0]) - wanted):
             best_ms, best = constant_ms, found
-        if executions <= wanted:
+        if aoa_estimates <= wanted:
             break
         constant_ms = (constant_ms // period_ms + 1) * period_ms
     assert best is not None

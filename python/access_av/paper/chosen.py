@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from access_av.paper.ablation import fixed
-from access_av.paper.readings import SHIPPED, load
+from access_av.paper.interpretations import SHIPPED, load
 from access_av.tables.toml import shipped
 
 if TYPE_CHECKING:
@@ -28,13 +28,13 @@ BASE_MS, EVERY_SSB_MS = 80.0, 20.0
 
 @dataclass(frozen=True)
 class Effect:
-    """The shipped reading in mode 0 with one thing chosen otherwise.
+    """The shipped interpretation in mode 0 with one thing chosen otherwise.
 
     Attributes
     ----------
     value
         Alternative value; the shipped value if ``is_shipped``.
-    worst_error_m, rms_error_m, executions
+    worst_error_m, rms_error_m, aoa_estimates
         Result of adaptive MUSIC.
     fixed_rms_m, every_ssb_rms_m
         Results of MUSIC at its base wake-up time and at every SSB.
@@ -46,7 +46,7 @@ class Effect:
     value: str
     why: str
     is_shipped: bool
-    executions: float
+    aoa_estimates: float
     worst_error_m: float
     rms_error_m: float
     rms_std_m: float
@@ -70,7 +70,7 @@ def effects(
 ) -> list[Effect]:
     """Returns the shipped values, each followed by the effects of its alternatives."""
     paper = load(SHIPPED).scenario
-    driver = replace(driver, methods=("music",), runs=runs, known={}, tapes=[], progress=None)
+    driver = replace(driver, methods=("music",), runs=runs, known={}, traces=[], progress=None)
     here = _driven(driver, paper)
     found: list[Effect] = []
     chosen = entries()
@@ -81,7 +81,7 @@ def effects(
             there = _driven(driver, paper.with_overrides(other["changes"]))
             found.append(Effect(what, other["value"], why, False, **there))
         # A world is driven through once.
-        del driver.tapes[1:]
+        del driver.traces[1:]
         if progress is not None:
             progress(index + 1, len(chosen))
     return found
@@ -89,11 +89,11 @@ def effects(
 
 def _driven(driver: Driver, scenario: Scenario) -> dict[str, float]:
     adaptive = driver.drive(
-        scenario.with_overrides({"vehicle.wake_up.due.base_ms": BASE_MS})
+        scenario.with_overrides({"vehicle.wake_up.trigger.base_ms": BASE_MS})
     ).drives
     often, seldom = (driver.drive(fixed(scenario, ms)).drives for ms in (EVERY_SSB_MS, BASE_MS))
     return {
-        "executions": float(adaptive.executions[0]),
+        "aoa_estimates": float(adaptive.aoa_estimates[0]),
         "worst_error_m": float(adaptive.worst_m[0]),
         "rms_error_m": float(adaptive.rms_error_m[0]),
         "rms_std_m": float(np.std(adaptive.rms_error_m[1:])),

@@ -43,13 +43,13 @@ SAFE_DEVIATIONS = 2.58
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement of the paper under one reading, and what is obtained for it.
+    """One statement of the paper under one interpretation, and what is obtained for it.
 
     Attributes
     ----------
     interval
         95 % interval of ``obtained`` over the runs; ``None`` where nothing is drawn, or for modes.
-    turns_with_seed
+    seed_sensitive
         Whether other runs may give another verdict: by its margin's spread over the runs, or
         because another seed that was tried did.
     verdict
@@ -66,16 +66,16 @@ class Claim:
         Whether the claim is met by the runs of each seed, where it was judged with several.
     """
 
-    reading: str
+    interpretation: str
     id: str
-    says: str
-    where: str
+    statement: str
+    paper_section: str
     stated: Any
     obtained: Any
     interval: Any
     unit: str
     verdict: str
-    turns_with_seed: bool
+    seed_sensitive: bool
     evidence: str
     note: str
     spread: Mapping[str, float] = field(default_factory=dict)
@@ -124,14 +124,14 @@ def evidence(
         return str(entry["evidence"])
     if entry.get("solved_by") in freedoms:
         return BY_CONSTRUCTION
-    # Energies are fitted to the paper's figures under every reading.
+    # Energies are fitted to the paper's figures under every interpretation.
     return CALIBRATED if {*entry["rests_on"]} & {*chosen, "energy"} else INDEPENDENT
 
 
 def check_claims(
     outcome: Outcome,
     *,
-    reading: str = "",
+    interpretation: str = "",
     chosen: Collection[str] = ("radio", "controller"),
     freedoms: Collection[str] = energy_fit.SHIPPED,
     stated: Mapping[str, Any] | None = None,
@@ -142,7 +142,7 @@ def check_claims(
     ----------
     outcome
         Campaigns of one interpretation; variants after the first are resamples of its runs.
-    reading
+    interpretation
         Its name.
     chosen
         Parameters of the interpretation that were chosen with the claims known.
@@ -153,7 +153,7 @@ def check_claims(
         in its note, and the others are judged.
     """
     return [
-        _judge(claim_id, entry, outcome, reading, evidence(entry, chosen, freedoms))
+        _judge(claim_id, entry, outcome, interpretation, evidence(entry, chosen, freedoms))
         for claim_id, entry in (stated_claims() if stated is None else stated).items()
     ]
 
@@ -177,8 +177,8 @@ def with_seeds(claims: Mapping[int, list[Claim]]) -> list[Claim]:
     made = []
     for index, claim in enumerate(first):
         met = {seed: each[index].met for seed, each in claims.items()}
-        turns = claim.turns_with_seed or len({*met.values()}) > 1
-        made.append(replace(claim, met_by_seed=met, turns_with_seed=turns))
+        turns = claim.seed_sensitive or len({*met.values()}) > 1
+        made.append(replace(claim, met_by_seed=met, seed_sensitive=turns))
     return made
 
 
@@ -188,7 +188,7 @@ def as_records(claims: list[Claim]) -> list[dict[str, Any]]:
 
 
 def _judge(
-    claim_id: str, entry: Mapping[str, Any], outcome: Outcome, reading: str, kind: str
+    claim_id: str, entry: Mapping[str, Any], outcome: Outcome, interpretation: str, kind: str
 ) -> Claim:
     finding: Finding | None = None
     turns = False
@@ -210,16 +210,16 @@ def _judge(
         except (MissingFigureError, InputError) as error:
             finding, verdict, note = None, NOT_JUDGED, f"Not judged: {error}"
     return Claim(
-        reading=reading,
+        interpretation=interpretation,
         id=claim_id,
-        says=entry["says"],
-        where=entry["where"],
+        statement=entry["statement"],
+        paper_section=entry["paper_section"],
         stated=entry["stated"],
         obtained=None if finding is None else _obtained(entry, finding.value),
         interval=None if finding is None else _interval(finding.value),
         unit=entry["unit"],
         verdict=verdict,
-        turns_with_seed=turns,
+        seed_sensitive=turns,
         evidence=kind,
         note=note,
         spread={} if finding is None else dict(finding.spread),

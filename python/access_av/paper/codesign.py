@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from access_av.device.platform import Platform
+from access_av.paper.interpretations import load
 from access_av.paper.own_design import tracked
-from access_av.paper.readings import load
 from access_av.run.simulation import Simulation, simulate
 
 if TYPE_CHECKING:
@@ -43,8 +43,8 @@ class Point:
         Components that the energy includes.
     """
 
-    executions: float
-    listened: float
+    aoa_estimates: float
+    bursts_received: float
     rms_error_m: float
     energy_j: tuple[float, ...]
     boundary: str
@@ -58,7 +58,7 @@ class Compared:
     ----------
     paper, policy, engine
         The paper's adaptive point; our tracker and policy in its accounting; and on our engine.
-    error_less_m
+    rms_error_reduction_m
         RMS error of the paper minus that of the proposed method: mean and 95 % interval.
     """
 
@@ -66,7 +66,7 @@ class Compared:
     paper: Point
     policy: Point
     engine: Point
-    error_less_m: tuple[float, float, float]
+    rms_error_reduction_m: tuple[float, float, float]
 
     @property
     def policy_ratio(self) -> float:
@@ -81,19 +81,19 @@ class Compared:
     @property
     def is_better(self) -> bool:
         """In error, with 95 %, and in energy in its own accounting, over the whole range."""
-        return self.error_less_m[1] > 0.0 and self.policy_ratio < 1.0
+        return self.rms_error_reduction_m[1] > 0.0 and self.policy_ratio < 1.0
 
 
 def compare(
-    reading: str,
+    interpretation: str,
     *,
     runs: int,
     seed: int,
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Compared]:
-    """Compare in every power mode, on the paper's trip under one of its readings."""
-    scenario = load(reading).scenario
+    """Compare in every power mode, on the paper's trip under one of its interpretations."""
+    scenario = load(interpretation).scenario
     papers = Platform(Platform.load(PAPERS_BOARD).core.with_overrides({"receiver.counted": True}))
     ours = Platform.load(OUR_BOARD)
     found = []
@@ -111,7 +111,7 @@ def compare(
                 paper=_point(one, here, papers),
                 policy=_point(other, there, papers),
                 engine=_point(other, there, ours),
-                error_less_m=(mean_m, mean_m - half_m, mean_m + half_m),
+                rms_error_reduction_m=(mean_m, mean_m - half_m, mean_m + half_m),
             )
         )
         if progress is not None:
@@ -120,20 +120,20 @@ def compare(
 
 
 def _point(drives: Simulation, scenario: Scenario, platform: Platform) -> Point:
-    executions, listened = (
-        float(drives.runs[name].to_numpy().mean()) for name in ("executions", "listened")
+    aoa_estimates, bursts_received = (
+        float(drives.runs[name].to_numpy().mean()) for name in ("aoa_estimates", "bursts_received")
     )
     duration_s = float(drives.steps["time_s"].to_numpy().max())
     energies = [
         platform.core.energy_j(
-            scenario.vehicle, round(executions), round(listened), duration_s, extent
+            scenario.vehicle, round(aoa_estimates), round(bursts_received), duration_s, extent
         )
         for extent in EXTENTS
     ]
     known = [energy for energy in energies if energy is not None]
     return Point(
-        executions=executions,
-        listened=listened,
+        aoa_estimates=aoa_estimates,
+        bursts_received=bursts_received,
         rms_error_m=drives.rms_error_m,
         energy_j=tuple(sum(energy[:3]) for energy in known),
         boundary=known[0][3],

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
-from access_av._core import Tapes
+from access_av._core import MeasurementTraces
 from access_av.paper.outcome import Drives, Numbers, resamples
 from access_av.paper.statements import METHODS
 from access_av.run.service_levels import INDEPENDENT_S
@@ -59,7 +59,7 @@ class Driver:
     planned: int = 0
     methods: tuple[str, ...] = TAPED
     known: dict[str, Driven] = field(default_factory=dict)
-    tapes: list[Tapes] = field(default_factory=list)
+    traces: list[MeasurementTraces] = field(default_factory=list)
 
     @property
     def trip_s(self) -> float:
@@ -85,9 +85,9 @@ class Driver:
     def _simulate(self, scenario: Scenario) -> Simulation:
         """From tape, so that a world's angles are estimated once for all policies in it."""
         core, threads = self.platform.core, self.threads
-        serving = [it for it in self.tapes if it.serve(scenario, platform=core)]
+        serving = [it for it in self.traces if it.serve(scenario, platform=core)]
         if not serving:
-            made = Tapes.record(
+            made = MeasurementTraces.record(
                 scenario,
                 self.runs,
                 self.seed,
@@ -96,8 +96,9 @@ class Driver:
                 threads=threads,
             )
             serving = [it for it in [made] if it and it.serve(scenario, platform=core)]
-            # A tape takes 100 MB: the first world, which most readings are in, and the latest stay.
-            self.tapes = [*self.tapes[:1], *serving]
+            # A tape takes 100 MB: the first world, which most interpretations are in, and the
+            # latest stay.
+            self.traces = [*self.traces[:1], *serving]
         if not serving:
             return simulate(
                 scenario,
@@ -115,7 +116,7 @@ class Driver:
         assert found.errors_m is not None
         weights = self._weights()
         drives = Drives.of_runs(
-            found.runs["executions"].to_numpy().astype(np.float64), found.errors_m, weights
+            found.runs["aoa_estimates"].to_numpy().astype(np.float64), found.errors_m, weights
         )
         # The sample in double precision.
         exact: dict[str, Any] = {}
@@ -126,7 +127,7 @@ class Driver:
         rms_m = drives.rms_error_m.copy()
         rms_m[0] = found.rms_error_m
         other_j = found.runs.select(
-            other_energy_j=(pl.col("energy_j") - pl.col("energy_executions_j")).fill_null(0.0)
+            other_energy_j=(pl.col("energy_j") - pl.col("energy_aoa_estimates_j")).fill_null(0.0)
         )["other_energy_j"]
         assert drives.runs is not None
         return Driven(

@@ -1,7 +1,7 @@
 """Fit the energy per execution of each power mode and method to the figures of the paper.
 
 The paper measures energy on its board, but states only some of the sums. This module determines the
-energies per execution that agree with these sums, for the simulated numbers of executions:
+energies per execution that agree with these sums, for the simulated numbers of angle estimates:
 
 1. *A prior from measurement.* One busy core of the board draws
    ``P = 6.97 W + 0.148 W · (f / 1.2 GHz)^3.96`` (MLPerf Inference v1.1 wall power of modes 0, 2, 3,
@@ -97,16 +97,17 @@ class ModeDemand:
         CPU clock.
     base_wake_up_s
         Base wake-up time by method.
-    fixed_executions
-        Executions at that interval, by method.
-    adaptive_executions
-        Executions of adaptive MUSIC, mean over the runs; an array for several readings at once.
+    fixed_aoa_estimates
+        Angle estimates at that interval, by method.
+    adaptive_aoa_estimates
+        Angle estimates of adaptive MUSIC, mean over the runs; an array for several interpretations
+        at once.
     """
 
     cpu_hz: float
     base_wake_up_s: Mapping[str, float]
-    fixed_executions: Mapping[str, float]
-    adaptive_executions: float | Numbers
+    fixed_aoa_estimates: Mapping[str, float]
+    adaptive_aoa_estimates: float | Numbers
 
 
 def busy_core_power_w(cpu_hz: float) -> float:
@@ -122,14 +123,14 @@ def fit_energy(
     Parameters
     ----------
     modes
-        Executions and base wake-up times by mode number; must hold modes 0 and 7.
+        Angle estimates and base wake-up times by mode number; must hold modes 0 and 7.
     freedoms
         Degrees of freedom of the fit, of :data:`FREEDOMS`.
 
     Returns
     -------
     dict
-        ``energies[mode][method]``, arrays where the executions are.
+        ``energies[mode][method]``, arrays where the angle estimates are.
 
     Raises
     ------
@@ -168,10 +169,10 @@ def _fit_music(modes: Mapping[int, ModeDemand], *, own: bool) -> dict[int, Numbe
     )
     zero = modes[0]
     most_j = sums_j["fixed_mode_0"]["music"]
-    energy_0 = most_j / zero.fixed_executions["music"]
+    energy_0 = most_j / zero.fixed_aoa_estimates["music"]
     energies = {0: np.asarray(energy_0)}
     if own:
-        energies[7] = np.asarray(sums_j["adaptive_mode_7"] / modes[7].adaptive_executions)
+        energies[7] = np.asarray(sums_j["adaptive_mode_7"] / modes[7].adaptive_aoa_estimates)
     for mode, demand in modes.items():
         if mode in energies:
             continue
@@ -185,10 +186,10 @@ def _fit_music(modes: Mapping[int, ModeDemand], *, own: bool) -> dict[int, Numbe
             continue
         within = mode in of_claim(WIDE_BUDGET)
         low_j, high_j = (narrow_j, wide_j) if within else (wide_j, float("inf"))
-        low = low_j * (1.0 + MARGIN) / demand.adaptive_executions
+        low = low_j * (1.0 + MARGIN) / demand.adaptive_aoa_estimates
         high = np.minimum(
-            high_j * (1.0 - MARGIN) / demand.adaptive_executions,
-            most_j / demand.fixed_executions["music"],
+            high_j * (1.0 - MARGIN) / demand.adaptive_aoa_estimates,
+            most_j / demand.fixed_aoa_estimates["music"],
         )
         energies[mode] = np.minimum(np.maximum(prior, low), high)
     return energies
@@ -203,7 +204,7 @@ def _power_ratios_in_mode_0(
     music_w = music_j / zero.base_wake_up_s["music"]
     return {
         method: fixed_j[method]
-        / zero.fixed_executions[method]
+        / zero.fixed_aoa_estimates[method]
         / zero.base_wake_up_s[method]
         / music_w
         for method in METHODS[1:]
@@ -222,10 +223,10 @@ def _common_factor(
     wanted: float = of_claim("e4_average_saving_percent") / 100.0
     constant = scaled = np.zeros(())
     for mode, demand in modes.items():
-        adaptive_j = music[mode] * demand.adaptive_executions
-        constant = constant + adaptive_j / (music[mode] * demand.fixed_executions["music"])
+        adaptive_j = music[mode] * demand.adaptive_aoa_estimates
+        constant = constant + adaptive_j / (music[mode] * demand.fixed_aoa_estimates["music"])
         for method in METHODS[1:]:
-            fixed_j = demand.fixed_executions[method] * _follower(
+            fixed_j = demand.fixed_aoa_estimates[method] * _follower(
                 demand, music[mode], method, ratio[method]
             )
             if mode == 0 or mode in HIGH_SAVING_MODES:

@@ -25,8 +25,8 @@ from access_av.paper import energy_fit
 from access_av.paper.driver import Driven, Driver
 from access_av.paper.energy_fit import NEEDED_MODES, ModeDemand, fit_energy
 from access_av.paper.findings import MissingFigureError, energy_j
+from access_av.paper.interpretations import SHIPPED, Interpretation, load
 from access_av.paper.outcome import Drives, Outcome
-from access_av.paper.readings import SHIPPED, Reading, load
 from access_av.paper.statements import METHODS, paper_numbers
 from access_av.statistics.percentiles import as_columns, names
 from access_av.tables.result import Origin, Result, origin
@@ -56,8 +56,8 @@ class Setting:
 def fixed_interval(scenario: Scenario, interval_ms: float) -> dict[str, Any]:
     """Wake-up settings of a fixed interval, on the clock of the scenario's own policy."""
     wake_up = json.loads(scenario.to_json())["vehicle"]["wake_up"]
-    clock = wake_up.get("due", wake_up).get("serving_ssb", "first-after")
-    return {"policy": "fixed", "interval_ms": interval_ms, "serving_ssb": clock}
+    clock = wake_up.get("trigger", wake_up).get("ssb_selection", "first-after")
+    return {"policy": "fixed", "interval_ms": interval_ms, "ssb_selection": clock}
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def cases(platform: Platform) -> list[Case]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Evaluation(Result):
-    """All results of one reading.
+    """All results of one interpretation.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Evaluation(Result):
         Computing time; version and commit. Not compared.
     """
 
-    reading: Reading
+    interpretation: Interpretation
     points: pl.DataFrame
     errors: pl.DataFrame
     snr: pl.DataFrame
@@ -127,12 +127,14 @@ class Evaluation(Result):
     origin: Origin = field(default_factory=origin, compare=False)
 
     def __repr__(self) -> str:
-        return f"Evaluation({self.reading.name}, {self.runs} runs, {self.points.height} points)"
+        return (
+            f"Evaluation({self.interpretation.name}, {self.runs} runs, {self.points.height} points)"
+        )
 
     @property
     def scenario(self) -> Scenario:
-        """The reading's scenario."""
-        return self.reading.scenario
+        """The interpretation's scenario."""
+        return self.interpretation.scenario
 
     def plot(self) -> Any:
         """Draws RMS error against energy of every operating point with a mode, with Altair."""
@@ -172,7 +174,7 @@ class Evaluation(Result):
 
 
 def evaluate(
-    reading: Reading | Scenario | str = SHIPPED,
+    interpretation: Interpretation | Scenario | str = SHIPPED,
     platform: Platform | str = "jetson-agx-xavier",
     *,
     runs: int = 100,
@@ -180,13 +182,13 @@ def evaluate(
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Evaluation:
-    """Run the three campaigns under one reading.
+    """Run the three campaigns under one interpretation.
 
     Parameters
     ----------
-    reading
-        A reading, its name or path, or a scenario. Its estimator is replaced by each campaign's,
-        its wake-up policy by the fixed campaigns' intervals.
+    interpretation
+        An interpretation, its name or path, or a scenario. Its estimator is replaced by each
+        campaign's, its wake-up policy by the fixed campaigns' intervals.
     platform
         A platform, or the name or path of one.
     runs
@@ -211,17 +213,19 @@ def evaluate(
     >>> found.campaign("R").height
     8
     """
-    if isinstance(reading, Scenario):
-        reading = Reading(reading.name, reading.description, reading, (), keeps_t_max=False)
-    elif isinstance(reading, str):
-        reading = load(reading)
+    if isinstance(interpretation, Scenario):
+        interpretation = Interpretation(
+            interpretation.name, interpretation.description, interpretation, (), keeps_t_max=False
+        )
+    elif isinstance(interpretation, str):
+        interpretation = load(interpretation)
     board = Platform.load(platform) if isinstance(platform, str) else platform
     planned = len({case.setting for case in cases(board)})
     driver = Driver(board, runs, seed, threads, progress=progress, planned=planned)
-    return evaluate_with(driver, reading)
+    return evaluate_with(driver, interpretation)
 
 
-def evaluate_with(driver: Driver, reading: Reading) -> Evaluation:
+def evaluate_with(driver: Driver, interpretation: Interpretation) -> Evaluation:
     """Evaluates an interpretation with a driver that may have cached runs."""
     started = time.monotonic()
     platform = driver.platform
@@ -229,7 +233,7 @@ def evaluate_with(driver: Driver, reading: Reading) -> Evaluation:
     wanted = cases(platform)
     for case in wanted:
         if case.setting not in driven:
-            scenario = case.setting.apply(reading.scenario)
+            scenario = case.setting.apply(interpretation.scenario)
             if case.setting.adaptive and case.mode is not None:
                 scenario = scenario.with_overrides({"vehicle.platform.mode": case.mode.number})
             driven[case.setting] = driver.drive(scenario)
@@ -238,11 +242,11 @@ def evaluate_with(driver: Driver, reading: Reading) -> Evaluation:
         [(case, driven[case.setting].drives) for case in wanted],
         platform,
         driver.trip_s,
-        settings=settings_of(reading, platform) | {"runs": driver.runs},
+        settings=settings_of(interpretation, platform) | {"runs": driver.runs},
     )
     errors = {setting: as_columns(each.percentiles()) for setting, each in driven.items()}
     return Evaluation(
-        reading=reading,
+        interpretation=interpretation,
         points=pl.DataFrame(
             [_point(case, outcome, refitted) | errors[case.setting] for case in wanted],
             infer_schema_length=None,
@@ -273,8 +277,8 @@ def outcome_of(
 ) -> tuple[Outcome, bool]:
     """Returns the numbers for the verdicts, and whether the energies were fitted.
 
-    A platform whose energies were fitted to the paper gets those that fit the reading's own
-    executions, those of the first variant unless ``fit_each``; one that was measured keeps its
+    A platform whose energies were fitted to the paper gets those that fit the interpretation's own
+    angle estimates, those of the first variant unless ``fit_each``; one that was measured keeps its
     figures.
     """
     every_ssb = {case.setting.method: each for case, each in drives if case.mode is None}
@@ -311,11 +315,11 @@ def outcome_of(
     return outcome, refits
 
 
-def settings_of(reading: Reading, platform: Platform) -> dict[str, float]:
+def settings_of(interpretation: Interpretation, platform: Platform) -> dict[str, float]:
     """Returns the values of an interpretation for the settings that the paper specifies."""
-    scenario = json.loads(reading.scenario.resolved(platform.core).to_json())
+    scenario = json.loads(interpretation.scenario.resolved(platform.core).to_json())
     vehicle = scenario["vehicle"]
-    controller = vehicle["wake_up"].get("due", vehicle["wake_up"])
+    controller = vehicle["wake_up"].get("trigger", vehicle["wake_up"])
     names = ("kp", "ki", "kd", "weight_snr", "weight_velocity", "t_max_ms")
     return {
         "antennas": vehicle["array"]["elements"],
@@ -340,10 +344,10 @@ def _demands(
         mode.number: ModeDemand(
             cpu_hz=mode.cpu_hz,
             base_wake_up_s={method: mode.base_wake_up_ms[method] / 1e3 for method in METHODS},
-            fixed_executions={
-                method: float(fixed[mode.number, method].executions[0]) for method in METHODS
+            fixed_aoa_estimates={
+                method: float(fixed[mode.number, method].aoa_estimates[0]) for method in METHODS
             },
-            adaptive_executions=adaptive[mode.number].executions[:variants],
+            adaptive_aoa_estimates=adaptive[mode.number].aoa_estimates[:variants],
         )
         for mode in platform.modes
     }
@@ -373,7 +377,7 @@ def _point(case: Case, outcome: Outcome, refitted: bool) -> dict[str, Any]:
         "method": method,
         "adaptive": case.setting.adaptive,
         "base_wake_up_ms": case.setting.base_wake_up_ms,
-        "executions": float(drives.executions[0]),
+        "aoa_estimates": float(drives.aoa_estimates[0]),
         "worst_error_x_m": float(drives.worst_x_m[0]),
         "worst_error_y_m": float(drives.worst_y_m[0]),
         "rms_error_m": float(drives.rms_error_m[0]),

@@ -162,7 +162,7 @@ def energy_j(outcome: Outcome, mode: int, method: str, *, adaptive: bool = False
             f"Platform {outcome.platform} has no energy per execution of {label(method)} in "
             f"mode {mode}."
         )
-    return np.asarray(drives.executions * per_execution_j + drives.besides_j)
+    return np.asarray(drives.aoa_estimates * per_execution_j + drives.besides_j)
 
 
 def savings_percent(outcome: Outcome, mode: int) -> dict[str, Numbers]:
@@ -182,13 +182,13 @@ def _e1(outcome: Outcome) -> Finding:
     return Finding({method: energy_j(outcome, 0, method) for method in METHODS})
 
 
-def _executions(outcome: Outcome, modes: tuple[int, ...]) -> Finding:
+def _aoa_estimates(outcome: Outcome, modes: tuple[int, ...]) -> Finding:
     """The trip's duration over the base wake-up time, which is how the paper counts."""
     counts, driven = {}, []
     for method in METHODS:
         base_ms = [_base_wake_up_ms(outcome, mode)[method] for mode in modes]
         counts[method] = np.asarray(outcome.trip_s * 1e3 / max(base_ms))
-        least = min(outcome.fixed[mode, method].executions[0] for mode in modes)
+        least = min(outcome.fixed[mode, method].aoa_estimates[0] for mode in modes)
         driven.append(f"{label(method)} {least:.0f}")
     return Finding(
         counts,
@@ -333,7 +333,7 @@ def _settings(*names: str) -> Callable[[Outcome], Finding]:
 
     def find(outcome: Outcome) -> Finding:
         if missing := [name for name in names if name not in outcome.settings]:
-            raise MissingFigureError(f"The reading has no {', '.join(missing)}.")
+            raise MissingFigureError(f"The interpretation has no {', '.join(missing)}.")
         return Finding({name: np.array([outcome.settings[name]]) for name in names})
 
     return find
@@ -401,9 +401,9 @@ FINDINGS: dict[str, Callable[[Outcome], Finding]] = {
     "a8_esprit_is_worst": _esprit_is_worst,
     "a9_root_music_exceeds_0.3_m": lambda it: Finding(_fixed_worst(it, "root_music")),
     "e1_mode0_fixed_j": _e1,
-    "e2_mode0_executions": lambda outcome: _executions(outcome, (0,)),
+    "e2_mode0_executions": lambda outcome: _aoa_estimates(outcome, (0,)),
     "e3_mode67_saving_percent": _e3_saving,
-    "e3_mode67_executions": lambda outcome: _executions(outcome, (6, 7)),
+    "e3_mode67_executions": lambda outcome: _aoa_estimates(outcome, (6, 7)),
     "e4_average_saving_percent": _e4,
     "e5_mode0_saved_per_day_kj": _e5,
     "e6_fleet_of_100_saved_per_day_mj": _e6,

@@ -24,7 +24,7 @@ LADDER = tuple(tuple(FREEDOMS)[:count] for count in range(len(FREEDOMS) + 1))
 
 
 @dataclass(frozen=True)
-class Bought:
+class FitOption:
     """The claims under a fit of so much freedom.
 
     Attributes
@@ -36,12 +36,12 @@ class Bought:
     free, solved
         How many numbers are free, and how many of them are solved for.
     reproduced, by_construction, by_arithmetic
-        Number of claims under the shown reading that are reproduced, and of those that agree by
-        construction or by arithmetic, which are not counted as reproduced.
+        Number of claims under the shown interpretation that are reproduced, and of those that agree
+        by construction or by arithmetic, which are not counted as reproduced.
     average_saving_percent
         Result of claim e4 under the shown interpretation.
     energy, both
-        Readings that keep the energy half, and of those the ones that keep both.
+        Interpretations that keep the energy half, and of those the ones that keep both.
     """
 
     freedoms: tuple[str, ...]
@@ -56,7 +56,7 @@ class Bought:
     both: tuple[str, ...]
 
     def as_row(self) -> dict[str, Any]:
-        """A row of the table ``freedoms``."""
+        """A row of the table ``fit_degrees_of_freedom``."""
         return {
             "freedom": self.says,
             "free_numbers": self.free,
@@ -76,7 +76,7 @@ class Bought:
 
 
 def met_halves(claims: Sequence[Claim]) -> tuple[bool, bool]:
-    """Whether the claims of one reading keep the accuracy half, and the energy half."""
+    """Whether the claims of one interpretation keep the accuracy half, and the energy half."""
     met = {claim.id for claim in claims if claim.met}
     return met.issuperset(half("accuracy")), met.issuperset(half("energy"))
 
@@ -86,17 +86,17 @@ def ladder(
     claims: Sequence[Claim],
     shown: str,
     stated: Mapping[str, Any] | None = None,
-) -> list[Bought]:
+) -> list[FitOption]:
     """The claims under ever more freedom; nothing where no energies were fitted.
 
     Parameters
     ----------
     evaluations
-        One of each reading.
+        One of each interpretation.
     claims
         Theirs, under the shipped fit.
     shown
-        Name of the reading whose claims are counted.
+        Name of the interpretation whose claims are counted.
     stated
         Claims as ``paper.toml`` has them; its own when ``None``.
     """
@@ -116,19 +116,19 @@ def _bought(
     claims: Sequence[Claim],
     shown: str,
     with_energy: Mapping[str, Any],
-) -> Bought:
+) -> FitOption:
     free, solved = numbers(freedoms)
     energy, both = [], []
     counted: list[Claim] = []
     for each in evaluations:
-        name = each.reading.name
+        name = each.interpretation.name
         judged = rejudged(each, claims, freedoms, with_energy)
         keeps_accuracy, keeps_energy = met_halves(judged)
         energy += [name] if keeps_energy else []
         both += [name] if keeps_energy and keeps_accuracy else []
         counted = judged if name == shown else counted
     saving = [it.obtained for it in counted if it.id == "e4_average_saving_percent"]
-    return Bought(
+    return FitOption(
         freedoms=freedoms,
         says=(FREEDOMS[freedoms[-1]] if freedoms else NONE).says,
         free=free,
@@ -148,14 +148,16 @@ def rejudged(
     freedoms: Collection[str],
     with_energy: Mapping[str, Any],
 ) -> list[Claim]:
-    """The claims of a reading, those with an energy in them under a fit of these freedoms."""
-    reading = evaluation.reading
+    """Returns the claims of an interpretation, with energies fitted with these free parameters."""
+    interpretation = evaluation.interpretation
     again = check_claims(
         evaluation.refit(tuple(freedoms)).outcome,
-        reading=reading.name,
-        chosen=reading.chosen,
+        interpretation=interpretation.name,
+        chosen=interpretation.chosen,
         freedoms=freedoms,
         stated=with_energy,
     )
-    kept = [it for it in claims if it.reading == reading.name and it.id not in with_energy]
+    kept = [
+        it for it in claims if it.interpretation == interpretation.name and it.id not in with_energy
+    ]
     return kept + again

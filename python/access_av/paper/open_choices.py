@@ -82,7 +82,7 @@ OPEN_WORLD = (
     Dimension("odometer", "odometer", choices=("exact", "real")),
     Dimension("grid_deg", "MUSIC's grid / degrees", choices=("none", "0.5", "1")),
     # The clock of fixed intervals too.
-    Dimension("serving_ssb", "between two SSBs", choices=("first-after", "last-before")),
+    Dimension("ssb_selection", "between two SSBs", choices=("first-after", "last-before")),
 )
 # The world of the shipped scenario, up to its shadowing, which lasts for less than the range does.
 SHIPPED_WORLD = (0.5, 0.875, 0.25, 0.0, 0.75, 1.0 / 3.0)
@@ -143,12 +143,12 @@ def controller_changes(point: Mapping[str, Any], world: Mapping[str, Any]) -> di
         "u_unit_ms": point["u_unit_ms"],
         "delta_t": point["delta_t"],
         "sensing": point["sensing"],
-        "serving_ssb": world.get("serving_ssb", "first-after"),
+        "ssb_selection": world.get("ssb_selection", "first-after"),
         "weight_velocity": WEIGHT_VELOCITY * point.get("velocity", 1.0),
     }
     gate = point.get("gate", "none")
     bound = {"latest_ms": 240.0} if gate == "within t_max" else {}
-    gated = {"policy": "gated", "snr_set_point": set_point, "due": pid, **bound}
+    gated = {"policy": "gated", "snr_set_point": set_point, "trigger": pid, **bound}
     return {
         "vehicle.wake_up": pid if gate == "none" else gated,
         "site.radio_heads[0].eirp_dbm": round(eirp_dbm + point["link_error_db"], 4),

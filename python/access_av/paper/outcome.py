@@ -28,7 +28,7 @@ class Drives:
 
     Attributes
     ----------
-    executions, worst_x_m, worst_y_m, rms_error_m
+    aoa_estimates, worst_x_m, worst_y_m, rms_error_m
         Arrays over variants. Worst is along the track, of the mean over runs of the absolute error.
     horizontal_m
         Mean absolute errors in x and y, put together, against time: variants by every fifth SSB.
@@ -41,12 +41,12 @@ class Drives:
     track_m
         ``horizontal_m`` of the sample at every SSB, of shape (SSBs,); ``None`` if unknown.
     runs
-        One row per run: ``run``, ``executions``, ``rms_error_m``, ``max_error_x_m``,
+        One row per run: ``run``, ``aoa_estimates``, ``rms_error_m``, ``max_error_x_m``,
         ``max_error_y_m``, ``longest_gap_s``, and ``other_energy_j``, the energy in addition to that
-        of the executions; ``None`` if unknown.
+        of the angle estimates; ``None`` if unknown.
     """
 
-    executions: Numbers
+    aoa_estimates: Numbers
     worst_x_m: Numbers
     worst_y_m: Numbers
     rms_error_m: Numbers
@@ -82,13 +82,13 @@ class Drives:
 
     @classmethod
     def of_runs(
-        cls, executions: Numbers, errors_m: NDArray[np.float32], weights: Numbers
+        cls, aoa_estimates: Numbers, errors_m: NDArray[np.float32], weights: Numbers
     ) -> Drives:
         """Drives from their runs.
 
         Parameters
         ----------
-        executions
+        aoa_estimates
             Values of each run.
         errors_m
             Estimate minus truth in x and y at every SSB, of shape (runs, SSBs, 2).
@@ -100,7 +100,7 @@ class Drives:
         mean_x, mean_y = light @ size_x, light @ size_y
         square_m2 = np.square(errors_m, dtype=np.float64).sum(axis=2).mean(axis=1)
         return cls(
-            executions=weights @ executions,
+            aoa_estimates=weights @ aoa_estimates,
             worst_x_m=mean_x.max(axis=1).astype(np.float64),
             worst_y_m=mean_y.max(axis=1).astype(np.float64),
             rms_error_m=np.sqrt(weights @ square_m2),
@@ -108,8 +108,8 @@ class Drives:
             worst_of_runs_m=np.maximum(size_x.max(axis=1), size_y.max(axis=1)).astype(np.float64),
             runs=pl.DataFrame(
                 {
-                    "run": np.arange(len(executions)),
-                    "executions": executions,
+                    "run": np.arange(len(aoa_estimates)),
+                    "aoa_estimates": aoa_estimates,
                     "rms_error_m": np.sqrt(square_m2),
                     "max_error_x_m": size_x.max(axis=1).astype(np.float64),
                     "max_error_y_m": size_y.max(axis=1).astype(np.float64),
@@ -120,7 +120,7 @@ class Drives:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The three campaigns of one reading, or of several side by side.
+    """The three campaigns of one interpretation, or of several side by side.
 
     Attributes
     ----------

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 BOUND_M = 0.3
 # A wake-up comes before the bound demands it that takes so much variance away: chosen on this
 # trip, so that without the road it keeps the bound by it alone.
-LEAST_GAIN_M2 = BOUND_M**2 / 200.0
+MIN_VARIANCE_REDUCTION_M2 = BOUND_M**2 / 200.0
 # It listens for SSBs so much stronger than the link budget says: three standard deviations of the
 # paper's fading.
 HEADROOM_DB = 9.0
@@ -47,9 +47,9 @@ class Comparison:
         Whether the tracker knows the road's course.
     energy_j, papers_energy_j
         Energy of a trip; ``None`` if the platform has no value.
-    error_less_m, error_less_low_m, error_less_high_m
+    rms_error_reduction_m, rms_error_reduction_low_m, rms_error_reduction_high_m
         RMS error of the paper minus that of the proposed method, with its paired 95 % interval.
-    executions_less, executions_less_low, executions_less_high
+    estimates_saved, estimates_saved_low, estimates_saved_high
         Difference of the numbers of estimates, with its paired 95 % interval.
     ours
         Drives of our tracker.
@@ -57,30 +57,30 @@ class Comparison:
 
     mode: int
     map: bool
-    executions: float
-    papers_executions: float
+    aoa_estimates: float
+    papers_aoa_estimates: float
     energy_j: float | None
     papers_energy_j: float | None
     worst_error_m: float
     papers_worst_m: float
     rms_error_m: float
     papers_rms_m: float
-    error_less_m: float
-    error_less_low_m: float
-    error_less_high_m: float
-    executions_less: float
-    executions_less_low: float
-    executions_less_high: float
+    rms_error_reduction_m: float
+    rms_error_reduction_low_m: float
+    rms_error_reduction_high_m: float
+    estimates_saved: float
+    estimates_saved_low: float
+    estimates_saved_high: float
     ours: Drives | None = field(default=None, repr=False, compare=False)
 
     def as_row(self) -> dict[str, Any]:
-        """Returns a row of the table ``ours``."""
+        """Returns a row of the table ``proposed_vs_paper``."""
         return {key: value for key, value in vars(self).items() if key != "ours"}
 
     @property
     def is_better(self) -> bool:
         """In error and energy at once, with 95 % each."""
-        return self.error_less_low_m > 0.0 and self.executions_less_low > 0.0
+        return self.rms_error_reduction_low_m > 0.0 and self.estimates_saved_low > 0.0
 
 
 def tracked(scenario: Scenario, base_ms: float, *, knows_road: bool = True) -> Scenario:
@@ -95,9 +95,9 @@ def tracked(scenario: Scenario, base_ms: float, *, knows_road: bool = True) -> S
             "vehicle.integrity.enabled": False,
             "vehicle.wake_up": {
                 "policy": "uncertainty",
-                "bound_m": BOUND_M,
+                "target_error_m": BOUND_M,
                 "base_ms": base_ms,
-                "least_gain_m2": 1e6,  # only where the bound demands it
+                "min_variance_reduction_m2": 1e6,  # only where the bound demands it
             },
         }
     )
@@ -107,7 +107,7 @@ def _ours(scenario: Scenario, base_ms: float, *, knows_road: bool) -> Scenario:
     return tracked(scenario, base_ms, knows_road=knows_road).with_overrides(
         {
             "vehicle.estimator.method": "music",
-            "vehicle.wake_up.least_gain_m2": LEAST_GAIN_M2,
+            "vehicle.wake_up.min_variance_reduction_m2": MIN_VARIANCE_REDUCTION_M2,
             "vehicle.wake_up.snr_headroom_db": HEADROOM_DB,
         }
     )
@@ -133,30 +133,30 @@ def beside(evaluation: Evaluation, mode: int, ours: Drives, *, knows_road: bool)
     try:
         papers_j = float(energy_j(evaluation.outcome, mode, "music", adaptive=True)[0])
         per_execution_j = evaluation.outcome.energy_per_execution_j[mode]["music"]
-        ours_j = float(np.atleast_1d(ours.executions[0] * per_execution_j)[0]) + papers.besides_j
+        ours_j = float(np.atleast_1d(ours.aoa_estimates[0] * per_execution_j)[0]) + papers.besides_j
     except MissingFigureError:
         pass
     less_m = papers.rms_error_m - ours.rms_error_m
-    less = papers.executions - ours.executions
+    less = papers.aoa_estimates - ours.aoa_estimates
     least_m, most_m = _interval(less_m)
     least, most = _interval(less)
     return Comparison(
         mode=mode,
         map=knows_road,
-        executions=float(ours.executions[0]),
-        papers_executions=float(papers.executions[0]),
+        aoa_estimates=float(ours.aoa_estimates[0]),
+        papers_aoa_estimates=float(papers.aoa_estimates[0]),
         energy_j=ours_j,
         papers_energy_j=papers_j,
         worst_error_m=float(ours.worst_m[0]),
         papers_worst_m=float(papers.worst_m[0]),
         rms_error_m=float(ours.rms_error_m[0]),
         papers_rms_m=float(papers.rms_error_m[0]),
-        error_less_m=float(less_m[0]),
-        error_less_low_m=least_m,
-        error_less_high_m=most_m,
-        executions_less=float(less[0]),
-        executions_less_low=least,
-        executions_less_high=most,
+        rms_error_reduction_m=float(less_m[0]),
+        rms_error_reduction_low_m=least_m,
+        rms_error_reduction_high_m=most_m,
+        estimates_saved=float(less[0]),
+        estimates_saved_low=least,
+        estimates_saved_high=most,
         ours=ours,
     )
 
@@ -194,7 +194,7 @@ class Fair:
     real_odometer: bool
     knows_road: bool
     who: str
-    executions: float
+    aoa_estimates: float
     rms_m: float
     rms_low_m: float
     rms_high_m: float
@@ -208,12 +208,12 @@ class Fair:
         return f"{odometer}, {'' if self.knows_road else 'no '}road map, {self.who}"
 
     def as_row(self) -> dict[str, Any]:
-        """A row of the table ``fair``."""
+        """A row of the table ``equal_information``."""
         return {
             "real_odometer": self.real_odometer,
             "map": self.knows_road,
             "who": self.who,
-            "executions": self.executions,
+            "aoa_estimates": self.aoa_estimates,
             "rms_error_m": self.rms_m,
             "rms_low_m": self.rms_low_m,
             "rms_high_m": self.rms_high_m,
@@ -234,7 +234,7 @@ def fair(driver: Driver, evaluation: Evaluation) -> list[Fair]:
     for real in (False, True):
         if real:
             # Another world, through which only MUSIC is driven.
-            driver = replace(driver, methods=("music",), known={}, tapes=[], progress=None)
+            driver = replace(driver, methods=("music",), known={}, traces=[], progress=None)
         paper = evaluation.scenario.with_overrides(
             {"vehicle.platform.mode": mode.number, "vehicle.estimator.method": "music"}
             | (REAL if real else {})
@@ -259,7 +259,7 @@ def _fair(real: bool, knows_road: bool, who: str, drives: Drives) -> Fair:
         real_odometer=real,
         knows_road=knows_road,
         who=who,
-        executions=float(drives.executions[0]),
+        aoa_estimates=float(drives.aoa_estimates[0]),
         rms_m=float(drives.rms_error_m[0]),
         rms_low_m=low_m,
         rms_high_m=high_m,

@@ -37,12 +37,12 @@ def of_drives(drives: Drives, energy_per_execution_j: float | None, **key: Any) 
     energy_j = (
         pl.lit(None, dtype=pl.Float64)
         if energy_per_execution_j is None
-        else pl.col("executions") * energy_per_execution_j + pl.col("other_energy_j")
+        else pl.col("aoa_estimates") * energy_per_execution_j + pl.col("other_energy_j")
     )
     return drives.runs.select(
         *_key(**key),
         "run",
-        "executions",
+        "aoa_estimates",
         "rms_error_m",
         "max_error_x_m",
         "max_error_y_m",
@@ -53,7 +53,7 @@ def of_drives(drives: Drives, energy_per_execution_j: float | None, **key: Any) 
 
 def _key(
     *,
-    reading: str,
+    interpretation: str,
     campaign: str,
     mode: int | None,
     method: str,
@@ -62,7 +62,7 @@ def _key(
     variant: str = "",
 ) -> list[pl.Expr]:
     return [
-        pl.lit(reading).alias("reading"),
+        pl.lit(interpretation).alias("interpretation"),
         pl.lit(campaign).alias("campaign"),
         pl.lit(mode, dtype=pl.Int64).alias("mode"),
         pl.lit(method).alias("method"),
@@ -84,7 +84,10 @@ def _points(evaluation: Evaluation) -> Iterator[tuple[dict[str, Any], Drives, fl
         else:
             drives = outcome.fixed[mode, method]
         names = ("campaign", "mode", "method", "adaptive", "base_wake_up_ms")
-        key = {"reading": evaluation.reading.name, **{name: point[name] for name in names}}
+        key = {
+            "interpretation": evaluation.interpretation.name,
+            **{name: point[name] for name in names},
+        }
         yield key, drives, point["energy_per_execution_j"]
 
 
@@ -111,7 +114,7 @@ def resamples_of(evaluation: Evaluation) -> list[pl.DataFrame]:
             }
         values = {
             "resample": np.arange(count),
-            "executions": drives.executions,
+            "aoa_estimates": drives.aoa_estimates,
             "worst_error_x_m": drives.worst_x_m,
             "worst_error_y_m": drives.worst_y_m,
             "rms_error_m": drives.rms_error_m,

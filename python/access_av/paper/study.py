@@ -17,46 +17,46 @@ from access_av.paper.claims import Claim, check_claims, with_seeds
 from access_av.paper.driver import Driver
 from access_av.paper.energy_fit import fit_energy
 from access_av.paper.evaluation import Evaluation, cases, demands, evaluate, evaluate_with
-from access_av.paper.readings import SHIPPED
-from access_av.paper.sampled_readings import sample
+from access_av.paper.interpretations import SHIPPED
+from access_av.paper.sampled_interpretations import sample
 from access_av.paper.unknowns import Unknowns, sobol
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from access_av.paper.interpretations import Interpretation
     from access_av.paper.outcome import Drives
     from access_av.paper.own_design import Fair
-    from access_av.paper.readings import Reading
     from access_av.run.campaign import Campaign
 
 FIT_SOURCE = "access-av fit: agrees with the sums and statements of the paper"
-# Sizes of `evaluate --unknowns`: environments, controllers in each, runs per setting.
+# Sizes of `evaluate --sensitivity`: environments, controllers in each, runs per setting.
 UNKNOWNS = (512, 2, 8)
 
 
 @dataclass(frozen=True)
 class Study:
-    """The paper under several readings.
+    """The paper under several interpretations.
 
     Attributes
     ----------
     evaluations
-        One per reading, in their order.
+        One per interpretation, in their order.
     claims
         Verdicts of all interpretations.
     ablations
-        Each reading with a constant in the controller's place, by power mode.
+        Each interpretation with a constant in the controller's place, by power mode.
     front
         MUSIC at fixed intervals, in ms.
-    ours
+    proposed_vs_paper
         Proposed method compared with the shipped interpretation, by power mode.
     unknowns
         Sensitivity of the claims, if requested.
     unusable
-        Readings that could not be evaluated, and why.
-    bought
+        Interpretations that could not be evaluated, and why.
+    fit_options
         Claims met with each degree of freedom of the energy fit.
-    fair
+    equal_information
         Both methods with equal information, in mode 0.
     effects
         Effects of alternative assumptions.
@@ -66,30 +66,32 @@ class Study:
     claims: list[Claim]
     ablations: list[ablation.Ablation]
     front: list[tuple[float, Drives]]
-    ours: list[own_design.Comparison]
-    unknowns: Unknowns | None
+    proposed_vs_paper: list[own_design.Comparison]
+    sensitivity: Unknowns | None
     unusable: Mapping[str, str]
     duration_s: float
-    bought: list[freedoms.Bought] = field(default_factory=list)
-    fair: list[Fair] = field(default_factory=list)
+    fit_options: list[freedoms.FitOption] = field(default_factory=list)
+    equal_information: list[Fair] = field(default_factory=list)
     effects: list[chosen_otherwise.Effect] = field(default_factory=list)
 
     @property
     def shown(self) -> Evaluation:
-        """The evaluation that the report shows in full: the shipped reading's, or the first."""
-        shipped = (each for each in self.evaluations if each.reading.name == SHIPPED)
+        """Evaluation that the report shows in full: of the shipped interpretation, or the first."""
+        shipped = (each for each in self.evaluations if each.interpretation.name == SHIPPED)
         return next(shipped, self.evaluations[0])
 
-    def of(self, reading: str) -> list[Claim]:
-        """The claims under one reading."""
-        return [claim for claim in self.claims if claim.reading == reading]
+    def of(self, interpretation: str) -> list[Claim]:
+        """The claims under one interpretation."""
+        return [claim for claim in self.claims if claim.interpretation == interpretation]
 
     def tables(self) -> dict[str, pl.DataFrame]:
         """Returns the written tables; columns as :mod:`access_av.columns` has them."""
         named = {
             name: pl.concat(
                 [
-                    getattr(each, name).select(pl.lit(each.reading.name).alias("reading"), pl.all())
+                    getattr(each, name).select(
+                        pl.lit(each.interpretation.name).alias("interpretation"), pl.all()
+                    )
                     for each in self.evaluations
                 ]
             )
@@ -98,7 +100,7 @@ class Study:
         front = [
             {
                 "base_wake_up_ms": interval_ms,
-                "executions": float(drives.executions[0]),
+                "aoa_estimates": float(drives.aoa_estimates[0]),
                 "worst_error_x_m": float(drives.worst_x_m[0]),
                 "worst_error_y_m": float(drives.worst_y_m[0]),
                 "rms_error_m": float(drives.rms_error_m[0]),
@@ -111,19 +113,23 @@ class Study:
             "snr": self.shown.snr,
             "ablations": pl.DataFrame([each.as_row() for each in self.ablations]),
             "fixed_front": pl.DataFrame(front),
-            "ours": pl.DataFrame([each.as_row() for each in self.ours]),
-            "fair": pl.DataFrame([each.as_row() for each in self.fair]),
+            "proposed_vs_paper": pl.DataFrame([each.as_row() for each in self.proposed_vs_paper]),
+            "equal_information": pl.DataFrame([each.as_row() for each in self.equal_information]),
             "evaluation_runs": run_tables.joined(self._runs()),
             "resamples": run_tables.joined(
                 table for each in self.evaluations for table in run_tables.resamples_of(each)
             ),
         }
-        if self.bought:
-            tables["freedoms"] = pl.DataFrame([each.as_row() for each in self.bought])
+        if self.fit_options:
+            tables["fit_degrees_of_freedom"] = pl.DataFrame(
+                [each.as_row() for each in self.fit_options]
+            )
         if self.effects:
-            tables["chosen"] = pl.DataFrame([asdict(each) for each in self.effects])
-        if self.unknowns is not None:
-            tables["unknowns"] = pl.DataFrame([asdict(each) for each in self.unknowns.indices])
+            tables["assumptions"] = pl.DataFrame([asdict(each) for each in self.effects])
+        if self.sensitivity is not None:
+            tables["sensitivity"] = pl.DataFrame(
+                [asdict(each) for each in self.sensitivity.indices]
+            )
         return tables
 
     def _runs(self) -> Iterator[pl.DataFrame]:
@@ -131,30 +137,34 @@ class Study:
         for each in self.evaluations:
             yield from run_tables.runs_of(each)
         music: dict[str, Any] = {"method": "music", "mode": None, "base_wake_up_ms": None}
-        shown: dict[str, Any] = {**music, "reading": self.shown.reading.name}
+        shown: dict[str, Any] = {**music, "interpretation": self.shown.interpretation.name}
         for one in self.ablations:
-            key = {**music, "reading": one.reading, "base_wake_up_ms": one.constant_ms}
+            key = {
+                **music,
+                "interpretation": one.interpretation,
+                "base_wake_up_ms": one.constant_ms,
+            }
             key |= {"campaign": run_tables.CONSTANT, "mode": one.mode, "adaptive": False}
             if one.constant is not None:
                 yield run_tables.of_drives(one.constant, None, **key)
         for interval_ms, drives in self.front:
             key = {**shown, "campaign": run_tables.FRONT, "base_wake_up_ms": interval_ms}
             yield run_tables.of_drives(drives, None, adaptive=False, **key)
-        for mine in self.ours:
+        for mine in self.proposed_vs_paper:
             per_execution_j = self.shown.outcome.energy_per_execution_j[mine.mode].get("music")
             each_j = None if per_execution_j is None else float(per_execution_j.flat[0])
             key = {**shown, "campaign": run_tables.TRACKER, "mode": mine.mode}
             key["variant"] = "road map" if mine.map else "no road map"
             if mine.ours is not None:
                 yield run_tables.of_drives(mine.ours, each_j, adaptive=True, **key)
-        for equal in self.fair:
+        for equal in self.equal_information:
             key = {**shown, "campaign": run_tables.EQUAL, "variant": equal.variant}
             if equal.drives is not None:
                 yield run_tables.of_drives(equal.drives, None, adaptive=True, **key)
 
 
 def study(
-    chosen: Sequence[Reading],
+    chosen: Sequence[Interpretation],
     platform: Platform,
     *,
     runs: int,
@@ -165,7 +175,7 @@ def study(
     stated: Mapping[str, Any] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Study:
-    """Evaluate readings, judge the claims, and hold them against constants and against ours.
+    """Evaluate interpretations, judge the claims, and hold them against constants and against ours.
 
     Parameters
     ----------
@@ -180,20 +190,21 @@ def study(
     Raises
     ------
     InputError
-        When no reading can be evaluated; names why.
+        When no interpretation can be evaluated; names why.
     """
     started = time.monotonic()
-    # Four adaptive settings and as many constants a reading; the fixed ones and the front once.
+    # Four adaptive settings and as many constants an interpretation; the fixed ones and the front
+    # once.
     planned = 8 * len(chosen) + len({case.setting for case in cases(platform)}) + 24
     driver = Driver(platform, runs, seed, threads, progress=progress, planned=planned)
     evaluations, ablations, unusable = [], [], {}
-    for reading in chosen:
+    for interpretation in chosen:
         try:
-            evaluations.append(evaluate_with(driver, reading))
+            evaluations.append(evaluate_with(driver, interpretation))
             # At once, while the driver has its world on tape.
             ablations += ablation.ablate(driver, evaluations[-1])
         except SettingsError as error:
-            unusable[reading.name] = str(error)
+            unusable[interpretation.name] = str(error)
     if not evaluations:
         raise InputError("; ".join(unusable.values()))
     hangs_on = None
@@ -213,27 +224,29 @@ def study(
     claims = {seed: judged(evaluations, stated)}
     for other in range(seed + 1, seed + seeds):
         again = Driver(platform, runs, other, threads, count=0, progress=progress, planned=planned)
-        claims[other] = judged([evaluate_with(again, each.reading) for each in evaluations], stated)
+        claims[other] = judged(
+            [evaluate_with(again, each.interpretation) for each in evaluations], stated
+        )
     made = Study(
         evaluations=evaluations,
         claims=with_seeds(claims) if seeds > 1 else claims[seed],
         ablations=ablations,
         front=[],
-        ours=[],
-        unknowns=hangs_on,
+        proposed_vs_paper=[],
+        sensitivity=hangs_on,
         unusable=unusable,
         duration_s=0.0,
     )
     shown = made.shown
-    of_shown = shown.reading.name
+    of_shown = shown.interpretation.name
     return Study(
         **{
             **vars(made),
-            "front": ablation.front(driver, shown.reading),
-            "ours": own_design.compare(driver, shown),
-            "fair": own_design.fair(driver, shown),
+            "front": ablation.front(driver, shown.interpretation),
+            "proposed_vs_paper": own_design.compare(driver, shown),
+            "equal_information": own_design.fair(driver, shown),
             "effects": [] if unknowns is None else chosen_otherwise.effects(driver),
-            "bought": freedoms.ladder(evaluations, made.claims, of_shown, stated),
+            "fit_options": freedoms.ladder(evaluations, made.claims, of_shown, stated),
             "duration_s": time.monotonic() - started,
         }
     )
@@ -242,14 +255,14 @@ def study(
 def judged(
     evaluations: Sequence[Evaluation], stated: Mapping[str, Any] | None = None
 ) -> list[Claim]:
-    """The claims under every reading."""
+    """The claims under every interpretation."""
     return [
         claim
         for each in evaluations
         for claim in check_claims(
             each.outcome,
-            reading=each.reading.name,
-            chosen=each.reading.chosen,
+            interpretation=each.interpretation.name,
+            chosen=each.interpretation.chosen,
             freedoms=each.freedoms,
             stated=stated,
         )
@@ -257,7 +270,7 @@ def judged(
 
 
 def fit_platform(
-    reading: str,
+    interpretation: str,
     platform: str,
     *,
     runs: int,
@@ -265,7 +278,7 @@ def fit_platform(
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Platform:
-    """Count executions by simulation, and fit the platform's energies per execution to the paper.
+    """Fits the energies per angle estimate to the paper; counts the estimates by simulation.
 
     Returns
     -------
@@ -277,7 +290,9 @@ def fit_platform(
     access_av.paper.energy_fit.fit_energy : How.
     """
     board = Platform.load(platform)
-    found = evaluate(reading, board, runs=runs, seed=seed, threads=threads, progress=progress)
+    found = evaluate(
+        interpretation, board, runs=runs, seed=seed, threads=threads, progress=progress
+    )
     energies_j = fit_energy(demands(found.outcome, board))
     return board.with_energy(
         {

@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
     from access_av.paper.ablation import Ablation
     from access_av.paper.claims import Claim
-    from access_av.paper.readings import Reading
+    from access_av.paper.interpretations import Interpretation
     from access_av.paper.study import Study
 
 
 @dataclass(frozen=True)
 class Half:
-    """Which halves hold under a reading, and what carries them.
+    """Which halves hold under an interpretation, and what carries them.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Half:
         In how many of the power modes the controller helps, makes no difference, and harms.
     """
 
-    reading: Reading
+    interpretation: Interpretation
     accuracy: bool
     energy: bool
     gated: bool
@@ -52,18 +52,20 @@ class Half:
 
 
 def halves(study: Study) -> list[Half]:
-    """Which halves hold under each reading."""
+    """Which halves hold under each interpretation."""
     found = []
     for each in study.evaluations:
-        accuracy, energy = met_halves(study.of(each.reading.name))
-        ablations = [one for one in study.ablations if one.reading == each.reading.name]
+        accuracy, energy = met_halves(study.of(each.interpretation.name))
+        ablations = [
+            one for one in study.ablations if one.interpretation == each.interpretation.name
+        ]
         found.append(
             Half(
-                reading=each.reading,
+                interpretation=each.interpretation,
                 accuracy=accuracy,
                 energy=energy,
-                gated=each.reading.is_gated,
-                keeps_t_max=each.reading.keeps(each.longest_gap_s),
+                gated=each.interpretation.is_gated,
+                keeps_t_max=each.interpretation.keeps(each.longest_gap_s),
                 longest_gap_s=each.longest_gap_s,
                 controller=controller(ablations),
             )
@@ -134,7 +136,7 @@ def main_figures(study: Study) -> list[MainFigure]:
 
     Claims that agree by construction or by arithmetic are not counted.
     """
-    claims = study.of(study.shown.reading.name)
+    claims = study.of(study.shown.interpretation.name)
     found = []
     for id_, name, sign in (
         (WORST, "maximum mean error / m", "≤ "),
@@ -170,10 +172,10 @@ def headline(study: Study) -> str:
 def bought_text(study: Study) -> str:
     """Returns the further fit parameter with which both claim groups hold, if there is one."""
     found = halves(study)
-    if not study.bought or any(half.accuracy and half.energy for half in found):
+    if not study.fit_options or any(half.accuracy and half.energy for half in found):
         return ""
-    titles = {half.reading.name: half.reading.title for half in found}
-    for each in study.bought:
+    titles = {half.interpretation.name: half.interpretation.title for half in found}
+    for each in study.fit_options:
         if each.both:
             named = ", ".join(f"“{titles[name]}”" for name in each.both)
             extra = FREEDOMS[each.freedoms[-1]].says
@@ -185,7 +187,7 @@ def bought_text(study: Study) -> str:
 
 
 def _saving_percent(study: Study, half: Half) -> float | None:
-    claims = {claim.id: claim.obtained for claim in study.of(half.reading.name)}
+    claims = {claim.id: claim.obtained for claim in study.of(half.interpretation.name)}
     return claims.get(SAVING)
 
 
@@ -194,7 +196,7 @@ def lead(study: Study) -> str:
     found = halves(study)
 
     def titles(chosen: list[Half]) -> str:
-        named = [f"“{half.reading.title}”" for half in chosen]
+        named = [f"“{half.interpretation.title}”" for half in chosen]
         return ", ".join(named) if named else "no interpretation"
 
     both = [half for half in found if half.accuracy and half.energy]
@@ -206,7 +208,7 @@ def lead(study: Study) -> str:
         f"{titles(both)}."
     ]
     saved = [
-        f"“{half.reading.title}” saves {percent:.1f} %"
+        f"“{half.interpretation.title}” saves {percent:.1f} %"
         for half in found
         if half.accuracy and (percent := _saving_percent(study, half)) is not None
     ]
@@ -223,13 +225,14 @@ def lead(study: Study) -> str:
         )
         if half.gated:
             sentences.append(
-                f"Under “{half.reading.title}” estimates wait for a better SSB, which Algorithm 1 "
+                f"Under “{half.interpretation.title}” estimates wait for a better SSB, which "
+                "Algorithm 1 "
                 f"does not say; {t_max}, and Algorithm 1 {controller_text(half.controller)} "
                 "against a constant in its place."
             )
         else:
             sentences.append(
-                f"Under “{half.reading.title}” {t_max}, and Algorithm 1 "
+                f"Under “{half.interpretation.title}” {t_max}, and Algorithm 1 "
                 f"{controller_text(half.controller)} against as many fixed wake-ups."
             )
     return " ".join(filter(None, [*sentences, bought_text(study)]))
@@ -294,12 +297,13 @@ def ours_text(study: Study) -> str:
         (False, "The tracker with uncertainty-driven wake-up and without a road map"),
         (True, "With a road map, which the paper's method does not have, the tracker"),
     ):
-        rows = [each for each in study.ours if each.map == knows_road]
+        rows = [each for each in study.proposed_vs_paper if each.map == knows_road]
         if not rows:
             continue
         better = sum(each.is_better for each in rows)
         ours, papers = (
-            [getattr(each, name) for each in rows] for name in ("executions", "papers_executions")
+            [getattr(each, name) for each in rows]
+            for name in ("aoa_estimates", "papers_aoa_estimates")
         )
         worst_m, papers_m = (
             max(getattr(each, name) for each in rows) for name in ("rms_error_m", "papers_rms_m")
@@ -314,9 +318,13 @@ def ours_text(study: Study) -> str:
 
 def fair_text(study: Study) -> str:
     """Comparison of the proposed method and the paper's method with equal information."""
-    rms_m = {(each.real_odometer, each.knows_road, each.who): each.rms_m for each in study.fair}
+    rms_m = {
+        (each.real_odometer, each.knows_road, each.who): each.rms_m
+        for each in study.equal_information
+    }
     count = {
-        (each.real_odometer, each.knows_road, each.who): each.executions for each in study.fair
+        (each.real_odometer, each.knows_road, each.who): each.aoa_estimates
+        for each in study.equal_information
     }
     if not rms_m:
         return ""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from access_av.paper.outcome import Numbers
-    from access_av.paper.sampled_readings import Sample
+    from access_av.paper.sampled_interpretations import Sample
 
 # Total indices below this value are irrelevant.
 MATTERS = 0.1
@@ -77,7 +77,7 @@ class Unknowns:
     holds: Mapping[str, float]
     holds_interval: Mapping[str, tuple[float, float]]
     explained: Mapping[str, float]
-    readings: int
+    interpretations: int
     runs: int
 
     @property
@@ -95,7 +95,7 @@ class Unknowns:
 
 
 def sobol(sample: Sample, runs: int, *, seed: int = 0, count: int = RESAMPLES) -> Unknowns:
-    """Sobol indices of a sample of readings; claims whose margin never changes have none.
+    """Sobol indices of a sample of interpretations; claims whose margin never changes have none.
 
     A margin m counts as m / (1 + |m|), so that what is missed a hundredfold does not outweigh all
     else.
@@ -136,7 +136,7 @@ def sobol(sample: Sample, runs: int, *, seed: int = 0, count: int = RESAMPLES) -
             name: (float(least[i]), float(most[i])) for i, name in enumerate(sample.margins)
         },
         explained={name: fit.explained for name, fit in zip(names, fits, strict=True)},
-        readings=len(sample.coordinates),
+        interpretations=len(sample.coordinates),
         runs=runs,
     )
 

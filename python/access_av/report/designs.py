@@ -129,7 +129,7 @@ def _table(rows: pl.DataFrame) -> str:
                 *(number(row[f"p{percent}_error_m"]) for percent in (50, 90, 99)),
                 ends_text(row["p99_error_low_m"], row["p99_error_high_m"]),
                 number(row["rms_error_m"]),
-                number(row["executions"], 0),
+                number(row["aoa_estimates"], 0),
                 *([badge("yes", "yes") if row["on_front"] else ""] if judged else []),
             ]
         )
@@ -140,7 +140,7 @@ def _table(rows: pl.DataFrame) -> str:
 
 def _energy_against_error(drawn: pl.DataFrame) -> Spec:
     """Returns the chart of energy against the 99th percentile of the error."""
-    columns = ("design", "choice", "energy_j", "p99_error_m", "rms_error_m", "executions")
+    columns = ("design", "choice", "energy_j", "p99_error_m", "rms_error_m", "aoa_estimates")
     ends = ("p99_error_low_m", "p99_error_high_m")
     points = drawn.select(
         *columns,
@@ -166,7 +166,7 @@ def _energy_against_error(drawn: pl.DataFrame) -> Spec:
         alt.Tooltip("energy_j:Q", title="energy / J", format=".3g"),
         alt.Tooltip("p99_error_m:Q", title="99th percentile / m", format=".3g"),
         alt.Tooltip("rms_error_m:Q", title="RMS / m", format=".3g"),
-        alt.Tooltip("executions:Q", title="estimates", format=".0f"),
+        alt.Tooltip("aoa_estimates:Q", title="estimates", format=".0f"),
     ]
 
     def layer(rows: pl.DataFrame, colour: str, opacity: float) -> Any:

@@ -1,4 +1,4 @@
-"""Report of ``access-av run``: error and executions against time, integrity."""
+"""Report of ``access-av run``: error and angle estimates against time, integrity."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
 from access_av.report.parts import figure, section, service_levels, source, table, tile, warnings
 from access_av.report.played import CAPTION as PLAYED
-from access_av.run.assumptions import energy_boundary, flattering, in_words
+from access_av.run.assumptions import energy_boundary, in_words, optimistic_assumptions
 from access_av.tables.numbers import value_text
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str 
     beside
         HTML section with the comparison of variants.
     """
-    if result.trajectories is None or result.executions is None:
+    if result.trajectories is None or result.aoa_estimates is None:
         raise InputError("the report needs trajectories: set keep_trajectories=True")
     operation = result.operation
     runs, duration_s = result.runs.height, float(result.steps["time_s"][-1])
@@ -61,13 +61,15 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str 
             figure("error"),
         ),
     ]
-    if not result.executions.is_empty():
-        specs["executions"] = charts.executions_against_time(result.executions, runs, duration_s)
+    if not result.aoa_estimates.is_empty():
+        specs["aoa_estimates"] = charts.aoa_estimates_against_time(
+            result.aoa_estimates, runs, duration_s
+        )
         sections.append(
             section(
-                "Executions",
+                "Angle estimates",
                 "Angle estimates per second, mean over the runs.",
-                figure("executions"),
+                figure("aoa_estimates"),
             )
         )
     integrity = result.integrity
@@ -104,7 +106,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str 
     if (boundary := energy_boundary(scenario)) is not None:
         energy_j = value_text(result.runs["energy_j"].mean())
         tiles.append(tile(f"{energy_j} J", f"energy of a run: {boundary}"))
-    estimates = result.runs["executions"].sum() / runs
+    estimates = result.runs["aoa_estimates"].sum() / runs
     tiles.append(tile(f"{estimates:,.0f}", "angles estimated per run"))
     if operation is not None and integrity is not None:
         tiles.append(tile(f"{operation.reliable:.1%}", "availability (state ok)"))
@@ -115,7 +117,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str 
         title=f"ACCESS-AV drive: {escape(scenario.name)}",
         kicker="ACCESS-AV drive",
         headline=f"90 % of the errors are below {result.error_quantiles_m[0.9]:.2f} m",
-        lead=escape(f"{scenario.description} {in_words(flattering(scenario))}".strip()),
+        lead=escape(f"{scenario.description} {in_words(optimistic_assumptions(scenario))}".strip()),
         tiles="".join(tiles),
         meta=escape(
             f"Scenario “{scenario.name}”, {runs} runs of {duration_s:.1f} s, seed {seed}, "

@@ -40,11 +40,11 @@ def error_against_time(steps: pl.DataFrame) -> Spec:
     return finish(chart, height=240, description="Horizontal error against time, over the runs")
 
 
-def executions_against_time(executions: pl.DataFrame, runs: int, duration_s: float) -> Spec:
+def aoa_estimates_against_time(aoa_estimates: pl.DataFrame, runs: int, duration_s: float) -> Spec:
     """Returns the chart of angle estimates per second (mean over the runs), by radio head."""
     bar_s = max(1.0, math.ceil(duration_s / 80.0))
     rates = (
-        executions.group_by(
+        aoa_estimates.group_by(
             start_s=(pl.col("time_s") / bar_s).floor() * bar_s,
             head=pl.format("PCI {}, SSB {}", "pci", "ssb_index"),
         )
@@ -63,7 +63,7 @@ def executions_against_time(executions: pl.DataFrame, runs: int, duration_s: flo
                 scale=alt.Scale(domain=[0.0, math.ceil(duration_s / bar_s) * bar_s]),
             ),
             x2="end_s:Q",
-            y=alt.Y("per_second:Q", title="executions per second"),
+            y=alt.Y("per_second:Q", title="angle estimates per second"),
             color=alt.Color("head:N", legend=alt.Legend(title=None)),
             tooltip=[
                 alt.Tooltip("head:N", title="radio head"),
@@ -72,7 +72,7 @@ def executions_against_time(executions: pl.DataFrame, runs: int, duration_s: flo
             ],
         )
     )
-    return finish(chart, height=200, description="Executions per second against time")
+    return finish(chart, height=200, description="Angle estimates per second against time")
 
 
 def stanford(trajectories: pl.DataFrame, alert_limit_m: float) -> Spec:

@@ -89,9 +89,9 @@ def render_located(
             )
         )
     sections.append(beside)
-    believed = source("Site with all default values", site.to_toml())
-    believed += source("Vehicle with all default values", vehicle.to_toml())
-    sections.append(section("Provenance", "", believed))
+    nominal = source("Site with all default values", site.to_toml())
+    nominal += source("Vehicle with all default values", vehicle.to_toml())
+    sections.append(section("Provenance", "", nominal))
     return sheet(
         specs,
         title="ACCESS-AV located drive",

@@ -103,7 +103,7 @@ def _map_text(bound: ErrorBound) -> str:
         )
     return (
         f"Bound of a vehicle after {MAP_TRAVEL_M:g} m of reception "
-        f"({bound.map_angles:.0f} independent angles of each radio head), with a heading σ of "
+        f"({bound.map_num_angles:.0f} independent angles of each radio head), with a heading σ of "
         f"{bound.map_heading_std_rad * 1e3:.1f} mrad and an unknown position. Squares of "
         f"{bound.map_step_m:g} m; no square where the radio heads do not determine the position. "
         "To scale on a wide screen."

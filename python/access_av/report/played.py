@@ -42,9 +42,9 @@ def steps_of(result: Simulation, run: int = 0) -> pl.DataFrame:
 
 def heard_of(result: Simulation, run: int = 0) -> pl.DataFrame:
     """Returns the angles of one simulated run: ``time_s``, ``pci`` and ``ssb_index``."""
-    if result.executions is None:
-        raise ValueError("the animation needs executions: set keep_trajectories=True")
-    return result.executions.filter(run=run).select("time_s", "pci", "ssb_index")
+    if result.aoa_estimates is None:
+        raise ValueError("the animation needs angle estimates: set keep_trajectories=True")
+    return result.aoa_estimates.filter(run=run).select("time_s", "pci", "ssb_index")
 
 
 def played(

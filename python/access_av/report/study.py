@@ -22,7 +22,7 @@ from access_av.report.study_parts import (
     reliability_rows,
     sources,
 )
-from access_av.run.assumptions import flattering, in_words
+from access_av.run.assumptions import in_words, optimistic_assumptions
 from access_av.study import economy
 from access_av.study.verdicts import NotOk
 
@@ -53,8 +53,8 @@ def render_study(study: Study, beside: str = "") -> str:
     }
     if study.points:
         specs["ways"] = charts.ways_to_operate(study)
-    scenario = study.believed.scenario
-    assumed = in_words(flattering(scenario))
+    scenario = study.nominal.scenario
+    assumed = in_words(optimistic_assumptions(scenario))
     described = f"{study.plant.description}." if study.plant.description else ""
     return sheet(
         specs,
@@ -64,7 +64,7 @@ def render_study(study: Study, beside: str = "") -> str:
         lead=escape(f"{study.verdict} {described} {assumed}".strip()),
         tiles=_tiles(study),
         meta=escape(
-            f"Simulated: {study.believed.runs} trips of {study.believed.duration_s:.0f} s with the "
+            f"Simulated: {study.nominal.runs} trips of {study.nominal.duration_s:.0f} s with the "
             f"nominal channel, seed {study.seed}, version {version('access-av')}. Intervals: 95 %."
         ),
         sections=warnings(study.plant.warnings())
@@ -86,7 +86,7 @@ def render_study(study: Study, beside: str = "") -> str:
 
 
 def _headline(study: Study) -> str:
-    judged = study.judged(study.believed).words
+    judged = study.judged(study.nominal).words
     stretches = len(study.targets.each) - 1
     more = f", and {count(stretches, 'target')} of stretches" if stretches else ""
     return escape(
@@ -96,19 +96,21 @@ def _headline(study: Study) -> str:
 
 
 def _tiles(study: Study) -> str:
-    believed, poor = (it.percentile(study.percent).value for it in (study.believed, study.poor))
+    nominal, poor_los = (
+        it.percentile(study.percent).value for it in (study.nominal, study.poor_los)
+    )
     made = [
-        tile(f"{believed:.2f} m", f"error within which the vehicle is {study.percent:g} % of time"),
-        tile(f"{poor:.2f} m", "the same percentile with poor line of sight"),
+        tile(f"{nominal:.2f} m", f"error within which the vehicle is {study.percent:g} % of time"),
+        tile(f"{poor_los:.2f} m", "the same percentile with poor line of sight"),
     ]
-    if lost_runs := study.believed.lost_runs:
-        made.insert(0, tile(f"{lost_runs} of {study.believed.runs}", "drives LOST"))
+    if lost_runs := study.nominal.lost_runs:
+        made.insert(0, tile(f"{lost_runs} of {study.nominal.runs}", "drives LOST"))
     if study.point is not None:
         made.append(tile(joules(economy.trip_j(study.point).central), "a trip, above idle"))
     if study.day is not None:
         made.append(tile(f"{digits(study.day.trips_wh.central)} Wh", "a fleet’s day, above idle"))
-    if study.believed.ok_share is not None:
-        made.append(tile(f"{study.believed.ok_share:.1%}", "of the time in state ok"))
+    if study.nominal.ok_share is not None:
+        made.append(tile(f"{study.nominal.ok_share:.1%}", "of the time in state ok"))
     return "".join(made)
 
 
@@ -119,8 +121,8 @@ def _interval(values: tuple[float, float, float]) -> str:
 def _verdict(study: Study) -> str:
     rows: list[tuple[str, ...]] = []
     for name, driven in (
-        ("nominal", study.believed),
-        ("poor line of sight", study.poor),
+        ("nominal", study.nominal),
+        ("poor line of sight", study.poor_los),
     ):
         for number, it in enumerate(study.results(driven)):
             stretch = f"{it.target.from_m:.0f} to {it.target.to_m:.0f} m along the road"
@@ -173,9 +175,9 @@ def _integrity(study: Study, written: Mapping[str, Any]) -> str:
         settings.append(f"integrity risk {risk:g} per hour")
     if correlation_s is not None:
         settings.append(f"error correlation {correlation_s:g} s")
-    drives = [study.believed, study.poor, *(it.driven for it in study.mended)]
+    drives = [study.nominal, study.poor_los, *(it.driven for it in study.remedies)]
     of_points = {it.driven.name: it.driven for it in study.points}
-    drives += [it for name, it in of_points.items() if name != study.believed.name]
+    drives += [it for name, it in of_points.items() if name != study.nominal.name]
     rows = reliability_rows(drives)
     first = 2  # the others unfold
     head = ("Variant", "Lost drives", "State ok", *(it.words for it in NotOk), "Errors while ok")
@@ -250,7 +252,7 @@ def _places(study: Study) -> str:
             "–" if place["level_m"] is None else f"{place['level_m']:.2f} m",
             f"{place['reliable_share']:.0%}",
             f"{place['bound_m']:.3f} m",
-            "–" if (it := place["dilution_of_degree_m"]) is None else f"{it:.2f} m",
+            "–" if (it := place["along_road_error_per_degree_m"]) is None else f"{it:.2f} m",
             "–" if (it := place["best_snr_db"]) is None else f"{it:.0f} dB",
         )
         for place in study.places.gather_every(step).iter_rows(named=True)
@@ -269,7 +271,8 @@ def _remedies(study: Study) -> str:
     if study.measured is None:
         return section(
             "What reduces the error?",
-            "The drives meet all targets: no measure was simulated. --always-mend simulates them.",
+            "The drives meet all targets: no measure was simulated. --force-remedies simulates "
+            "them.",
             "",
         )
     currency = escape(study.prices.currency)

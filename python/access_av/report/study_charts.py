@@ -33,7 +33,7 @@ WAYS_PX = 420
 
 def road_map(study: Study) -> Spec:
     """The road coloured by the target's percentile, what stands about it, and a drive played."""
-    site = study.believed.scenario.site
+    site = study.nominal.scenario.site
     heads, places = heads_of(site), study.places
     step = max(1, places.height // STRETCHES)
     road = (
@@ -104,7 +104,7 @@ def road_map(study: Study) -> Spec:
         )
         number = alt.Chart(worst).mark_text(fontSize=12, fontWeight="bold", color="#ffffff", dy=1)
         layers += [frame.put(disc), frame.put(number, text="number:N")]
-    steps, heard = steps_of(study.played), heard_of(study.played)
+    steps, heard = steps_of(study.example_run), heard_of(study.example_run)
     return finish(
         played(frame, alt.LayerChart(layer=layers), steps, heard, heads),
         height=frame.height_px,
@@ -185,7 +185,7 @@ def along_road(study: Study) -> Spec:
 
 def signal_along_road(study: Study) -> Spec:
     """Dilution along the road, and the strongest radio head's SNR."""
-    rows = thinned(study.places.select("along_m", "dilution_of_degree_m", "best_snr_db"))
+    rows = thinned(study.places.select("along_m", "along_road_error_per_degree_m", "best_snr_db"))
     x = alt.X("along_m:Q", title="along the road / m", scale=alt.Scale(nice=False))
     dilution = (
         alt.Chart(rows)
@@ -193,7 +193,7 @@ def signal_along_road(study: Study) -> Spec:
         .encode(
             x=x,
             y=alt.Y(
-                "dilution_of_degree_m:Q",
+                "along_road_error_per_degree_m:Q",
                 title="dilution / m per degree",
                 axis=alt.Axis(titleColor=BLUE),
             ),

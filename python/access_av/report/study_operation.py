@@ -205,7 +205,7 @@ def _way(study: Study, it: Point) -> tuple[str, ...]:
         lost(it.driven),
         f"{found.value:.3f} m",
         f"{escape(found.interval)} m",
-        f"{it.driven.executions.mean():,.0f}",
+        f"{it.driven.aoa_estimates.mean():,.0f}",
         joules_range(economy.trip_j(it)),
         ok(it.driven),
         label,

@@ -11,16 +11,16 @@ if TYPE_CHECKING:
     from access_av import _core
 
 
-def flattering(scenario: _core.Scenario) -> list[str]:
+def optimistic_assumptions(scenario: _core.Scenario) -> list[str]:
     """Returns the optimistic assumptions of a scenario as text, each with its key.
 
     Examples
     --------
     >>> from access_av import _core
-    >>> flattering(_core.Scenario.load("yard"))
+    >>> optimistic_assumptions(_core.Scenario.load("yard"))
     []
     >>> exact = {"vehicle.start": {"position_std_m": 0.0, "heading_std_rad": 0.0}}
-    >>> flattering(_core.Scenario.load("yard").with_overrides(exact))
+    >>> optimistic_assumptions(_core.Scenario.load("yard").with_overrides(exact))
     ['exact start (vehicle.start)']
     """
     site, vehicle = (json.loads(it.to_json()) for it in (scenario.site, scenario.vehicle))
@@ -45,10 +45,10 @@ def flattering(scenario: _core.Scenario) -> list[str]:
         "exact positions of the radio heads (site.radio_heads.all.position_std_m)": not any(
             head["position_std_m"] for head in heads
         ),
-        "truth equal to the nominal model (truth.draw)": json.loads(scenario.to_json())
+        "truth equal to the nominal model (truth.sample_errors)": json.loads(scenario.to_json())
         .get("truth", {})
-        .get("draw")
-        == "none",
+        .get("sample_errors")
+        is False,
         "no energy, because the platform has no value for the method (vehicle.platform.name)": (
             energy_boundary(scenario) is None
         ),

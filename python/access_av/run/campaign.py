@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from access_av.run.result_cache import Parts
+    from access_av.run.result_cache import ResultCache
 
 # Number of pending tasks per worker, so that no worker is idle.
 AHEAD = 4
@@ -97,7 +97,7 @@ class Campaign:
         Number of parallel tasks.
     """
 
-    parts: Parts
+    parts: ResultCache
     executor: Executor | None = None
     workers: int = 1
     shard: Shard = field(default_factory=Shard)

@@ -45,8 +45,8 @@ class ErrorBound(Result):
         One row per radio head; columns ``bound_heads``.
     site
         The bound over the site, one row per square of ``map_step_m``; columns ``bound_map``. It is
-        valid for a vehicle that has measured ``map_angles`` independent angles, with a heading σ of
-        ``map_heading_std_rad`` and an unknown position.
+        valid for a vehicle that has measured ``map_num_angles`` independent angles, with a heading
+        σ of ``map_heading_std_rad`` and an unknown position.
     """
 
     scenario: _core.Scenario
@@ -54,7 +54,7 @@ class ErrorBound(Result):
     heads: pl.DataFrame
     site: pl.DataFrame
     map_step_m: float
-    map_angles: float
+    map_num_angles: float
     map_heading_std_rad: float
     origin: Origin = field(default_factory=origin, compare=False)
 
@@ -158,7 +158,7 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
         heads=heads,
         site=site.with_columns(pl.col("bound_m").fill_nan(None)),
         map_step_m=step_m,
-        map_angles=looks,
+        map_num_angles=looks,
         map_heading_std_rad=heading_std_rad,
     )
 

@@ -116,7 +116,9 @@ def hypotheses(scenario: _core.Scenario) -> dict[str, Overrides]:
 def _of_size(site: Overrides, vehicle: Overrides, size: float) -> dict[str, Overrides]:
     heads, array, odometer = site["radio_heads"], vehicle["array"], vehicle["odometer"]
     receiver = vehicle["receiver"]
-    late_s = receiver["lateness_s"] + size * (receiver.get("lateness_std_s") or LATE_S)
+    late_s = receiver["angle_time_offset_s"] + size * (
+        receiver.get("angle_time_offset_std_s") or LATE_S
+    )
     scale = size * (odometer["scale_std"] or SCALE_STD)
     mounting = size * (array.get("mounting_std_rad") or MOUNTING_STD_RAD)
     phase = size * (array.get("phase_std_rad") or PHASE_STD_RAD)
@@ -145,7 +147,7 @@ def _of_size(site: Overrides, vehicle: Overrides, size: float) -> dict[str, Over
         "gain drift": {
             "truth.vehicle.array.gain_drift_db_per_sqrt_m": size * GAIN_STD_DB / DRIFTS_M**0.5,
         },
-        "clock late": {"truth.vehicle.receiver.lateness_s": min(late_s, LATEST_S)},
+        "clock late": {"truth.vehicle.receiver.angle_time_offset_s": min(late_s, LATEST_S)},
         "odometer scale": {"truth.vehicle.odometer.scale": odometer["scale"] + scale},
         "odometer noise": {"truth.vehicle.odometer.noise_m_per_sqrt_m": noise} if noise else {},
         "growing slip": {"faults": list(_growing_slip(scale))},

@@ -13,7 +13,7 @@ from access_av import _core
 from access_av.errors import InputError
 from access_av.run.campaign import Task
 from access_av.run.fault_injection import Overrides, hypotheses, mismatches
-from access_av.run.pairs import AS_IT_IS, Errors
+from access_av.run.pairs import AS_IT_IS, ErrorSamples
 from access_av.run.simulation import Simulation
 from access_av.statistics.alarms import Alarms
 from access_av.statistics.consistency import horizontal_error_m
@@ -92,7 +92,7 @@ class Case:
             "max_error_m": error_m.max(),
         }
 
-    def errors(self, name: str) -> Errors:
+    def errors(self, name: str) -> ErrorSamples:
         """Returns the errors of each run; infinite during the search for the first position."""
         by_run = [
             part["error_x_m"].to_numpy()
@@ -102,7 +102,7 @@ class Case:
         for row, found_m in zip(errors_m, by_run, strict=True):
             row[len(row) - len(found_m) :] = np.abs(found_m)
         duration_s = float(self.trajectories["time_s"].max())  # type: ignore[arg-type]
-        return Errors(name=name, errors_m=errors_m, duration_s=duration_s)
+        return ErrorSamples(name=name, errors_m=errors_m, duration_s=duration_s)
 
 
 def _settings(scenario: _core.Scenario) -> dict[str, Any]:
@@ -184,8 +184,8 @@ def drive(
     >>> import tempfile
     >>> from pathlib import Path
     >>> from access_av.run.campaign import Campaign
-    >>> from access_av.run.result_cache import Parts
-    >>> kept = Campaign(Parts(Path(tempfile.mkdtemp())))
+    >>> from access_av.run.result_cache import ResultCache
+    >>> kept = Campaign(ResultCache(Path(tempfile.mkdtemp())))
     >>> [case] = drive(kept, "paper-real-odometry-4", runs=1, only=["none"])
     >>> case.as_record()["availability"] > 0.9
     True

@@ -30,7 +30,7 @@ STRETCHES = f"stretches of {INDEPENDENT_S:g} s of one drive"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Errors:
+class ErrorSamples:
     """Horizontal errors of one variant.
 
     Attributes
@@ -91,7 +91,7 @@ class Errors:
         >>> errors_m = np.full((3, 100), 0.1)
         >>> errors_m[0, :40] = np.inf
         >>> errors_m[1, 40:] = 30.0
-        >>> Errors(name="a", errors_m=errors_m, duration_s=100.0).lost_runs
+        >>> ErrorSamples(name="a", errors_m=errors_m, duration_s=100.0).lost_runs
         1
         """
         return int(self.lost.sum())
@@ -106,7 +106,7 @@ class Errors:
         """Number of positions in state ``ok`` whose error exceeds the protection level."""
         return None
 
-    def delta_m(self, baseline: Errors, percent: float) -> tuple[float, float, float]:
+    def delta_m(self, baseline: ErrorSamples, percent: float) -> tuple[float, float, float]:
         """Difference of a percentile to the baseline's in metres, in pairs of rows.
 
         Returns

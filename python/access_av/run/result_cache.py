@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Parts:
+class ResultCache:
     """A directory of parts: arrays by name, one file each."""
 
     path: Path
@@ -49,7 +49,7 @@ class Parts:
         --------
         >>> import tempfile
         >>> from pathlib import Path
-        >>> parts = Parts(Path(tempfile.mkdtemp()))
+        >>> parts = ResultCache(Path(tempfile.mkdtemp()))
         >>> for _ in range(2):
         ...     part = parts.get({"seed": 1}, lambda: print("computed") or {"x": np.arange(2)})
         computed

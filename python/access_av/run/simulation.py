@@ -50,7 +50,7 @@ class Simulation(Result):
         One row per run.
     trajectories
         Truth and estimate, one row per run and SSB. ``None`` unless kept.
-    executions
+    aoa_estimates
         One row per angle estimate. ``None`` unless trajectories were kept.
     integrity
         Comparison of protection levels and errors; ``None`` without protection levels.
@@ -69,7 +69,7 @@ class Simulation(Result):
     steps: pl.DataFrame
     runs: pl.DataFrame
     trajectories: pl.DataFrame | None
-    executions: pl.DataFrame | None
+    aoa_estimates: pl.DataFrame | None
     integrity: Integrity | None
     error_quantiles_m: Mapping[float, float]
     errors_m: NDArray[np.float32] | None = None
@@ -101,7 +101,7 @@ class Simulation(Result):
             steps=_table(found.steps),
             runs=_table(found.runs),
             trajectories=None if found.trajectories is None else _table(found.trajectories),
-            executions=None if found.executions is None else _table(found.executions),
+            aoa_estimates=None if found.aoa_estimates is None else _table(found.aoa_estimates),
             integrity=found.integrity and Integrity.of_runs(*found.integrity),
             error_quantiles_m=found.error_quantiles_m,
             errors_m=found.errors_m,
@@ -111,7 +111,7 @@ class Simulation(Result):
         )
 
     def summary(self) -> dict[str, float | None]:
-        """Returns the main figures; executions and energy are means over the runs.
+        """Returns the main figures; aoa_estimates and energy are means over the runs.
 
         Examples
         --------
@@ -124,7 +124,11 @@ class Simulation(Result):
             if exact is None
             else {column(each.percent): each.value for each in exact}
         )
-        mean = self.runs.select("executions", "listened", "energy_j").mean().row(0, named=True)
+        mean = (
+            self.runs.select("aoa_estimates", "bursts_received", "energy_j")
+            .mean()
+            .row(0, named=True)
+        )
         return {
             "rms_error_m": self.rms_error_m,
             "mean_error_m": self.mean_error_m,
@@ -246,7 +250,7 @@ def simulate(
     threads
         Number of worker threads. Default and maximum: one per core. Results do not depend on it.
     keep_trajectories
-        Whether to keep the trajectory and executions of every run.
+        Whether to keep the trajectory and angle estimates of every run.
     errors_every
         Interval, in SSBs, of stored errors in x and y and protection levels of every run, for
         statistics over whole runs.

@@ -177,7 +177,9 @@ def sweep(
 
 def _row(values: Mapping[str, Any], found: Simulation, to_first: Difference) -> dict[str, Any]:
     exact = found.percentiles
-    mean = found.runs.select("executions", "listened", "energy_j").mean().row(0, named=True)
+    mean = (
+        found.runs.select("aoa_estimates", "bursts_received", "energy_j").mean().row(0, named=True)
+    )
     return {
         "variant": ", ".join(f"{key.rpartition('.')[2]} = {it}" for key, it in values.items()),
         "runs": found.runs.height,

@@ -65,25 +65,25 @@ def read_heads(path: Path) -> Drawn:
     )
 
 
-def road_text(points_m: Sequence[tuple[float, float]], *, german: bool = False) -> str:
-    """Returns points of a road as CSV; ``german``: semicolons and decimal commas."""
+def road_text(points_m: Sequence[tuple[float, float]], *, decimal_comma: bool = False) -> str:
+    """Returns points of a road as CSV; ``decimal_comma``: semicolons and decimal commas."""
     rows = [("x_m", "y_m"), *((f"{x_m:.4f}", f"{y_m:.4f}") for x_m, y_m in points_m)]
-    return _text(rows, german=german)
+    return _text(rows, decimal_comma=decimal_comma)
 
 
-def heads_text(heads: Sequence[Head], *, german: bool = False) -> str:
+def heads_text(heads: Sequence[Head], *, decimal_comma: bool = False) -> str:
     """Returns radio heads as CSV."""
     rows = [("name", "x_m", "y_m", "z_m", "pci")]
     for head in heads:
         pci = "" if head.pci is None else str(head.pci)
         name = '"' + head.name.replace('"', '""') + '"'
         rows.append((name, f"{head.x_m:.4f}", f"{head.y_m:.4f}", f"{head.z_m:.4f}", pci))
-    return _text(rows, german=german)
+    return _text(rows, decimal_comma=decimal_comma)
 
 
-def _text(rows: Sequence[Sequence[str]], *, german: bool) -> str:
+def _text(rows: Sequence[Sequence[str]], *, decimal_comma: bool) -> str:
     def cell(text: str) -> str:
-        return text.replace(".", ",") if german and text[:1] in "-0123456789" else text
+        return text.replace(".", ",") if decimal_comma and text[:1] in "-0123456789" else text
 
-    separator = ";" if german else ","
+    separator = ";" if decimal_comma else ","
     return "".join(separator.join(map(cell, row)) + "\n" for row in rows)

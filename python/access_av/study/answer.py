@@ -44,7 +44,7 @@ def study_plant(
     runs: int | None = None,
     seed: int = 1,
     threads: int | None = None,
-    always_mend: bool = False,
+    force_remedies: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Study:
     """Answers whether a plant's localization is good enough, where not, and what reduces the error.
@@ -60,7 +60,7 @@ def study_plant(
         Seed of all drives: measures and operations are driven in the same environments.
     threads
         Worker threads; all cores when ``None``.
-    always_mend
+    force_remedies
         Simulate measures also where all targets are met.
     progress
         Called as ``progress(done, total)`` with numbers of drives.
@@ -116,27 +116,27 @@ def study_plant(
     present = full
     of_operations = few * (len(operations(scenario)) + LIKELY_FINALISTS)
     after = fewest + of_operations
-    believed = driven("as it is", scenario, full)
-    needs_measures = always_mend or not targets.judgement(believed).holds
+    nominal = driven("as it is", scenario, full)
+    needs_measures = force_remedies or not targets.judgement(nominal).holds
     changes = remedies(scenario, fleet["vehicles"]) if needs_measures else []
     present, after = fewest, of_operations + pairs * len(changes)
-    poor = driven("poor line of sight", plant.poor_scenario(), fewest)
+    poor_los = driven("poor line of sight", plant.poor_scenario(), fewest)
     after = pairs * len(changes)
-    recommendation = operate(plant, targets, believed, few, seed, driven, plan)
+    recommendation = operate(plant, targets, nominal, few, seed, driven, plan)
     prices = economy.Prices.of(plant)
     after = 0
     measured = None
     if changes:
-        before = believed.first(pairs)
+        before = nominal.first(pairs)
         measured = measures(scenario, changes, before, targets, prices, seed, driven, plan)
-    places = by_place(believed, percent, targets.each[0].error_m)
+    places = by_place(nominal, percent, targets.each[0].error_m)
     point = recommendation.point
     return Study(
         plant=plant,
         seed=seed,
         targets=targets,
-        believed=believed,
-        poor=poor,
+        nominal=nominal,
+        poor_los=poor_los,
         places=places,
         worst=worst_places(places, plant),
         heads=radio_head_sides(scenario),
@@ -146,7 +146,7 @@ def study_plant(
         day=None if point is None else economy.day(plant, point),
         ways={} if point is None else economy.ways(plant, point, prices),
         unverified=unverified(plant),
-        played=simulate(scenario, runs=1, seed=seed, threads=threads, keep_trajectories=True),
+        example_run=simulate(scenario, runs=1, seed=seed, threads=threads, keep_trajectories=True),
     )
 
 

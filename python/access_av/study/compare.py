@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 
 from access_av.errors import InputError
-from access_av.run.pairs import Errors
+from access_av.run.pairs import ErrorSamples
 from access_av.study.trips import Driven, drive
 from access_av.tables.toml import tomllib
 
@@ -40,7 +40,7 @@ class Compared:
         Whether all errors equal those of the baseline.
     """
 
-    driven: Errors
+    driven: ErrorSamples
     percents: Sequence[float]
     delta_m: Sequence[tuple[float, float, float]] | None
     identical: bool = False
@@ -100,7 +100,7 @@ def values(text: str) -> tuple[str, list[Any]]:
     """
     key, equals, rest = text.partition("=")
     if not equals or not key.strip() or not rest.strip():
-        raise InputError(f"--vary {text}: write KEY=a,b,c, for example site.rician_k_db=5,10,15")
+        raise InputError(f"--sweep {text}: write KEY=a,b,c, for example site.rician_k_db=5,10,15")
     try:
         return key.strip(), list(tomllib.loads(f"values = [{rest}]")["values"])
     except tomllib.TOMLDecodeError:
@@ -125,14 +125,14 @@ def varied(vary: Sequence[str]) -> list[tuple[str, dict[str, Any]]]:
     ]
     if len(found) > MOST_VARIANTS:
         raise InputError(
-            f"--vary: {len(found)} variants; at most {MOST_VARIANTS} are compared, "
+            f"--sweep: {len(found)} variants; at most {MOST_VARIANTS} are compared, "
             "access-av designs searches more"
         )
     return found if vary else []
 
 
 def combinations(vary: Sequence[str]) -> str:
-    """The combinations that ``--vary`` options make, in words; empty without any.
+    """The combinations that ``--sweep`` options make, in words; empty without any.
 
     Examples
     --------
@@ -170,7 +170,7 @@ def compare(
     percents
         Which percentiles of the error.
     """
-    total, found = runs * len(scenarios), list[Errors]()
+    total, found = runs * len(scenarios), list[ErrorSamples]()
     for number, (label, scenario) in enumerate(scenarios.items()):
 
         def tell(done: int, _: int, before: int = number * runs) -> None:
@@ -181,7 +181,7 @@ def compare(
     return beside_first(found, percents)
 
 
-def beside_first(found: Sequence[Errors], percents: Sequence[float]) -> list[Compared]:
+def beside_first(found: Sequence[ErrorSamples], percents: Sequence[float]) -> list[Compared]:
     """Compares variants that were simulated in equal environments with the first one."""
     return [
         Compared(

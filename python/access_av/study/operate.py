@@ -135,7 +135,7 @@ class _Finalist:
 def operate(
     plant: _core.Plant,
     targets: Targets,
-    believed: Driven,
+    nominal: Driven,
     runs: int,
     seed: int,
     simulate: Simulate,
@@ -151,7 +151,7 @@ def operate(
     ----------
     plant, targets
         The plant and its targets.
-    believed
+    nominal
         Drives of the nominal plant.
     runs
         Runs of each operation, power mode and block.
@@ -163,7 +163,7 @@ def operate(
         Called with the number of drives that are still to be simulated.
     """
     scenario = plant.scenario()
-    screened = _screened(scenario, targets, believed, runs, seed, simulate, plan)
+    screened = _screened(scenario, targets, nominal, runs, seed, simulate, plan)
     finalists = [
         _Finalist(it, modes, changed, [])
         for it in _finalists(screened)
@@ -203,7 +203,7 @@ def _name(found: list[Point]) -> str | None:
 def _screened(
     scenario: _core.Scenario,
     targets: Targets,
-    believed: Driven,
+    nominal: Driven,
     runs: int,
     seed: int,
     simulate: Simulate,
@@ -215,7 +215,7 @@ def _screened(
     for number, it in enumerate(every):
         plan(runs * (len(every) - number))
         changed = scenario.with_overrides(dict(it.settings)) if it.settings else scenario
-        driven = simulate(it.name, changed, runs, seed) if it.settings else believed.first(runs)
+        driven = simulate(it.name, changed, runs, seed) if it.settings else nominal.first(runs)
         for modes in mode_groups(changed):
             own = own_mode(changed) in [mode.number for mode in modes]
             found += [point(driven, it, mode, targets, simulated=own) for mode in modes]

@@ -108,12 +108,12 @@ def by_place(driven: Driven, percent: float, error_m: float) -> pl.DataFrame:
             "level_m": level_m,
             "reliable_share": reliable_share,
             "bound_m": bound_m,
-            "dilution_of_degree_m": _dilution(driven.scenario, here_x, here_y, visible),
+            "along_road_error_per_degree_m": _dilution(driven.scenario, here_x, here_y, visible),
             "heads_visible": visible.sum(axis=0),
             "best_snr_db": snr_db.max(axis=0),
         }
     ).with_columns(
-        pl.col("dilution_of_degree_m", "level_m").fill_nan(None),
+        pl.col("along_road_error_per_degree_m", "level_m").fill_nan(None),
         pl.col("best_snr_db").replace(-math.inf, None),  # every radio head is behind walls
     )
 
@@ -171,7 +171,7 @@ def _why(row: Mapping[str, Any], places: pl.DataFrame, plant: Mapping[str, Any])
         return "the vehicle has just started, and its position is mostly the configured start"
     if not row["heads_visible"]:
         return f"no radio head is in reach and in sight{hiding(row, plant)}: only the odometer"
-    if row["dilution_of_degree_m"] is None:
+    if row["along_road_error_per_degree_m"] is None:
         return "every radio head in reach lies straight ahead or behind"
     if carried := _carried_over(row, places, plant):
         return carried
@@ -199,7 +199,7 @@ def _why(row: Mapping[str, Any], places: pl.DataFrame, plant: Mapping[str, Any])
 
 
 def _is_poor(row: Mapping[str, Any], usual_m: float) -> bool:
-    dilution_m = row["dilution_of_degree_m"]
+    dilution_m = row["along_road_error_per_degree_m"]
     return dilution_m is None or dilution_m > MORE_THAN_USUAL * usual_m
 
 
@@ -261,7 +261,7 @@ def _cross(one: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> 
 def _carried(places: pl.DataFrame, along_m: float) -> float:
     """Root mean square of the dilution on the stretch before a position."""
     before = pl.col("along_m").is_between(along_m - CARRIED_M, along_m)
-    square = (pl.col("dilution_of_degree_m").filter(before) ** 2).mean().sqrt()
+    square = (pl.col("along_road_error_per_degree_m").filter(before) ** 2).mean().sqrt()
     found = places.select(square).item()
     return math.inf if found is None else float(found)
 

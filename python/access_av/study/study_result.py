@@ -37,7 +37,7 @@ class Study(Result):
         The plant, and the seed of the drives.
     targets
         The targets; that of the whole trip is the first one.
-    believed, poor
+    nominal, poor_los
         Drives with the nominal channel, and with poor line of sight.
     places, worst
         The error along the road, and the positions with the largest errors.
@@ -51,7 +51,7 @@ class Study(Result):
         Prices, energy of a fleet's day, and money and carbon of each kind of localization.
     unverified
         Values that are equal to the template's or the default.
-    played
+    example_run
         The first drive with the nominal channel, step by step.
     origin
         Version and commit that computed it. Not compared.
@@ -60,8 +60,8 @@ class Study(Result):
     plant: _core.Plant
     seed: int
     targets: Targets
-    believed: Driven
-    poor: Driven
+    nominal: Driven
+    poor_los: Driven
     places: pl.DataFrame
     worst: list[WorstPlace]
     heads: pl.DataFrame
@@ -71,13 +71,13 @@ class Study(Result):
     day: economy.Day | None
     ways: dict[str, Way]
     unverified: list[Unverified]
-    played: Simulation
+    example_run: Simulation
     origin: Origin = field(default_factory=origin, compare=False)
 
     @property
     def scenario(self) -> _core.Scenario:
         """Scenario of the drives with the nominal channel."""
-        return self.believed.scenario
+        return self.nominal.scenario
 
     def __repr__(self) -> str:
         return f"Study({self.plant.name}: {self.verdict})"
@@ -93,7 +93,7 @@ class Study(Result):
         return self.targets.each[0].percent
 
     @property
-    def mended(self) -> list[Measure]:
+    def remedies(self) -> list[Measure]:
         """All measures; the single ones first, the most effective one at the top."""
         return [] if self.measured is None else self.measured.every
 
@@ -120,7 +120,7 @@ class Study(Result):
     @property
     def alert_limit_m(self) -> float:
         """Alert limit of the vehicle in metres; twice the target's error unless set."""
-        limit_m = self.believed.scenario.vehicle.alert_limit_m
+        limit_m = self.nominal.scenario.vehicle.alert_limit_m
         if limit_m is None:  # such plants are not studied
             raise RuntimeError("the vehicle has no integrity monitor")
         return limit_m
@@ -142,28 +142,28 @@ class Study(Result):
     @property
     def verdict(self) -> str:
         """The verdict on all targets with the nominal channel, and with poor line of sight."""
-        believed = self.judged(self.believed).words
+        nominal = self.judged(self.nominal).words
         text = (
-            f"{believed[0].upper()}{believed[1:]}: for {self.percent:g} % of the time the vehicle "
-            f"knows its position {self.in_words(self.believed)}; {self.error_m:g} m is required."
+            f"{nominal[0].upper()}{nominal[1:]}: for {self.percent:g} % of the time the vehicle "
+            f"knows its position {self.in_words(self.nominal)}; {self.error_m:g} m is required."
         )
-        if missed := [it for it in self.results(self.believed)[1:] if not it.judgement.holds]:
+        if missed := [it for it in self.results(self.nominal)[1:] if not it.judgement.holds]:
             named = ", ".join(
                 f"{it.target.name} ({it.error.value:.2f} m, required {it.target.words})"
                 for it in missed
             )
             text += f" Stretches that miss their targets: {named}."
         return (
-            f"{text} With poor line of sight: {self.judged(self.poor).words}, "
-            f"{self.in_words(self.poor)}."
+            f"{text} With poor line of sight: {self.judged(self.poor_los).words}, "
+            f"{self.in_words(self.poor_los)}."
         )
 
     @property
     def trajectory(self) -> pl.DataFrame:
         """Truth and estimate of the drive that is played, step by step."""
-        if self.played.trajectories is None:  # they were asked for
+        if self.example_run.trajectories is None:  # they were asked for
             raise RuntimeError("the simulation kept no trajectories")
-        return self.played.trajectories
+        return self.example_run.trajectories
 
     def summary(self) -> dict[str, Any]:
         """Every figure of the page, as plain values for JSON."""
@@ -210,14 +210,14 @@ def _summary(study: Study) -> dict[str, Any]:
         "targets": [vars(it) for it in study.targets.each],
         "alert_limit_m": study.alert_limit_m,
         "verdict": study.verdict,
-        "believed": _figures(study, study.believed),
-        "poor": _figures(study, study.poor),
+        "nominal": _figures(study, study.nominal),
+        "poor_los": _figures(study, study.poor_los),
         "worst": [vars(place) for place in study.worst],
         "radio_heads": study.heads.to_dicts(),
         "before_measures": None
         if study.measured is None
         else _figures(study, study.measured.before),
-        "remedies": [_measure(study, it) for it in study.mended],
+        "remedies": [_measure(study, it) for it in study.remedies],
         "cheapest_measure": cheapest and cheapest.name,
         **_recommendation(study),
         "currency": study.prices.currency,
@@ -314,7 +314,7 @@ def _figures(study: Study, driven: Driven) -> dict[str, Any]:
         "ok_share": driven.ok_share,
         "state_shares": driven.state_shares and dict(driven.state_shares),
         "not_ok_shares": reasons and {it.value: share for it, share in reasons.items()},
-        "beyond_level_while_ok": driven.exceedances,
+        "integrity_failures": driven.exceedances,
     }
 
 
@@ -328,9 +328,9 @@ def _percentile(found: Percentile) -> dict[str, Any]:
 
 def _tables(study: Study) -> dict[str, pl.DataFrame]:
     """Everything the figures are computed from, by the file's name."""
-    drives = [study.believed, study.poor, *(it.driven for it in study.mended)]
+    drives = [study.nominal, study.poor_los, *(it.driven for it in study.remedies)]
     of_points = {point.driven.name: point.driven for point in study.points}
-    drives += [it for name, it in of_points.items() if name != study.believed.name]
+    drives += [it for name, it in of_points.items() if name != study.nominal.name]
     rows = [
         {
             "variant": point.driven.name,
@@ -360,7 +360,7 @@ def _tables(study: Study) -> dict[str, pl.DataFrame]:
         "errors": pl.concat(driven.table() for driven in drives),
         "drives": pl.concat(driven.drives() for driven in drives),
         "targets": targets_table(
-            {it.name: study.results(it) for it in (study.believed, study.poor)}
+            {it.name: study.results(it) for it in (study.nominal, study.poor_los)}
         ),
         "places": study.places,
         "points": pl.DataFrame(rows, infer_schema_length=None),

@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from access_av.device.platform import Platform
-from access_av.run.pairs import Errors
+from access_av.run.pairs import ErrorSamples
 from access_av.run.simulation import simulate
 from access_av.statistics.integrity import Integrity
 from access_av.statistics.proportions import clopper_pearson
@@ -51,7 +51,7 @@ class Energy:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Driven(Errors):
+class Driven(ErrorSamples):
     """Many drives of one scenario.
 
     Attributes
@@ -62,8 +62,8 @@ class Driven(Errors):
         Protection levels, shape (runs, epochs); NaN where the position may not be relied on.
     time_s
         Times of the epochs.
-    executions, listened
-        Angle estimates, and SSB bursts listened to, of each run.
+    aoa_estimates, bursts_received
+        Angle estimates, and SSB received bursts, of each run.
     integrity
         Counts of states and of errors beyond the protection level; ``None`` without a monitor.
     seeds
@@ -73,8 +73,8 @@ class Driven(Errors):
     scenario: _core.Scenario
     levels_m: NDArray[np.float32]
     time_s: NDArray[np.float64]
-    executions: NDArray[np.int64]
-    listened: NDArray[np.int64]
+    aoa_estimates: NDArray[np.int64]
+    bursts_received: NDArray[np.int64]
     integrity: Integrity | None
     seeds: NDArray[np.int64]
     has_own_estimator: bool = False
@@ -122,8 +122,8 @@ class Driven(Errors):
             self,
             errors_m=self.errors_m[:runs],
             levels_m=self.levels_m[:runs],
-            executions=self.executions[:runs],
-            listened=self.listened[:runs],
+            aoa_estimates=self.aoa_estimates[:runs],
+            bursts_received=self.bursts_received[:runs],
             seeds=self.seeds[:runs],
             integrity=_of_runs(self.integrity, slice(runs)),
         )
@@ -144,16 +144,16 @@ class Driven(Errors):
             parts[0],
             errors_m=np.concatenate([it.errors_m for it in parts]),
             levels_m=np.concatenate([it.levels_m for it in parts]),
-            executions=np.concatenate([it.executions for it in parts]),
-            listened=np.concatenate([it.listened for it in parts]),
+            aoa_estimates=np.concatenate([it.aoa_estimates for it in parts]),
+            bursts_received=np.concatenate([it.bursts_received for it in parts]),
             seeds=np.concatenate([it.seeds for it in parts]),
             integrity=_together(of_parts) if len(of_parts) == len(parts) else None,
         )
 
-    def between(self, first: int, last: int) -> Errors:
+    def between(self, first: int, last: int) -> ErrorSamples:
         """Errors of the epochs from ``first`` to before ``last``: a part of each drive."""
         share = (last - first) / self.errors_m.shape[1]
-        return Errors(
+        return ErrorSamples(
             name=self.name,
             errors_m=self.errors_m[:, first:last],
             duration_s=share * self.duration_s,
@@ -169,10 +169,12 @@ class Driven(Errors):
             return None
         vehicle = self.scenario.vehicle
         core = (platform or Platform.load(platform_name(self.scenario))).core
-        estimates, listened = (round(float(it.mean())) for it in (self.executions, self.listened))
+        estimates, bursts_received = (
+            round(float(it.mean())) for it in (self.aoa_estimates, self.bursts_received)
+        )
         found = {}
         for extent in EXTENTS:
-            parts = core.energy_j(vehicle, estimates, listened, self.duration_s, extent)
+            parts = core.energy_j(vehicle, estimates, bursts_received, self.duration_s, extent)
             if parts is None:
                 return None
             found[extent] = Energy(*parts[:3])
@@ -206,8 +208,8 @@ class Driven(Errors):
                 "variant": [self.name] * self.runs,
                 "run": np.arange(self.runs, dtype=np.uint32),
                 "seed": self.seeds,
-                "executions": self.executions,
-                "listened": self.listened,
+                "aoa_estimates": self.aoa_estimates,
+                "bursts_received": self.bursts_received,
                 "duration_s": [self.duration_s] * self.runs,
                 "is_lost": self.lost,
                 "ok_steps": column("ok"),
@@ -219,7 +221,7 @@ class Driven(Errors):
         )
 
 
-def share_within(driven: Errors, error_m: float) -> tuple[float, float, float]:
+def share_within(driven: ErrorSamples, error_m: float) -> tuple[float, float, float]:
     """Share of the time within an error, and the ends of its 95 % interval.
 
     The wider, at each end, of the bootstrap over whole drives, and of Clopper and Pearson's for
@@ -284,8 +286,8 @@ def drive(
         errors_m=errors_m,
         levels_m=found.levels_m,
         time_s=time_s[::every],
-        executions=found.runs["executions"].to_numpy().astype(np.int64),
-        listened=found.runs["listened"].to_numpy().astype(np.int64),
+        aoa_estimates=found.runs["aoa_estimates"].to_numpy().astype(np.int64),
+        bursts_received=found.runs["bursts_received"].to_numpy().astype(np.int64),
         duration_s=float(time_s[-1]),
         integrity=found.integrity,
         seeds=np.full(runs, seed, dtype=np.int64),

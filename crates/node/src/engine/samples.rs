@@ -72,7 +72,7 @@ impl Engine {
                 self.event(Level::Warn, "samples", text);
             }
         }
-        let gaps = self.live.stream_counts().untold_gaps;
+        let gaps = self.live.stream_counts().inferred_gaps;
         if std::mem::replace(&mut self.unreported_gaps, gaps) < gaps
             && !self.interruptions.is_recent(came)
         {
@@ -101,13 +101,13 @@ impl Engine {
             taken = self.live.receive(self.pending.time_s, antennas).map(drop);
         }
         if ends && taken.is_ok() {
-            taken = self.live.end_stretch();
+            taken = self.live.end_segment();
         }
         self.pending.antennas.iter_mut().for_each(Vec::clear);
         if let Err(error) = taken {
             self.refused("samples", &error);
         }
-        self.live.hear_before(f64::INFINITY)?;
+        self.live.process_until(f64::INFINITY)?;
         if let Some(error) = self.live.take_refused_burst() {
             self.refused("samples", &error);
             // All samples are required to detect a clock step as early as possible.

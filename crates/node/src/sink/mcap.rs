@@ -247,7 +247,7 @@ impl Sink for Mcap {
             Record::Pose(pose) if pose.by == By::Odometry => self.pose(pose),
             Record::Pose(_) => Ok(false),
             Record::Verdict(outcome) => {
-                let ssb = outcome.execution.ssb;
+                let ssb = outcome.angle_result.ssb;
                 let head = (ssb.pci, ssb.ssb_index);
                 let last_s = self.last_verdict_s.entry(head).or_insert(f64::NEG_INFINITY);
                 if !is_due(*last_s, ssb.time_s, self.settings.verdict_hz) {
@@ -255,7 +255,7 @@ impl Sink for Mcap {
                 }
                 *last_s = ssb.time_s;
                 let writer = self.writer(ssb.time_s)?;
-                writer.verdict(VERDICT_TOPIC, &outcome.execution)?;
+                writer.verdict(VERDICT_TOPIC, &outcome.angle_result)?;
                 Ok(true)
             }
             Record::Status {

@@ -167,15 +167,15 @@ pub struct VerdictMessage {
 
 impl From<&Outcome> for VerdictMessage {
     fn from(outcome: &Outcome) -> Self {
-        let (execution, verdict) = (&outcome.execution, &outcome.execution.verdict);
+        let (angle_result, verdict) = (&outcome.angle_result, &outcome.angle_result.verdict);
         Self {
             kind: "verdict",
-            time_s: execution.ssb.time_s,
-            pci: execution.ssb.pci,
-            ssb_index: execution.ssb.ssb_index,
-            snr_db: execution.ssb.snr_db,
-            phase_rad: execution.measured.map(|it| it.phase_rad),
-            phase_sigma_rad: execution.measured.map(|it| it.phase_sigma_rad),
+            time_s: angle_result.ssb.time_s,
+            pci: angle_result.ssb.pci,
+            ssb_index: angle_result.ssb.ssb_index,
+            snr_db: angle_result.ssb.snr_db,
+            phase_rad: angle_result.measured.map(|it| it.phase_rad),
+            phase_sigma_rad: angle_result.measured.map(|it| it.phase_sigma_rad),
             accepted: verdict.accepted,
             reason: verdict.reason.name(),
             mahalanobis_squared: verdict.mahalanobis_squared.filter(|it| it.is_finite()),
@@ -264,15 +264,15 @@ pub struct EnergyMessage {
     /// Duration of the drive in seconds.
     pub duration_s: f64,
     /// Number of estimated angles.
-    pub executions: u64,
+    pub aoa_estimates: u64,
     /// Number of received bursts.
-    pub listened: u64,
+    pub bursts_received: u64,
     /// Time that the receiver was on, in seconds.
     pub on_time_s: f64,
     /// Total energy in joules; null if the platform has no energy model.
     pub total_j: Option<f64>,
     /// Energy of angle estimation in joules; null without an energy model.
-    pub executions_j: Option<f64>,
+    pub aoa_estimates_j: Option<f64>,
     /// Energy of reception in joules; null without an energy model.
     pub listening_j: Option<f64>,
     /// Energy of idle time in joules; null without an energy model.
@@ -285,11 +285,11 @@ impl From<&LiveEnergy> for EnergyMessage {
     fn from(energy: &LiveEnergy) -> Self {
         Self {
             duration_s: energy.duration_s,
-            executions: energy.executions as u64,
-            listened: energy.listened as u64,
+            aoa_estimates: energy.aoa_estimates as u64,
+            bursts_received: energy.bursts_received as u64,
             on_time_s: energy.on_time_s,
             total_j: energy.energy.map(|it| it.total_j()),
-            executions_j: energy.energy.map(|it| it.executions_j),
+            aoa_estimates_j: energy.energy.map(|it| it.aoa_estimates_j),
             listening_j: energy.energy.map(|it| it.listening_j),
             idle_j: energy.energy.map(|it| it.idle_j),
             boundary: energy.boundary.map(|it| it.to_string()),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use num_complex::Complex32;
 
 use crate::clock::{ArrivalClock, Finding, unix_s};
-use crate::gate::Gate;
+use crate::gate::RxWindow;
 use crate::inbox::{Block, Inbox, Input};
 use crate::settings::{Clock, SampleFormat, Stream};
 use crate::statistics::SourceHealth;
@@ -68,7 +68,7 @@ pub struct Framing {
     antennas: Vec<u8>,
     clock: Times,
     counted: u64,
-    gate: Arc<Gate>,
+    gate: Arc<RxWindow>,
     inbox: Arc<Inbox>,
     health: Arc<SourceHealth>,
     told_of_defects: bool,
@@ -88,7 +88,7 @@ impl Framing {
     pub fn new(
         stream: &Stream,
         format: SampleFormat,
-        gate: Arc<Gate>,
+        gate: Arc<RxWindow>,
         inbox: Arc<Inbox>,
         health: Arc<SourceHealth>,
     ) -> Self {

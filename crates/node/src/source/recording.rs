@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use num_complex::Complex32;
 use recording::{Capture, Recording, RecordingError};
 
-use crate::gate::Gate;
+use crate::gate::RxWindow;
 use crate::inbox::{Block, Inbox, Input};
 use crate::statistics::SourceHealth;
 
@@ -108,7 +108,7 @@ fn global_index(capture: &Capture) -> u64 {
 pub fn run(
     recording: Recording,
     start_s: f64,
-    gate: &Gate,
+    gate: &RxWindow,
     inbox: &Inbox,
     health: &Arc<SourceHealth>,
 ) {

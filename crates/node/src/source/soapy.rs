@@ -9,7 +9,7 @@ use soapysdr::{Device, Direction, Error, ErrorCode, RxStream};
 
 use super::framing::Framing;
 use crate::clock::{ArrivalClock, unix_s};
-use crate::gate::Gate;
+use crate::gate::RxWindow;
 use crate::inbox::{Inbox, Input};
 use crate::settings::Radio;
 
@@ -19,7 +19,7 @@ const TIMEOUT_US: i64 = 200_000;
 const RETRY: Duration = Duration::from_secs(1);
 
 /// Receives until the node stops; a radio that fails is opened again.
-pub fn run(radio: &Radio, mut framing: Framing, gate: &Arc<Gate>, inbox: &Inbox) {
+pub fn run(radio: &Radio, mut framing: Framing, gate: &Arc<RxWindow>, inbox: &Inbox) {
     let mut said = String::new();
     while !inbox.is_closed() {
         if let Err(error) = session(radio, &mut framing, gate, inbox) {
@@ -50,7 +50,7 @@ fn open(radio: &Radio) -> Result<RxStream<Complex32>, Error> {
 fn session(
     radio: &Radio,
     framing: &mut Framing,
-    gate: &Arc<Gate>,
+    gate: &Arc<RxWindow>,
     inbox: &Inbox,
 ) -> Result<(), Error> {
     let mut stream = open(radio)?;

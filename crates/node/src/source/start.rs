@@ -13,7 +13,7 @@ use super::framing::Framing;
 use super::lines::Lines;
 use super::{message, raw, recording as played, zeromq};
 use crate::address::Address;
-use crate::gate::Gate;
+use crate::gate::RxWindow;
 use crate::inbox::{Inbox, Input};
 use crate::settings::{NodeSettings, SampleSource};
 use crate::statistics::SourceHealth;
@@ -23,7 +23,7 @@ pub struct Sources {
     /// Queue of the inputs.
     pub inbox: Arc<Inbox>,
     /// Gate of the required samples.
-    pub gate: Arc<Gate>,
+    pub gate: Arc<RxWindow>,
     /// Health of each source.
     pub health: Vec<Arc<SourceHealth>>,
     /// Stream of samples; `None` without samples.

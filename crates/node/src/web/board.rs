@@ -12,7 +12,9 @@ use super::site::site_json;
 use crate::events;
 use crate::inbox::{Inbox, Level};
 use crate::sink::{Distributor, EnergyMessage, HeadMessage, PoseFields};
-use crate::statistics::{ODOMETRY_TO_POSE_TARGETS, Punctuality, SSB_TO_POSE_TARGETS, SourceHealth};
+use crate::statistics::{
+    LatencyStats, ODOMETRY_TO_POSE_TARGETS, SSB_TO_POSE_TARGETS, SourceHealth,
+};
 
 /// Maximum number of events that the page shows, one for each cause.
 const EVENTS: usize = 30;
@@ -28,7 +30,7 @@ pub struct Counters {
     /// Outputs.
     pub records: Arc<Distributor>,
     /// Latencies.
-    pub punctuality: Arc<Punctuality>,
+    pub latency_stats: Arc<LatencyStats>,
     /// Sources.
     pub sources: Vec<Arc<SourceHealth>>,
     /// Sample rate in Hz; 0 without samples.
@@ -86,7 +88,7 @@ struct Row {
 }
 
 /// The state that the page and the metrics show.
-pub struct Board {
+pub struct StatusBoard {
     state: Mutex<State>,
     name: String,
     period: Duration,
@@ -95,7 +97,7 @@ pub struct Board {
     began: Instant,
 }
 
-impl Board {
+impl StatusBoard {
     /// An empty board of a node, by its name, with this update period.
     pub fn new(name: &str, period: Duration, counters: Counters) -> Self {
         let state = State {
@@ -215,7 +217,7 @@ impl Board {
         let events: Vec<Value> = state.events.iter().map(row_json).collect();
         drop(state);
         let counters = &self.counters;
-        let punctuality = &counters.punctuality;
+        let latency_stats = &counters.latency_stats;
         let [dropped_blocks, dropped_messages] = counters.inbox.dropped();
         let sources: Vec<Value> = counters.sources.iter().map(|it| source_json(it)).collect();
         let mut value = json!({
@@ -230,9 +232,9 @@ impl Board {
                 "records": counters.records.dropped(),
             },
             "latency": {
-                "ssb_to_pose": punctuality.ssb_to_pose.quantiles(),
-                "odometry_to_pose": punctuality.odometry_to_pose.quantiles(),
-                "jitter": punctuality.jitter.quantiles(),
+                "ssb_to_pose": latency_stats.ssb_to_pose.quantiles(),
+                "odometry_to_pose": latency_stats.odometry_to_pose.quantiles(),
+                "jitter": latency_stats.jitter.quantiles(),
             },
             "latency_targets": {
                 "ssb_to_pose": SSB_TO_POSE_TARGETS,

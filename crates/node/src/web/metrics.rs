@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::board::Board;
+use super::board::StatusBoard;
 use crate::health::OutputStatus;
 use crate::statistics::{Histogram, SourceHealth};
 use onboard::live::{HeadStatus, State};
@@ -53,24 +53,24 @@ impl Text {
 }
 
 /// All metrics of a node.
-pub fn text(board: &Board) -> String {
+pub fn text(board: &StatusBoard) -> String {
     let mut text = Text(String::with_capacity(8192));
     let counters = &board.counters;
-    let punctuality = &counters.punctuality;
+    let latency_stats = &counters.latency_stats;
     text.histogram(
         "ssb_to_pose_seconds",
         "From the arrival of an SSB's last sample to the pose with its angle.",
-        &punctuality.ssb_to_pose,
+        &latency_stats.ssb_to_pose,
     );
     text.histogram(
         "odometry_to_pose_seconds",
         "From the arrival of odometry to the pose by it.",
-        &punctuality.odometry_to_pose,
+        &latency_stats.odometry_to_pose,
     );
     text.histogram(
         "pose_jitter_seconds",
         "Difference between the time from pose to pose and that from odometry to odometry.",
-        &punctuality.jitter,
+        &latency_stats.jitter,
     );
     let [blocks, messages] = counters.inbox.dropped();
     text.family(
@@ -232,9 +232,14 @@ pub fn text(board: &Board) -> String {
     }
     let energy = &shown.energy;
     let help = "SSB bursts received.";
-    text.one("bursts_total", "counter", help, energy.listened as f64);
+    text.one(
+        "bursts_total",
+        "counter",
+        help,
+        energy.bursts_received as f64,
+    );
     let help = "Angles estimated.";
-    text.one("angles_total", "counter", help, energy.executions as f64);
+    text.one("angles_total", "counter", help, energy.aoa_estimates as f64);
     if let Some(joules) = energy.energy {
         let help = "Energy since the start, by the energy model of the platform.";
         text.one("energy_joules_total", "counter", help, joules.total_j());

@@ -5,6 +5,6 @@ mod metrics;
 mod server;
 mod site;
 
-pub use board::{Board, Counters};
+pub use board::{Counters, StatusBoard};
 pub use metrics::text as metrics_text;
 pub use server::{open, serve};

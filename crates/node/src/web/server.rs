@@ -17,7 +17,7 @@ use serde_json::json;
 use tokio::net::TcpListener;
 use tokio::time::sleep;
 
-use super::board::Board;
+use super::board::StatusBoard;
 use super::metrics;
 use crate::settings::PageSettings;
 
@@ -28,7 +28,7 @@ const PAGE: &str = include_str!("page.html");
 
 #[derive(Clone)]
 struct Shared {
-    board: Arc<Board>,
+    board: Arc<StatusBoard>,
     period: Duration,
 }
 
@@ -50,7 +50,7 @@ pub async fn open(settings: &PageSettings) -> Result<TcpListener> {
 pub async fn serve(
     listener: TcpListener,
     settings: &PageSettings,
-    board: Arc<Board>,
+    board: Arc<StatusBoard>,
 ) -> Result<()> {
     let shared = Shared {
         board,

@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sums_are_those_of_one_strand() {
+    fn vectorized_sums_equal_sequential_sums() {
         let a: [Complex32; 127] = std::array::from_fn(|i| Complex32::new(i as f32, 1.0));
         let b: [Complex32; 127] = std::array::from_fn(|i| Complex32::new(2.0, -(i as f32)));
         let expected: Complex32 = a.iter().zip(&b).map(|(a, b)| a * b).sum();

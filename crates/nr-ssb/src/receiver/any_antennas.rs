@@ -4,8 +4,8 @@ use num_complex::Complex32;
 
 use super::config::ReceiverConfig;
 use super::error::ReceiverError;
-use super::heard::HeardSsb;
 use super::stream::StreamReceiver;
+use super::tracked_ssb::TrackedSsb;
 use crate::dsp::tones::Tone;
 use crate::search::SearchError;
 
@@ -26,10 +26,10 @@ trait Stream: Send {
     fn push(
         &mut self,
         antennas: &[&[Complex32]],
-        take: &mut dyn FnMut(&HeardSsb),
+        take: &mut dyn FnMut(&TrackedSsb),
     ) -> Result<(), ReceiverError>;
 
-    fn finish(&mut self, take: &mut dyn FnMut(&HeardSsb)) -> Result<(), ReceiverError>;
+    fn finish(&mut self, take: &mut dyn FnMut(&TrackedSsb)) -> Result<(), ReceiverError>;
 }
 
 impl<const A: usize> Stream for StreamReceiver<A> {
@@ -44,18 +44,18 @@ impl<const A: usize> Stream for StreamReceiver<A> {
     fn push(
         &mut self,
         antennas: &[&[Complex32]],
-        take: &mut dyn FnMut(&HeardSsb),
+        take: &mut dyn FnMut(&TrackedSsb),
     ) -> Result<(), ReceiverError> {
         let ratio = self.input_per_output();
         self.push(antennas, &mut |mut seen| {
-            take(&HeardSsb::new(&mut seen, ratio));
+            take(&TrackedSsb::new(&mut seen, ratio));
         })
     }
 
-    fn finish(&mut self, take: &mut dyn FnMut(&HeardSsb)) -> Result<(), ReceiverError> {
+    fn finish(&mut self, take: &mut dyn FnMut(&TrackedSsb)) -> Result<(), ReceiverError> {
         let ratio = self.input_per_output();
         self.finish(&mut |mut seen| {
-            take(&HeardSsb::new(&mut seen, ratio));
+            take(&TrackedSsb::new(&mut seen, ratio));
         })?;
         self.reset();
         Ok(())
@@ -124,7 +124,7 @@ impl Receiver {
     pub fn push(
         &mut self,
         antennas: &[&[Complex32]],
-        take: &mut dyn FnMut(&HeardSsb),
+        take: &mut dyn FnMut(&TrackedSsb),
     ) -> Result<(), ReceiverError> {
         self.stream.push(antennas, take)
     }
@@ -133,7 +133,7 @@ impl Receiver {
     ///
     /// # Errors
     /// Those of [`push`](Self::push).
-    pub fn finish(&mut self, take: &mut dyn FnMut(&HeardSsb)) -> Result<(), ReceiverError> {
+    pub fn finish(&mut self, take: &mut dyn FnMut(&TrackedSsb)) -> Result<(), ReceiverError> {
         self.stream.finish(take)
     }
 }

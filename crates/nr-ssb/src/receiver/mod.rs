@@ -40,13 +40,13 @@ mod any_antennas;
 mod beam;
 mod config;
 mod error;
-mod heard;
 mod stream;
+mod tracked_ssb;
 mod window;
 
 pub use any_antennas::Receiver;
 pub use config::ReceiverConfig;
 pub use error::ReceiverError;
-pub use heard::HeardSsb;
 pub use stream::StreamReceiver;
+pub use tracked_ssb::TrackedSsb;
 pub use window::{Seen, Window, WindowReceiver};

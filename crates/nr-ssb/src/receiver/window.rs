@@ -62,7 +62,7 @@ pub struct Seen<'a, const A: usize> {
     pub is_followed: bool,
     /// Unreported missing samples before the SSB at the base rate, modulo the period: all beams
     /// deviated from their period at once. They are not part of `sample_start`.
-    pub untold: f64,
+    pub unreported_gap: f64,
 }
 
 /// Tracks the beams at one frequency in windows of samples, which may be parts of a stream or
@@ -80,7 +80,7 @@ pub struct WindowReceiver<const A: usize> {
     offset_hz: f64,
     in_vain: u32,
     /// Total number of unreported missing samples.
-    untold: f64,
+    unreported_gap: f64,
     /// Position of the last tone measurement (samples), and the samples without tones.
     tones_measured: f64,
     cleaned: Vec<Vec<Complex32>>,
@@ -106,7 +106,7 @@ impl<const A: usize> WindowReceiver<A> {
             searches: 0,
             offset_hz: 0.0,
             in_vain: 0,
-            untold: 0.0,
+            unreported_gap: 0.0,
             tones_measured: f64::NEG_INFINITY,
             cleaned: vec![Vec::with_capacity(BEFORE + AFTER); A],
             config,
@@ -132,7 +132,7 @@ impl<const A: usize> WindowReceiver<A> {
     pub fn reset(&mut self) {
         self.beams.clear();
         (self.search_begun, self.search_until) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-        (self.in_vain, self.untold) = (0, 0.0);
+        (self.in_vain, self.unreported_gap) = (0, 0.0);
         self.tones_measured = f64::NEG_INFINITY;
     }
 
@@ -278,7 +278,7 @@ impl<const A: usize> WindowReceiver<A> {
                 Some(beam) if beam.tracker.misses() > 0 => {
                     let off = beam.found(&found, period);
                     if none_came && off.abs() > OFF_PERIOD {
-                        self.untold += (-off).rem_euclid(period);
+                        self.unreported_gap += (-off).rem_euclid(period);
                     }
                     none_came = false; // the others tell of the same
                 }
@@ -349,7 +349,7 @@ impl<const A: usize> WindowReceiver<A> {
                 ssb: &ssb,
                 tracker: &mut beam.tracker,
                 is_followed,
-                untold: self.untold,
+                unreported_gap: self.unreported_gap,
             });
         } else {
             beam.skip(1.0, period);

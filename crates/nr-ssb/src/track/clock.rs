@@ -124,7 +124,7 @@ mod tests {
     const PERIOD: f64 = 0.02 * RATE;
 
     #[test]
-    fn a_frequency_offset_tells_the_drift_and_times_correct_it() {
+    fn clock_drift_is_estimated_from_the_frequency_offset_and_corrected_by_times() {
         let mut clock = ClockLoop::new(1000.0, -7000.0, Some(3.5e9), RATE);
         assert!((clock.expected_start(PERIOD) - 1000.0 - PERIOD * (1.0 + 2e-6)).abs() < 1e-6);
         // The truth is 2.3 ppm.
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn two_searches_tell_a_drift_that_nothing_else_did() {
+    fn two_searches_detect_a_clock_drift() {
         let mut clock = ClockLoop::new(0.0, 0.0, Some(3.5e9), RATE);
         clock.found(50.0 * PERIOD * (1.0 - 1e-5), 50.0 * PERIOD);
         assert!((clock.drift + 1e-5).abs() < 1e-12);

@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn time_tells_the_high_bits_of_an_index() {
+    fn time_determines_the_high_bits_of_an_index() {
         for (case, spacing) in [
             (Case::D, SubcarrierSpacing::Khz120),
             (Case::E, SubcarrierSpacing::Khz240),

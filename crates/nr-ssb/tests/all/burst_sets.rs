@@ -66,7 +66,7 @@ fn sixty_four_beams_of_frequency_range_2() {
 
 /// The raster of frequency range 2, its points 17.28 MHz apart.
 #[test]
-fn a_scan_above_24_ghz_looks_at_120_and_240_khz() {
+fn a_scan_above_24_ghz_searches_120_and_240_khz() {
     let mut cell = Cell::random(&mut rng(5), SubcarrierSpacing::Khz120, 1);
     cell.ssb_indices = vec![17];
     cell.ssb_freq_hz = 24.25008e9 + 160.0 * 17.28e6;
@@ -89,7 +89,7 @@ fn a_scan_above_24_ghz_looks_at_120_and_240_khz() {
 
 /// Without a frequency the first four SSBs of a frame look the same of 4 and of 8.
 #[test]
-fn an_unknown_burst_set_stays_unknown_until_an_ssb_tells() {
+fn an_unknown_burst_set_size_is_determined_by_the_first_decoded_ssb() {
     let mut cell = Cell::random(&mut rng(9), SubcarrierSpacing::Khz30, ANTENNAS);
     (cell.lmax, cell.half_frame, cell.ssb_indices) = (Lmax::L8, false, vec![1]);
     let [ssb] = found(&cell, None, 10.0).try_into().unwrap();

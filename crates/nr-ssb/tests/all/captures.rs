@@ -10,7 +10,7 @@ const CFO_TOLERANCE_HZ: f64 = 20.0;
 
 #[test]
 #[ignore = "needs the recordings (ACCESS_AV_DATA)"]
-fn every_annotated_ssb_is_found_without_being_told_where() {
+fn every_annotated_ssb_is_found_by_a_blind_search() {
     for recording in recordings::annotated() {
         let name = &recording.name;
         let finds = scan(

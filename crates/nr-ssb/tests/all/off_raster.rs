@@ -152,7 +152,7 @@ fn an_oscillator_of_20_ppm_hides_no_cell() {
 /// PSS and SSS, shifted in frequency, look like another cell's; on the raster such a shadow may be
 /// found before the cell itself.
 #[test]
-fn a_cell_off_the_raster_casts_no_shadow_on_it() {
+fn a_cell_off_the_raster_does_not_mask_cells_on_it() {
     for seed in 1020..1040 {
         let (cell, samples) = off_raster(SubcarrierSpacing::Khz30, 15e3 * 55.0, seed);
         let centre_hz = cell.ssb_freq_hz - 15e3 * 55.0;
@@ -164,7 +164,7 @@ fn a_cell_off_the_raster_casts_no_shadow_on_it() {
 
 /// A strong cell on the raster hides none off it, 20 dB weaker, whatever their spacings.
 #[test]
-fn a_weak_cell_off_the_raster_is_found_beside_a_strong_one_on_it() {
+fn a_weak_cell_off_the_raster_is_found_next_to_a_strong_one_on_it() {
     use SubcarrierSpacing::{Khz15, Khz30};
     let mut rng = air::rng(77);
     for spacings in [[Khz30, Khz30], [Khz30, Khz15], [Khz15, Khz30]] {

@@ -2,7 +2,7 @@
 
 use crate::air::{Cell, add_noise, raised, rng, silence, slices};
 use nr_ssb::receiver::{
-    HeardSsb, Receiver, ReceiverConfig, StreamReceiver, Window, WindowReceiver,
+    Receiver, ReceiverConfig, StreamReceiver, TrackedSsb, Window, WindowReceiver,
 };
 use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
 
@@ -37,7 +37,7 @@ fn cell_and_samples() -> (Cell, Vec<Vec<Complex32>>) {
     (cell, samples)
 }
 
-fn heard(config: ReceiverConfig, samples: &[Vec<Complex32>], block: usize) -> Vec<HeardSsb> {
+fn heard(config: ReceiverConfig, samples: &[Vec<Complex32>], block: usize) -> Vec<TrackedSsb> {
     let mut receiver = Receiver::new(config, RATE_HZ, 3.6e9 - 2e6).unwrap();
     let mut heard = Vec::new();
     for first in (0..samples[0].len()).step_by(block) {
@@ -53,7 +53,7 @@ fn heard(config: ReceiverConfig, samples: &[Vec<Complex32>], block: usize) -> Ve
 }
 
 #[test]
-fn every_ssb_of_a_stream_is_heard_once_with_its_channel() {
+fn every_ssb_of_a_stream_is_received_once_with_its_channel() {
     let (cell, samples) = cell_and_samples();
     let config = ReceiverConfig::new(cell.ssb_freq_hz, SPACING, 3);
     let all = heard(config.clone(), &samples, 1_000_000_000);
@@ -181,7 +181,7 @@ fn an_oscillator_20_ppm_off_is_found_within_three_bursts_of_the_longest_period()
 }
 
 #[test]
-fn samples_that_are_missing_untold_are_told_by_the_beams() {
+fn unreported_gaps_are_inferred_from_the_beams() {
     let (cell, samples) = cell_and_samples();
     let config = ReceiverConfig {
         lost_after_s: 10.0,
@@ -190,17 +190,17 @@ fn samples_that_are_missing_untold_are_told_by_the_beams() {
     let mut receiver = StreamReceiver::<3>::new(config, RATE_HZ, 3.6e9 - 2e6).unwrap();
     // 7 ms are cut out within the third period; then all of it again, for the search to come round.
     let cut = (0.05 * RATE_HZ) as usize..(0.057 * RATE_HZ) as usize;
-    let mut untold = Vec::new();
+    let mut unreported_gap = Vec::new();
     let mut push = |range: std::ops::Range<usize>| {
         let block: Vec<&[Complex32]> = samples.iter().map(|it| &it[range.clone()]).collect();
         receiver
-            .push(&block, &mut |seen| untold.push(seen.untold))
+            .push(&block, &mut |seen| unreported_gap.push(seen.unreported_gap))
             .unwrap();
     };
     push(0..cut.start);
     push(cut.end..samples[0].len());
     let lost = 0.007 * SPACING.base_rate_hz();
-    assert_eq!(untold[..6], [0.0; 6]);
-    let last = *untold.last().unwrap();
-    assert!((last - lost).abs() < 1.0, "{untold:?}");
+    assert_eq!(unreported_gap[..6], [0.0; 6]);
+    let last = *unreported_gap.last().unwrap();
+    assert!((last - lost).abs() < 1.0, "{unreported_gap:?}");
 }

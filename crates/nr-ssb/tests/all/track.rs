@@ -120,7 +120,7 @@ fn noise_variance_and_blocks_keep_the_scale_of_a_resource_element() {
 }
 
 #[test]
-fn a_cell_that_has_moved_is_taken_up_where_a_search_finds_it_and_one_that_is_gone_is_missed() {
+fn a_moved_cell_is_tracked_at_its_new_position_and_a_vanished_one_is_reported() {
     let (mut cell, config, samples) = scene(60, 5.0);
     let mut tracker = Tracker::<4>::new(&config, &first(&config, &samples)).unwrap();
     let expected = cell.ssb_start(1);

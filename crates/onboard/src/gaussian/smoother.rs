@@ -384,7 +384,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_beside_the_state_are_smoothed_as_if_they_were_of_it() {
+    fn correlated_biases_are_smoothed_as_if_they_were_part_of_the_state() {
         let (f, kept, by_state) = ([[1.0, 0.5], [-0.1, 0.9]], 0.8, [-0.2, 0.1]);
         let mut whole = Gaussian::independent([1.0, -0.5, 0.2], [1.4, 0.8, 0.3]);
         let (mut beside, mut within) = (Journal::<2>::default(), Journal::<3>::default());
@@ -430,7 +430,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nothing_follows_stays_as_it_was() {
+    fn the_last_state_is_not_changed_by_smoothing() {
         let mut belief = Gaussian::independent([1.0, 2.0], [0.5, 0.0]);
         let mut journal = Journal::default();
         journal.asked(0.0, &belief, std::iter::empty());

@@ -17,13 +17,13 @@ use super::stream_clock::Continuity;
 use super::time_base::ClockStep;
 use super::time_check::TimeCheck;
 use crate::BoxError;
-use crate::burst::{Burst, OfSsb};
+use crate::burst::{Burst, HasSsb};
 use crate::energy::{Energy, EnergyModel};
 use crate::geometry::{Pose, wrap_angle};
 use crate::localize::{AngleMeasurement, MeasurementKind, OdometryVerdict, UpdateReason};
 use crate::monitor::Confirmation;
 use crate::observation::{BURST_S, OdometrySample, SensedSsb};
-use crate::pipeline::{Custom, OdometryDefect, Onboard};
+use crate::pipeline::{Custom, OdometryDefect, Pipeline};
 use crate::radio_head::RadioHead;
 use crate::receive::ReceiverConfig;
 use crate::settings::{Boundary, Extent, Platform, Site, Vehicle};
@@ -66,9 +66,9 @@ pub struct LiveEnergy {
     /// Time since the first input, in seconds.
     pub duration_s: f64,
     /// Number of estimated angles.
-    pub executions: usize,
+    pub aoa_estimates: usize,
     /// Number of received bursts.
-    pub listened: usize,
+    pub bursts_received: usize,
     /// Receiver on-time for these bursts according to the platform file, in seconds.
     pub on_time_s: f64,
     /// Energy; `None` if the platform has no value for the vehicle's method.
@@ -81,7 +81,7 @@ pub struct LiveEnergy {
 pub struct Live {
     site: Site,
     vehicle: Vehicle,
-    onboard: Onboard,
+    onboard: Pipeline,
     has_own_localizer: bool,
     sight: Sight,
     stream: Option<SampleStream>,
@@ -107,8 +107,8 @@ pub struct Live {
     /// Whether samples were interrupted for an unknown time, and no SSB was received since.
     is_resuming: bool,
     energy: Option<EnergyModel>,
-    executions: usize,
-    listened: usize,
+    aoa_estimates: usize,
+    bursts_received: usize,
     /// Minimum and maximum of all times.
     interval_s: Option<[f64; 2]>,
 }
@@ -130,7 +130,7 @@ impl Live {
     ) -> Result<Self, LiveError> {
         let (vehicle, start) = starting_at(site, vehicle, start)?;
         let has_own_localizer = custom.localizer.is_some();
-        let onboard = Onboard::new(site, &vehicle, platform, start, custom)?;
+        let onboard = Pipeline::new(site, &vehicle, platform, start, custom)?;
         let receiver = || ReceiverConfig::new(site, &vehicle);
         let stream = stream.map(|config| SampleStream::new(config, receiver()));
         let heads = RadioHead::heard(site, &vehicle);
@@ -151,8 +151,8 @@ impl Live {
             empty_stretches: 0,
             is_resuming: false,
             energy: EnergyModel::new(&vehicle, platform, Extent::Value)?,
-            executions: 0,
-            listened: 0,
+            aoa_estimates: 0,
+            bursts_received: 0,
             interval_s: None,
             has_own_localizer,
             onboard,
@@ -180,12 +180,12 @@ impl Live {
         antennas: &[&[Complex32]],
     ) -> Result<Continuity, LiveError> {
         let continuity = self.receive(time_s, antennas)?;
-        self.hear_before(f64::INFINITY)?;
+        self.process_until(f64::INFINITY)?;
         Ok(continuity)
     }
 
     /// Like [`samples`](Self::samples), but bursts are processed only when
-    /// [`hear_before`](Self::hear_before) is called: for recordings, whose odometry is read in
+    /// [`process_until`](Self::process_until) is called: for recordings, whose odometry is read in
     /// advance.
     ///
     /// # Errors
@@ -209,7 +209,7 @@ impl Live {
     ///
     /// # Errors
     /// [`LiveError::Custom`] for errors of user code.
-    pub fn hear_before(&mut self, time_s: f64) -> Result<(), LiveError> {
+    pub fn process_until(&mut self, time_s: f64) -> Result<(), LiveError> {
         while let Some(stream) = &mut self.stream {
             let burst = stream.burst();
             let number = burst.len();
@@ -244,7 +244,7 @@ impl Live {
     ///
     /// # Errors
     /// [`LiveError::Receive`].
-    pub fn end_stretch(&mut self) -> Result<(), LiveError> {
+    pub fn end_segment(&mut self) -> Result<(), LiveError> {
         self.empty_stretches += u32::from(std::mem::take(&mut self.has_samples));
         match &mut self.stream {
             Some(stream) => stream.break_off(),
@@ -329,7 +329,7 @@ impl Live {
 
     /// Processes an angle that was estimated elsewhere. The angles of a burst (SSBs within half a
     /// frame) are processed together: as soon as odometry, a later angle or
-    /// [`settle`](Self::settle) completes the burst.
+    /// [`flush`](Self::flush) completes the burst.
     ///
     /// # Errors
     /// [`LiveError::Value`] for an invalid value; [`LiveError::Time`], [`LiveError::AngleAhead`]
@@ -396,9 +396,9 @@ impl Live {
     ///
     /// # Errors
     /// [`LiveError::Custom`] for errors of user code.
-    pub fn settle(&mut self) -> Result<(), LiveError> {
-        self.end_stretch()?;
-        self.hear_before(f64::INFINITY)?;
+    pub fn flush(&mut self) -> Result<(), LiveError> {
+        self.end_segment()?;
+        self.process_until(f64::INFINITY)?;
         self.hear_angles()
     }
 
@@ -430,7 +430,7 @@ impl Live {
     }
 
     /// Returns the pipeline, for its calibration and findings.
-    pub const fn onboard(&self) -> &Onboard {
+    pub const fn onboard(&self) -> &Pipeline {
         &self.onboard
     }
 
@@ -440,14 +440,14 @@ impl Live {
         let duration_s = self
             .interval_s
             .map_or(0.0, |[first_s, last_s]| last_s - first_s);
-        let (executions, listened) = (self.executions, self.listened);
+        let (aoa_estimates, bursts_received) = (self.aoa_estimates, self.bursts_received);
         let model = self.energy.as_ref();
         LiveEnergy {
             duration_s,
-            executions,
-            listened,
-            on_time_s: model.map_or(0.0, |model| listened as f64 * model.on_time_s),
-            energy: model.map(|model| model.of_run(executions, listened, duration_s)),
+            aoa_estimates,
+            bursts_received,
+            on_time_s: model.map_or(0.0, |model| bursts_received as f64 * model.on_time_s),
+            energy: model.map(|model| model.run_energy(aoa_estimates, bursts_received, duration_s)),
             boundary: model.map(|model| model.boundary),
         }
     }
@@ -483,18 +483,18 @@ impl Live {
     }
 
     /// Stores the outcomes of a burst.
-    fn book(&mut self, heard: Result<Heard, BoxError>) -> Result<(), LiveError> {
-        let Heard {
+    fn book(&mut self, heard: Result<BurstSummary, BoxError>) -> Result<(), LiveError> {
+        let BurstSummary {
             time_s,
             ssb_index,
-            listened,
+            receiver_on,
         } = heard.map_err(LiveError::Custom)?;
         self.see(time_s);
         let burst_s = self.clocks.angles.outside(time_s) - self.time_offset_s();
         self.last_burst = Some((burst_s, ssb_index));
         (self.has_samples, self.empty_stretches) = (false, 0);
         self.is_resuming = false;
-        self.listened += usize::from(listened);
+        self.bursts_received += usize::from(receiver_on);
         let newest_s = self.onboard.newest_odometry().map(|it| it.time_s);
         let after_s = newest_s.unwrap_or(time_s).max(time_s);
         let after = self.onboard.pose(after_s).map_err(LiveError::Custom)?;
@@ -507,13 +507,13 @@ impl Live {
             self.recovered_s = Some(recovered.time_s);
             self.confirmation.confirm();
         }
-        for &execution in self.onboard.executions() {
-            self.executions += 1;
-            let (ssb, verdict) = (execution.ssb, execution.verdict);
+        for &angle_result in self.onboard.aoa_estimates() {
+            self.aoa_estimates += 1;
+            let (ssb, verdict) = (angle_result.ssb, angle_result.verdict);
             let sends = |it: &&mut HeadStatus| it.head.sends(ssb.pci, ssb.ssb_index);
             let mut status = self.heads.iter_mut().find(sends);
             let residual_rad = (status.as_ref())
-                .zip(execution.measured)
+                .zip(angle_result.measured)
                 .map(|(it, measured)| {
                     let (kind, value_rad) = (measured.kind, measured.phase_rad);
                     (self.sight).residual_rad(kind, after.pose, &it.head, value_rad)
@@ -541,13 +541,13 @@ impl Live {
             if self.outcomes.len() == OUTCOMES {
                 self.outcomes.pop_front();
             }
-            let mut execution = execution;
-            execution.ssb.time_s = angles.outside(ssb.time_s);
-            if let Some(measured) = &mut execution.measured {
+            let mut angle_result = angle_result;
+            angle_result.ssb.time_s = angles.outside(ssb.time_s);
+            if let Some(measured) = &mut angle_result.measured {
                 measured.time_s = angles.outside(measured.time_s);
             }
             self.outcomes.push_back(Outcome {
-                execution,
+                angle_result,
                 residual_rad,
                 after: found,
             });
@@ -560,20 +560,22 @@ impl Live {
 }
 
 /// Time and index of a burst's first SSB, and whether the burst was received.
-struct Heard {
+struct BurstSummary {
     time_s: f64,
     ssb_index: u8,
-    listened: bool,
+    receiver_on: bool,
 }
 
-fn hear<T: OfSsb>(onboard: &mut Onboard, burst: &[T]) -> Result<Heard, BoxError> {
-    let first = burst.first().map(OfSsb::ssb);
+fn hear<T: HasSsb>(onboard: &mut Pipeline, burst: &[T]) -> Result<BurstSummary, BoxError> {
+    let first = burst.first().map(HasSsb::ssb);
     let (time_s, ssb_index) = first.map_or((0.0, 0), |it| (it.time_s, it.ssb_index));
-    let listened = onboard.hear(time_s, &mut Burst(burst))?.listened;
-    Ok(Heard {
+    let receiver_on = onboard
+        .process_burst(time_s, &mut Burst(burst))?
+        .receiver_on;
+    Ok(BurstSummary {
         time_s,
         ssb_index,
-        listened,
+        receiver_on,
     })
 }
 

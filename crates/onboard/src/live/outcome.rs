@@ -1,14 +1,14 @@
 //! Results of angles and radio heads.
 
 use crate::localize::PoseEstimate;
-use crate::pipeline::Execution;
+use crate::pipeline::AngleResult;
 use crate::radio_head::RadioHead;
 
 /// Angle with its result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
     /// SSB, angle and verdict.
-    pub execution: Execution,
+    pub angle_result: AngleResult,
     /// Measured minus predicted angle for the pose after it: electrical angle, or azimuth of a
     /// non-linear array, in radians; `None` without an angle or radio head.
     pub residual_rad: Option<f64>,

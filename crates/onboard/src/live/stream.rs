@@ -32,10 +32,10 @@ pub struct StreamCounts {
     pub lost_s: f64,
     /// Number of gaps that the times of the blocks do not report, according to the times of the
     /// SSBs ...
-    pub untold_gaps: u64,
+    pub inferred_gaps: u64,
     /// ... and their total duration modulo the SSB period, in seconds. Subsequent times are
     /// corrected by it.
-    pub untold_s: f64,
+    pub unreported_gap_s: f64,
     /// Number of blocks that began before the end of the previous one.
     pub overlaps: u64,
     /// Number of restarted streams.
@@ -61,9 +61,9 @@ struct Bursts {
     observations: Vec<SsbObservation>,
     held: usize,
     /// Duration of unreported missing samples before the newest, in seconds.
-    untold_s: f64,
-    untold_gaps: u64,
-    /// Time minus sample time in seconds, if the caller measures it; `untold_s` is not applied
+    unreported_gap_s: f64,
+    inferred_gaps: u64,
+    /// Time minus sample time in seconds, if the caller measures it; `unreported_gap_s` is not applied
     /// then.
     offset_s: Option<f64>,
     /// Interruptions that the caller reported, in seconds.
@@ -73,11 +73,12 @@ struct Bursts {
 }
 
 impl Bursts {
-    fn take(&mut self, observation: &SsbObservation, untold_s: f64) {
-        if untold_s != self.untold_s {
-            (self.untold_s, self.untold_gaps) = (untold_s, self.untold_gaps + 1);
+    fn take(&mut self, observation: &SsbObservation, unreported_gap_s: f64) {
+        if unreported_gap_s != self.unreported_gap_s {
+            (self.unreported_gap_s, self.inferred_gaps) =
+                (unreported_gap_s, self.inferred_gaps + 1);
         }
-        let correction_s = self.correction_s() - untold_s;
+        let correction_s = self.correction_s() - unreported_gap_s;
         match self.observations.get_mut(self.held) {
             Some(room) => room.copy_from(observation),
             None => self.observations.push(observation.clone()),
@@ -90,7 +91,8 @@ impl Bursts {
 
     /// Returns time minus sample time, in seconds.
     fn correction_s(&self) -> f64 {
-        self.offset_s.unwrap_or(self.untold_s + self.interrupted_s)
+        self.offset_s
+            .unwrap_or(self.unreported_gap_s + self.interrupted_s)
     }
 }
 
@@ -124,8 +126,8 @@ impl SampleStream {
     /// Returns the counts.
     pub fn counts(&self) -> StreamCounts {
         StreamCounts {
-            untold_gaps: self.bursts.untold_gaps,
-            untold_s: self.bursts.untold_s,
+            inferred_gaps: self.bursts.inferred_gaps,
+            unreported_gap_s: self.bursts.unreported_gap_s,
             found: self.receiver.found(),
             ..self.counts
         }
@@ -206,7 +208,7 @@ impl SampleStream {
             ..
         } = self;
         let time_s = |sample| clock.time_s(sample);
-        receiver.push(new, &time_s, &mut |it, untold_s| bursts.take(it, untold_s))?;
+        receiver.push(new, &time_s, &mut |it, gap_s| bursts.take(it, gap_s))?;
         bursts.heard_until_s = clock.time_s(receiver.heard_until()) + bursts.correction_s();
         Ok(continuity)
     }
@@ -225,8 +227,8 @@ impl SampleStream {
     fn gap_to(&mut self, sample: u64, clock: &StreamClock) -> Result<(), LiveError> {
         let (receiver, bursts) = (&mut self.receiver, &mut self.bursts);
         let time_s = |sample| clock.time_s(sample);
-        receiver.gap_to(sample, &time_s, &mut |it, untold_s| {
-            bursts.take(it, untold_s);
+        receiver.gap_to(sample, &time_s, &mut |it, unreported_gap_s| {
+            bursts.take(it, unreported_gap_s);
         })?;
         Ok(())
     }

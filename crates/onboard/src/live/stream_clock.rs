@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_there_already_is_left_out_and_a_stream_may_begin_anew() {
+    fn repeated_samples_are_omitted_and_a_stream_may_restart() {
         let mut clock = StreamClock::new(RATE_HZ);
         clock.block(5.0, 3840);
         let (continuity, left_out) = clock.block(5.0 + 0.5e-3, 3840);

@@ -25,7 +25,7 @@ pub struct Recovered {
 /// Estimator of a pose from odometry and angles.
 ///
 /// Odometry arrives in order of time, with finite values. Angles are not older than the newest
-/// odometry: a [`History`](super::History) in front of the localizer replays late angles, if the
+/// odometry: a [`OutOfSequenceBuffer`](super::OutOfSequenceBuffer) in front of the localizer replays late angles, if the
 /// localizer can be copied.
 pub trait Localizer: Any + Send {
     /// Predicts with an odometry sample; the first sample defines the origin of the distance.

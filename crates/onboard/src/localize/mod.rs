@@ -4,7 +4,7 @@
 //! Layers of the built-in localizer: an extended Kalman filter ([`ekf`]) that may estimate a
 //! time-correlated bias of the angles ([`bias`]); a bank of such filters, one for each fault mode
 //! ([`modes`]); protection level and integrity state ([`integrity`]); search for the initial pose
-//! and relocalization ([`acquire`]); and out-of-sequence measurements ([`History`]).
+//! and relocalization ([`acquire`]); and out-of-sequence measurements ([`OutOfSequenceBuffer`]).
 
 pub mod acquire;
 pub mod bias;
@@ -22,7 +22,7 @@ pub use choose::built_in;
 pub use dead_reckoning::DeadReckoning;
 pub use ekf::Ekf;
 pub use localizer::{Localizer, Recovered, copy_into};
-pub use out_of_sequence::{AngleUpdate, HISTORY_S, History};
+pub use out_of_sequence::{AngleUpdate, HISTORY_S, OutOfSequenceBuffer};
 pub use output::{
     InitialPose, Integrity, IntegrityState, OdometryVerdict, PoseEstimate, UpdateReason,
     UpdateVerdict,

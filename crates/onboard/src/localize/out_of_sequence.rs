@@ -32,7 +32,7 @@ const USUAL_EVENTS: usize = 256;
 const MOST_EVENTS: usize = 4096;
 
 /// Localizer with replay of late angles.
-pub struct History {
+pub struct OutOfSequenceBuffer {
     localizer: Box<dyn Localizer>,
     /// Inputs since the oldest copy, in order of their times.
     events: VecDeque<Event>,
@@ -86,7 +86,7 @@ struct Checkpoint {
     events: usize,
 }
 
-impl History {
+impl OutOfSequenceBuffer {
     /// Creates a history with this localizer.
     pub fn new(localizer: Box<dyn Localizer>) -> Self {
         let mut made = Self {

@@ -1,6 +1,6 @@
 //! Monitors of odometry and receive channels: they identify faults that no filter can tolerate.
 //!
-//! [`Onboard`](crate::Onboard) runs them where the vehicle has an integrity monitor. A fault of the odometry makes the
+//! [`Pipeline`](crate::Pipeline) runs them where the vehicle has an integrity monitor. A fault of the odometry makes the
 //! pose unavailable until the odometry agrees with the angles again.
 
 mod channels;

@@ -14,7 +14,7 @@ mod vehicle;
 mod warning;
 
 pub use platform::of_platform;
-pub use together::{of_both, of_both_along, of_site};
+pub use together::{of_site, of_site_and_vehicle, of_site_and_vehicle_along};
 pub use usual::{
     Usual, as_centimetres, as_degrees, as_millimetres, as_milliseconds, as_percent, rounded,
     unusual,

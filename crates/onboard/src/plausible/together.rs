@@ -21,7 +21,7 @@ pub fn of_site(site: &Site) -> Vec<Warning> {
 
 /// Returns the warnings of a site and a vehicle before a drive. Keys begin with `site` and
 /// `vehicle`.
-pub fn of_both(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
+pub fn of_site_and_vehicle(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
     let road = site.build_road().ok().flatten();
     beneath("site", in_reach(site, vehicle, road.as_ref()))
         .chain(beneath("vehicle", on_site(site, vehicle)))
@@ -30,7 +30,7 @@ pub fn of_both(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
 
 /// Returns the warnings of a site and a vehicle for a recorded path. Interference is not checked,
 /// because the recording shows it.
-pub fn of_both_along(site: &Site, vehicle: &Vehicle, way: &Road) -> Vec<Warning> {
+pub fn of_site_and_vehicle_along(site: &Site, vehicle: &Vehicle, way: &Road) -> Vec<Warning> {
     let mut of_site = in_reach(site, vehicle, Some(way));
     of_site.extend(drowned(site, vehicle, Some(way)));
     beneath("site", of_site)

@@ -124,7 +124,7 @@ const ROWS: &[Usual] = &[
         write: |it| format!("specify MHz: {it} GHz are {}", rounded(it * 1000.0)),
     },
     Usual {
-        key: "receiver.phase_bias_std_rad",
+        key: "receiver.correlated_noise_std_rad",
         within: [0.0, 1.0],
         why: "an angle with this error contains no information",
         write: as_degrees,
@@ -262,7 +262,7 @@ const ROWS: &[Usual] = &[
         write: as_milliseconds,
     },
     Usual {
-        key: "wake_up.bound_m",
+        key: "wake_up.target_error_m",
         within: [0.005, 50.0],
         why: "not a plausible target for the position error",
         write: as_millimetres,
@@ -298,7 +298,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_speed_in_mps_is_told_from_a_slow_vehicle() {
+    fn a_speed_in_mps_is_distinguished_from_a_slow_vehicle() {
         for (written, meant) in [(3.33, 12), (2.78, 10), (4.17, 15), (1.39, 5), (0.83, 3)] {
             let told = speed_in_mps("top_speed_kmh", written).map(|it| it.write);
             let wanted = format!("write km/h: {meant},");

@@ -124,7 +124,7 @@ pub enum ReceiveError {
 }
 
 /// Receiver of windows at one frequency.
-pub struct Receiver(Box<dyn OfWindows>);
+pub struct Receiver(Box<dyn DynWindowReceiver>);
 
 impl Receiver {
     /// Creates a receiver without cells.
@@ -165,7 +165,7 @@ impl Receiver {
 }
 
 /// Receiver of a sample stream at one frequency.
-pub struct StreamReceiver(Box<dyn OfStream>);
+pub struct StreamReceiver(Box<dyn DynStreamReceiver>);
 
 impl StreamReceiver {
     /// Creates a receiver without cells, for samples of a rate and centre frequency.
@@ -243,7 +243,7 @@ impl StreamReceiver {
 }
 
 /// Receiver of windows for any number of antennas.
-trait OfWindows: Send {
+trait DynWindowReceiver: Send {
     fn tracked(&self) -> usize;
     fn searches(&self) -> u64;
     fn receive(
@@ -253,7 +253,7 @@ trait OfWindows: Send {
     ) -> Result<(), ReceiveError>;
 }
 
-impl<const A: usize> OfWindows for (WindowReceiver<A>, Observer<A>) {
+impl<const A: usize> DynWindowReceiver for (WindowReceiver<A>, Observer<A>) {
     fn tracked(&self) -> usize {
         self.0.tracked()
     }
@@ -280,7 +280,7 @@ impl<const A: usize> OfWindows for (WindowReceiver<A>, Observer<A>) {
 }
 
 /// Receiver of a stream for any number of antennas.
-trait OfStream: Send {
+trait DynStreamReceiver: Send {
     fn tracked(&self) -> usize;
     fn tone(&self, index: usize) -> Option<Tone>;
     fn heard_until(&self) -> f64;
@@ -300,7 +300,7 @@ trait OfStream: Send {
     fn reset(&mut self);
 }
 
-impl<const A: usize> OfStream for (ssb::StreamReceiver<A>, Observer<A>) {
+impl<const A: usize> DynStreamReceiver for (ssb::StreamReceiver<A>, Observer<A>) {
     fn tracked(&self) -> usize {
         self.0.receiver().tracked()
     }
@@ -417,9 +417,9 @@ impl<const A: usize> Observer<A> {
         time_s: &dyn Fn(f64) -> f64,
         take: &mut dyn FnMut(&SsbObservation, f64),
     ) {
-        let untold_s = seen.untold / self.config.spacing.base_rate_hz();
-        let received_s = time_s(seen.ssb.sample_start * ratio) + untold_s;
-        take(self.observe(seen, received_s), untold_s);
+        let unreported_gap_s = seen.unreported_gap / self.config.spacing.base_rate_hz();
+        let received_s = time_s(seen.ssb.sample_start * ratio) + unreported_gap_s;
+        take(self.observe(seen, received_s), unreported_gap_s);
     }
 }
 

@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn guesses_that_join_are_one_gap_from_either_side() {
+    fn adjacent_unsurveyed_segments_are_one_gap_in_either_direction() {
         let segments = [(40.0, true), (10.0, false), (20.0, false), (30.0, true)];
         let segments = segments.map(|(length_m, surveyed)| Segment {
             length_m,

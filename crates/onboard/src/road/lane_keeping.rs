@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unseen_swing_shortens_the_way_as_said() {
+    fn unobserved_lane_oscillation_shortens_the_distance_as_predicted() {
         use rand::{RngExt, SeedableRng};
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
         let mut normal = || rng.sample::<f64, _>(rand_distr::StandardNormal);

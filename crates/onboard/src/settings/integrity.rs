@@ -36,7 +36,7 @@ pub struct IntegritySettings {
 #[serde(default, deny_unknown_fields)]
 pub struct FaultProbability {
     /// Fault of a radio head: moved or spoofed. Default: 1e-3 where its bias is estimated
-    /// (`receiver.phase_bias_probability`) and two other radio heads exist to separate it from the position; else 0.01.
+    /// (`receiver.multipath_bias_probability`) and two other radio heads exist to separate it from the position; else 0.01.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub radio_head: Option<f64>,
@@ -48,7 +48,7 @@ pub struct FaultProbability {
     /// Displacement of all radio heads relative to the map. A filter estimates it, and the angles weigh that filter.
     /// Without a map the radio heads define the frame, and this fault does not exist.
     #[schemars(range(min = 0.0, max = 0.5))]
-    pub all_radio_heads: f64,
+    pub site_frame_offset: f64,
     /// Prior probability of an array fault (mounting or phases). The monitor does not detect this
     /// fault: its probability is subtracted from the integrity risk.
     #[schemars(range(min = 0.0, max = 0.5))]
@@ -72,7 +72,7 @@ impl Default for FaultProbability {
         Self {
             radio_head: None,
             odometer: 1e-3,
-            all_radio_heads: 0.01,
+            site_frame_offset: 0.01,
             array: 1e-5,
         }
     }

@@ -54,7 +54,7 @@ pub use toml_file::{Library, NamedText, TomlFile};
 pub use underlay::UnderlaySettings;
 pub use vehicle::{PlatformSettings, Vehicle, check_together};
 pub use wake_up::{
-    DeltaT, DueSettings, FixedSettings, GatedSettings, PidSettings, SensingMode, ServingSsb,
-    SnrSetPoint, UncertaintySettings, WakeUpSettings,
+    DeltaT, FixedSettings, GatedSettings, PidSettings, SensingMode, SnrSetPoint, SsbSelection,
+    TriggerSettings, UncertaintySettings, WakeUpSettings,
 };
 pub use walls::WallSettings;

@@ -1,4 +1,4 @@
-//! Overriding keys: `like` files, overrides, and the truth of a simulation.
+//! Overriding keys: `extends` files, overrides, and the truth of a simulation.
 
 use toml::{Table, Value};
 
@@ -40,7 +40,7 @@ pub fn lay_over(
             // The base is the name of a file: override keys of that file.
             (Some(Value::String(name)), Value::Table(mut value)) => {
                 let name = Value::String(name.clone());
-                value.entry("like").or_insert(name);
+                value.entry("extends").or_insert(name);
                 base.insert(key, Value::Table(value));
             }
             (_, value) => {

@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_mode_or_method_says_what_there_is() {
+    fn an_unknown_mode_or_method_lists_the_known_ones() {
         let xavier = xavier();
         let mut vehicle = vehicle("paper");
         vehicle.platform.mode = 9;
@@ -293,7 +293,7 @@ mod tests {
         vehicle.estimator.method = EstimatorMethod::MaximumLikelihood;
         let message = xavier.base_wake_up_s(&vehicle).unwrap_err().to_string();
         assert!(message.contains("root-music"), "{message}");
-        assert!(message.contains("`wake_up.due.base_ms`"), "{message}");
+        assert!(message.contains("`wake_up.trigger.base_ms`"), "{message}");
     }
 
     #[test]

@@ -28,34 +28,34 @@ pub struct ReceiverSettings {
     pub snr_noise_db: f64,
     /// Time offset of an angle: its time stamp minus the time of its measurement, in seconds.
     #[schemars(range(min = -1.0, max = 0.4))]
-    pub lateness_s: f64,
+    pub angle_time_offset_s: f64,
     /// Standard deviation of the time offset, in seconds; 0 means that the clocks agree. The offset
     /// is estimated while driving. Default: 0 on a road, 0.1 s for a differential drive. In
     /// recorded drives, an offset of up to 1.5 s is estimated in advance.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 0.5))]
-    pub lateness_std_s: Option<f64>,
+    pub angle_time_offset_std_s: Option<f64>,
     /// Standard deviation of the time-correlated part of the electrical angle's error, in radians.
     #[schemars(range(min = 0.0, max = 3.2))]
-    pub phase_bias_std_rad: f64,
+    pub correlated_noise_std_rad: f64,
     /// Maximum fraction of an angle's variance that is time-correlated; the actual fraction is
     /// estimated while driving. Default: 0.25 for logged angles, 0 for angles of the receiver,
     /// whose variance is that of thermal noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
-    pub phase_bias_share: Option<f64>,
+    pub correlated_noise_fraction: Option<f64>,
     /// Prior probability that the angles of a radio head have a time-correlated bias, as reflections cause it. Every
     /// filter of the localizer then estimates the bias of each radio head; 0 estimates none. Default: 0.75 on a road
     /// vehicle, 0 on a differential drive, without integrity monitoring, and for logged angles with a specified bias.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
-    pub phase_bias_probability: Option<f64>,
+    pub multipath_bias_probability: Option<f64>,
     /// Correlation time of the time-correlated error, in seconds, while the vehicle moves.
     #[schemars(range(min = 1e-3, max = 1e9))]
-    pub phase_bias_correlation_s: f64,
+    pub noise_correlation_time_s: f64,
     /// Correlation distance of the time-correlated error, in metres.
     #[schemars(range(min = 1e-3, max = 1e9))]
-    pub phase_bias_correlation_m: f64,
+    pub noise_correlation_distance_m: f64,
     /// Physical cell identities that are received. Default: all of the site.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pci_allow_list: Option<Vec<u16>>,
@@ -70,13 +70,13 @@ impl Default for ReceiverSettings {
             pilots: Pilots::Ssb,
             snapshots: 20,
             snr_noise_db: 0.0,
-            lateness_s: 0.0,
-            lateness_std_s: None,
-            phase_bias_std_rad: 0.0,
-            phase_bias_share: None,
-            phase_bias_probability: None,
-            phase_bias_correlation_s: 1.0,
-            phase_bias_correlation_m: 0.3,
+            angle_time_offset_s: 0.0,
+            angle_time_offset_std_s: None,
+            correlated_noise_std_rad: 0.0,
+            correlated_noise_fraction: None,
+            multipath_bias_probability: None,
+            noise_correlation_time_s: 1.0,
+            noise_correlation_distance_m: 0.3,
             pci_allow_list: None,
         }
     }

@@ -16,8 +16,8 @@ use super::limits::check_limits;
 use super::overlay::{ends_in_tag, lay_over, set};
 use super::read::{from_table, parse};
 
-/// Maximum length of a chain of `like` keys.
-const MOST_LIKES: usize = 8;
+/// Maximum length of a chain of `extends` keys.
+const MAX_EXTENDS: usize = 8;
 
 /// Text of a file, and its name for error messages.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,7 +55,7 @@ pub trait Library {
     }
 }
 
-/// Kind of settings file. A file with `like = "another"` overrides keys of that other file.
+/// Kind of settings file. A file with `extends = "another"` overrides keys of that other file.
 pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
     /// Name of this kind of file in error messages, such as "site".
     const WHAT: &'static str;
@@ -115,7 +115,7 @@ pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
         library: &dyn Library,
     ) -> Result<Self, SettingsError> {
         let check = Check { file: origin };
-        take_after_likes::<Self>(&mut table, origin, library)?;
+        apply_extends::<Self>(&mut table, origin, library)?;
         Self::resolve(&mut table, origin, library)?;
         let settings: Self = from_table(table, origin)?;
         let json = serde_json::to_value(&settings).unwrap_or_default();
@@ -132,16 +132,16 @@ pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
         Ok(settings)
     }
 
-    /// Returns the keys that a file contains, with those of the files that it is like, without defaults.
+    /// Returns the keys that a file contains, with those of the files that it extends, without defaults.
     ///
     /// # Errors
-    /// [`SettingsError`] where a file that it is like cannot be read.
+    /// [`SettingsError`] if a file that it extends cannot be read.
     fn stated_keys(
         mut table: Table,
         origin: &str,
         library: &dyn Library,
     ) -> Result<Table, SettingsError> {
-        take_after_likes::<Self>(&mut table, origin, library)?;
+        apply_extends::<Self>(&mut table, origin, library)?;
         Ok(table)
     }
 
@@ -192,31 +192,31 @@ fn is_usable_name(name: &str) -> bool {
         && !name.ends_with(' ')
 }
 
-/// Applies a table as an override to the file that its `like` key names.
-fn take_after_likes<T: TomlFile>(
+/// Applies a table as an override to the file that its `extends` key names.
+fn apply_extends<T: TomlFile>(
     table: &mut Table,
     origin: &str,
     library: &dyn Library,
 ) -> Result<(), SettingsError> {
     let mut beside = origin.to_owned();
-    for _ in 0..MOST_LIKES {
+    for _ in 0..MAX_EXTENDS {
         let check = Check { file: &beside };
-        let name = match table.remove("like") {
+        let name = match table.remove("extends") {
             None => return Ok(()),
             Some(Value::String(name)) => name,
             Some(other) => {
-                return Err(check.error("like", other, "it must be the name of a file"));
+                return Err(check.error("extends", other, "it must be the name of a file"));
             }
         };
         let base = library.text(T::WHAT, T::SHIPPED, &name, &beside);
-        let base = base.map_err(|error| error.beneath(&beside, "like"))?;
+        let base = base.map_err(|error| error.beneath(&beside, "extends"))?;
         let mut laid = parse(&base.text, &base.origin)?;
         lay_over(&mut laid, std::mem::take(table), "", check)?;
         *table = laid;
         beside = base.origin;
     }
-    let allowed = format!("at most {MOST_LIKES} files may be like one another in a row");
-    Err(Check { file: origin }.error("like", "endless", &allowed))
+    let allowed = format!("a chain of `extends` may contain at most {MAX_EXTENDS} files");
+    Err(Check { file: origin }.error("extends", "endless", &allowed))
 }
 
 /// Returns the schema of a type, computed once.
@@ -225,23 +225,23 @@ fn schema<T: JsonSchema>() -> Json {
     let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
     made.get_or_insert_default()
         .entry(type_name::<T>())
-        .or_insert_with(|| with_like(schemars::schema_for!(T).to_value()))
+        .or_insert_with(|| with_extends(schemars::schema_for!(T).to_value()))
         .clone()
 }
 
-/// Adds the key `like` to a schema; the types do not contain it.
-fn with_like(mut schema: Json) -> Json {
-    let like = serde_json::json!({
+/// Adds the key `extends` to a schema; the types do not contain it.
+fn with_extends(mut schema: Json) -> Json {
+    let extends = serde_json::json!({
         "type": "string",
-        "description": "A shipped name, or a path: this file's keys are laid over that one's.",
+        "description": "Name of a shipped file, or path of a file. The keys of this file override its keys.",
     });
     if let Some(properties) = schema.get_mut("properties").and_then(Json::as_object_mut) {
-        properties.insert("like".to_owned(), like.clone());
+        properties.insert("extends".to_owned(), extends.clone());
     }
     for held in ["Site", "Vehicle"] {
         let held = schema.pointer_mut(&format!("/$defs/{held}/properties"));
         if let Some(properties) = held.and_then(Json::as_object_mut) {
-            properties.insert("like".to_owned(), like.clone());
+            properties.insert("extends".to_owned(), extends.clone());
         }
     }
     schema

@@ -24,7 +24,7 @@ impl WakeUpSettings {
     /// At every SSB, which is the maximum rate.
     pub const EVERY_SSB: Self = Self::Fixed(FixedSettings {
         interval_ms: Some(1.0),
-        serving_ssb: ServingSsb::FirstAfter,
+        ssb_selection: SsbSelection::FirstAfter,
     });
 }
 
@@ -37,14 +37,14 @@ pub struct FixedSettings {
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub interval_ms: Option<f64>,
     /// SSB that is used if an estimate becomes due between two SSBs.
-    #[serde(skip_serializing_if = "ServingSsb::is_first_after")]
-    pub serving_ssb: ServingSsb,
+    #[serde(skip_serializing_if = "SsbSelection::is_first_after")]
+    pub ssb_selection: SsbSelection,
 }
 
 /// SSB that is used if an estimate becomes due between two SSBs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum ServingSsb {
+pub enum SsbSelection {
     /// First SSB at or after the due time: never early, up to one SSB period late.
     #[default]
     FirstAfter,
@@ -52,7 +52,7 @@ pub enum ServingSsb {
     LastBefore,
 }
 
-impl ServingSsb {
+impl SsbSelection {
     #[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
     const fn is_first_after(&self) -> bool {
         matches!(self, Self::FirstAfter)
@@ -84,8 +84,8 @@ pub struct PidSettings {
     #[schemars(range(min = 1e-3, max = 1e4))]
     pub position_uncertainty_m: f64,
     /// SSB that is used if an estimate becomes due between two SSBs.
-    #[serde(skip_serializing_if = "ServingSsb::is_first_after")]
-    pub serving_ssb: ServingSsb,
+    #[serde(skip_serializing_if = "SsbSelection::is_first_after")]
+    pub ssb_selection: SsbSelection,
     /// Proportional gain.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub kp: f64,
@@ -124,7 +124,7 @@ impl Default for PidSettings {
             base_ms: None,
             t_max_ms: None,
             position_uncertainty_m: 1.0,
-            serving_ssb: ServingSsb::FirstAfter,
+            ssb_selection: SsbSelection::FirstAfter,
             kp: 0.75,
             ki: 0.08,
             kd: 0.195,
@@ -189,7 +189,7 @@ pub struct GatedSettings {
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub latest_ms: Option<f64>,
     /// Trigger: condition that makes an estimate due.
-    pub due: DueSettings,
+    pub trigger: TriggerSettings,
 }
 
 impl Default for GatedSettings {
@@ -197,7 +197,7 @@ impl Default for GatedSettings {
         Self {
             snr_set_point: SnrSetPoint::Expected { offset_db: 3.0 },
             latest_ms: None,
-            due: DueSettings::Pid(PidSettings::default()),
+            trigger: TriggerSettings::Pid(PidSettings::default()),
         }
     }
 }
@@ -205,7 +205,7 @@ impl Default for GatedSettings {
 /// Trigger of an estimate, based on the time since the previous one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "policy", rename_all = "kebab-case")]
-pub enum DueSettings {
+pub enum TriggerSettings {
     /// Constant time.
     Fixed(FixedSettings),
     /// Algorithm 1 of the paper.
@@ -261,8 +261,8 @@ pub struct UncertaintySettings {
     /// stays below it. The actual error exceeds the target if the covariance is too small or no
     /// radio head is in range. `access-av tune` finds the target for a required error.
     #[schemars(range(min = 1e-3, max = 1e3))]
-    pub bound_m: f64,
-    /// Probability that the error is below `bound_m` at a wake-up, given a correct covariance.
+    pub target_error_m: f64,
+    /// Probability that the error is below `target_error_m` at a wake-up, given a correct covariance.
     #[schemars(range(min = 0.01, max = 0.999_999))]
     pub confidence: f64,
     /// Minimum time between two wake-ups in ms: duration of one estimate. Default: one SSB period.
@@ -278,7 +278,7 @@ pub struct UncertaintySettings {
     /// made before the target requires it. It also applies where the target cannot be reached. A
     /// wake-up with several angles needs a reduction in proportion to its energy.
     #[schemars(range(min = 0.0, max = 1e6))]
-    pub least_gain_m2: f64,
+    pub min_variance_reduction_m2: f64,
     /// Maximum SNR above the link budget's prediction, in dB. With this key, the receiver is on
     /// wherever an SSB of that SNR would justify its energy, and the measured SNR decides. Default:
     /// the link budget decides, which keeps the receiver off for longer.
@@ -290,11 +290,11 @@ pub struct UncertaintySettings {
 impl Default for UncertaintySettings {
     fn default() -> Self {
         Self {
-            bound_m: 0.3,
+            target_error_m: 0.3,
             confidence: 0.9,
             base_ms: None,
             wake_up_cost: None,
-            least_gain_m2: 1.5e-4,
+            min_variance_reduction_m2: 1.5e-4,
             snr_headroom_db: None,
         }
     }
@@ -306,7 +306,7 @@ impl WakeUpSettings {
         match self {
             Self::Pid(pid)
             | Self::Gated(GatedSettings {
-                due: DueSettings::Pid(pid),
+                trigger: TriggerSettings::Pid(pid),
                 ..
             }) => Some(pid),
             Self::Fixed(_) | Self::Gated(_) | Self::Uncertainty(_) => None,
@@ -319,10 +319,10 @@ impl WakeUpSettings {
             Self::Fixed(_) => "wake_up.interval_ms",
             Self::Pid(_) | Self::Uncertainty(_) => "wake_up.base_ms",
             Self::Gated(GatedSettings {
-                due: DueSettings::Fixed(_),
+                trigger: TriggerSettings::Fixed(_),
                 ..
-            }) => "wake_up.due.interval_ms",
-            Self::Gated(_) => "wake_up.due.base_ms",
+            }) => "wake_up.trigger.interval_ms",
+            Self::Gated(_) => "wake_up.trigger.base_ms",
         }
     }
 
@@ -331,9 +331,9 @@ impl WakeUpSettings {
         match self {
             Self::Fixed(fixed) => Some(&mut fixed.interval_ms),
             Self::Pid(pid) => Some(&mut pid.base_ms),
-            Self::Gated(gated) => Some(match &mut gated.due {
-                DueSettings::Fixed(fixed) => &mut fixed.interval_ms,
-                DueSettings::Pid(pid) => &mut pid.base_ms,
+            Self::Gated(gated) => Some(match &mut gated.trigger {
+                TriggerSettings::Fixed(fixed) => &mut fixed.interval_ms,
+                TriggerSettings::Pid(pid) => &mut pid.base_ms,
             }),
             Self::Uncertainty(_) => None,
         }
@@ -350,11 +350,13 @@ impl WakeUpSettings {
         match self {
             Self::Pid(pid) => t_max(pid, "wake_up"),
             Self::Gated(gated) => {
-                let (base_ms, base) = match &gated.due {
-                    DueSettings::Fixed(fixed) => (fixed.interval_ms, "wake_up.due.interval_ms"),
-                    DueSettings::Pid(pid) => {
-                        t_max(pid, "wake_up.due")?;
-                        (pid.base_ms, "wake_up.due.base_ms")
+                let (base_ms, base) = match &gated.trigger {
+                    TriggerSettings::Fixed(fixed) => {
+                        (fixed.interval_ms, "wake_up.trigger.interval_ms")
+                    }
+                    TriggerSettings::Pid(pid) => {
+                        t_max(pid, "wake_up.trigger")?;
+                        (pid.base_ms, "wake_up.trigger.base_ms")
                     }
                 };
                 let base_ms = base_ms.unwrap_or(0.0);

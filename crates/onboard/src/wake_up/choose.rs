@@ -9,7 +9,7 @@ use super::policy::WakeUpPolicy;
 use super::uncertainty::UncertaintyDriven;
 use crate::energy::EnergyModel;
 use crate::settings::{
-    Check, DueSettings, Extent, FixedSettings, PidSettings, Platform, SettingsError, Site,
+    Check, Extent, FixedSettings, PidSettings, Platform, SettingsError, Site, TriggerSettings,
     UncertaintySettings, Vehicle, WakeUpSettings,
 };
 
@@ -41,22 +41,23 @@ pub fn built_in(
         let file = &vehicle.name;
         settings.check_t_max(base_s, BASE, top_speed_mps, place, Check { file })?;
         let controller = Controller::new(settings, base_s, top_speed_mps);
-        let lead_s = settings.serving_ssb.lead_s(period_s);
+        let lead_s = settings.ssb_selection.lead_s(period_s);
         Ok(Due::controlled(controller, settings.sensing, lead_s))
     };
     let constant = |settings: &FixedSettings| {
-        let lead_s = settings.serving_ssb.lead_s(period_s);
+        let lead_s = settings.ssb_selection.lead_s(period_s);
         Ok(Due::constant(interval_s(settings.interval_ms)?, lead_s))
     };
     Ok(match vehicle.wake_up_policy() {
         WakeUpSettings::Fixed(settings) => Box::new(FixedInterval::new(constant(&settings)?)),
         WakeUpSettings::Pid(settings) => Box::new(Adaptive::new(controlled(&settings, "wake_up")?)),
         WakeUpSettings::Gated(settings) => {
-            let (due, shortest_s) = match settings.due {
-                DueSettings::Fixed(due) => (constant(&due)?, interval_s(due.interval_ms)?),
-                DueSettings::Pid(due) => {
-                    (controlled(&due, "wake_up.due")?, interval_s(due.base_ms)?)
-                }
+            let (due, shortest_s) = match settings.trigger {
+                TriggerSettings::Fixed(due) => (constant(&due)?, interval_s(due.interval_ms)?),
+                TriggerSettings::Pid(due) => (
+                    controlled(&due, "wake_up.trigger")?,
+                    interval_s(due.base_ms)?,
+                ),
             };
             let latest_s = match settings.latest_ms {
                 Some(latest_ms) => {
@@ -107,6 +108,6 @@ fn wake_up_cost(
         return Ok(stated);
     }
     let model = EnergyModel::new(vehicle, platform, Extent::Value)?;
-    let known = model.and_then(|model| model.listening_in_executions());
+    let known = model.and_then(|model| model.listening_in_aoa_estimates());
     Ok(known.unwrap_or(UNKNOWN_WAKE_UP_COST))
 }

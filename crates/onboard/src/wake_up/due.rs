@@ -21,7 +21,7 @@ pub struct Due {
 
 impl Due {
     /// Creates a clock with a constant wake-up time. See
-    /// [`ServingSsb`](crate::settings::ServingSsb) for `lead_s`.
+    /// [`SsbSelection`](crate::settings::SsbSelection) for `lead_s`.
     pub const fn constant(wake_up_time_s: f64, lead_s: f64) -> Self {
         Self {
             controller: None,
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_ssb_before_a_wake_up_time_serves_it_where_asked() {
+    fn the_last_ssb_before_a_wake_up_time_is_used_if_configured() {
         for (wake_up_time_s, served_s) in [(0.065, 0.06), (0.08, 0.08), (0.15, 0.14), (0.01, 0.02)]
         {
             let mut due = Due::constant(wake_up_time_s, 0.02);

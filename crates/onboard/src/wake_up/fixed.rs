@@ -54,7 +54,7 @@ impl WakeUpPolicy for FixedInterval {
 mod tests {
     use super::*;
 
-    fn executions(interval_s: f64, lead_s: f64) -> usize {
+    fn aoa_estimates(interval_s: f64, lead_s: f64) -> usize {
         let mut policy = FixedInterval::new(Due::constant(interval_s, lead_s));
         // Trip of 80.33 s, up to the first SSB after its end.
         (0..=4017)
@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn executions_on_the_papers_trip() {
+    fn number_of_estimates_on_the_papers_trip() {
         for (interval_s, after, before) in [
             (0.02, 4018, 4018),
             (0.065, 1005, 1340), // an SSB every 20 ms: 80 ms or 60
@@ -71,13 +71,13 @@ mod tests {
             (0.15, 503, 574),
             (0.1, 804, 804),
         ] {
-            assert_eq!(executions(interval_s, 0.0), after);
-            assert_eq!(executions(interval_s, 0.02), before);
+            assert_eq!(aoa_estimates(interval_s, 0.0), after);
+            assert_eq!(aoa_estimates(interval_s, 0.02), before);
         }
     }
 
     #[test]
-    fn what_comes_late_is_taken_and_shifts_nothing() {
+    fn late_ssbs_are_used_and_do_not_shift_the_interval() {
         let mut policy = FixedInterval::new(Due::constant(0.08, 0.0));
         assert!(policy.take(0.0) && policy.take(0.16));
         // A late SSB, and another SSB of the burst that was used.
@@ -88,6 +88,6 @@ mod tests {
 
     #[test]
     fn faster_than_the_ssbs_means_every_ssb() {
-        assert_eq!(executions(0.001, 0.0), 4018);
+        assert_eq!(aoa_estimates(0.001, 0.0), 4018);
     }
 }

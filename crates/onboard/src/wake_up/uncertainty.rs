@@ -11,7 +11,7 @@
 //! information about heading and odometer has become position information there. The value depends
 //! on the position: one angle close to a radio head has the value of many from a distance. A given
 //! energy is used best if the last angle has the same value everywhere (equal marginal gains). An
-//! angle with at least the value `least_gain_m2` is therefore used before the target requires it,
+//! angle with at least the value `min_variance_reduction_m2` is therefore used before the target requires it,
 //! so that the stretch ahead, where angles have less value, begins with a small error.
 //!
 //! A wake-up has a fixed energy: the receiver settles and is on for the burst. The platform
@@ -44,10 +44,10 @@ const MOST_HEADS: usize = 64;
 /// Wake-up policy driven by the covariance.
 #[derive(Clone, Debug)]
 pub struct UncertaintyDriven {
-    bound_m: f64,
+    target_error_m: f64,
     quantile: RadialQuantile,
     wake_up_cost: f64,
-    least_gain_m2: f64,
+    min_variance_reduction_m2: f64,
     snr_headroom_db: Option<f64>,
     period_s: f64,
     base_s: f64,
@@ -65,10 +65,10 @@ impl UncertaintyDriven {
         vehicle: &Vehicle,
     ) -> Self {
         Self {
-            bound_m: settings.bound_m,
+            target_error_m: settings.target_error_m,
             quantile: RadialQuantile::new(1.0 - settings.confidence),
             wake_up_cost,
-            least_gain_m2: settings.least_gain_m2,
+            min_variance_reduction_m2: settings.min_variance_reduction_m2,
             snr_headroom_db: settings.snr_headroom_db,
             period_s: site.ssb.period_s(),
             base_s: settings.base_ms.unwrap_or(0.0) * 1e-3,
@@ -80,7 +80,7 @@ impl UncertaintyDriven {
     /// Whether the error stays below the target until the SSB after `time_s`, without another
     /// angle.
     pub fn keeps(&self, ekf: &Ekf, time_s: f64) -> bool {
-        self.error_m(ekf, time_s + self.period_s) <= self.bound_m
+        self.error_m(ekf, time_s + self.period_s) <= self.target_error_m
     }
 
     /// Returns the angles to use, one bit for each radio head: the number with the best reduction
@@ -101,7 +101,7 @@ impl UncertaintyDriven {
         let spread = |belief: &Belief| ahead.principal_variances(belief).iter().sum::<f64>();
         let next = ekf.transition(&belief, ekf.speed_mps() * self.period_s);
         let keeps = |belief: &Belief| {
-            self.quantile.radius(next.principal_variances(belief)) <= self.bound_m
+            self.quantile.radius(next.principal_variances(belief)) <= self.target_error_m
         };
         let before = spread(&belief);
         let (mut taken, mut best, mut most_m2) = (0u64, 0u64, 0.0);
@@ -136,7 +136,7 @@ impl UncertaintyDriven {
                 break;
             }
         }
-        if (demanded && kept) || most_m2 >= self.least_gain_m2 {
+        if (demanded && kept) || most_m2 >= self.min_variance_reduction_m2 {
             best
         } else {
             0
@@ -146,8 +146,9 @@ impl UncertaintyDriven {
     /// Returns the time after `time_s` for which the error stays below the target without another
     /// angle, in seconds: the latest wake-up.
     fn wake_up_time_s(&self, ekf: &Ekf, time_s: f64) -> f64 {
-        let holds =
-            |periods: f64| self.error_m(ekf, time_s + periods * self.period_s) <= self.bound_m;
+        let holds = |periods: f64| {
+            self.error_m(ekf, time_s + periods * self.period_s) <= self.target_error_m
+        };
         let (mut low, mut high) = (0.0, (HORIZON_S / self.period_s).ceil());
         if holds(high) {
             return high * self.period_s;

@@ -81,13 +81,13 @@ fn turns_on_the_spot() {
 }
 
 #[test]
-fn without_a_yaw_rate_it_does_not_know_where_it_heads() {
+fn without_a_yaw_rate_the_heading_is_uncertain() {
     let (pose, [_, y_std_m, heading_std_rad]) = end(false);
     assert!(heading_std_rad > 1.5 && (pose.y_m - 5.0).abs() < 3.0 * y_std_m);
 }
 
 #[test]
-fn a_scale_walks_unless_all_of_the_odometer_is_told() {
+fn the_odometer_scale_is_constant_only_if_its_deviation_and_noise_are_configured() {
     let site = Site::from_library("trip-2", &Shipped).unwrap();
     let walk_of = |vehicle: &str| {
         let vehicle = Vehicle::from_toml(vehicle, "agv", &Shipped).unwrap();

@@ -17,7 +17,7 @@ const TURN_RAD: f64 = 0.1;
 fn tracker(at_m: f64, aside_m: f64, position_std_m: f64) -> (Ekf, Gap) {
     let gap_m = 4.0 * RADIUS_M * TURN_RAD.sin();
     let road = format!(
-        "like = 'trip-2'\n[road]\nsegments = [{{ length_m = 90.0 }}, \
+        "extends = 'trip-2'\n[road]\nsegments = [{{ length_m = 90.0 }}, \
          {{ length_m = {gap_m:?}, surveyed = false }}, {{ length_m = 90.0 }}]"
     );
     let site = Site::from_toml(&road, "site.toml", &Shipped).unwrap();
@@ -53,7 +53,7 @@ fn sample(number: u32) -> OdometrySample {
 }
 
 #[test]
-fn the_gap_is_told_and_costs_certainty_until_the_lane_is_kept_again() {
+fn the_gap_is_reported_and_increases_the_covariance_until_the_lane_is_followed_again() {
     let (mut tracker, gap) = tracker(60.0, 0.0, 0.1);
     assert_eq!(tracker.odometry(&sample(0)), OdometryVerdict::First);
     let lane_m2 = tracker.config().lane_keeping.stationary()[0];

@@ -337,13 +337,13 @@ fn angles_ahead_of_the_odometry_or_received_twice_are_rejected() {
     drive.live.angle(&angle).unwrap();
     let again = drive.live.angle(&angle);
     assert!(matches!(again, Err(LiveError::AngleRepeated { pci: 2 })));
-    drive.live.settle().unwrap();
+    drive.live.flush().unwrap();
     let again = drive.live.angle(&angle);
     assert!(matches!(again, Err(LiveError::AngleRepeated { pci: 2 })));
 }
 
 #[test]
-fn a_gap_of_all_messages_costs_the_odometry_error_of_the_way_driven() {
+fn a_gap_of_all_messages_adds_the_odometry_error_of_the_driven_distance() {
     for gap_s in [1.0, 8.0, 20.0] {
         let mut drive = Drive::new();
         assert!(drive.drive(10.0).is_empty());

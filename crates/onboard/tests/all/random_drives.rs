@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 
 use onboard::geometry::Pose;
 use onboard::localize::{
-    AngleMeasurement, AngleUpdate, History, MeasurementKind, UpdateReason, UpdateVerdict, built_in,
+    AngleMeasurement, AngleUpdate, MeasurementKind, OutOfSequenceBuffer, UpdateReason,
+    UpdateVerdict, built_in,
 };
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
@@ -37,12 +38,13 @@ fn drive(seed: u64) {
     let vehicle = format!(
         "name = \"any\"\ndrive = \"{kind}\"\n{guard}[odometer]\nnoise_m_per_sqrt_m = {noise:?}\n\
          [gyroscope]\nnoise_rad_per_sqrt_s = {yaw_noise:?}\nbias_std_radps = 0.01\n\
-         [array]\nposition_m = [0.2, 0.1, 0.5]\n[receiver]\nphase_bias_share = 0.5\n"
+         [array]\nposition_m = [0.2, 0.1, 0.5]\n[receiver]\ncorrelated_noise_fraction = 0.5\n"
     );
     let site = Site::from_toml(&site, "site", &Shipped).unwrap();
     let vehicle = Vehicle::from_toml(&vehicle, "vehicle", &Shipped).unwrap();
     let heads = RadioHead::heard(&site, &vehicle);
-    let mut localizer = History::new(built_in(&site, &vehicle, Pose::default()).unwrap());
+    let mut localizer =
+        OutOfSequenceBuffer::new(built_in(&site, &vehicle, Pose::default()).unwrap());
 
     let mut truth = Pose::default();
     let (mut distance_m, mut speed_mps, mut rate_radps) = (0.0, 0.0, 0.0);

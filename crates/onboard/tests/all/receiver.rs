@@ -103,7 +103,7 @@ impl Air {
 }
 
 #[test]
-fn a_beam_that_vanishes_costs_nothing_and_is_heard_again_when_it_returns() {
+fn a_beam_that_vanishes_and_returns_is_received_again() {
     let mut air = Air::new(SubcarrierSpacing::Khz30, 3.0, 8.0, 1);
     let mut receiver = air.receiver();
     let all: Vec<u8> = (0..8).collect();

@@ -34,7 +34,7 @@ noise_rad_per_sqrt_s = 0.02
 bias_std_radps = 0.002
 [integrity]
 [receiver]
-phase_bias_share = 0.25
+correlated_noise_fraction = 0.25
 ";
 
 /// Time from one odometry sample to the next (s).
@@ -154,7 +154,7 @@ fn a_wrong_start_is_noticed_and_left() {
 }
 
 #[test]
-fn who_has_begun_anew_is_searched_for_no_more() {
+fn no_search_runs_after_a_restart() {
     let mut drive = Drive::new(Pose::default());
     // At standstill, no result of a search is accepted.
     let mut lost_s = |seconds: f64| {

@@ -1,4 +1,4 @@
-//! Sites and vehicles as files: `like`, overrides, and rejected values.
+//! Sites and vehicles as files: `extends`, overrides, and rejected values.
 
 use onboard::receive::ReceiverConfig;
 use onboard::settings::{
@@ -54,9 +54,9 @@ fn refusal<T>(outcome: Result<T, SettingsError>) -> (String, String, String) {
 }
 
 #[test]
-fn a_file_is_like_another_but_for_its_own_keys() {
+fn a_file_extends_another_and_overrides_its_keys() {
     let carrier = Vehicle::from_library("carrier", &Shipped).unwrap();
-    let mine = vehicle("like = 'carrier'\nname = 'mine'\nodometer.scale = 1.01").unwrap();
+    let mine = vehicle("extends = 'carrier'\nname = 'mine'\nodometer.scale = 1.01").unwrap();
     assert_eq!((mine.name.as_str(), mine.odometer.scale), ("mine", 1.01));
     // A table's other keys are those of the file it is like.
     assert_eq!(mine.odometer.scale_std, carrier.odometer.scale_std);
@@ -65,72 +65,77 @@ fn a_file_is_like_another_but_for_its_own_keys() {
     again.odometer.scale = 1.0;
     assert_eq!(again, carrier);
     // The written file does not depend on others.
-    assert!(!mine.to_toml().contains("like ="));
+    assert!(!mine.to_toml().contains("extends ="));
     assert_eq!(vehicle(&mine.to_toml()).unwrap(), mine);
     // A list is replaced as a whole.
-    let moved = "like = 'trip-2'\n[[radio_heads]]\nposition_m = [10.0, 50.0, 8.0]";
+    let moved = "extends = 'trip-2'\n[[radio_heads]]\nposition_m = [10.0, 50.0, 8.0]";
     assert_eq!(site(moved).unwrap().radio_heads.len(), 1);
 }
 
 #[test]
-fn likes_lead_from_file_to_file_and_end() {
+fn chains_of_extends_are_resolved_and_loops_rejected() {
     let shelf = Shelf(&[
-        ("a", "like = 'b'\nname = 'a'\nodometer.scale = 1.02"),
+        ("a", "extends = 'b'\nname = 'a'\nodometer.scale = 1.02"),
         (
             "b",
-            "like = 'tugger'\nodometer = { scale = 1.01, scale_std = 0.2 }",
+            "extends = 'tugger'\nodometer = { scale = 1.01, scale_std = 0.2 }",
         ),
-        ("loop", "like = 'pool'"),
-        ("pool", "like = 'loop'"),
-        ("wrong", "like = 'b'\nodometer.skale = 1.0"),
+        ("loop", "extends = 'pool'"),
+        ("pool", "extends = 'loop'"),
+        ("wrong", "extends = 'b'\nodometer.skale = 1.0"),
     ]);
     let a = Vehicle::from_library("a", &shelf).unwrap();
     assert_eq!((a.odometer.scale, a.odometer.scale_std), (1.02, 0.2));
     assert!(matches!(a.wake_up, Some(WakeUpSettings::Uncertainty(_))));
 
     let (file, key, message) = refusal(Vehicle::from_library("loop", &shelf));
-    assert_eq!((file.as_str(), key.as_str()), ("loop", "like"));
+    assert_eq!((file.as_str(), key.as_str()), ("loop", "extends"));
     assert!(message.contains("at most 8 files"), "{message}");
     let (file, key, _) = refusal(Vehicle::from_library("wrong", &shelf));
     assert_eq!((file.as_str(), key.as_str()), ("wrong", "odometer.skale"));
-    let (_, key, message) = refusal(vehicle("like = 7"));
-    assert!(key == "like" && message.contains("the name of a file"));
-    let message = vehicle("like = 'carier'").unwrap_err().to_string();
+    let (_, key, message) = refusal(vehicle("extends = 7"));
+    assert!(key == "extends" && message.contains("the name of a file"));
+    let message = vehicle("extends = 'carier'").unwrap_err().to_string();
     assert!(message.contains("did you mean `carrier`?"), "{message}");
     // A site is not like a vehicle.
-    let message = site("like = 'carrier'").unwrap_err().to_string();
+    let message = site("extends = 'carrier'").unwrap_err().to_string();
     assert!(message.contains("no site `carrier`"), "{message}");
 }
 
 #[test]
-fn another_kind_takes_none_of_the_old_ones_keys() {
-    let fixed = vehicle("like = 'tugger'\n[wake_up]\npolicy = 'fixed'\ninterval_ms = 40").unwrap();
+fn a_changed_tag_removes_the_keys_of_the_previous_variant() {
+    let fixed =
+        vehicle("extends = 'tugger'\n[wake_up]\npolicy = 'fixed'\ninterval_ms = 40").unwrap();
     let Some(WakeUpSettings::Fixed(settings)) = fixed.wake_up else {
         panic!("{:?}", fixed.wake_up)
     };
     assert_eq!(settings.interval_ms, Some(40.0));
     // The keys remain with the same kind.
-    let tight = vehicle("like = 'tugger'\nwake_up = { policy = 'uncertainty', bound_m = 0.1 }");
+    let tight =
+        vehicle("extends = 'tugger'\nwake_up = { policy = 'uncertainty', target_error_m = 0.1 }");
     let Some(WakeUpSettings::Uncertainty(settings)) = tight.unwrap().wake_up else {
         panic!("the policy is uncertainty")
     };
-    assert_eq!((settings.bound_m, settings.least_gain_m2), (0.1, 1.5e-4));
+    assert_eq!(
+        (settings.target_error_m, settings.min_variance_reduction_m2),
+        (0.1, 1.5e-4)
+    );
     // And so does a table that names no kind.
-    let told = "like = 'paper'\nwake_up.snr_set_point = { kind = 'absolute', snr_db = 5.0 }";
+    let told = "extends = 'paper'\nwake_up.snr_set_point = { kind = 'absolute', snr_db = 5.0 }";
     assert!(matches!(
         vehicle(told).unwrap().wake_up,
         Some(WakeUpSettings::Gated(_))
     ));
-    let tracker = "like = 'paper'\nlocalizer.kind = 'tracker'";
+    let tracker = "extends = 'paper'\nlocalizer.kind = 'tracker'";
     let tracker = vehicle(tracker).unwrap().localizer;
     assert!(matches!(tracker, LocalizerSettings::Tracker(_)));
 }
 
 #[test]
-fn entries_of_a_list_are_laid_over_by_name_or_all_at_once() {
+fn entries_of_a_list_are_overridden_by_name_or_all_at_once() {
     let yard = Site::from_library("yard", &Shipped).unwrap();
     let surveyed = site(
-        "like = 'yard'\n[radio_heads]\nall = { position_std_m = 0.1, eirp_dbm = 3.0 }\n\
+        "extends = 'yard'\n[radio_heads]\nall = { position_std_m = 0.1, eirp_dbm = 3.0 }\n\
          gate.eirp_dbm = 20.0",
     )
     .unwrap();
@@ -141,13 +146,13 @@ fn entries_of_a_list_are_laid_over_by_name_or_all_at_once() {
         let eirp_dbm = if head.name == "gate" { 20.0 } else { 3.0 };
         assert_eq!(head.eirp_dbm, eirp_dbm);
     }
-    let (_, key, message) = refusal(site("like = 'yard'\nradio_heads.gaet.eirp_dbm = 3.0"));
+    let (_, key, message) = refusal(site("extends = 'yard'\nradio_heads.gaet.eirp_dbm = 3.0"));
     assert_eq!(key, "radio_heads.gaet");
     assert!(
         message.contains("named gate, hall, dock, store, or all"),
         "{message}"
     );
-    let (_, key, message) = refusal(site("like = 'yard'\nradio_heads.gate = 3.0"));
+    let (_, key, message) = refusal(site("extends = 'yard'\nradio_heads.gate = 3.0"));
     assert_eq!(key, "radio_heads.gate");
     assert!(message.contains("a table of the entry's keys"), "{message}");
 }
@@ -295,10 +300,10 @@ fn vehicle_files_are_checked() {
 }
 
 #[test]
-fn a_vehicle_hears_the_radio_heads_on_its_list() {
+fn a_vehicle_receives_only_the_radio_heads_on_its_list() {
     let trip = Site::from_library("trip-2", &Shipped).unwrap();
     let with = |list: &str| {
-        let list = format!("like = 'carrier'\nreceiver.pci_allow_list = {list}");
+        let list = format!("extends = 'carrier'\nreceiver.pci_allow_list = {list}");
         vehicle(&list).unwrap()
     };
     let check = Check { file: "both" };

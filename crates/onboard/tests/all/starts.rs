@@ -36,7 +36,7 @@ bias_std_radps = 0.002
 position_std_m = 0.3
 heading_std_rad = 0.05
 [receiver]
-phase_bias_share = 0.25
+correlated_noise_fraction = 0.25
 ";
 
 /// A place with radio heads, and a closed path in it: an oval of two straights and two half circles.

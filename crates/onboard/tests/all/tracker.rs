@@ -29,7 +29,7 @@ fn tracker() -> (Ekf, RadioHead) {
     };
     let mut config = EkfConfig::new(&site(), &vehicle);
     // A filter that estimates biases explains an outlier by a large one.
-    config.bias_probability = 0.0;
+    config.multipath_bias_probability = 0.0;
     let mut tracker = Ekf::new(config, Some(Arc::new(road())), &heads, &start);
     assert_eq!(tracker.odometry(&sample(0.0, 0.0)), OdometryVerdict::First);
     assert_eq!(
@@ -96,7 +96,7 @@ fn bad_angles_are_named_and_leave_the_state() {
 }
 
 #[test]
-fn an_angle_nobody_vouches_for_counts_as_far_as_it_is_likely() {
+fn an_unverified_angle_is_weighted_by_its_likelihood() {
     let sure = angle(0.12, 0.0, 0.01);
     let after = |off_rad: f64, resolved: bool| {
         let (mut tracker, head) = tracker();
@@ -206,7 +206,7 @@ fn a_gap_loses_time_and_a_jump_loses_certainty() {
 }
 
 #[test]
-fn a_transition_makes_of_a_covariance_what_driving_on_makes_of_it() {
+fn the_transition_matrix_propagates_a_covariance_as_the_filter_does() {
     let (tracker, _) = tracker();
     let belief = *tracker.belief();
     for way_m in [0.0, 0.2, 4.0, 30.0] {

@@ -1,6 +1,6 @@
 //! Observables of an SSB in addition to its angle.
 
-use nr_ssb::receiver::HeardSsb;
+use nr_ssb::receiver::TrackedSsb;
 use num_complex::Complex64;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -137,7 +137,7 @@ impl<'py> IntoPyObject<'py> for &Square {
 
 impl Observables {
     /// Returns the observables of a received SSB, if its carrier frequency is known.
-    pub fn of(ssb: &HeardSsb) -> Option<Self> {
+    pub fn of(ssb: &TrackedSsb) -> Option<Self> {
         let seen = ssb.observables?;
         Some(Self {
             first_path_start: seen.delay.first_path_start,

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use nr_ssb::receiver::{HeardSsb, Receiver as Core, ReceiverConfig, ReceiverError};
+use nr_ssb::receiver::{Receiver as Core, ReceiverConfig, ReceiverError, TrackedSsb};
 use num_complex::{Complex32, Complex64};
 use pyo3::prelude::*;
 use recording::scan::{ArrayView, array_view};
@@ -175,7 +175,7 @@ impl Receiver {
     fn hear(
         &self,
         py: Python<'_>,
-        call: impl FnOnce(&mut Core, &mut dyn FnMut(&HeardSsb)) -> PyResult<()> + Send,
+        call: impl FnOnce(&mut Core, &mut dyn FnMut(&TrackedSsb)) -> PyResult<()> + Send,
     ) -> PyResult<Vec<Py<Cell>>> {
         let cells = py.detach(|| {
             let mut receiver = self.core.lock().unwrap_or_else(PoisonError::into_inner);

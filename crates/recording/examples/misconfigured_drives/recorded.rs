@@ -14,7 +14,7 @@ use super::simulator::{Drive, Kind};
 const MRCLAM: &str = "drive = \"differential\"
 odometer = { scale_std = 0.08, noise_m_per_sqrt_m = 0.05 }
 gyroscope = { noise_rad_per_sqrt_s = 0.04, bias_std_radps = 0.005 }
-receiver = { lateness_s = 0.04 }
+receiver = { angle_time_offset_s = 0.04 }
 start = { position_std_m = 0.05, heading_std_rad = 0.05 }
 array = { mounting_std_rad = 0.02, mounting_rad = ";
 /// Data sheet of the robot of "lost in the woods".

@@ -29,7 +29,7 @@ noise_m_per_sqrt_m = 0.05
 noise_rad_per_sqrt_s = 0.04
 bias_std_radps = 0.005
 [receiver]
-lateness_s = 0.04
+angle_time_offset_s = 0.04
 [start]
 position_std_m = 0.05
 heading_std_rad = 0.05
@@ -141,7 +141,7 @@ impl Drive {
             "integrity",
             "localizer",
         ] {
-            // Environment variables add settings: RECEIVER="phase_bias_correlation_s = 2.0".
+            // Environment variables add settings: RECEIVER="noise_correlation_time_s = 2.0".
             let Ok(keys) = std::env::var(table.to_uppercase()) else {
                 continue;
             };
@@ -211,7 +211,7 @@ impl Drive {
             }
         }
         let share = |part: u32| 100.0 * f64::from(part) / f64::from(all.max(1));
-        let accepted = (located.executions.iter())
+        let accepted = (located.aoa_estimates.iter())
             .filter(|it| it.verdict.accepted)
             .count();
         let mut text = format!(
@@ -231,7 +231,10 @@ impl Drive {
             text,
             " nis {:4.2} ok {:5.1}% beyond {:5.2}% nees/2 {:6.2} heading {:6.2} taken {:5.1}% remarks {}",
             {
-                let seen = located.executions.iter().filter(|it| it.verdict.accepted);
+                let seen = located
+                    .aoa_estimates
+                    .iter()
+                    .filter(|it| it.verdict.accepted);
                 seen.filter_map(|it| it.verdict.mahalanobis_squared)
                     .sum::<f64>()
                     / accepted.max(1) as f64
@@ -240,7 +243,7 @@ impl Drive {
             share(beyond),
             nees / f64::from(all),
             nees_heading / f64::from(all),
-            100.0 * accepted as f64 / located.executions.len().max(1) as f64,
+            100.0 * accepted as f64 / located.aoa_estimates.len().max(1) as f64,
             located.remarks.len()
         );
         text

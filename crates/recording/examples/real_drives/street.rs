@@ -113,7 +113,7 @@ pub fn exact_and_real(folder: &Path) {
 pub fn ten_odometers(folder: &Path) {
     let road = fs::read_to_string(folder.join("road.toml")).unwrap();
     let road = road.replace("[track]", "\n[road]");
-    let demand = "[wake_up]\npolicy = \"uncertainty\"\nbound_m = 0.2\n";
+    let demand = "[wake_up]\npolicy = \"uncertainty\"\ntarget_error_m = 0.2\n";
     for (label, angles, more) in [
         ("every burst", "angles.csv", ""),
         ("every 2 m", "angles_every2m.csv", ""),
@@ -135,7 +135,7 @@ pub fn ten_odometers(folder: &Path) {
                 let vehicle = format!("{STREET}{more}");
                 let located = drive.locate(&vehicle, drive.start, false);
                 rms_m.push(drive.rms_m(&located.poses, f64::NEG_INFINITY, f64::INFINITY));
-                heard += located.executions.len();
+                heard += located.aoa_estimates.len();
                 poses.extend_from_slice(&located.poses);
                 for pose in &located.poses {
                     let Some(truth) = drive.true_pose(pose.estimate.time_s) else {

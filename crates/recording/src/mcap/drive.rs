@@ -11,7 +11,7 @@ use super::writer::{DiagnosticLevel, DiagnosticStatus, Frames, McapWriter, Twist
 use crate::error::RecordingError;
 use crate::file::Partial;
 use crate::replay::{LocatedDrive, LocatedPose, Remark};
-use onboard::Execution;
+use onboard::AngleResult;
 use onboard::localize::IntegrityState;
 
 /// Topic of the poses.
@@ -43,16 +43,16 @@ pub fn write_drive_mcap(file: &Path, drive: &LocatedDrive) -> Result<(), Recordi
 
 fn write(file: BufWriter<File>, drive: &LocatedDrive) -> Result<(), McapError> {
     let mut writer = McapWriter::new(file)?;
-    let mut executions = drive.executions.iter().peekable();
-    let mut lately: Vec<&Execution> = Vec::new();
+    let mut aoa_estimates = drive.aoa_estimates.iter().peekable();
+    let mut lately: Vec<&AngleResult> = Vec::new();
     let mut remarks = drive.remarks.as_slice();
     let mut diagnosed_s = f64::NEG_INFINITY;
     let mut smoothed = drive.smoothed.iter().peekable();
     for pose in &drive.poses {
         let time_s = pose.estimate.time_s;
-        while let Some(execution) = executions.next_if(|it| it.ssb.time_s <= time_s) {
-            writer.verdict(VERDICT_TOPIC, execution)?;
-            lately.push(execution);
+        while let Some(angle_result) = aoa_estimates.next_if(|it| it.ssb.time_s <= time_s) {
+            writer.verdict(VERDICT_TOPIC, angle_result)?;
+            lately.push(angle_result);
         }
         if pose.searching.is_none() {
             writer.odometry(POSE_TOPIC, Frames::MAP, &pose.estimate, &twist(pose))?;
@@ -69,8 +69,8 @@ fn write(file: BufWriter<File>, drive: &LocatedDrive) -> Result<(), McapError> {
             lately.clear();
         }
     }
-    for execution in executions {
-        writer.verdict(VERDICT_TOPIC, execution)?;
+    for angle_result in aoa_estimates {
+        writer.verdict(VERDICT_TOPIC, angle_result)?;
     }
     if let (Some(last), [_, ..]) = (drive.poses.last(), remarks) {
         writer.diagnostics(last.estimate.time_s, &[input(remarks)])?;
@@ -107,10 +107,10 @@ fn input(remarks: &[Remark]) -> DiagnosticStatus {
     }
 }
 
-fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
+fn diagnosis(pose: &LocatedPose, lately: &[&AngleResult]) -> DiagnosticStatus {
     let accepted = lately
         .iter()
-        .filter(|execution| execution.verdict.accepted)
+        .filter(|angle_result| angle_result.verdict.accepted)
         .count();
     let state = pose.estimate.integrity.map(|integrity| integrity.state);
     let (level, message) = match (accepted, lately.len()) {
@@ -134,7 +134,10 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
         (few, all) if 2 * few < all => (DiagnosticLevel::Warn, "most angles rejected"),
         _ => (DiagnosticLevel::Ok, "angles accepted"),
     };
-    let mut cells: Vec<u16> = lately.iter().map(|execution| execution.ssb.pci).collect();
+    let mut cells: Vec<u16> = lately
+        .iter()
+        .map(|angle_result| angle_result.ssb.pci)
+        .collect();
     cells.sort_unstable();
     cells.dedup();
     let mut values = vec![
@@ -158,9 +161,9 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
         values.push(("hypotheses".to_owned(), hypotheses.to_string()));
     }
     let mut refused = BTreeMap::new();
-    for execution in lately.iter().filter(|it| !it.verdict.accepted) {
+    for angle_result in lately.iter().filter(|it| !it.verdict.accepted) {
         *refused
-            .entry(execution.verdict.reason.name())
+            .entry(angle_result.verdict.reason.name())
             .or_insert(0u32) += 1;
     }
     values.extend(

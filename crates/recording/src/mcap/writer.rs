@@ -9,7 +9,7 @@ use mcap::{Compression, McapError, WriteOptions, Writer};
 
 use super::cdr::Encoder;
 use super::schema::{DIAGNOSTICS, ODOMETRY, Schema, TRANSFORMS, UNOBSERVED, VERDICT};
-use onboard::Execution;
+use onboard::AngleResult;
 use onboard::geometry::{Pose, wrap_angle};
 use onboard::localize::PoseEstimate;
 
@@ -211,9 +211,9 @@ impl<W: Write + Seek> McapWriter<W> {
     ///
     /// # Errors
     /// [`McapError`] if the message cannot be written.
-    pub fn verdict(&mut self, topic: &str, execution: &Execution) -> Result<(), McapError> {
-        let (ssb, verdict) = (&execution.ssb, &execution.verdict);
-        let measured = execution.measured.as_ref();
+    pub fn verdict(&mut self, topic: &str, angle_result: &AngleResult) -> Result<(), McapError> {
+        let (ssb, verdict) = (&angle_result.ssb, &angle_result.verdict);
+        let measured = angle_result.measured.as_ref();
         header(&mut self.message, ssb.time_s, "base_link")
             .u16(ssb.pci)
             .u8(ssb.ssb_index)
@@ -224,7 +224,7 @@ impl<W: Write + Seek> McapWriter<W> {
             .f64(ssb.snr_db)
             .f64(verdict.mahalanobis_squared.unwrap_or(f64::NAN))
             .f64(verdict.threshold.unwrap_or(f64::NAN))
-            .f64(execution.wake_up_time_s)
+            .f64(angle_result.wake_up_time_s)
             .u8(u8::from(measured.is_some_and(|it| it.resolved)))
             .u8(u8::from(measured.is_some_and(|it| it.kind.is_at_head())));
         self.write(topic, &VERDICT, ssb.time_s)

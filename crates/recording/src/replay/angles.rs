@@ -83,8 +83,8 @@ pub fn scatter_sigma_rad(site: &Site, vehicle: &Vehicle) -> f64 {
 /// errors of the array are not included, because the localizer models them.
 pub fn all_of_error(site: &Site, vehicle: &Vehicle) -> Vehicle {
     let mut vehicle = vehicle.clone();
-    vehicle.receiver.phase_bias_share = Some(1.0);
-    vehicle.receiver.phase_bias_correlation_m = 0.5 * site.wavelength_m();
-    vehicle.receiver.phase_bias_correlation_s = 1e-3; // correlation depends on distance only
+    vehicle.receiver.correlated_noise_fraction = Some(1.0);
+    vehicle.receiver.noise_correlation_distance_m = 0.5 * site.wavelength_m();
+    vehicle.receiver.noise_correlation_time_s = 1e-3; // correlation depends on distance only
     vehicle
 }

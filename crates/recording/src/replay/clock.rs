@@ -30,7 +30,7 @@ const FINEST_S: f64 = 0.005;
 const ASIDE_S: f64 = 0.1;
 
 /// Minimum time offset that is corrected (s), 0.04 m at walking pace.
-pub const LEAST_LATENESS_S: f64 = 0.03;
+pub const MIN_ANGLE_TIME_OFFSET_S: f64 = 0.03;
 
 /// Standard deviation of the start position (m), estimated together with the time offset because
 /// both are confounded on a straight road.
@@ -63,7 +63,7 @@ const DOUBTED_STD_S: f64 = 0.1;
 /// Time offset of the angles according to the odometry's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::struct_field_names, reason = "every name ends with its unit")]
-pub struct Lateness {
+pub struct AngleTimeOffset {
     /// Estimated time offset (s).
     pub found_s: f64,
     /// Standard deviation of the remaining offset, which the localizer's filter estimates (s).
@@ -79,10 +79,10 @@ pub struct Lateness {
 ///
 /// # Errors
 /// [`ReplayError::Settings`] if the road cannot be built.
-pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
+pub fn angle_time_offset(given: &Drive<'_>) -> Result<Option<AngleTimeOffset>, ReplayError> {
     let vehicle = &given.vehicle;
     let is_tracker = matches!(vehicle.localizer, LocalizerSettings::Tracker(_));
-    let is_stated = vehicle.receiver.lateness_std_s.is_some();
+    let is_stated = vehicle.receiver.angle_time_offset_std_s.is_some();
     if !is_tracker || !vehicle.start.known || is_stated {
         return Ok(None);
     }
@@ -93,10 +93,10 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
         .to_mut()
         .retain(|it| it.measured.time_s - first_s < SPAN_S);
     let config = EkfConfig::new(&given.site, vehicle);
-    let filter_std_s = config.lateness_std_s;
+    let filter_std_s = config.angle_time_offset_std_s;
     let scale_std = config.odometer_scale_std;
     // The offset is searched for, so that it must not be a filter state as well.
-    given.vehicle.to_mut().receiver.lateness_std_s = Some(0.0);
+    given.vehicle.to_mut().receiver.angle_time_offset_std_s = Some(0.0);
     let start = &mut given.vehicle.to_mut().start;
     start.position_std_m = start.position_std_m.max(DOUBTED_START_STD_M);
     start.heading_std_rad = start.heading_std_rad.max(DOUBTED_HEADING_STD_RAD);
@@ -104,7 +104,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     odometer.scale_std = DOUBTED_SCALE_STDS * scale_std;
     let of = |late_s: f64| {
         let mut meant = given.clone();
-        meant.vehicle.to_mut().receiver.lateness_s += late_s;
+        meant.vehicle.to_mut().receiver.angle_time_offset_s += late_s;
         screened(&meant)
     };
     let log_likelihood =
@@ -122,7 +122,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     }
     let around_s = [best.0 - GRID_S, best.0 + GRID_S];
     let found_s = highest(around_s, &mut likelihood)?;
-    if found_s.abs() < LEAST_LATENESS_S {
+    if found_s.abs() < MIN_ANGLE_TIME_OFFSET_S {
         return Ok(None);
     }
     let Some(at_best) = of(found_s)?.filter(is_understood) else {
@@ -134,7 +134,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
         return Ok(None);
     }
     if log_odds < CORRECTION_LOG_ODDS {
-        return Ok(Some(Lateness {
+        return Ok(Some(AngleTimeOffset {
             found_s: 0.0,
             left_std_s: DOUBTED_STD_S.max(filter_std_s),
             candidate_s: found_s,
@@ -144,7 +144,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     let curvature = (2.0 * at_best - beside) / (ASIDE_S * ASIDE_S);
     // The standard deviation is limited to the spacing of the search grid.
     let left_std_s = curvature.max(0.0).sqrt().recip().min(GRID_S);
-    Ok(Some(Lateness {
+    Ok(Some(AngleTimeOffset {
         found_s,
         left_std_s,
         candidate_s: found_s,

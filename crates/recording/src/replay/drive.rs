@@ -1,6 +1,6 @@
 //! Replay of a drive.
 
-use onboard::burst::{Burst, OfSsb, first_burst};
+use onboard::burst::{Burst, HasSsb, first_burst};
 use onboard::geometry::Pose;
 use onboard::localize::OdometryVerdict;
 use onboard::localize::Recovered;
@@ -8,9 +8,9 @@ use onboard::localize::ekf::EstimatedConstants;
 use onboard::monitor::ActiveFaults;
 use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
-use onboard::{Custom, Execution, Onboard};
+use onboard::{AngleResult, Custom, Pipeline};
 
-use super::clock::LEAST_LATENESS_S;
+use super::clock::MIN_ANGLE_TIME_OFFSET_S;
 use super::error::ReplayError;
 use super::located::{Diagnosis, LocatedDrive, LocatedPose, LocatedRange, Remark, gathered};
 use crate::library::load;
@@ -37,7 +37,7 @@ pub(super) fn check_odometry(odometry: &OdometryLog) -> Result<(), ReplayError> 
 
 /// Drive that is being located.
 pub struct Replay<'a> {
-    onboard: Onboard,
+    onboard: Pipeline,
     odometry: std::iter::Peekable<std::slice::Iter<'a, OdometrySample>>,
     ranges: &'a [LoggedRange],
     drive: LocatedDrive,
@@ -69,7 +69,7 @@ impl<'a> Replay<'a> {
     ) -> Result<Self, ReplayError> {
         check_odometry(odometry)?;
         let platform: Platform = load(&vehicle.platform.name)?;
-        let onboard = Onboard::new(site, vehicle, &platform, start, custom)?;
+        let onboard = Pipeline::new(site, vehicle, &platform, start, custom)?;
         Ok(Self {
             onboard,
             was_lost: false,
@@ -95,8 +95,8 @@ impl<'a> Replay<'a> {
     }
 
     /// Sets the time offset (s) that was already subtracted from the angles' times.
-    pub const fn set_back(&mut self, lateness_s: f64) {
-        self.set_back_s = lateness_s;
+    pub const fn set_back(&mut self, angle_time_offset_s: f64) {
+        self.set_back_s = angle_time_offset_s;
     }
 
     /// Adds ranges in order of time, which are processed between the odometry samples.
@@ -123,15 +123,17 @@ impl<'a> Replay<'a> {
     ///
     /// # Errors
     /// [`ReplayError::Custom`].
-    pub fn hear<T: OfSsb>(&mut self, mut ssbs: &[T]) -> Result<(), ReplayError> {
+    pub fn hear<T: HasSsb>(&mut self, mut ssbs: &[T]) -> Result<(), ReplayError> {
         while !ssbs.is_empty() {
             let (burst, later) = ssbs.split_at(first_burst(ssbs));
             let time_s = burst.first().map_or(f64::NAN, |first| first.ssb().time_s);
             self.odometry_until(time_s)?;
             let mut source = Burst(burst);
-            let heard = self.onboard.hear(time_s, &mut source);
+            let heard = self.onboard.process_burst(time_s, &mut source);
             let heard = heard.map_err(ReplayError::Custom)?;
-            self.drive.executions.extend_from_slice(heard.executions);
+            self.drive
+                .aoa_estimates
+                .extend_from_slice(heard.aoa_estimates);
             self.remark_on_loss(time_s);
             self.remark_on_faults(time_s);
             ssbs = later;
@@ -154,7 +156,7 @@ impl<'a> Replay<'a> {
             .map_or(0.0, |last| last.estimate.time_s);
         let EstimatedConstants {
             odometer_scale,
-            lateness_s,
+            angle_time_offset_s,
             mounting_rad,
             ..
         } = constants;
@@ -172,13 +174,13 @@ impl<'a> Replay<'a> {
             );
             self.remark(time_s, text);
         }
-        if lateness_s.is_remarkable(LEAST_LATENESS_S) {
+        if angle_time_offset_s.is_remarkable(MIN_ANGLE_TIME_OFFSET_S) {
             let text = format!(
                 "angles are {:.0} ± {:.0} ms later than stated, by the odometry's clock, and are \
-                 taken as that; check the clocks, receiver.lateness_s, and whether the odometry is \
+                 taken as that; check the clocks, receiver.angle_time_offset_s, and whether the odometry is \
                  of commands",
-                1e3 * (lateness_s.found - lateness_s.stated),
-                1e3 * lateness_s.std
+                1e3 * (angle_time_offset_s.found - angle_time_offset_s.stated),
+                1e3 * angle_time_offset_s.std
             );
             self.remark(time_s, text);
         }
@@ -266,7 +268,7 @@ impl<'a> Replay<'a> {
         self.odometry_until(f64::INFINITY)?;
         self.drive.constants = self.onboard.constants();
         if let Some(constants) = &mut self.drive.constants {
-            constants.lateness_s.found += self.set_back_s;
+            constants.angle_time_offset_s.found += self.set_back_s;
         }
         self.remark_on_constants();
         self.diagnose_faults();
@@ -303,8 +305,8 @@ impl<'a> Replay<'a> {
     }
 
     /// Angles so far, each with its result (used or rejected).
-    pub fn executions(&self) -> &[Execution] {
-        &self.drive.executions
+    pub fn aoa_estimates(&self) -> &[AngleResult] {
+        &self.drive.aoa_estimates
     }
 
     /// Located drive so far.

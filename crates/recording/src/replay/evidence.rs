@@ -8,7 +8,7 @@ use onboard::localize::Localizer;
 
 use super::error::ReplayError;
 use super::hypotheses::Drive;
-use super::innovations::{Met, Step, plain_filter, replay_angles};
+use super::innovations::{InnovationRecord, Step, plain_filter, replay_angles};
 use super::stated::with_phase;
 use crate::angle_log::LoggedAngle;
 
@@ -92,7 +92,7 @@ impl Evidence {
             evidence.log_likelihood += log_likelihood(met.as_ref(), sigma_rad);
             let relative = met.as_ref().map(|it| it.relative_log_likelihood);
             evidence.relative_log_likelihood += relative.unwrap_or(UNUSABLE);
-            let misfits = |met: &Met| met.innovation.mahalanobis2() > FITS;
+            let misfits = |met: &InnovationRecord| met.innovation.mahalanobis2() > FITS;
             let head = evidence.heads.entry(head_of(logged)).or_default();
             for count in [&mut evidence.all, head] {
                 count.angles += 1;
@@ -100,20 +100,20 @@ impl Evidence {
                 count.misfits += usize::from(met.as_ref().is_none_or(misfits));
             }
         }
-        evidence.log_likelihood *= independent_share(angles);
+        evidence.log_likelihood *= information_fraction(angles);
         Ok(Some(evidence))
     }
 }
 
 /// Returns the log-likelihood of an angle in units of its standard deviation, so that it does not
 /// depend on the unit of the angle.
-fn log_likelihood(met: Option<&Met>, sigma_rad: f64) -> f64 {
+fn log_likelihood(met: Option<&InnovationRecord>, sigma_rad: f64) -> f64 {
     let density = met.map_or(0.0, |met| met.innovation.density());
     (sigma_rad * with_outliers(density, OUTLIERS)).ln()
 }
 
 /// Returns the fraction of the angles that count as independent.
-fn independent_share(angles: &[LoggedAngle]) -> f64 {
+fn information_fraction(angles: &[LoggedAngle]) -> f64 {
     let apart = |it: &LoggedAngle| {
         let time = (it.measured.time_s / INDEPENDENT_S).floor() as i64;
         (head_of(it), time)

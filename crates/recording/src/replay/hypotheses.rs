@@ -230,7 +230,7 @@ pub fn robot() -> Hypothesis {
             "drive in the vehicle's file: drive = \"differential\"",
             Correction::Vehicle(|vehicle| {
                 vehicle.drive = DriveKind::Differential;
-                vehicle.receiver.phase_bias_probability = Some(0.0); // default of a differential drive
+                vehicle.receiver.multipath_bias_probability = Some(0.0); // default of a differential drive
             }),
         )
     }

@@ -16,7 +16,7 @@ use crate::odometry::OdometryLog;
 
 /// Innovation of an angle in the localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Met {
+pub struct InnovationRecord {
     /// Innovation of the electrical angle (rad).
     pub innovation: Innovation,
     /// Log-likelihood relative to an angle that is predicted exactly; see [`Ekf::relative_log_likelihood`].
@@ -29,7 +29,7 @@ pub struct Met {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Step {
     pub pose: Option<Pose>,
-    pub met: Option<Met>,
+    pub met: Option<InnovationRecord>,
 }
 
 /// Processes a drive with a filter without search and integrity monitoring, and returns its
@@ -47,7 +47,7 @@ pub fn innovations(
     odometry: &OdometryLog,
     angles: &[LoggedAngle],
     used: Option<&[bool]>,
-) -> Result<Vec<Option<Met>>, ReplayError> {
+) -> Result<Vec<Option<InnovationRecord>>, ReplayError> {
     let mut ekf = plain_filter(site, vehicle)?;
     if used.is_some() {
         ekf.set_gate(f64::INFINITY);
@@ -69,7 +69,7 @@ pub fn plain_filter(site: &Site, vehicle: &Vehicle) -> Result<Ekf, ReplayError> 
     let heads = RadioHead::heard(site, vehicle);
     let road = site.build_road()?.filter(|_| vehicle.follows_road());
     let mut config = EkfConfig::new(site, vehicle);
-    config.phase_bias.is_found = false;
+    config.correlated_noise.is_found = false;
     Ok(Ekf::new(config, road.map(Arc::new), &heads, &start))
 }
 
@@ -118,7 +118,7 @@ pub fn replay_angles(
     let (mut lost, mut steps) = (0, Vec::with_capacity(angles.len()));
     for (index, logged) in angles.iter().enumerate() {
         let mut measured = with_phase(logged, &measurand).measured;
-        measured.time_s -= vehicle.receiver.lateness_s;
+        measured.time_s -= vehicle.receiver.angle_time_offset_s;
         while let Some(sample) = odometry.next_if(|sample| sample.time_s <= measured.time_s) {
             localizer.odometry(sample).map_err(ReplayError::Custom)?;
         }
@@ -138,7 +138,7 @@ pub fn replay_angles(
                 && (localizer.update(head, &measured))
                     .map_err(ReplayError::Custom)?
                     .accepted;
-            step.met = innovation.map(|(innovation, relative_log_likelihood)| Met {
+            step.met = innovation.map(|(innovation, relative_log_likelihood)| InnovationRecord {
                 innovation,
                 relative_log_likelihood,
                 used: accepted,

@@ -9,9 +9,9 @@ use onboard::localize::ekf::EkfConfig;
 use onboard::observation::SensedSsb;
 use onboard::receive::ReceiverConfig;
 use onboard::settings::{IntegritySettings, Site, Vehicle, WakeUpSettings};
-use onboard::{Custom, Execution};
+use onboard::{AngleResult, Custom};
 
-use super::clock::{LEAST_LATENESS_S, Lateness, earlier, lateness};
+use super::clock::{AngleTimeOffset, MIN_ANGLE_TIME_OFFSET_S, angle_time_offset, earlier};
 use super::data_quality::warnings;
 use super::diagnosis::diagnose;
 use super::drive::{Replay, check_odometry};
@@ -47,14 +47,14 @@ pub fn locate_angles(
     check_times(odometry, &angles.angles)?;
     let measurand = vehicle.array.measurand();
     let mut logged = Cow::Borrowed(angles.angles.as_slice());
-    let mut late = lateness(&as_given(site, &vehicle, odometry, &logged))?;
+    let mut late = angle_time_offset(&as_given(site, &vehicle, odometry, &logged))?;
     if let Some(found) = &mut late {
         let angles: Vec<LoggedAngle> = logged.iter().map(|it| with_phase(it, &measurand)).collect();
         *found = resolved(*found, site, &vehicle, start, odometry, &angles)?;
     }
     if let Some(late) = late {
         logged = Cow::Owned(earlier(&logged, late.found_s));
-        vehicle.receiver.lateness_std_s = Some(late.left_std_s);
+        vehicle.receiver.angle_time_offset_std_s = Some(late.left_std_s);
     }
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     if let Some(late) = late {
@@ -113,12 +113,16 @@ pub fn locate_recording(
     if heard_s.is_none() {
         return Err(ReplayError::NoSsb { file });
     }
-    let mut heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
+    let mut heard: Vec<LoggedAngle> = replay
+        .aoa_estimates()
+        .iter()
+        .filter_map(as_logged)
+        .collect();
     let mut heard_by = in_time(&vehicle);
     let mut late = if defines_times(recording) {
         None
     } else {
-        lateness(&as_given(site, &heard_by, odometry, &heard))?
+        angle_time_offset(&as_given(site, &heard_by, odometry, &heard))?
     };
     if let Some(found) = &mut late {
         let chosen = as_chosen(&heard_by);
@@ -126,7 +130,7 @@ pub fn locate_recording(
     }
     if let Some(late) = late {
         heard = earlier(&heard, late.found_s);
-        vehicle.receiver.lateness_std_s = Some(late.left_std_s);
+        vehicle.receiver.angle_time_offset_std_s = Some(late.left_std_s);
         heard_by = in_time(&vehicle);
         let chosen = as_chosen(&heard_by);
         replay = Replay::new(site, &chosen, start, Custom::default(), odometry)?;
@@ -153,27 +157,27 @@ pub fn locate_recording(
 /// drive. A significant estimate is corrected from the start of the drive, and its variance
 /// remains.
 fn resolved(
-    late: Lateness,
+    late: AngleTimeOffset,
     site: &Site,
     vehicle: &Vehicle,
     start: Pose,
     odometry: &OdometryLog,
     angles: &[LoggedAngle],
-) -> Result<Lateness, ReplayError> {
+) -> Result<AngleTimeOffset, ReplayError> {
     if late.found_s != 0.0 {
         return Ok(late);
     }
     let mut vehicle = vehicle.clone();
     // The prior includes the candidate of the search, so that it does not bias the estimate.
-    vehicle.receiver.lateness_std_s = Some(late.left_std_s.max(late.candidate_s.abs()));
+    vehicle.receiver.angle_time_offset_std_s = Some(late.left_std_s.max(late.candidate_s.abs()));
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     replay.hear(angles)?;
     let drive = replay.finish()?;
     let is_suspect = drive.suspicions().next().is_some();
-    let estimate = drive.constants.map(|it| it.lateness_s);
+    let estimate = drive.constants.map(|it| it.angle_time_offset_s);
     Ok(estimate
-        .filter(|it| !is_suspect && it.is_remarkable(LEAST_LATENESS_S))
-        .map_or(late, |it| Lateness {
+        .filter(|it| !is_suspect && it.is_remarkable(MIN_ANGLE_TIME_OFFSET_S))
+        .map_or(late, |it| AngleTimeOffset {
             found_s: it.found - it.stated,
             left_std_s: it.std,
             ..late
@@ -220,11 +224,11 @@ fn as_given<'a>(
 
 /// Converts the measurement of an execution to a logged angle; the time offset is already
 /// corrected.
-fn as_logged(execution: &Execution) -> Option<LoggedAngle> {
-    let measured = execution.measured?;
+fn as_logged(angle_result: &AngleResult) -> Option<LoggedAngle> {
+    let measured = angle_result.measured?;
     let ssb = SensedSsb {
         time_s: measured.time_s,
-        ..execution.ssb
+        ..angle_result.ssb
     };
     Some(LoggedAngle { ssb, measured })
 }
@@ -241,7 +245,7 @@ fn as_chosen(vehicle: &Vehicle) -> Vehicle {
 /// Returns the vehicle without a time offset, because it is already corrected.
 fn in_time(vehicle: &Vehicle) -> Vehicle {
     let mut vehicle = vehicle.clone();
-    vehicle.receiver.lateness_s = 0.0;
+    vehicle.receiver.angle_time_offset_s = 0.0;
     vehicle
 }
 
@@ -255,7 +259,7 @@ fn finish(
 ) -> Result<LocatedDrive, ReplayError> {
     let mut drive = replay.finish()?;
     if smooth {
-        drive.smoothed = look_back(site, vehicle, start, odometry, &drive.executions)?;
+        drive.smoothed = look_back(site, vehicle, start, odometry, &drive.aoa_estimates)?;
     }
     Ok(drive)
 }
@@ -267,29 +271,29 @@ fn look_back(
     vehicle: &Vehicle,
     start: Pose,
     odometry: &OdometryLog,
-    executions: &[Execution],
+    aoa_estimates: &[AngleResult],
 ) -> Result<Vec<LocatedPose>, ReplayError> {
     let mut unguarded = Vehicle {
         integrity: Some(IntegritySettings::off()),
         ..as_chosen(&in_time(vehicle))
     };
     // The smoothed filter estimates a bias if the monitored one did.
-    let bias_probability = EkfConfig::new(site, vehicle).bias_probability;
-    unguarded.receiver.phase_bias_probability = Some(bias_probability);
+    let multipath_bias_probability = EkfConfig::new(site, vehicle).multipath_bias_probability;
+    unguarded.receiver.multipath_bias_probability = Some(multipath_bias_probability);
     let mut mistrusted_until_s = BTreeMap::new();
-    for execution in executions {
-        if execution.verdict.reason == UpdateReason::Excluded {
-            let ssb = &execution.ssb;
+    for angle_result in aoa_estimates {
+        if angle_result.verdict.reason == UpdateReason::Excluded {
+            let ssb = &angle_result.ssb;
             mistrusted_until_s.insert((ssb.pci, ssb.ssb_index), ssb.time_s);
         }
     }
-    let trusted = |execution: &&Execution| {
-        let ssb = execution.ssb;
+    let trusted = |angle_result: &&AngleResult| {
+        let ssb = angle_result.ssb;
         let until_s = mistrusted_until_s.get(&(ssb.pci, ssb.ssb_index));
         until_s.is_none_or(|until_s| ssb.time_s > *until_s)
     };
-    let executions = executions.iter().filter(trusted);
-    let mut angles: Vec<LoggedAngle> = executions.filter_map(as_logged).collect();
+    let aoa_estimates = aoa_estimates.iter().filter(trusted);
+    let mut angles: Vec<LoggedAngle> = aoa_estimates.filter_map(as_logged).collect();
     // With all data available, no angle is late.
     angles.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));
     let mut replay = Replay::new(site, &unguarded, start, Custom::default(), odometry)?;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-use onboard::Execution;
+use onboard::AngleResult;
 use onboard::localize::ekf::EstimatedConstants;
 use onboard::localize::{PoseEstimate, UpdateVerdict};
 
@@ -80,7 +80,7 @@ pub struct LocatedDrive {
     /// One pose per odometry sample.
     pub poses: Vec<LocatedPose>,
     /// Results of the angles.
-    pub executions: Vec<Execution>,
+    pub aoa_estimates: Vec<AngleResult>,
     /// Results of the ranges.
     pub ranges: Vec<LocatedRange>,
     /// Smoothed poses from the first known one; empty unless requested.

@@ -25,7 +25,7 @@ struct Stretch {
 
 /// Missing samples that the recording does not report, detected from the times of the SSBs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct UntoldGap {
+pub struct InferredGap {
     /// Time of the first SSB after the gap in seconds; this and all later times are corrected.
     pub before_s: f64,
     /// Duration of the gap in seconds, modulo the SSB period.
@@ -43,7 +43,7 @@ pub fn receive_recording(
     recording: &mut Recording,
     start_time_s: f64,
     mut take: impl FnMut(&[SsbObservation]) -> Result<(), ReplayError>,
-) -> Result<Vec<UntoldGap>, ReplayError> {
+) -> Result<Vec<InferredGap>, ReplayError> {
     let file = recording.data_file().display().to_string();
     let failed = |error| match error {
         LiveError::Receive(ReceiveError::Ssb(ReceiverError::FrontEnd(source))) => {
@@ -73,7 +73,7 @@ pub fn receive_recording(
     let mut stream = SampleStream::new(stream, config).map_err(&failed)?;
     let block = ((BLOCK_S * rate_hz) as u64).max(1);
     let mut raw = Vec::new();
-    let (mut gaps, mut untold_s) = (Vec::new(), 0.0);
+    let (mut gaps, mut unreported_gap_s) = (Vec::new(), 0.0);
     let mut hear = |stream: &mut SampleStream| {
         while let Some(first) = stream.burst().first() {
             let before_s = first.ssb.time_s;
@@ -81,10 +81,10 @@ pub fn receive_recording(
             take(burst)?;
             let number = burst.len();
             stream.forget(number);
-            let lost_s = stream.counts().untold_s - untold_s;
+            let lost_s = stream.counts().unreported_gap_s - unreported_gap_s;
             if lost_s > 0.0 {
-                gaps.push(UntoldGap { before_s, lost_s });
-                untold_s += lost_s;
+                gaps.push(InferredGap { before_s, lost_s });
+                unreported_gap_s += lost_s;
             }
         }
         Ok::<(), ReplayError>(())

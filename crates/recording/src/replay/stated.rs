@@ -31,10 +31,13 @@ pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
     let receiver = &mut vehicle.receiver;
     // Angles of a differential drive with reflections resemble those of a lost drive, so that the
     // two would be confused.
-    let is_unstated = receiver.phase_bias_share.is_none() && receiver.phase_bias_std_rad == 0.0;
+    let is_unstated =
+        receiver.correlated_noise_fraction.is_none() && receiver.correlated_noise_std_rad == 0.0;
     let may_be_found = is_unstated && vehicle.drive == DriveKind::Road;
-    (receiver.phase_bias_probability).get_or_insert(if may_be_found { UNKNOWN } else { 0.0 });
-    receiver.phase_bias_share.get_or_insert(USUAL_SHARE);
+    (receiver.multipath_bias_probability).get_or_insert(if may_be_found { UNKNOWN } else { 0.0 });
+    receiver
+        .correlated_noise_fraction
+        .get_or_insert(USUAL_SHARE);
     (site, vehicle)
 }
 

@@ -8,7 +8,7 @@ use std::path::Path;
 use mcap::{Compression, MessageStream, WriteOptions};
 use proptest::prelude::*;
 
-use onboard::Execution;
+use onboard::AngleResult;
 use onboard::geometry::Pose;
 use onboard::localize::{
     AngleMeasurement, MeasurementKind, PoseEstimate, UpdateReason, UpdateVerdict,
@@ -134,7 +134,7 @@ fn odometry_csv_of_any_kind_is_read() {
 }
 
 #[test]
-fn what_a_csv_names_is_said_where_it_is_not_enough() {
+fn missing_csv_columns_are_reported_with_those_found() {
     let file = common::scratch("odometry-named").join("odo.csv");
     for (text, said) in [
         (
@@ -367,7 +367,7 @@ fn angles_are_read_from_the_verdicts_of_mcap_and_those_without_an_angle_passed_o
             snr_db: 12.5,
             resolved: resolved == Some(true),
         });
-        Execution {
+        AngleResult {
             ssb,
             measured,
             verdict: UpdateVerdict::unused(UpdateReason::Outlier),
@@ -380,8 +380,8 @@ fn angles_are_read_from_the_verdicts_of_mcap_and_those_without_an_angle_passed_o
         verdict(1.54, Some((-0.5, false))),
     ];
     let mut writer = McapWriter::compressed(File::create(&file).unwrap()).unwrap();
-    for execution in &told {
-        writer.verdict("/access_av/verdicts", execution).unwrap();
+    for angle_result in &told {
+        writer.verdict("/access_av/verdicts", angle_result).unwrap();
     }
     writer.finish().unwrap();
     for read in [

@@ -155,11 +155,7 @@ fn faults_of(spoil: impl FnOnce(&mut Vec<Vec<Complex32>>)) -> Vec<ChannelFault> 
     let mut antennas = half_frame(1.4, 2);
     spoil(&mut antennas);
     let found = scan(&mut block(&antennas), &known()).unwrap();
-    assert_eq!(
-        found.ssbs.len(),
-        1,
-        "the other channels receive the cell"
-    );
+    assert_eq!(found.ssbs.len(), 1, "the other channels receive the cell");
     found.faults
 }
 

@@ -15,7 +15,7 @@ pub struct ChannelSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub paths: Option<String>,
     /// Standard deviation of the log-normal shadowing in dB. All following keys except
-    /// `line_of_sight_only`, `blockage` and `hall` apply to the model `rician` only.
+    /// `oracle_nlos_rejection`, `blockage` and `hall` apply to the model `rician` only.
     #[schemars(range(min = 0.0, max = 40.0))]
     pub shadowing_std_db: f64,
     /// Correlation distance of the shadowing in metres; 0 draws independent shadowing for every
@@ -35,7 +35,7 @@ pub struct ChannelSettings {
     /// Whether SSBs without a line of sight are removed (models of TR 38.901 only). The result is
     /// the error of a vehicle that knows which angles have no line of sight.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub line_of_sight_only: bool,
+    pub oracle_nlos_rejection: bool,
     /// Moving objects that block the line of sight [default: none].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blockage: Option<BlockageSettings>,
@@ -54,7 +54,7 @@ impl Default for ChannelSettings {
             scatter: ScatterModel::PerAntenna,
             rays: 8,
             delay_spread_ns: 0.0,
-            line_of_sight_only: false,
+            oracle_nlos_rejection: false,
             blockage: None,
             hall: None,
         }
@@ -176,14 +176,14 @@ impl ChannelSettings {
             )?;
         }
         check.that(
-            factory || self.model == Umi || !self.line_of_sight_only,
-            "channel.line_of_sight_only",
+            factory || self.model == Umi || !self.oracle_nlos_rejection,
+            "channel.oracle_nlos_rejection",
             "true",
             "allowed with a `model` of TR 38.901 only",
         )?;
         let mine = Self {
             model: self.model,
-            line_of_sight_only: self.line_of_sight_only,
+            oracle_nlos_rejection: self.oracle_nlos_rejection,
             paths: self.paths.clone(),
             blockage: self.blockage,
             hall: self.hall,

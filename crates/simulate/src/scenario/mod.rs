@@ -24,4 +24,4 @@ pub use price::Price;
 pub use scenario_file::{Fidelity, Scenario};
 pub use size::DriveSize;
 pub use target::Target;
-pub use truth::{Draw, TruthSettings};
+pub use truth::TruthSettings;

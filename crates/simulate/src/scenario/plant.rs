@@ -395,7 +395,7 @@ mod tests {
             plant.vehicle.integrity_monitor().unwrap().alert_limit_m
         };
         assert!((limit_m(BENDS) - 0.6).abs() < 1e-12);
-        let own = "vehicle = { like = \"tugger\", integrity.alert_limit_m = 1.5 }";
+        let own = "vehicle = { extends = \"tugger\", integrity.alert_limit_m = 1.5 }";
         let text = BENDS.replace("vehicle = \"tugger\"", own);
         assert!((limit_m(&text) - 1.5).abs() < 1e-12);
     }

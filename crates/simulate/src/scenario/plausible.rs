@@ -2,8 +2,8 @@
 
 use onboard::geometry::Point;
 use onboard::plausible::{
-    Usual, Warning, as_degrees, as_milliseconds, as_percent, of_both_along, of_vehicle, rounded,
-    speed_in_mps, unusual,
+    Usual, Warning, as_degrees, as_milliseconds, as_percent, of_site_and_vehicle_along, of_vehicle,
+    rounded, speed_in_mps, unusual,
 };
 use onboard::road::Road;
 use onboard::settings::{Check, SettingsError};
@@ -71,7 +71,7 @@ impl Scenario {
     pub fn warnings(&self) -> Result<Vec<Warning>, SettingsError> {
         let check = Check { file: &self.name };
         let path = self.path(check)?;
-        let mut found = of_both_along(&self.site, &self.vehicle, &path);
+        let mut found = of_site_and_vehicle_along(&self.site, &self.vehicle, &path);
         found.extend(unusual(self, ROWS));
         if let Some(speed_kmh) = self.motion.top_speed_kmh {
             found.extend(speed_in_mps("motion.top_speed_kmh", speed_kmh));
@@ -87,9 +87,9 @@ impl Scenario {
     /// Warns of true values that are probably in another unit than the nominal values.
     fn far_from_belief(&self, check: Check<'_>) -> Result<Vec<Warning>, SettingsError> {
         let (site, vehicle, _) = self.actual(check)?;
-        let believed = of_vehicle(&self.vehicle);
+        let nominal = of_vehicle(&self.vehicle);
         let mut found = of_vehicle(&vehicle);
-        found.retain(|it| !believed.contains(it));
+        found.retain(|it| !nominal.contains(it));
         let turned_rad = vehicle.array.mounting_rad - self.vehicle.array.mounting_rad;
         if turned_rad.abs() > MOST_TURNED_RAD {
             found.push(Warning {
@@ -108,9 +108,9 @@ impl Scenario {
             .zip(&self.site.radio_heads)
             .enumerate();
         found = found.into_iter().map(|it| it.beneath("vehicle")).collect();
-        found.extend(heads.filter_map(|(index, (head, believed))| {
+        found.extend(heads.filter_map(|(index, (head, nominal))| {
             let [at, plan] =
-                [head, believed].map(|it| Point::new(it.position_m[0], it.position_m[1]));
+                [head, nominal].map(|it| Point::new(it.position_m[0], it.position_m[1]));
             let moved_m = at.distance_m(plan);
             (moved_m > MOST_MOVED_M).then(|| Warning {
                 key: format!("site.radio_heads[{index}].position_m"),

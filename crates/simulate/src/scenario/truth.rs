@@ -14,8 +14,9 @@ use toml::{Table, Value};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TruthSettings {
-    /// Whether errors are drawn from the standard deviations.
-    pub draw: Draw,
+    /// Whether random errors are sampled from the standard deviations. Otherwise, all values are
+    /// nominal except those in `[truth]`.
+    pub sample_errors: bool,
     /// Factor for all standard deviations of the drawn errors.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub std_factor: f64,
@@ -30,21 +31,10 @@ pub struct TruthSettings {
     pub vehicle: Table,
 }
 
-/// Source of the random errors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Draw {
-    /// Errors are drawn from the standard deviations of site and vehicle.
-    #[default]
-    AsStated,
-    /// No errors are drawn. All values are nominal except those in `[truth]`.
-    None,
-}
-
 impl Default for TruthSettings {
     fn default() -> Self {
         Self {
-            draw: Draw::AsStated,
+            sample_errors: true,
             std_factor: 1.0,
             site: Table::new(),
             vehicle: Table::new(),
@@ -73,7 +63,7 @@ const DRAWN: [(&str, &str); 7] = [
     ("phase_rad", "phase_std_rad"),
     ("scale", "scale_std"),
     ("bias_radps", "bias_std_radps"),
-    ("lateness_s", "lateness_std_s"),
+    ("angle_time_offset_s", "angle_time_offset_std_s"),
 ];
 
 impl TruthSettings {
@@ -103,24 +93,25 @@ impl TruthSettings {
 
     /// Returns the factor of the standard deviations.
     pub const fn factor(&self) -> f64 {
-        match self.draw {
-            Draw::AsStated => self.std_factor,
-            Draw::None => 0.0,
+        if self.sample_errors {
+            self.std_factor
+        } else {
+            0.0
         }
     }
 }
 
 fn depart<T: TomlFile + Clone>(
-    believed: &T,
+    nominal: &T,
     over: &Table,
     facts: &[&str],
     check: Check<'_>,
 ) -> Result<T, SettingsError> {
     if over.is_empty() {
-        return Ok(believed.clone());
+        return Ok(nominal.clone());
     }
     let path = format!("truth.{}", T::WHAT);
-    let mut table = Table::try_from(believed).unwrap_or_default();
+    let mut table = Table::try_from(nominal).unwrap_or_default();
     let base = table.clone();
     let mut laid = over.clone();
     not_drawn(&mut laid);
@@ -140,7 +131,7 @@ fn depart<T: TomlFile + Clone>(
         )?;
     }
     let departed = departed?;
-    believed_in(&base, over, &path, check)?;
+    check_nominal_keys(&base, over, &path, check)?;
     Ok(departed)
 }
 
@@ -158,7 +149,7 @@ fn not_drawn(over: &mut Table) {
 
 /// Rejects keys that the nominal model does not contain, such as a gyroscope that the vehicle
 /// lacks.
-fn believed_in(
+fn check_nominal_keys(
     base: &Table,
     over: &Table,
     path: &str,
@@ -173,7 +164,7 @@ fn believed_in(
                 return Err(check.error(&path, "given", "the nominal model has no such key"));
             }
             (Some(Value::Table(base)), Value::Table(over)) => {
-                believed_in(base, over, &path, check)?;
+                check_nominal_keys(base, over, &path, check)?;
             }
             _ => {}
         }

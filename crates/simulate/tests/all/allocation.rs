@@ -6,7 +6,7 @@ use onboard::localize::{AngleMeasurement, MeasurementKind};
 use onboard::observation::{OdometrySample, SensedSsb};
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Check, Shipped, TomlFile, UncertaintySettings, WakeUpSettings};
-use onboard::{Custom, Onboard};
+use onboard::{Custom, Pipeline};
 use recording::LoggedAngle;
 use simulate::scenario::Scenario;
 use simulate::world::MotionProfile;
@@ -22,12 +22,12 @@ fn the_counter_counts() {
 #[test]
 fn a_drive_allocates_nothing_after_initialisation() {
     let guarded = || ("vehicle.integrity", value("{}"));
-    let adapts = ("vehicle.receiver.phase_bias_probability", value("0.1"));
+    let adapts = ("vehicle.receiver.multipath_bias_probability", value("0.1"));
     // A target error so small that every angle is required.
     let mut demanding = unguarded("yard");
     demanding.vehicle.wake_up = Some(WakeUpSettings::Uncertainty(UncertaintySettings {
-        bound_m: 1e-3,
-        least_gain_m2: 0.0,
+        target_error_m: 1e-3,
+        min_variance_reduction_m2: 0.0,
         ..UncertaintySettings::default()
     }));
     for (scenario, least_accepted) in [
@@ -63,7 +63,7 @@ fn drive(scenario: &Scenario) -> u32 {
     let simulation = simulation(scenario);
     let platform = simulation.platform();
     let start = road.pose(0.0);
-    let mut onboard = Onboard::new(site, vehicle, platform, start, Custom::default()).unwrap();
+    let mut onboard = Pipeline::new(site, vehicle, platform, start, Custom::default()).unwrap();
 
     let integrity = vehicle.integrity_monitor().is_some();
     let mut accepted = 0;
@@ -107,9 +107,9 @@ fn drive(scenario: &Scenario) -> u32 {
                 },
             });
         }
-        let heard = onboard.hear(time_s, &mut Burst(&burst)).unwrap();
-        let executions = heard.executions.iter();
-        accepted += executions.filter(|it| it.verdict.accepted).count() as u32;
+        let heard = onboard.process_burst(time_s, &mut Burst(&burst)).unwrap();
+        let aoa_estimates = heard.aoa_estimates.iter();
+        accepted += aoa_estimates.filter(|it| it.verdict.accepted).count() as u32;
         std::hint::black_box(onboard.pose(time_s)).unwrap();
         accepted > 0
     };

@@ -32,8 +32,8 @@ fn azimuths(scenario: &Scenario, seed: u64) -> [f64; 3] {
     let measurand = scenario.vehicle.array.measurand();
     let (mut squares, mut bounds, mut normalised) = (0.0, 0.0, 0.0);
     let record = run(scenario, seed, 0);
-    for execution in &record.executions {
-        let (ssb, measured) = (execution.ssb, execution.measured.unwrap());
+    for angle_result in &record.aoa_estimates {
+        let (ssb, measured) = (angle_result.ssb, angle_result.measured.unwrap());
         let head = truth.heads.iter().find(|it| it.pci == ssb.pci).unwrap();
         let there = truth.path.at(ssb.time_s);
         let [along, left] = truth.array.line_of_sight(&there, head).towards;
@@ -44,7 +44,7 @@ fn azimuths(scenario: &Scenario, seed: u64) -> [f64; 3] {
         bounds += thermal.sigma_rad(ssb.snr_db).powi(2) * share;
         normalised += (error_rad / measured.phase_sigma_rad).powi(2);
     }
-    let count = record.executions.len() as f64;
+    let count = record.aoa_estimates.len() as f64;
     [(squares / bounds).sqrt(), normalised / count, count]
 }
 
@@ -149,7 +149,7 @@ fn positions_and_tables_of_a_circle_give_equal_results() {
         let road = "[{ length_m = 60.0, turn_rad = 0.1 }]";
         let all = with_circle([("vehicle.array.shape", shape), ("site.road.segments", road)]);
         let record = run(&changed("paper-real-odometry-2", all), 1, 0);
-        let angles = record.executions.iter().map(|it| it.measured.unwrap());
+        let angles = record.aoa_estimates.iter().map(|it| it.measured.unwrap());
         angles
             .map(|it| (it.phase_rad, it.phase_sigma_rad))
             .collect::<Vec<_>>()

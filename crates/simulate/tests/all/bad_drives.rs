@@ -211,8 +211,10 @@ fn bad_angles_are_reported_and_ignored() {
     }
     // Each readable angle gets its own verdict.
     let refused = |reason| {
-        let executions = located.executions.iter();
-        executions.filter(|it| it.verdict.reason == reason).count()
+        let aoa_estimates = located.aoa_estimates.iter();
+        aoa_estimates
+            .filter(|it| it.verdict.reason == reason)
+            .count()
     };
     assert_eq!(refused(UpdateReason::UnknownRadioHead), 1);
     // The repeated angle is left out before the localizer could reject it as too late.
@@ -244,7 +246,7 @@ fn an_angle_without_a_variance_is_unusable_for_every_estimator() {
     }
     let located = drive.locate_these(&odometry, &angles);
     let reasons: Vec<_> = located
-        .executions
+        .aoa_estimates
         .iter()
         .map(|it| it.verdict.reason)
         .collect();

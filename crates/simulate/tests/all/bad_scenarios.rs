@@ -40,7 +40,7 @@ fn misspelt_keys_get_the_nearest_known_key() {
     let nearest = "did you mean `t_max_ms`?";
     assert_says(
         with_line("position_uncertainty_m = 1.0", "tmax_ms = 240.0"),
-        "vehicle.wake_up.due.tmax_ms",
+        "vehicle.wake_up.trigger.tmax_ms",
         nearest,
     );
     let nearest = "did you mean `channel`?";
@@ -72,7 +72,7 @@ fn wrong_types_are_reported_with_the_expected_type() {
     let outcome = with_line("method = \"music\"", "method = \"musik\"");
     assert_says(outcome, "vehicle.estimator.method", "did you mean `music`?");
     let outcome = with_line("policy = \"pid\"", "policy = \"pdi\"");
-    assert_says(outcome, "vehicle.wake_up.due", "did you mean `pid`?");
+    assert_says(outcome, "vehicle.wake_up.trigger", "did you mean `pid`?");
     let outcome = with_line("offset_db = 3.0", "offset = 3.1");
     assert_says(
         outcome,
@@ -165,7 +165,7 @@ fn numbers_must_be_finite_and_in_range() {
         (
             "snr_scale_db = 10.0",
             "snr_scale_db = 0",
-            "vehicle.wake_up.due.snr_scale_db",
+            "vehicle.wake_up.trigger.snr_scale_db",
         ),
     ] {
         assert_says(with_line(line, bad), key, "must");
@@ -202,9 +202,9 @@ fn a_guess_of_the_road_must_be_straight() {
 fn contradictions_are_reported_with_both_sides() {
     let bound = "position_uncertainty_m = 1.0";
     let outcome = with_line(bound, "base_ms = 250.0\nt_max_ms = 240.0");
-    assert_says(outcome, "vehicle.wake_up.due.t_max_ms", "base_ms, 250");
+    assert_says(outcome, "vehicle.wake_up.trigger.t_max_ms", "base_ms, 250");
     let outcome = with_line(bound, "base_ms = 250.0\nposition_uncertainty_m = 1.0");
-    let key = "vehicle.wake_up.due.position_uncertainty_m";
+    let key = "vehicle.wake_up.trigger.position_uncertainty_m";
     assert_says(outcome, key, "t_max of 240.0 ms");
     let outcome = with_line("pilots = \"blind\"", "pilots = \"pss+sss\"");
     assert_says(outcome, "vehicle.estimator.method", "receiver.pilots");
@@ -304,7 +304,7 @@ fn a_vehicle_without_radio_heads_is_rejected() {
         let names = NAMES.replace("vehicle = 'carrier'\n", "");
         read(&format!(
             "{names}{ROAD}site.radio_heads = [{heads}]\n\
-             vehicle = {{ like = 'carrier', receiver.pci_allow_list = [{list}] }}"
+             vehicle = {{ extends = 'carrier', receiver.pci_allow_list = [{list}] }}"
         ))
     };
     assert!(hears("7").is_ok());

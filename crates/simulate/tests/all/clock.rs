@@ -35,7 +35,7 @@ fn found_s(
     }
     let (site, vehicle) = (&scenario.site, &scenario.vehicle);
     let located = locate_angles(site, vehicle, start, &odometry, &angles, false).unwrap();
-    let found = located.constants.map(|it| it.lateness_s);
+    let found = located.constants.map(|it| it.angle_time_offset_s);
     found.map_or([0.0; 2], |it| [it.found, it.std])
 }
 

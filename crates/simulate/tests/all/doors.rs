@@ -101,10 +101,10 @@ fn a_custom_localizer_drives_and_may_fail() {
         ];
         let scenario = changed("paper-real-odometry-2", late);
         let record = run_with(&scenario, &straight_on(usize::MAX)).unwrap();
-        let reason = |it: &onboard::Execution| it.verdict.reason;
+        let reason = |it: &onboard::AngleResult| it.verdict.reason;
         assert!(
             record
-                .executions
+                .aoa_estimates
                 .iter()
                 .all(|it| reason(it) == UpdateReason::Excluded)
         );
@@ -171,12 +171,12 @@ fn a_custom_policy_selects_radio_heads() {
     };
     let scenario = unguarded("paper-real-odometry-2");
     let record = run_with(&scenario, &strongest).unwrap();
-    assert_eq!(record.executions.len(), record.steps.len().div_ceil(5));
-    assert_eq!(record.listened, record.executions.len());
-    let intervals = record.executions.iter().map(|it| it.wake_up_time_s);
+    assert_eq!(record.aoa_estimates.len(), record.steps.len().div_ceil(5));
+    assert_eq!(record.bursts_received, record.aoa_estimates.len());
+    let intervals = record.aoa_estimates.iter().map(|it| it.wake_up_time_s);
     assert!(intervals.into_iter().all(|interval_s| interval_s == 0.1));
     for pci in [1, 2] {
-        assert!(record.executions.iter().any(|it| it.ssb.pci == pci));
+        assert!(record.aoa_estimates.iter().any(|it| it.ssb.pci == pci));
     }
     assert!(record.steps.last().unwrap().error_m() < 1.0);
 }
@@ -230,17 +230,17 @@ fn an_estimator_without_a_standard_deviation_gets_the_bound_at_its_snr() {
     };
     let record = retold(&scenario, bare).unwrap();
     let bound = ThermalNoise::new(&scenario.site, &scenario.vehicle);
-    for execution in &record.executions {
-        let measured = execution.measured.unwrap();
+    for angle_result in &record.aoa_estimates {
+        let measured = angle_result.measured.unwrap();
         // Bound for 254 known resource elements at four antennas: 1/√(2 · SNR · 254 · 5).
-        let snr = 10f64.powf(0.1 * execution.ssb.snr_db);
+        let snr = 10f64.powf(0.1 * angle_result.ssb.snr_db);
         let by_hand_rad = (2.0 * snr * 254.0 * 5.0).sqrt().recip();
         assert!((measured.phase_sigma_rad / by_hand_rad - 1.0).abs() < 1e-9);
         assert_eq!(
             measured.phase_sigma_rad,
-            bound.sigma_rad(execution.ssb.snr_db)
+            bound.sigma_rad(angle_result.ssb.snr_db)
         );
-        assert_eq!(measured.snr_db, execution.ssb.snr_db);
+        assert_eq!(measured.snr_db, angle_result.ssb.snr_db);
         assert!((measured.angle_rad.cos() * PI - measured.phase_rad).abs() < 1e-9);
     }
     assert!(record.steps.last().unwrap().error_m() < 1.0);
@@ -260,7 +260,7 @@ fn a_likelihood_gives_the_same_position_as_its_angle() {
         Ok(Some(EstimatedAngle::LogLikelihood(log.collect())))
     };
     let record = retold(&scenario, likelihood).unwrap();
-    for (found, expected) in record.executions.iter().zip(&built_in.executions) {
+    for (found, expected) in record.aoa_estimates.iter().zip(&built_in.aoa_estimates) {
         let (found, expected) = (found.measured.unwrap(), expected.measured.unwrap());
         assert!(wrap_angle(found.phase_rad - expected.phase_rad).abs() < 1e-6);
         let sigma_rad = expected.phase_sigma_rad.max(0.01);
@@ -281,13 +281,13 @@ fn a_likelihood_gives_the_same_position_as_its_angle() {
 fn an_estimator_may_return_nothing_or_fail() {
     let scenario = unguarded("paper-real-odometry-2");
     let record = retold(&scenario, |_, _| Ok(None)).unwrap();
-    for execution in &record.executions {
-        assert_eq!(execution.measured, None);
-        assert_eq!(execution.verdict.reason, UpdateReason::Unusable);
+    for angle_result in &record.aoa_estimates {
+        assert_eq!(angle_result.measured, None);
+        assert_eq!(angle_result.verdict.reason, UpdateReason::Unusable);
     }
     for nonsense in [EstimatedAngle::LogLikelihood(Vec::new()), not_finite()] {
         let record = retold(&scenario, move |_, _| Ok(Some(nonsense.clone()))).unwrap();
-        let reasons = record.executions.iter().map(|it| it.verdict.reason);
+        let reasons = record.aoa_estimates.iter().map(|it| it.verdict.reason);
         assert!(
             reasons
                 .into_iter()
@@ -355,8 +355,8 @@ fn a_custom_propagation_works_with_snapshots_and_samples() {
         let budget = onboard::link_budget::LinkBudget::new(&scenario.site, &scenario.vehicle);
         let truth = world.draw(simulate::random::Streams::new(2, 0));
         let (mut squares, mut apart_db) = (Vec::new(), Vec::new());
-        for execution in &record.executions {
-            let (ssb, measured) = (execution.ssb, execution.measured.unwrap());
+        for angle_result in &record.aoa_estimates {
+            let (ssb, measured) = (angle_result.ssb, angle_result.measured.unwrap());
             let heads = truth.heads.iter().enumerate();
             let (index, head) = heads.into_iter().find(|it| it.1.pci == ssb.pci).unwrap();
             let there = truth.path.at(ssb.time_s);
@@ -412,9 +412,9 @@ fn arrays_of_any_size_are_consistent() {
             road,
         ];
         let record = run(&changed("paper-real-odometry-2", iq), 8, 0);
-        assert!(record.executions.len() * 100 > 2 * record.steps.len() * 98);
-        let accepted = record.executions.iter().filter(|it| it.verdict.accepted);
-        assert!(accepted.count() * 100 > record.executions.len() * 97);
+        assert!(record.aoa_estimates.len() * 100 > 2 * record.steps.len() * 98);
+        let accepted = record.aoa_estimates.iter().filter(|it| it.verdict.accepted);
+        assert!(accepted.count() * 100 > record.aoa_estimates.len() * 97);
         let worst_m = record.steps.iter().map(Step::error_m).fold(0.0, f64::max);
         assert!(worst_m < 1.0, "{elements}: {worst_m} m with samples");
     }

@@ -43,7 +43,7 @@ fn scenario() -> Scenario {
                 "vehicle.localizer.curvature_correlation_m",
                 (2.0 * RADIUS_M * TURN_RAD).into(),
             ),
-            ("vehicle.receiver.lateness_std_s", 0.0.into()),
+            ("vehicle.receiver.angle_time_offset_std_s", 0.0.into()),
         ],
     )
 }

@@ -3,7 +3,7 @@
 use crate::common;
 use std::f64::consts::TAU;
 
-use onboard::Execution;
+use onboard::AngleResult;
 use onboard::geometry::{Point, wrap_angle};
 use onboard::settings::{Shipped, TomlFile};
 use simulate::RunRecord;
@@ -61,8 +61,8 @@ fn errors(scenario: &Scenario, record: &RunRecord) -> Vec<Seen> {
         let [from, to] = [&pair[0], &pair[1]].map(|step| step.truth.point());
         driven_m.push(driven_m[driven_m.len() - 1] + from.distance_m(to));
     }
-    let of = |execution: &Execution| {
-        let measured = execution.measured.unwrap();
+    let of = |angle_result: &AngleResult| {
+        let measured = angle_result.measured.unwrap();
         let step = (measured.time_s / scenario.site.ssb.period_s() + 1e-6).floor() as usize;
         let truth = record.steps[step].truth;
         let angle_rad = truth.point().bearing_rad(head) - truth.heading_rad;
@@ -73,7 +73,7 @@ fn errors(scenario: &Scenario, record: &RunRecord) -> Vec<Seen> {
             sigma_rad: measured.phase_sigma_rad,
         }
     };
-    record.executions.iter().map(of).collect()
+    record.aoa_estimates.iter().map(of).collect()
 }
 
 fn mean_square(values: impl ExactSizeIterator<Item = f64>) -> f64 {
@@ -89,7 +89,7 @@ fn noise_gives_equal_angle_errors_with_samples_and_snapshots() {
             let more = [("vehicle.receiver.pilots", Value::from(pilots))];
             let scenario = scenario(fidelity, 60.0, &more);
             let record = drive(&scenario, 1);
-            assert_eq!(record.executions.len(), record.steps.len(), "{fidelity}");
+            assert_eq!(record.aoa_estimates.len(), record.steps.len(), "{fidelity}");
             errors(&scenario, &record)
         };
         let (snapshots, iq) = (by("snapshots"), by("iq"));
@@ -238,7 +238,7 @@ fn several_cells_with_blind_snapshots_and_poor_hardware_are_located() {
     let record = drive(&scenario, 4);
     for pci in [1, 400] {
         let heard = record
-            .executions
+            .aoa_estimates
             .iter()
             .filter(|it| it.ssb.pci == pci)
             .count();
@@ -259,7 +259,7 @@ fn samples_are_reproducible_and_differ_between_runs() {
         drive(&scenario, 2),
     );
     assert_eq!(a, b);
-    assert_ne!(a.executions, c.executions);
+    assert_ne!(a.aoa_estimates, c.aoa_estimates);
 }
 
 #[test]

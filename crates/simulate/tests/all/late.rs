@@ -6,7 +6,7 @@ use onboard::localize::{PoseEstimate, UpdateReason};
 use onboard::observation::{OdometrySample, SensedSsb};
 use onboard::settings::WakeUpSettings;
 use onboard::wake_up::{Situation, WakeUpPolicy};
-use onboard::{BoxError, Custom, Onboard};
+use onboard::{BoxError, Custom, Pipeline};
 use recording::LoggedAngle;
 use simulate::scenario::Scenario;
 use simulate::{RunRecord, Step};
@@ -46,19 +46,19 @@ impl Drive {
         }
     }
 
-    fn onboard(&self) -> Onboard {
+    fn onboard(&self) -> Pipeline {
         let simulation = simulation(&self.scenario);
         let (site, vehicle) = (&self.scenario.site, &self.scenario.vehicle);
         let platform = simulation.platform();
-        Onboard::new(site, vehicle, platform, self.start, Custom::default()).unwrap()
+        Pipeline::new(site, vehicle, platform, self.start, Custom::default()).unwrap()
     }
 
     /// Returns the inputs in order of arrival. At equal times, odometry precedes bursts.
-    fn arrivals(&self, lateness_s: impl Fn(usize) -> f64) -> Vec<Arrival<'_>> {
+    fn arrivals(&self, delay_s: impl Fn(usize) -> f64) -> Vec<Arrival<'_>> {
         let odometry = self.odometry.iter();
         let odometry = odometry.map(|it| (it.time_s, Arrival::Odometry(it)));
         let bursts = self.bursts.iter().enumerate().map(|(number, burst)| {
-            let arrives_s = burst[0].ssb.time_s + lateness_s(number);
+            let arrives_s = burst[0].ssb.time_s + delay_s(number);
             (arrives_s, Arrival::Burst(burst))
         });
         let mut all: Vec<_> = odometry.chain(bursts).collect();
@@ -67,10 +67,10 @@ impl Drive {
     }
 
     /// Returns the poses at all odometry samples after the arrival of the last SSB.
-    fn poses(&self, lateness_s: impl Fn(usize) -> f64) -> Vec<PoseEstimate> {
+    fn poses(&self, delay_s: impl Fn(usize) -> f64) -> Vec<PoseEstimate> {
         let mut onboard = self.onboard();
         let mut poses = Vec::new();
-        for arrival in self.arrivals(lateness_s) {
+        for arrival in self.arrivals(delay_s) {
             take(&mut onboard, &arrival);
             if let Arrival::Odometry(sample) = arrival
                 && sample.time_s > self.until_s - SILENCE_S + 0.5
@@ -89,7 +89,7 @@ enum Arrival<'a> {
 }
 
 /// Processes an input and returns the number of accepted angles.
-fn take(onboard: &mut Onboard, arrival: &Arrival<'_>) -> usize {
+fn take(onboard: &mut Pipeline, arrival: &Arrival<'_>) -> usize {
     match arrival {
         Arrival::Odometry(sample) => {
             onboard.odometry(sample).unwrap().unwrap();
@@ -97,9 +97,9 @@ fn take(onboard: &mut Onboard, arrival: &Arrival<'_>) -> usize {
         }
         Arrival::Burst(burst) => {
             let time_s = burst[0].ssb.time_s;
-            let heard = onboard.hear(time_s, &mut Burst(burst)).unwrap();
-            let executions = heard.executions.iter();
-            executions.filter(|it| it.verdict.accepted).count()
+            let heard = onboard.process_burst(time_s, &mut Burst(burst)).unwrap();
+            let aoa_estimates = heard.aoa_estimates.iter();
+            aoa_estimates.filter(|it| it.verdict.accepted).count()
         }
     }
 }
@@ -182,9 +182,9 @@ fn ssbs_older_than_the_buffer_are_too_late_and_change_nothing() {
                 Arrival::Burst(burst) if burst[0] == drive.bursts[400][0] => {
                     let now_s = burst[0].ssb.time_s + 1.0;
                     let before = onboard.pose(now_s).unwrap();
-                    let heard = onboard.hear(burst[0].ssb.time_s, &mut Burst(burst));
-                    let executions = heard.unwrap().executions.iter();
-                    late.extend(executions.map(|it| (it.verdict.accepted, it.verdict.reason)));
+                    let heard = onboard.process_burst(burst[0].ssb.time_s, &mut Burst(burst));
+                    let aoa_estimates = heard.unwrap().aoa_estimates.iter();
+                    late.extend(aoa_estimates.map(|it| (it.verdict.accepted, it.verdict.reason)));
                     assert_eq!(onboard.pose(now_s).unwrap(), before);
                 }
                 other => {
@@ -252,7 +252,7 @@ fn a_drive_with_only_late_ssbs_ends_at_the_same_pose() {
         let in_time = drive(0.0);
         for latency_ms in [100.0, 400.0] {
             let late = drive(latency_ms);
-            assert_eq!(late.executions.len(), in_time.executions.len());
+            assert_eq!(late.aoa_estimates.len(), in_time.aoa_estimates.len());
             let arrived_s = 30.0 + 1e-3 * latency_ms;
             let estimates = |record: &RunRecord| -> Vec<PoseEstimate> {
                 let after = |step: &&Step| step.time_s > arrived_s;

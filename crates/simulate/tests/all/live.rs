@@ -8,7 +8,7 @@ use onboard::live::{
 };
 use onboard::observation::{MeasurementKind, OdometrySample};
 use onboard::settings::{FixedSettings, Platform, Site, Vehicle, WakeUpSettings};
-use onboard::{Custom, Execution, Live};
+use onboard::{AngleResult, Custom, Live};
 use recording::replay::{StartChoice, locate_angles, locate_recording};
 use recording::{Datatype, OdometryLog, Recording, load, read_odometry_csv};
 use simulate::scenario::Scenario;
@@ -39,7 +39,7 @@ fn scenario() -> Scenario {
                 value("[{ length_m = 60.0, turn_rad = 0.1 }]"),
             ),
             ("site.radio_heads[1].ssb_index", 2.into()),
-            ("vehicle.receiver.lateness_std_s", 0.0.into()),
+            ("vehicle.receiver.angle_time_offset_std_s", 0.0.into()),
         ],
     )
 }
@@ -118,7 +118,7 @@ fn drive(
         from += block;
         outcomes.extend(std::iter::from_fn(|| live.next_outcome()));
     }
-    live.settle().unwrap();
+    live.flush().unwrap();
     outcomes.extend(std::iter::from_fn(|| live.next_outcome()));
     outcomes
 }
@@ -132,19 +132,19 @@ fn live_samples_give_the_poses_of_the_recording() {
     let located = locate_recording(site, vehicle, start, odometry, recording, 0.0, false).unwrap();
     let samples = recorded.samples();
     assert!(
-        located.executions.len() > 190,
+        located.aoa_estimates.len() > 190,
         "{}",
-        located.executions.len()
+        located.aoa_estimates.len()
     );
     let mut live = recorded.live();
     let mut outcomes = Vec::new();
     for block in [76_800, 19_200, 5_003] {
         live = recorded.live();
         outcomes = drive(&mut live, &recorded.odometry, &samples, block);
-        let executions: Vec<Execution> = outcomes.iter().map(|it| it.execution).collect();
-        assert_eq!(executions, located.executions, "{block}");
+        let aoa_estimates: Vec<AngleResult> = outcomes.iter().map(|it| it.angle_result).collect();
+        assert_eq!(aoa_estimates, located.aoa_estimates, "{block}");
     }
-    let executions = &located.executions;
+    let aoa_estimates = &located.aoa_estimates;
     let status = live.status(2.0).unwrap();
     assert_eq!(status.tracked, 2);
     assert_eq!(status.state, State::Unmonitored);
@@ -153,7 +153,7 @@ fn live_samples_give_the_poses_of_the_recording() {
         assert!(outcome.residual_rad.unwrap().abs() < 0.5);
     }
     let energy = live.energy();
-    assert_eq!(energy.executions, executions.len());
+    assert_eq!(energy.aoa_estimates, aoa_estimates.len());
     assert!((energy.duration_s - 2.0).abs() < 0.1, "{energy:?}");
 }
 
@@ -164,7 +164,7 @@ fn live_angles_give_the_poses_of_the_log() {
     let (site, mut vehicle) = (scenario.site.clone(), scenario.vehicle.clone());
     vehicle.wake_up = Some(WakeUpSettings::EVERY_SSB);
     // The replay of a log searches for a time offset; disable this.
-    vehicle.receiver.lateness_std_s = Some(0.0);
+    vehicle.receiver.angle_time_offset_std_s = Some(0.0);
     vehicle.start.pose = Some(
         scenario
             .path(onboard::settings::Check { file: "test" })
@@ -302,7 +302,7 @@ fn a_pose_can_be_set_and_cleared_and_cells_can_be_excluded() {
     live.set_pose(now_s, elsewhere, Some(covariance)).unwrap();
     let given = live.status(now_s).unwrap();
     assert!(given.pose.unwrap().point().distance_m(elsewhere.point()) < 0.2);
-    let pci = outcomes[0].execution.ssb.pci;
+    let pci = outcomes[0].angle_result.ssb.pci;
     live.exclude(pci).unwrap();
     assert!(
         live.heads()
@@ -361,18 +361,19 @@ fn drive_asleep(
         }
         if window.is_none_or(|[_, until_s]| end_s >= until_s) {
             if window.is_some() {
-                live.end_stretch().unwrap();
-                live.hear_before(f64::INFINITY).unwrap();
+                live.end_segment().unwrap();
+                live.process_until(f64::INFINITY).unwrap();
             }
             let next_s = live.next_wake_up_s(end_s).unwrap();
             let was_open = window.is_none();
             window = (next_s > end_s).then_some([next_s - GUARD_S, next_s + LENGTH_S]);
             if was_open && window.is_some() {
-                live.end_stretch().unwrap();
+                live.end_segment().unwrap();
             }
         }
-        received
-            .extend(std::iter::from_fn(|| live.next_outcome()).map(|it| it.execution.ssb.time_s));
+        received.extend(
+            std::iter::from_fn(|| live.next_outcome()).map(|it| it.angle_result.ssb.time_s),
+        );
         number += STEP;
         counted += STEP;
     }
@@ -410,8 +411,11 @@ fn windows_without_an_ssb_open_the_receiver_and_windows_follow_missing_samples()
             "{later}, not {expected}"
         );
         let counts = live.stream_counts();
-        assert_eq!((counts.untold_gaps, counts.gaps), (1, 0));
-        assert!((counts.untold_s - 7.3e-3).abs() < 1e-5, "{counts:?}");
+        assert_eq!((counts.inferred_gaps, counts.gaps), (1, 0));
+        assert!(
+            (counts.unreported_gap_s - 7.3e-3).abs() < 1e-5,
+            "{counts:?}"
+        );
         assert!(counts.taken_s < 2.0, "{counts:?}");
     }
 }

@@ -43,7 +43,7 @@ fn scenario() -> Scenario {
 }
 
 /// Reads the site and vehicle files of a recorded drive.
-fn believed(dir: &Path) -> (Site, Vehicle) {
+fn nominal(dir: &Path) -> (Site, Vehicle) {
     let path = |name: &str| dir.join(name).display().to_string();
     let site = load(&path("site.toml")).unwrap();
     (site, load(&path("vehicle.toml")).unwrap())
@@ -84,31 +84,31 @@ fn rms_error_m(drive: &LocatedDrive, truth: &Path) -> f64 {
 fn a_recorded_drive_is_located() {
     let dir = common::scratch("drive");
     let made = synthesize(&scenario(), &SETTINGS, &dir, &mut |_| true).unwrap();
-    let believed = believed(&dir);
+    let nominal = nominal(&dir);
     let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
     let mut recording = Recording::open(&made.recording).unwrap();
     assert_eq!(recording.warnings(), []);
     assert_eq!(recording.length(), made.samples);
 
-    let drive = locate(&believed, &odometry, &mut recording).unwrap();
+    let drive = locate(&nominal, &odometry, &mut recording).unwrap();
     assert_eq!(drive.poses.len(), odometry.samples.len());
     // Two radio heads; the acquisition of the second takes one or two bursts.
     assert!(
-        drive.executions.len() + 5 > 2 * made.bursts,
+        drive.aoa_estimates.len() + 5 > 2 * made.bursts,
         "{}",
-        drive.executions.len()
+        drive.aoa_estimates.len()
     );
     let accepted = drive
-        .executions
+        .aoa_estimates
         .iter()
         .filter(|it| it.verdict.accepted)
         .count();
-    assert!(accepted * 100 > drive.executions.len() * 98);
+    assert!(accepted * 100 > drive.aoa_estimates.len() * 98);
     let from_samples_m = rms_error_m(&drive, &dir.join("truth.tum"));
 
     // Repeat with an angle log that contains an angle of an unknown cell.
     let mut angles: Vec<LoggedAngle> = drive
-        .executions
+        .aoa_estimates
         .iter()
         .map(|it| LoggedAngle {
             ssb: it.ssb,
@@ -125,17 +125,17 @@ fn a_recorded_drive_is_located() {
     let late = angles.angles[4];
     angles.angles.insert(100, late);
     // A recording has one clock, but the replay of a log searches for a time offset; disable this.
-    let (site, mut vehicle) = believed.clone();
-    vehicle.receiver.lateness_std_s = Some(0.0);
+    let (site, mut vehicle) = nominal.clone();
+    vehicle.receiver.angle_time_offset_std_s = Some(0.0);
     let (site, vehicle) = (&site, &vehicle);
     let start = StartChoice::AsSet;
     let again = locate_angles(site, vehicle, start, &odometry, &angles, false).unwrap();
     let from_angles_m = rms_error_m(&again, &dir.join("truth.tum"));
     assert_eq!(
-        again.executions[20].verdict.reason.name(),
+        again.aoa_estimates[20].verdict.reason.name(),
         "unknown radio head"
     );
-    assert_eq!(again.executions[100].verdict.reason.name(), "too late");
+    assert_eq!(again.aoa_estimates[100].verdict.reason.name(), "too late");
     println!("RMS error {from_samples_m:.3} m from samples, {from_angles_m:.3} m from angles");
     assert!(from_samples_m < 0.5, "{from_samples_m}");
     assert!((from_samples_m - from_angles_m).abs() < 1e-6);
@@ -169,10 +169,10 @@ fn a_continuous_recording_is_scanned_and_located_equally() {
     }
     assert_eq!(found.ssbs.len(), annotations.len());
 
-    let believed = believed(&dir);
+    let nominal = nominal(&dir);
     let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
-    let drive = locate(&believed, &odometry, &mut recording).unwrap();
-    assert_eq!(drive.executions.len(), 2 * made.bursts);
+    let drive = locate(&nominal, &odometry, &mut recording).unwrap();
+    assert_eq!(drive.aoa_estimates.len(), 2 * made.bursts);
 }
 
 #[test]
@@ -184,20 +184,20 @@ fn incompatible_inputs_are_rejected() {
         ..SETTINGS
     };
     let made = synthesize(&scenario(), &settings, &dir, &mut |_| true).unwrap();
-    let believed = believed(&dir);
+    let nominal = nominal(&dir);
     let mut recording = Recording::open(&made.recording).unwrap();
-    let error = locate(&believed, &OdometryLog::default(), &mut recording).unwrap_err();
+    let error = locate(&nominal, &OdometryLog::default(), &mut recording).unwrap_err();
     assert!(matches!(error, ReplayError::NoOdometry { why: None }));
 
     let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
-    let mut elsewhere = believed.clone();
+    let mut elsewhere = nominal.clone();
     elsewhere.0.carrier_mhz = 3600.0;
     let error = locate(&elsewhere, &odometry, &mut recording).unwrap_err();
     assert!(matches!(error, ReplayError::FrontEnd { .. }), "{error}");
 
     let data = dir.join("iq.sigmf-data");
     let mut mono = Recording::open_raw(&[&data], 3.84e6, Some(3.5e9)).unwrap();
-    let error = locate(&believed, &odometry, &mut mono).unwrap_err();
+    let error = locate(&nominal, &odometry, &mut mono).unwrap_err();
     let ReplayError::Receive { source, .. } = &error else {
         panic!("{error}")
     };
@@ -209,7 +209,7 @@ fn incompatible_inputs_are_rejected() {
     assert!(synthesize(&far, &settings, &dir, &mut |_| true).is_err());
 
     // With one radio head, several positions are possible.
-    let (mut site, mut vehicle) = believed;
+    let (mut site, mut vehicle) = nominal;
     vehicle.start.pose = None;
     site.radio_heads.truncate(1);
     let error = locate(&(site, vehicle), &odometry, &mut recording).unwrap_err();

@@ -37,7 +37,7 @@ fn every_policy_and_method_gives_the_record_of_its_own_drive() {
     let tracker = ("vehicle.localizer.kind", Value::from("tracker"));
     let policy = |name: &str| ("vehicle.wake_up.policy", Value::from(name));
     let esprit = ("vehicle.estimator.method", Value::from("esprit"));
-    let bound = ("vehicle.wake_up.bound_m", Value::from(0.3));
+    let bound = ("vehicle.wake_up.target_error_m", Value::from(0.3));
     let asleep = ("vehicle.wake_up.sensing", Value::from("wake-up"));
     for changes in [
         &[][..],
@@ -48,7 +48,7 @@ fn every_policy_and_method_gives_the_record_of_its_own_drive() {
         let simulation = simulation("paper", changes);
         assert!(traces.serve(&simulation), "{changes:?}");
         let own = simulation.campaign(&options()).unwrap();
-        assert!(own.runs.iter().all(|run| run.executions > 5));
+        assert!(own.runs.iter().all(|run| run.aoa_estimates > 5));
         assert_eq!(traces.campaign(&simulation, &options()).unwrap(), own);
     }
 }
@@ -90,14 +90,14 @@ fn traces_are_invalid_for_another_environment() {
         assert!(!traces.serve(&other), "{key}");
     }
     // The nominal transmit power may differ if the true power is equal.
-    let believed = [
+    let nominal = [
         ("site.radio_heads[0].eirp_dbm", Value::from(-10.0)),
         (
             "truth.site.radio_heads.roadside.eirp_dbm",
             Value::from(-17.3),
         ),
     ];
-    assert!(traces.serve(&simulation("paper", &believed)));
+    assert!(traces.serve(&simulation("paper", &nominal)));
 }
 
 #[test]

@@ -194,7 +194,7 @@ fn faults_of_the_channels_are_detected_within_twenty_ssbs() {
                 "{what:?}: {:?}",
                 first.faults
             );
-            let times = run.executions.iter().map(|it| it.ssb.time_s);
+            let times = run.aoa_estimates.iter().map(|it| it.ssb.time_s);
             let ssbs = times
                 .filter(|it| (FROM_S..first.time_s).contains(it))
                 .count();
@@ -233,7 +233,7 @@ fn two_radio_heads_with_one_pci_are_reported_within_twenty_ssbs() {
         let Fault::DuplicatePci { pci, .. } = found else {
             panic!("{found:?}");
         };
-        let of_head = run.executions.iter().filter(|it| it.ssb.pci == pci);
+        let of_head = run.aoa_estimates.iter().filter(|it| it.ssb.pci == pci);
         let times = of_head.map(|it| it.ssb.time_s);
         let ssbs = times
             .filter(|it| (FROM_S..first.time_s).contains(it))

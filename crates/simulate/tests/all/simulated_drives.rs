@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use onboard::estimator::{AngleEstimator, EstimatedAngle};
 use onboard::observation::{SensedSsb, SsbObservation};
 use onboard::wake_up::{Situation, WakeUpPolicy};
-use onboard::{BoxError, Custom, Execution};
+use onboard::{AngleResult, BoxError, Custom};
 use simulate::{Campaign, CampaignOptions, Simulation, SimulationError, Step};
 use toml::Value;
 
@@ -75,10 +75,11 @@ fn all_policies_see_the_same_radio_channel() {
     let every = simulation(&fixed("music", 20.0)).run(3, 0, NONE).unwrap();
     let fourth = simulation(&fixed("music", 80.0)).run(3, 0, NONE).unwrap();
     let mut compared = 0;
-    for execution in &fourth.executions {
-        let same_ssb = |other: &&Execution| (other.ssb.time_s - execution.ssb.time_s).abs() < 1e-9;
-        let other = every.executions.iter().find(same_ssb).unwrap();
-        assert_eq!(other.measured, execution.measured);
+    for angle_result in &fourth.aoa_estimates {
+        let same_ssb =
+            |other: &&AngleResult| (other.ssb.time_s - angle_result.ssb.time_s).abs() < 1e-9;
+        let other = every.aoa_estimates.iter().find(same_ssb).unwrap();
+        assert_eq!(other.measured, angle_result.measured);
         compared += 1;
     }
     assert_eq!(compared, 1005);
@@ -97,12 +98,12 @@ fn trip_of_the_paper_has_the_errors_of_the_paper() {
     assert!((0.35..0.95).contains(&music_m), "{music_m}");
     assert!(esprit_m > 1.3 * music_m, "{esprit_m} {music_m}");
     assert!(x_m < 0.04 && y_m < 0.25, "{x_m} {y_m}");
-    let executions: usize = adaptive.runs.iter().map(|run| run.executions).sum();
-    let mean = executions as f64 / runs as f64;
+    let aoa_estimates: usize = adaptive.runs.iter().map(|run| run.aoa_estimates).sum();
+    let mean = aoa_estimates as f64 / runs as f64;
     assert!((400.0..430.0).contains(&mean), "{mean}");
-    assert_eq!(theoretical.runs[0].executions, 4018);
+    assert_eq!(theoretical.runs[0].aoa_estimates, 4018);
     let energy_j = adaptive.runs[0].energy.unwrap().total_j();
-    assert!((energy_j / adaptive.runs[0].executions as f64 - 0.625).abs() < 0.005);
+    assert!((energy_j / adaptive.runs[0].aoa_estimates as f64 - 0.625).abs() < 0.005);
 }
 
 #[test]
@@ -175,9 +176,9 @@ fn custom_estimators_and_policies_are_used() {
     };
     let record = simulation.run(1, 0, &sideways).unwrap();
     let mut angles = record
-        .executions
+        .aoa_estimates
         .iter()
-        .filter_map(|execution| execution.measured);
+        .filter_map(|angle_result| angle_result.measured);
     assert!(angles.all(|angle| angle.phase_rad == PI * 1f64.cos()));
     let failing = |_| {
         Ok(Custom {

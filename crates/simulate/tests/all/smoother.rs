@@ -117,14 +117,14 @@ fn the_last_smoothed_pose_equals_the_filtered_pose() {
     let sure = [
         ("vehicle.array.mounting_std_rad", 0.0.into()),
         ("vehicle.array.phase_std_rad", 0.0.into()),
-        ("vehicle.receiver.phase_bias_probability", 0.0.into()),
+        ("vehicle.receiver.multipath_bias_probability", 0.0.into()),
         (
             "vehicle.integrity",
-            value("{ fault_probability = { odometer = 1e-9, all_radio_heads = 0 } }"),
+            value("{ fault_probability = { odometer = 1e-9, site_frame_offset = 0 } }"),
         ),
     ];
     let mut rarely_noisy = sure.to_vec();
-    rarely_noisy[3].1 = value("{ fault_probability = { odometer = 3e-6, all_radio_heads = 0 } }");
+    rarely_noisy[3].1 = value("{ fault_probability = { odometer = 3e-6, site_frame_offset = 0 } }");
     for (changes, covered) in [
         (vec![], 0.0),
         (vec![("vehicle.gyroscope", yaw)], 0.0),

@@ -75,8 +75,11 @@ fn during_the_search_all_ssbs_are_received_and_no_pose_is_valid() {
         .unwrap();
     assert!(found.step.time_s > 0.0 && until > 10, "{found:?}");
     // During the search, both radio heads are received at each SSB, for every policy.
-    let looked = |step: &&onboard::Execution| step.ssb.time_s < found.step.time_s;
-    assert_eq!(record.executions.iter().filter(looked).count(), 2 * until);
+    let looked = |step: &&onboard::AngleResult| step.ssb.time_s < found.step.time_s;
+    assert_eq!(
+        record.aoa_estimates.iter().filter(looked).count(),
+        2 * until
+    );
     for step in &record.steps[..until] {
         let integrity = step.integrity.unwrap();
         assert_eq!(integrity.state, IntegrityState::Unavailable);
@@ -85,7 +88,7 @@ fn during_the_search_all_ssbs_are_received_and_no_pose_is_valid() {
     }
     assert!(record.steps[until..].iter().all(|step| !step.searching));
     // After the search, the policy decides, and does not receive every burst.
-    assert!(record.listened < record.steps.len());
+    assert!(record.bursts_received < record.steps.len());
 }
 
 #[test]

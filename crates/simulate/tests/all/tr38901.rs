@@ -267,9 +267,9 @@ fn a_blocked_line_of_sight_returns() {
 }
 
 #[test]
-fn with_line_of_sight_only_other_positions_have_no_signal() {
+fn oracle_nlos_rejection_removes_ssbs_without_line_of_sight() {
     let told = ChannelSettings {
-        line_of_sight_only: true,
+        oracle_nlos_rejection: true,
         ..ChannelSettings::default()
     };
     let (mut heard, mut expected, mut places) = (0.0, 0.0, 0.0);
@@ -320,7 +320,7 @@ fn a_drive_is_reproducible_and_works_with_samples() {
             head.ssb_index = index as u8;
         }
         let samples = run(&by_samples, 4, 0);
-        let heard = [&record, &samples].map(|it| it.executions.len());
+        let heard = [&record, &samples].map(|it| it.aoa_estimates.len());
         println!("{model}: {heard:?} angles");
         assert!(heard.iter().all(|count| *count > 20), "{model}: {heard:?}");
         // The mean SNR depends on the position only, not on the fidelity.
@@ -359,7 +359,7 @@ fn keys_without_a_meaning_for_the_model_are_rejected() {
             .to_string();
         assert!(error.contains(message), "{error}");
     }
-    let overrides = [("channel.line_of_sight_only", true.into())];
+    let overrides = [("channel.oracle_nlos_rejection", true.into())];
     let error = yard.with_overrides(overrides, &Shipped).unwrap_err();
     assert!(error.to_string().contains("TR 38.901"), "{error}");
     let overrides = [

@@ -189,10 +189,10 @@ fn errors_without_a_map_are_consistent() {
 fn a_campus_is_driven_across_several_cells() {
     let records = drives(&unguarded("campus-handover"), SEED, 1);
     let mut cells: Vec<u16> = records[0]
-        .executions
+        .aoa_estimates
         .iter()
-        .filter(|execution| execution.verdict.accepted)
-        .map(|execution| execution.ssb.pci)
+        .filter(|angle_result| angle_result.verdict.accepted)
+        .map(|angle_result| angle_result.ssb.pci)
         .collect();
     cells.sort_unstable();
     cells.dedup();

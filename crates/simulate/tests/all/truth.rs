@@ -24,7 +24,7 @@ fn uncertain(more: &[(&'static str, Value)]) -> Scenario {
         ("vehicle.array.phase_std_rad", 0.1),
         ("vehicle.array.position_std_m", 0.05),
         ("vehicle.odometer.scale_std", 0.004),
-        ("vehicle.receiver.lateness_std_s", 0.02),
+        ("vehicle.receiver.angle_time_offset_std_s", 0.02),
         ("vehicle.start.position_std_m", 0.5),
         ("vehicle.start.heading_std_rad", 0.05),
     ]
@@ -74,7 +74,7 @@ fn departures(scenario: &Scenario, truth: &Truth) -> Vec<(&'static str, f64, f64
         ),
         (
             "clock",
-            truth.vehicle.receiver.lateness_s - vehicle.receiver.lateness_s,
+            truth.vehicle.receiver.angle_time_offset_s - vehicle.receiver.angle_time_offset_s,
             0.02,
         ),
         ("start, x", truth.told_start.x_m - at_start.x_m, 0.5),
@@ -125,8 +125,8 @@ fn all_uncertain_values_are_drawn_independently_with_their_standard_deviation() 
 fn heights_and_values_without_a_standard_deviation_are_nominal() {
     let scenario = uncertain(&[]);
     let truth = draw(&scenario, 3);
-    for (drawn, believed) in (truth.site.radio_heads.iter()).zip(&scenario.site.radio_heads) {
-        assert_eq!(drawn.position_m[2], believed.position_m[2]);
+    for (drawn, nominal) in (truth.site.radio_heads.iter()).zip(&scenario.site.radio_heads) {
+        assert_eq!(drawn.position_m[2], nominal.position_m[2]);
     }
     assert_eq!(
         truth.site.radio_heads[1].eirp_dbm,
@@ -162,7 +162,7 @@ fn std_factor_scales_all_deviations_and_draw_none_removes_them() {
             "{name}: {once} {thrice}"
         );
     }
-    let none = uncertain(&[("truth.draw", "none".into())]);
+    let none = uncertain(&[("truth.sample_errors", false.into())]);
     let truth = draw(&none, 1);
     assert_eq!((&truth.site, &truth.vehicle), (&none.site, &none.vehicle));
     assert_eq!(truth.told_start, truth.path.at(0.0).pose);
@@ -175,7 +175,7 @@ fn a_given_true_value_holds_in_every_run() {
         ("truth.site.radio_heads", value(heads)),
         ("truth.vehicle.array.mounting_rad", 0.1.into()),
         ("truth.vehicle.odometer.scale", 1.05.into()),
-        ("truth.vehicle.receiver.lateness_s", 0.03.into()),
+        ("truth.vehicle.receiver.angle_time_offset_s", 0.03.into()),
     ]);
     for run in 0..20 {
         let Truth { site, vehicle, .. } = draw(&scenario, run);
@@ -188,15 +188,15 @@ fn a_given_true_value_holds_in_every_run() {
             (vehicle.array.mounting_rad, vehicle.odometer.scale),
             (0.1, 1.05)
         );
-        assert_eq!(vehicle.receiver.lateness_s, 0.03);
+        assert_eq!(vehicle.receiver.angle_time_offset_s, 0.03);
         // Values that are not given are drawn.
         assert_ne!(second.position_m, scenario.site.radio_heads[1].position_m);
         assert_ne!(vehicle.array.phase_rad, 0.0);
     }
     // The nominal models do not change.
-    let believed = uncertain(&[]);
-    assert_eq!(scenario.vehicle, believed.vehicle);
-    assert_eq!(scenario.site, believed.site);
+    let nominal = uncertain(&[]);
+    assert_eq!(scenario.vehicle, nominal.vehicle);
+    assert_eq!(scenario.site, nominal.site);
 }
 
 #[test]
@@ -220,7 +220,7 @@ fn a_true_value_with_a_standard_deviation_is_drawn_around_the_value() {
 #[test]
 fn deviations_change_the_simulated_signals() {
     let exact = [
-        ("truth.draw", Value::from("none")),
+        ("truth.sample_errors", Value::from(false)),
         ("truth.vehicle.odometer.scale", 1.1.into()),
         ("truth.vehicle.odometer.noise_m_per_sqrt_m", 0.0.into()),
         ("truth.vehicle.lane_keeping.rms_m", 0.0.into()),
@@ -263,17 +263,17 @@ fn angles_with_late_time_stamps_refer_to_earlier_positions() {
                     ("site.rician_k_db", 90.0.into()),
                     // A different SSB index gives a different reception time.
                     ("site.radio_heads[1].ssb_index", 2.into()),
-                    ("vehicle.receiver.lateness_s", told_s.into()),
-                    ("truth.vehicle.receiver.lateness_s", LATE_S.into()),
+                    ("vehicle.receiver.angle_time_offset_s", told_s.into()),
+                    ("truth.vehicle.receiver.angle_time_offset_s", LATE_S.into()),
                 ],
             );
             let truth = draw(&scenario, 0);
             let [mut sum, mut information] = [0.0; 2];
-            for execution in &common::run(&scenario, 9, 0).executions {
-                let measured = execution.measured.unwrap();
+            for angle_result in &common::run(&scenario, 9, 0).aoa_estimates {
+                let measured = angle_result.measured.unwrap();
                 // The vehicle subtracts the specified time offset.
-                assert_eq!(measured.time_s, execution.ssb.time_s - told_s);
-                let head = truth.heads.iter().find(|it| it.pci == execution.ssb.pci);
+                assert_eq!(measured.time_s, angle_result.ssb.time_s - told_s);
+                let head = truth.heads.iter().find(|it| it.pci == angle_result.ssb.pci);
                 let phase_at = |time_s| {
                     let there = truth.path.at(time_s);
                     let sight = truth.array.line_of_sight(&there, head.unwrap());
@@ -305,7 +305,7 @@ fn invalid_deviations_are_rejected() {
             "truth.drw",
             Value::from("none"),
             "truth.drw",
-            "did you mean `draw`?",
+            "did you mean `sample_errors`?",
         ),
         (
             "yard",
@@ -337,16 +337,16 @@ fn invalid_deviations_are_rejected() {
         ),
         (
             "yard",
-            "truth.vehicle.receiver.lateness_s",
+            "truth.vehicle.receiver.angle_time_offset_s",
             0.5.into(),
-            "truth.vehicle.receiver.lateness_s",
+            "truth.vehicle.receiver.angle_time_offset_s",
             "it must be between -1 and 0.4",
         ),
         (
             "yard",
-            "truth.vehicle.receiver.lateness_std_s",
+            "truth.vehicle.receiver.angle_time_offset_std_s",
             (-0.1).into(),
-            "truth.vehicle.receiver.lateness_std_s",
+            "truth.vehicle.receiver.angle_time_offset_std_s",
             "it must be between 0 and 0.5",
         ),
         (

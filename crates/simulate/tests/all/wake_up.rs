@@ -40,7 +40,7 @@ fn mean(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 
 /// Both policies process equal runs; the paired differences are compared with their standard error.
 #[test]
-fn half_the_executions_of_the_pid_give_no_larger_error() {
+fn half_the_estimates_of_the_pid_give_no_larger_error() {
     // The energy of the receiver is excluded; only angle estimates have a cost.
     let yard = bare_yard("jetson-agx-xavier");
     let driven = runs(&yard, 6);
@@ -53,14 +53,14 @@ fn half_the_executions_of_the_pid_give_no_larger_error() {
         let pid = runs(&pid, 6);
         let pairs = || driven.iter().zip(&pid);
         let (share, error) =
-            mean(pairs().map(|(mine, pid)| mine.executions as f64 / pid.executions as f64));
+            mean(pairs().map(|(mine, pid)| mine.aoa_estimates as f64 / pid.aoa_estimates as f64));
         assert!(share + 4.0 * error < 0.5, "{base_ms} ms: {share} ± {error}");
         let (more_m, error_m) = mean(pairs().map(|(mine, pid)| mine.rms_error_m - pid.rms_error_m));
         assert!(
             more_m < 4.0 * error_m,
             "{base_ms} ms: {more_m} ± {error_m} m"
         );
-        assert!(pairs().all(|(mine, pid)| mine.listened < pid.listened));
+        assert!(pairs().all(|(mine, pid)| mine.bursts_received < pid.bursts_received));
     }
 }
 
@@ -76,18 +76,23 @@ fn fewer_wake_ups_than_at_a_fixed_interval_give_no_larger_error() {
     let fixed = runs(&yard.with_overrides(changes, &Shipped).unwrap(), 6);
     let driven = runs(&yard, 6);
     let pairs = || driven.iter().zip(&fixed);
-    let (share, error) =
-        mean(pairs().map(|(mine, fixed)| mine.listened as f64 / fixed.listened as f64));
+    let (share, error) = mean(
+        pairs().map(|(mine, fixed)| mine.bursts_received as f64 / fixed.bursts_received as f64),
+    );
     assert!(share + 4.0 * error < 0.8, "{share} ± {error}");
     let (more_m, error_m) = mean(pairs().map(|(mine, fixed)| mine.rms_error_m - fixed.rms_error_m));
     assert!(more_m < 4.0 * error_m, "{more_m} ± {error_m} m");
-    assert!(driven.iter().all(|it| it.executions > 3 * it.listened));
+    assert!(
+        driven
+            .iter()
+            .all(|it| it.aoa_estimates > 3 * it.bursts_received)
+    );
 }
 
 /// If the SNR of consecutive SSBs differs, a policy that measures the SNR before its selection
 /// needs fewer angles.
 #[test]
-fn measuring_the_snr_first_saves_executions() {
+fn measuring_the_snr_first_saves_estimates() {
     let paper = common::changed(
         "paper",
         [
@@ -100,7 +105,7 @@ fn measuring_the_snr_first_saves_executions() {
             ),
             ("vehicle.wake_up.policy", "uncertainty".into()),
             ("vehicle.wake_up.base_ms", 80.0.into()),
-            ("vehicle.wake_up.least_gain_m2", 0.0015.into()),
+            ("vehicle.wake_up.min_variance_reduction_m2", 0.0015.into()),
         ],
     );
     let headroom = [("vehicle.wake_up.snr_headroom_db", 9.0.into())];
@@ -108,12 +113,16 @@ fn measuring_the_snr_first_saves_executions() {
     let by_budget = runs(&paper, 8);
     let pairs = || sensing.iter().zip(&by_budget);
     let (share, error) =
-        mean(pairs().map(|(mine, other)| mine.executions as f64 / other.executions as f64));
+        mean(pairs().map(|(mine, other)| mine.aoa_estimates as f64 / other.aoa_estimates as f64));
     assert!(share + 4.0 * error < 0.8, "{share} ± {error}");
     let (more_m, error_m) = mean(pairs().map(|(mine, other)| mine.rms_error_m - other.rms_error_m));
     assert!(more_m < 4.0 * error_m, "{more_m} ± {error_m} m");
-    let listened = |runs: &[RunSummary]| runs.iter().map(|run| run.listened).sum::<usize>();
-    assert!(listened(&sensing) > listened(&by_budget), "what it costs");
+    let bursts_received =
+        |runs: &[RunSummary]| runs.iter().map(|run| run.bursts_received).sum::<usize>();
+    assert!(
+        bursts_received(&sensing) > bursts_received(&by_budget),
+        "what it costs"
+    );
 }
 
 /// Minimum variance reduction above that of any angle: angles are estimated only if the target
@@ -122,10 +131,10 @@ const NEVER_WORTH_IT_M2: f64 = 1e6;
 
 /// Simulates the drive with four radio heads, with estimates only if the target error requires
 /// them, and with a latency of the SSBs.
-fn on_demand(bound_m: f64, latency_ms: f64, runs: u64) -> Vec<RunRecord> {
+fn on_demand(target_error_m: f64, latency_ms: f64, runs: u64) -> Vec<RunRecord> {
     let settings = UncertaintySettings {
-        bound_m,
-        least_gain_m2: NEVER_WORTH_IT_M2,
+        target_error_m,
+        min_variance_reduction_m2: NEVER_WORTH_IT_M2,
         wake_up_cost: Some(0.5),
         ..UncertaintySettings::default()
     };
@@ -154,19 +163,25 @@ fn most_predicted_m(record: &RunRecord) -> f64 {
 
 #[test]
 fn the_target_error_is_met_with_the_fewest_angles() {
-    let bound_m = 0.3;
-    let records = on_demand(bound_m, 0.0, 12);
+    let target_error_m = 0.3;
+    let records = on_demand(target_error_m, 0.0, 12);
     for record in &records {
         // One angle in 10⁴ is rejected as an outlier by the innovation gate.
         assert!(record.out_of_reach <= 3, "{}", record.out_of_reach);
         // The error grows by less than 3 % until the next SSB. An estimate at the last possible SSB
         // gives an error close to the target, and one missed angle exceeds it slightly.
         let most_m = most_predicted_m(record);
-        assert!((0.97..1.03).contains(&(most_m / bound_m)), "{most_m}");
-        assert!(record.listened < record.steps.len());
+        assert!(
+            (0.97..1.03).contains(&(most_m / target_error_m)),
+            "{most_m}"
+        );
+        assert!(record.bursts_received < record.steps.len());
     }
     let beyond = |record: &RunRecord| {
-        let beyond = record.steps.iter().filter(|step| step.error_m() > bound_m);
+        let beyond = record
+            .steps
+            .iter()
+            .filter(|step| step.error_m() > target_error_m);
         beyond.count() as f64 / record.steps.len() as f64
     };
     let (share, error) = mean(records.iter().map(beyond));
@@ -184,8 +199,8 @@ fn the_target_error_is_met_with_late_ssbs() {
 #[test]
 fn an_infeasible_target_error_is_reported_and_all_angles_are_used() {
     let settings = UncertaintySettings {
-        bound_m: 0.02,
-        least_gain_m2: 0.0,
+        target_error_m: 0.02,
+        min_variance_reduction_m2: 0.0,
         ..UncertaintySettings::default()
     };
     for record in driven_by(settings, 0.0, 1) {
@@ -195,15 +210,16 @@ fn an_infeasible_target_error_is_reported_and_all_angles_are_used() {
             "{} of {steps}",
             record.out_of_reach
         );
-        assert!(10 * record.executions.len() > 9 * 4 * steps);
+        assert!(10 * record.aoa_estimates.len() > 9 * 4 * steps);
     }
 }
 
 #[test]
 fn a_larger_target_error_costs_less() {
-    let executions = [0.3, 0.6, 1.2].map(|bound_m| on_demand(bound_m, 0.0, 1)[0].executions.len());
+    let aoa_estimates = [0.3, 0.6, 1.2]
+        .map(|target_error_m| on_demand(target_error_m, 0.0, 1)[0].aoa_estimates.len());
     assert!(
-        executions[0] > 2 * executions[1] && executions[1] > 2 * executions[2],
-        "{executions:?}"
+        aoa_estimates[0] > 2 * aoa_estimates[1] && aoa_estimates[1] > 2 * aoa_estimates[2],
+        "{aoa_estimates:?}"
     );
 }

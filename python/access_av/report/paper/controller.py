@@ -17,20 +17,25 @@ if TYPE_CHECKING:
     from access_av.paper.study import Study
     from access_av.report.chart import Spec
 
-FIXED, READING, CONSTANT, OURS = "fixed interval", "reading", "constant instead", "ours"
+FIXED, INTERPRETATION, CONSTANT, OURS = (
+    "fixed interval",
+    "interpretation",
+    "constant instead",
+    "ours",
+)
 
 
 def contribution(study: Study, specs: dict[str, Spec]) -> str:
-    """Each reading with its controller and with a constant, and the front of fixed intervals."""
+    """Returns the section that compares each controller with a constant, and fixed intervals."""
     specs["ablation"] = _gain_chart(study)
     specs["front"] = _front_chart(study)
-    titles = {each.reading.name: each.reading.title for each in study.evaluations}
+    titles = {each.interpretation.name: each.interpretation.title for each in study.evaluations}
     rows = [
         (
-            escape(titles[each.reading]),
+            escape(titles[each.interpretation]),
             str(each.mode),
-            f"{each.executions:.0f}",
-            f"{each.constant_executions:.0f} at {each.constant_ms:.0f} ms",
+            f"{each.aoa_estimates:.0f}",
+            f"{each.constant_aoa_estimates:.0f} at {each.constant_ms:.0f} ms",
             number(each.rms_error_m),
             number(each.constant_rms_m),
             f"{each.gain_m:+.3f} ({each.gain_low_m:+.3f} … {each.gain_high_m:+.3f})",
@@ -42,10 +47,10 @@ def contribution(study: Study, specs: dict[str, Spec]) -> str:
         for each in study.ablations
     ]
     head = (
-        "Reading",
+        "Interpretation",
         "Mode",
-        "Executions",
-        "Constant: executions",
+        "Angle estimates",
+        "Constant: angle estimates",
         "RMS / m",
         "Constant: RMS / m",
         "Gain / m (95 %)",
@@ -56,17 +61,18 @@ def contribution(study: Study, specs: dict[str, Spec]) -> str:
         '<div class="charts">'
         + figure("ablation", "RMS error with the constant less RMS error with Algorithm 1, same "
                  "runs; right of zero it helps. Lines are paired 95 % intervals.",
-                 "Algorithm 1 against a constant of as many executions")
+                 "Algorithm 1 against a constant of as many angle estimates")
         + figure("front", "Down and left is better. The line is MUSIC at fixed intervals.",
-                 "Error against executions")
-        + f"</div><details><summary>Every reading and mode as a table</summary>{details}</details>"
+                 "Error against angle estimates")
+        + "</div><details><summary>Every interpretation and mode as a table</summary>"
+        + f"{details}</details>"
     )  # fmt: skip
 
 
 def fair(study: Study) -> str:
     """Paper's method and proposed method with equal information."""
     names = {
-        "paper": "the paper's reading",
+        "paper": "the paper's interpretation",
         "ours": "ours",
         "one angle": "ours with one angle, at the start",
         "bound": "bound: no localizer is better, with an angle at every SSB",
@@ -76,14 +82,14 @@ def fair(study: Study) -> str:
             "0.3 %, 1 cm/√m; start 0.1 m, 0.02 rad" if each.real_odometer else "exact, exact start",
             "known" if each.knows_road else "not known",
             names[each.who],
-            f"{each.executions:.0f}",
+            f"{each.aoa_estimates:.0f}",
             f"{each.rms_m:.4f}" if each.rms_m < 0.01 else f"{each.rms_m:.3f}",
             f"{each.rms_low_m:.3f} … {each.rms_high_m:.3f}" if each.who != "bound" else "–",
             number(each.worst_m),
         )
-        for each in study.fair
+        for each in study.equal_information
     ]
-    head = ("Odometer", "Road", "Who", "Executions", "RMS / m", "95 %", "Worst / m")
+    head = ("Odometer", "Road", "Who", "Angle estimates", "RMS / m", "95 %", "Worst / m")
     return f"<p>{escape(summary.fair_text(study))}</p>" + table(head, rows, numbers=(3, 4, 6))
 
 
@@ -92,19 +98,19 @@ def ours(study: Study) -> str:
     rows = [
         (
             str(each.mode) if each.map else f"{each.mode}, road unknown",
-            f"{each.executions:.0f} / {each.papers_executions:.0f}",
+            f"{each.aoa_estimates:.0f} / {each.papers_aoa_estimates:.0f}",
             f"{number(each.energy_j, 1)} / {number(each.papers_energy_j, 1)}",
             f"{each.worst_error_m:.3f} / {each.papers_worst_m:.3f}",
             f"{each.rms_error_m:.3f} / {each.papers_rms_m:.3f}",
-            f"{each.error_less_m:+.3f} ({each.error_less_low_m:+.3f} … "
-            f"{each.error_less_high_m:+.3f})",
+            f"{each.rms_error_reduction_m:+.3f} ({each.rms_error_reduction_low_m:+.3f} … "
+            f"{each.rms_error_reduction_high_m:+.3f})",
             badge("better in both", "yes") if each.is_better else badge("not in both", "no"),
         )
-        for each in study.ours
+        for each in study.proposed_vs_paper
     ]
     head = (
         "Mode",
-        "Executions, ours / paper's",
+        "Angle estimates, ours / paper's",
         "Energy / J",
         "Worst error / m",
         "RMS / m",
@@ -115,11 +121,11 @@ def ours(study: Study) -> str:
 
 
 def _gain_chart(study: Study) -> Spec:
-    titles = {each.reading.name: each.reading.title for each in study.evaluations}
+    titles = {each.interpretation.name: each.interpretation.title for each in study.evaluations}
     rows = pl.DataFrame(
         [
             {
-                "reading": titles[each.reading],
+                "interpretation": titles[each.interpretation],
                 "mode": each.mode,
                 "gain": each.gain_m,
                 "low": each.gain_low_m,
@@ -129,9 +135,9 @@ def _gain_chart(study: Study) -> Spec:
             for each in study.ablations
         ]
     ).with_columns(pl.col(pl.Float64).round(4))
-    order = [each.reading.title for each in study.evaluations]
+    order = [each.interpretation.title for each in study.evaluations]
     base = alt.Chart(rows).encode(
-        y=alt.Y("reading:N", sort=order, title=None, axis=alt.Axis(labelLimit=190)),
+        y=alt.Y("interpretation:N", sort=order, title=None, axis=alt.Axis(labelLimit=190)),
         yOffset=alt.YOffset("mode:N"),
         color=alt.Color(
             "what:N",
@@ -140,7 +146,7 @@ def _gain_chart(study: Study) -> Spec:
             ),
             legend=alt.Legend(title=None, orient="top"),
         ),
-        tooltip=["reading:N", "mode:O", "gain:Q", "low:Q", "high:Q"],
+        tooltip=["interpretation:N", "mode:O", "gain:Q", "low:Q", "high:Q"],
     )
     scale = alt.Scale(type="symlog", constant=0.05)
     span = base.mark_rule(strokeWidth=2).encode(
@@ -151,14 +157,15 @@ def _gain_chart(study: Study) -> Spec:
     return finish(
         zero + span + dots,
         height=34 * len(order) + 60,
-        description="What Algorithm 1 gains in RMS error over a constant, by reading and mode",
+        description="What Algorithm 1 gains in RMS error over a constant, by interpretation and "
+        "mode",
     )
 
 
 def _front_chart(study: Study) -> Spec:
-    shown = study.shown.reading.name
+    shown = study.shown.interpretation.name
     rows = [
-        {"what": FIXED, "executions": float(drives.executions[0]),
+        {"what": FIXED, "aoa_estimates": float(drives.aoa_estimates[0]),
          "rms": float(drives.rms_error_m[0]), "name": f"{interval_ms:g} ms"}
         for interval_ms, drives in study.front
     ]  # fmt: skip
@@ -169,24 +176,25 @@ def _front_chart(study: Study) -> Spec:
         ):
             continue  # in another world
         rows += [
-            {"what": READING, "executions": float(drives.executions[0]),
-             "rms": float(drives.rms_error_m[0]), "name": f"{each.reading.title}, mode {mode}"}
+            {"what": INTERPRETATION, "aoa_estimates": float(drives.aoa_estimates[0]),
+             "rms": float(drives.rms_error_m[0]),
+             "name": f"{each.interpretation.title}, mode {mode}"}
             for mode, drives in each.outcome.adaptive.items()
         ]  # fmt: skip
     rows += [
-        {"what": CONSTANT, "executions": each.constant_executions, "rms": each.constant_rms_m,
-         "name": f"constant {each.constant_ms:.0f} ms in {each.reading}"}
-        for each in study.ablations if each.reading == shown
+        {"what": CONSTANT, "aoa_estimates": each.constant_aoa_estimates, "rms": each.constant_rms_m,
+         "name": f"constant {each.constant_ms:.0f} ms in {each.interpretation}"}
+        for each in study.ablations if each.interpretation == shown
     ]  # fmt: skip
     rows += [
-        {"what": OURS, "executions": each.executions, "rms": each.rms_error_m,
+        {"what": OURS, "aoa_estimates": each.aoa_estimates, "rms": each.rms_error_m,
          "name": f"ours, mode {each.mode}" + ("" if each.map else ", road unknown")}
-        for each in study.ours
+        for each in study.proposed_vs_paper
     ]  # fmt: skip
     points = pl.DataFrame(rows).with_columns(pl.col(pl.Float64).round(4))
-    x = alt.X("executions:Q", title="executions in a trip", scale=alt.Scale(type="log"))
+    x = alt.X("aoa_estimates:Q", title="angle estimates in a trip", scale=alt.Scale(type="log"))
     y = alt.Y("rms:Q", title="RMS error / m", scale=alt.Scale(type="log"))
-    names = [FIXED, READING, CONSTANT, OURS]
+    names = [FIXED, INTERPRETATION, CONSTANT, OURS]
     dots = (
         alt.Chart(points)
         .mark_point(filled=True, size=60)
@@ -203,16 +211,16 @@ def _front_chart(study: Study) -> Spec:
                 scale=alt.Scale(domain=names),
                 legend=alt.Legend(title=None, orient="top"),
             ),
-            tooltip=["name:N", "executions:Q", "rms:Q"],
+            tooltip=["name:N", "aoa_estimates:Q", "rms:Q"],
         )
     )
     line = (
         alt.Chart(points.filter(what=FIXED))
         .mark_line(color=PURPLE, strokeWidth=1)
-        .encode(x=x, y=y, order="executions:Q")
+        .encode(x=x, y=y, order="aoa_estimates:Q")
     )
     return finish(
         line + dots,
         height=320,
-        description="RMS error against executions: fixed intervals, readings, ours",
+        description="RMS error against angle estimates: fixed intervals, interpretations, ours",
     )

@@ -101,9 +101,9 @@ def _chart(evaluation: Evaluation) -> Spec:
         "mode",
         "mode_name",
         "line",
-        pl.col("energy_j", "rms_error_m", "worst_error_x_m", "worst_error_y_m", "executions").round(
-            4
-        ),
+        pl.col(
+            "energy_j", "rms_error_m", "worst_error_x_m", "worst_error_y_m", "aoa_estimates"
+        ).round(4),
     )
     table = table.filter(pl.col("energy_j").is_not_null())
     most_j, most_m = (
@@ -142,7 +142,7 @@ def _chart(evaluation: Evaluation) -> Spec:
                 alt.Tooltip("rms_error_m:Q", title="RMS error / m", format=".3f"),
                 alt.Tooltip("worst_error_x_m:Q", title="worst X / m", format=".3f"),
                 alt.Tooltip("worst_error_y_m:Q", title="worst Y / m", format=".3f"),
-                alt.Tooltip("executions:Q", title="executions", format=".0f"),
+                alt.Tooltip("aoa_estimates:Q", title="angle estimates", format=".0f"),
             ],
         )
         .add_params(budget, bound)

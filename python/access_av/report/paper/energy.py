@@ -1,4 +1,4 @@
-"""The report's section on energy and executions."""
+"""The report's section on energy and angle estimates."""
 
 from __future__ import annotations
 
@@ -27,13 +27,14 @@ def energy_text(evaluation: Evaluation) -> str:
     """Energies and their sources."""
     free, solved = numbers(evaluation.freedoms)
     return escape(
-        "Energy of a trip is the number of executions times the energy of one execution. "
+        "Energy of a trip is the number of angle estimates times the energy of one execution. "
         f"Boundary: {evaluation.platform.energy_boundary}. Bars are ours; diamonds are the "
         "values the paper states. "
         + (
             "Energies per execution were fitted to those and to the paper’s statements about the "
             f"rest, for each interpretation separately: {free} numbers are free, {solved} of them "
-            "solved for from stated figures. Agreement is therefore a check of the executions, not "
+            "solved for from stated figures. Agreement is therefore a check of the angle "
+            "estimates, not "
             "of the power."
             if evaluation.refitted
             else "Energies per execution are the platform’s own."
@@ -62,21 +63,21 @@ def _savings(evaluation: Evaluation, mode: int) -> float | None:
 
 
 def energy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
-    """Energy and executions of a trip in each mode."""
+    """Energy and angle estimates of a trip in each mode."""
     specs["energy-bars"] = _energy_chart(evaluation)
-    specs["executions"] = _executions_chart(evaluation)
+    specs["aoa_estimates"] = _aoa_estimates_chart(evaluation)
     bars = figure("energy-bars", title="Energy of a trip")
-    return f'<div class="charts">{bars}{figure("executions", title="Executions in a trip")}</div>'
+    return f'<div class="charts">{bars}{figure("aoa_estimates", title="Estimates in a trip")}</div>'
 
 
 def freedoms(study: Study) -> str:
     """Claims met with each degree of freedom of the energy fit."""
-    if not study.bought:
+    if not study.fit_options:
         return "<p>The platform's energies are its own: nothing was fitted.</p>"
-    titles = {each.reading.name: each.reading.title for each in study.evaluations}
+    titles = {each.interpretation.name: each.interpretation.title for each in study.evaluations}
 
-    def named(readings: tuple[str, ...]) -> str:
-        return escape(", ".join(titles[name] for name in readings) or "none")
+    def named(interpretations: tuple[str, ...]) -> str:
+        return escape(", ".join(titles[name] for name in interpretations) or "none")
 
     rows = [
         (
@@ -89,12 +90,12 @@ def freedoms(study: Study) -> str:
             named(each.energy),
             named(each.both),
         )
-        for index, each in enumerate(study.bought)
+        for index, each in enumerate(study.fit_options)
     ]
     head = (
         "Free in the fit",
         "Numbers free / solved for",
-        f"“{study.shown.reading.title}”: reproduced / agree by construction / by arithmetic",
+        f"“{study.shown.interpretation.title}”: reproduced / agree by construction / by arithmetic",
         "Average saving / %",
         "Energy half kept by",
         "Both halves kept by",
@@ -103,7 +104,7 @@ def freedoms(study: Study) -> str:
 
 
 def energy_table(evaluation: Evaluation) -> str:
-    """Energies, savings and executions of each mode."""
+    """Energies, savings and angle estimates of each mode."""
     paper = paper_numbers()["energy_j"]
     rows = []
     for mode in evaluation.platform.modes:
@@ -116,7 +117,7 @@ def energy_table(evaluation: Evaluation) -> str:
                 *(number(value, 1) for value in fixed["energy_j"]),
                 number(adaptive["energy_j"].item(), 1) + (f" (paper {stated})" if stated else ""),
                 number(_savings(evaluation, mode.number), 1),
-                number(adaptive["executions"].item(), 0),
+                number(adaptive["aoa_estimates"].item(), 0),
             )
         )
     head = (
@@ -124,7 +125,7 @@ def energy_table(evaluation: Evaluation) -> str:
         *(f"{label(m)} / J" for m in METHODS),
         "Adaptive / J",
         "Saved / %",
-        "Executions",
+        "Angle estimates",
     )
     return table(head, rows, numbers=range(1, 7))
 
@@ -161,9 +162,9 @@ def _energy_chart(evaluation: Evaluation) -> Spec:
     )
 
 
-def _executions_chart(evaluation: Evaluation) -> Spec:
+def _aoa_estimates_chart(evaluation: Evaluation) -> Spec:
     """Angle estimates in a trip, per mode."""
-    bars = _grouped_bars(evaluation, "executions", "executions in a trip", ".0f")
+    bars = _grouped_bars(evaluation, "aoa_estimates", "angle estimates in a trip", ".0f")
     return finish(
         bars, height=230, description="Angle estimates in one trip per power mode and method"
     )

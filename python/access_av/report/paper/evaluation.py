@@ -17,7 +17,7 @@ from access_av.report.paper import (
     design_space,
     energy,
     equipment,
-    readings,
+    interpretations,
     unknowns,
 )
 from access_av.report.parts import badge, source, table, tile
@@ -44,7 +44,7 @@ def render(study: Study, specs: dict[str, Spec] | None = None) -> str:
     Parameters
     ----------
     study
-        The paper under several readings; the shown one's charts are drawn in full.
+        The paper under several interpretations; the shown one's charts are drawn in full.
     specs
         Takes the charts, by name.
 
@@ -58,23 +58,23 @@ def render(study: Study, specs: dict[str, Spec] | None = None) -> str:
     return fill(
         TEMPLATE.read_text(encoding="utf-8"),
         specs,
-        shown=escape(evaluation.reading.title),
+        shown=escape(evaluation.interpretation.title),
         headline=escape(summary.headline(study)),
         promise=escape(summary.PROMISE),
-        overview=readings.overview(study, specs),
-        chosen=readings.chosen(study),
+        overview=interpretations.overview(study, specs),
+        chosen=interpretations.chosen(study),
         freedoms=energy.freedoms(study),
         fair=controller.fair(study),
         lead=escape(summary.lead(study)),
         tiles=_tiles(study),
         meta=_meta(study),
         runs=evaluation.runs,
-        readings=readings.readings(study),
-        matrix=readings.matrix(study),
+        interpretations=interpretations.interpretations(study),
+        matrix=interpretations.matrix(study),
         seeds=escape(summary.seeds_text(study)),
-        claims=readings.claims(study),
-        tolerances=escape(readings.tolerances()),
-        power_modes=readings.power_modes(evaluation),
+        claims=interpretations.claims(study),
+        tolerances=escape(interpretations.tolerances()),
+        power_modes=interpretations.power_modes(evaluation),
         contribution=controller.contribution(study, specs),
         unknowns=unknowns.unknowns(study, specs),
         ours=controller.ours(study),
@@ -95,8 +95,8 @@ def render(study: Study, specs: dict[str, Spec] | None = None) -> str:
 
 def _tiles(study: Study) -> str:
     """Claims met under the shown interpretation, by weight of evidence."""
-    name = study.shown.reading.title
-    met = summary.counts(study.of(study.shown.reading.name))
+    name = study.shown.interpretation.title
+    met = summary.counts(study.of(study.shown.interpretation.name))
     made = [
         tile(
             f"{held} of {judged}",
@@ -107,7 +107,7 @@ def _tiles(study: Study) -> str:
         for kind, (held, judged) in met.items()
         if judged
     ]
-    without_map = [each for each in study.ours if not each.map]
+    without_map = [each for each in study.proposed_vs_paper if not each.map]
     better = sum(each.is_better for each in without_map)
     made.append(
         tile(
@@ -121,7 +121,7 @@ def _tiles(study: Study) -> str:
 def _meta(study: Study) -> str:
     evaluation = study.shown
     return escape(
-        f"{len(study.evaluations)} readings, platform “{evaluation.platform.name}”, "
+        f"{len(study.evaluations)} interpretations, platform “{evaluation.platform.name}”, "
         f"{evaluation.runs} runs per setting, seed {evaluation.seed}, "
         f"version {version('access-av')}."
     )
@@ -147,7 +147,7 @@ def _provenance(evaluation: Evaluation) -> str:
     head = ("Mode", "Method", "J per execution", "Provenance", "Source")
     return (
         f"<p>{escape(NO_FIGURES)}</p>"
-        "<p>Errors, executions and SNR are simulated by this version from the scenario below "
+        "<p>Errors, angle estimates and SNR are simulated by this version from the scenario below "
         "and the seed above. Prices and carbon factors carry their sources where they stand.</p>"
         "<details><summary>Energy per execution, with its sources</summary>"
         + table(head, rows, numbers=(2,))

@@ -9,7 +9,7 @@ import polars as pl
 from access_av.device.platform import Platform
 from access_av.errors import InputError
 from access_av.paper.claims import as_records
-from access_av.paper.readings import SHIPPED, load_all
+from access_av.paper.interpretations import SHIPPED, load_all
 from access_av.paper.study import Study, study
 from access_av.report.paper.evaluation import render
 from access_av.report.paper.figures import figures
@@ -38,7 +38,7 @@ def write(made: Study, directory: ResultsDirectory) -> None:
     directory.write_text("scenario.toml", shown.scenario.resolved(shown.platform.core).to_toml())
     directory.write_text("platform.toml", shown.platform.to_toml())
     directory.write_manifest(
-        readings=[each.reading.name for each in made.evaluations],
+        interpretations=[each.interpretation.name for each in made.evaluations],
         unusable=dict(made.unusable),
         platform=shown.platform.name,
         runs=shown.runs,
@@ -57,7 +57,7 @@ def run(
     out: Path | None = None,
     **how: Any,
 ) -> tuple[Study, ResultsDirectory]:
-    """Evaluate these readings, or all that are shipped, and write the results."""
+    """Evaluate these interpretations, or all that are shipped, and write the results."""
     chosen, board = load_all(names), Platform.load(platform)
     directory = ResultsDirectory.create("evaluate", out)
     made = study(chosen, board, runs=runs, seed=seed, **how)
@@ -67,7 +67,7 @@ def run(
 
 def operating_points(
     results: Path | None = None,
-    reading: str = SHIPPED,
+    interpretation: str = SHIPPED,
     *,
     progress: Callable[[int, int], None] | None = None,
 ) -> pl.DataFrame:
@@ -78,15 +78,15 @@ def operating_points(
     results
         Directory of an evaluation. ``None`` takes ``results/latest`` if that is one, else the
         newest one in ``results/`` and, where there is none, runs the paper's.
-    reading
-        Under which reading.
+    interpretation
+        Under which interpretation.
     progress
         Called as ``progress(done, total)`` while a new one runs.
 
     Raises
     ------
     InputError
-        When ``results`` holds no evaluation, or not of that reading.
+        When ``results`` holds no evaluation, or not of that interpretation.
     """
     if results is not None:
         file = results / POINTS_FILE
@@ -96,14 +96,16 @@ def operating_points(
         earlier = sorted(RESULTS.glob(f"*-evaluate/{POINTS_FILE}"))
         earlier += RESULTS.glob(f"latest/{POINTS_FILE}")
         if not earlier:
-            _, directory = run([reading], runs=100, seed=1, progress=progress)
+            _, directory = run([interpretation], runs=100, seed=1, progress=progress)
             earlier = [directory.path / POINTS_FILE]
         file = earlier[-1]
     points = _points(file)
-    there = points["reading"].unique(maintain_order=True).to_list()
-    if reading not in there:
-        raise InputError(f"{file.parent}: no reading {reading} here; there are: {', '.join(there)}")
-    return points.filter(pl.col("energy_j").is_not_null(), reading=reading)
+    there = points["interpretation"].unique(maintain_order=True).to_list()
+    if interpretation not in there:
+        raise InputError(
+            f"{file.parent}: no interpretation {interpretation} here; there are: {', '.join(there)}"
+        )
+    return points.filter(pl.col("energy_j").is_not_null(), interpretation=interpretation)
 
 
 def _points(file: Path) -> pl.DataFrame:

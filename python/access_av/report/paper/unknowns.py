@@ -25,10 +25,11 @@ LEAST_TOTAL = 0.05
 
 def unknowns(study: Study, specs: dict[str, Spec]) -> str:
     """On what each claim hangs, and in how much of the space it holds."""
-    found = study.unknowns
+    found = study.sensitivity
     if found is None:
         return (
-            "<p>Not asked for. <code>access-av evaluate --unknowns</code> draws readings from what "
+            "<p>Not asked for. <code>access-av evaluate --sensitivity</code> draws interpretations "
+            "from what "
             "the paper leaves open and says on what each claim hangs.</p>"
         )
     specs["sobol"] = _index_chart(found)
@@ -38,7 +39,8 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
         [(each.label, each.range_text) for each in DIMENSIONS],
     )
     return (
-        f"<p>{found.readings} readings of {found.runs} runs each, drawn from the ranges below. A "
+        f"<p>{found.interpretations} interpretations of {found.runs} runs each, drawn from the "
+        "ranges below. A "
         "total index of 0.6 means: 60 % of what the claim's margin varies by involves that one "
         "thing, by itself or together with others. Cells below "
         f"{LEAST_TOTAL:.0%} are left empty; “unexplained” is what the expansion cannot say.</p>"
@@ -47,7 +49,7 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
         + figure(
             "share",
             "Bars are 95 % intervals over worlds.",
-            "Share of the drawn readings in which each claim holds",
+            "Share of the drawn interpretations in which each claim holds",
         )
         + f"<details><summary>The ranges</summary>{ranges}</details>"
     )
@@ -122,7 +124,9 @@ def _share_chart(found: Unknowns) -> Spec:
         tooltip=["claim:N", "share:Q", "low:Q", "high:Q"],
     )
     bars = base.mark_bar(color=BLUE, cornerRadiusEnd=2).encode(
-        x=alt.X("share:Q", title="share of the readings", scale=alt.Scale(domain=[0.0, 1.0]))
+        x=alt.X("share:Q", title="share of the interpretations", scale=alt.Scale(domain=[0.0, 1.0]))
     )
     ends = base.mark_rule(color=GREY, strokeWidth=3).encode(x="low:Q", x2="high:Q")
-    return finish(bars + ends, height=320, description="Share of readings in which a claim holds")
+    return finish(
+        bars + ends, height=320, description="Share of interpretations in which a claim holds"
+    )

@@ -7,7 +7,7 @@ this, and tests hold what is really produced to it.
 Examples
 --------
 >>> from access_av import columns
->>> columns.TABLES["executions"].null["angle_rad"]
+>>> columns.TABLES["aoa_estimates"].null["angle_rad"]
 'no angle could be estimated'
 >>> columns.GLOSSARY["covariance_xy_m2"].unit
 'm²'

@@ -40,7 +40,7 @@ _NO_ARRAY = "one channel (the key is absent)"
 _UNDECODED = "the message was not decoded"
 
 _SETTING = (
-    "reading", "campaign", "mode", "method", "adaptive", "base_wake_up_ms", "variant",
+    "interpretation", "campaign", "mode", "method", "adaptive", "base_wake_up_ms", "variant",
 )  # fmt: skip
 _SETTING_NULL = {
     "mode": f"{_NO_MODE}; the front; or equal information, which is in mode 0",
@@ -69,7 +69,7 @@ _PERCENTILES = tuple(
 )
 _IN_THE_WORST = (
     "choice", "world", "runs", "energy_j", "rms_error_m", *_PERCENTILES, "p90_max_error_m",
-    "executions", "listened",
+    "aoa_estimates", "bursts_received",
 )  # fmt: skip
 _PERCENTILES_NULL = {
     **dict.fromkeys(
@@ -94,7 +94,7 @@ _POSES_NULL = {
     **{name: _NO_COVARIANCE for name in _POSES if name.startswith("covariance")},
     **dict.fromkeys((*_LEVELS, "integrity"), _NOT_GUARDED),
 }
-_ENERGIES = ("energy_j", "energy_executions_j", "energy_listening_j", "energy_idle_j")
+_ENERGIES = ("energy_j", "energy_aoa_estimates_j", "energy_listening_j", "energy_idle_j")
 
 TABLES: Mapping[str, Table] = {
     table.name: table
@@ -111,7 +111,8 @@ TABLES: Mapping[str, Table] = {
             "A run",
             "`access_av.simulate(…).runs`",
             (
-                "run", "executions", "listened", "longest_gap_s", *_ENERGIES, "rms_error_m",
+                "run", "aoa_estimates", "bursts_received",
+                "longest_gap_s", *_ENERGIES, "rms_error_m",
                 "max_error_m", "final_error_m", "found_s", "found_m",
             ),
             {
@@ -137,9 +138,9 @@ TABLES: Mapping[str, Table] = {
             },
         ),
         Table(
-            "executions",
+            "aoa_estimates",
             "An angle estimate and its use by the localizer",
-            "`executions.parquet` of `access-av run`; `access_av.simulate(…).executions`",
+            "`aoa_estimates.parquet` of `access-av run`; `access_av.simulate(…).aoa_estimates`",
             (
                 "run", "time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "estimator_snr_db",
                 *_COMPARED, "wake_up_time_s", "resolved", "accepted", "reason",
@@ -294,7 +295,7 @@ TABLES: Mapping[str, Table] = {
             "`access_av.sweep(…).table`",
             (
                 "variant", "runs", "rms_error_m", *_PERCENTILES, "delta_m", "delta_low_m",
-                "delta_high_m", "executions", "listened", "energy_j",
+                "delta_high_m", "aoa_estimates", "bursts_received", "energy_j",
             ),
             {
                 **_PERCENTILES_NULL,
@@ -309,10 +310,11 @@ TABLES: Mapping[str, Table] = {
             "operating_points",
             "An operating point of an interpretation of the paper",
             "`operating_points.parquet` of `access-av evaluate`; `access-av explore --json`; all "
-            "but `reading`: `access_av.evaluate(…).points`",
+            "but `interpretation`: `access_av.evaluate(…).points`",
             (
-                "reading", "campaign", "mode", "mode_name", "method", "adaptive", "base_wake_up_ms",
-                "executions", "worst_error_x_m", "worst_error_y_m", "rms_error_m",
+                "interpretation", "campaign", "mode", "mode_name", "method", "adaptive",
+                "base_wake_up_ms",
+                "aoa_estimates", "worst_error_x_m", "worst_error_y_m", "rms_error_m",
                 "energy_per_execution_j", "energy_j", "energy_provenance", *_PERCENTILES,
             ),
             {
@@ -336,7 +338,8 @@ TABLES: Mapping[str, Table] = {
             "A run of a study",
             "`drives.parquet` of `access-av study`",
             (
-                "variant", "run", "seed", "executions", "listened", "duration_s", "is_lost",
+                "variant", "run", "seed", "aoa_estimates", "bursts_received", "duration_s",
+                "is_lost",
                 "ok_steps", "level_steps", "suspected_steps", "unavailable_steps", "exceedances",
             ),
             dict.fromkeys(
@@ -363,12 +366,13 @@ TABLES: Mapping[str, Table] = {
             "`places.parquet` and `places.csv` of `access-av study`",
             (
                 "along_m", "x_m", "y_m", "median_error_m", "target_error_m", "within_share",
-                "passes", "level_m", "reliable_share", "bound_m", "dilution_of_degree_m",
+                "passes", "level_m", "reliable_share", "bound_m", "along_road_error_per_degree_m",
                 "heads_visible", "best_snr_db",
             ),
             {
                 "level_m": "the state is never ok there",
-                "dilution_of_degree_m": "no visible radio head determines the position along the "
+                "along_road_error_per_degree_m": "no visible radio head determines the position "
+                "along the "
                 "road",
                 "best_snr_db": "walls hide every radio head",
             },
@@ -394,8 +398,9 @@ TABLES: Mapping[str, Table] = {
         Table(
             "compared",
             "A percentile of the error of a variant",
-            "`compared.parquet` of `access-av run`, `study`, `locate` and `integrity`, with --vary "
-            "or --compare",
+            "`compared.parquet` of `access-av run`, `study`, `locate` and `integrity`, with "
+            "--sweep "
+            "or --against",
             (
                 "variant", "runs", "percent", "percentile_m", "percentile_low_m",
                 "percentile_high_m", "delta_m", "delta_low_m", "delta_high_m", "lost_runs",
@@ -430,10 +435,11 @@ TABLES: Mapping[str, Table] = {
         Table(
             "errors",
             "A setting of an interpretation and an SSB",
-            "`errors.parquet` of `access-av evaluate`; all but `reading`: "
+            "`errors.parquet` of `access-av evaluate`; all but `interpretation`: "
             "`access_av.evaluate(…).errors`",
             (
-                "reading", "method", "adaptive", "base_wake_up_ms", "time_s", "mean_abs_error_x_m",
+                "interpretation", "method", "adaptive", "base_wake_up_ms", "time_s",
+                "mean_abs_error_x_m",
                 "mean_abs_error_y_m",
             ),
         ),
@@ -448,8 +454,9 @@ TABLES: Mapping[str, Table] = {
             "A claim of the paper under an interpretation",
             "`claims.json` of `access-av evaluate`",
             (
-                "reading", "id", "says", "where", "stated", "obtained", "interval", "unit",
-                "verdict", "turns_with_seed", "evidence", "note", "spread", "met_by_seed",
+                "interpretation", "id", "statement", "paper_section", "stated", "obtained",
+                "interval", "unit",
+                "verdict", "seed_sensitive", "evidence", "note", "spread", "met_by_seed",
                 "deviation", "tolerance",
             ),
             {
@@ -466,7 +473,7 @@ TABLES: Mapping[str, Table] = {
             "A run of a setting of the evaluation",
             "`evaluation_runs.parquet` of `access-av evaluate`",
             (
-                *_SETTING, "run", "executions", "rms_error_m", "max_error_x_m", "max_error_y_m",
+                *_SETTING, "run", "aoa_estimates", "rms_error_m", "max_error_x_m", "max_error_y_m",
                 "longest_gap_s", "energy_j",
             ),
             {
@@ -480,7 +487,7 @@ TABLES: Mapping[str, Table] = {
             "A bootstrap resample of the runs of an operating point",
             "`resamples.parquet` of `access-av evaluate`",
             (
-                *_SETTING, "resample", "executions", "worst_error_x_m", "worst_error_y_m",
+                *_SETTING, "resample", "aoa_estimates", "worst_error_x_m", "worst_error_y_m",
                 "rms_error_m", "late_to_early", "share_below_music", "share_below_esprit",
                 "share_below_root_music",
             ),
@@ -497,7 +504,7 @@ TABLES: Mapping[str, Table] = {
             "An interpretation and a power mode, with a constant in place of the controller",
             "`ablations.parquet` of `access-av evaluate`",
             (
-                "reading", "mode", "constant_ms", "executions", "constant_executions",
+                "interpretation", "mode", "constant_ms", "aoa_estimates", "constant_aoa_estimates",
                 "rms_error_m", "constant_rms_m", "gain_m", "gain_low_m", "gain_high_m", "matters",
             ),
         ),
@@ -506,36 +513,39 @@ TABLES: Mapping[str, Table] = {
             "MUSIC at a fixed interval",
             "`fixed_front.parquet` of `access-av evaluate`",
             (
-                "base_wake_up_ms", "executions", "worst_error_x_m", "worst_error_y_m",
+                "base_wake_up_ms", "aoa_estimates", "worst_error_x_m", "worst_error_y_m",
                 "rms_error_m",
             ),
         ),
         Table(
-            "ours",
+            "proposed_vs_paper",
             "A power mode: localizer and wake-up of this project, and the paper's adaptive point",
-            "`ours.parquet` of `access-av evaluate`",
+            "`proposed_vs_paper.parquet` of `access-av evaluate`",
             (
-                "mode", "map", "executions", "papers_executions", "energy_j", "papers_energy_j",
-                "worst_error_m", "papers_worst_m", "rms_error_m", "papers_rms_m", "error_less_m",
-                "error_less_low_m", "error_less_high_m", "executions_less", "executions_less_low",
-                "executions_less_high",
+                "mode", "map", "aoa_estimates", "papers_aoa_estimates", "energy_j",
+                "papers_energy_j",
+                "worst_error_m", "papers_worst_m", "rms_error_m", "papers_rms_m",
+                "rms_error_reduction_m",
+                "rms_error_reduction_low_m", "rms_error_reduction_high_m", "estimates_saved",
+                "estimates_saved_low",
+                "estimates_saved_high",
             ),
             dict.fromkeys(("energy_j", "papers_energy_j"), _NO_FIGURE),
         ),
         Table(
-            "fair",
+            "equal_information",
             "A localization method in mode 0, with its information",
-            "`fair.parquet` of `access-av evaluate`",
+            "`equal_information.parquet` of `access-av evaluate`",
             (
-                "real_odometer", "map", "who", "executions", "rms_error_m", "rms_low_m",
+                "real_odometer", "map", "who", "aoa_estimates", "rms_error_m", "rms_low_m",
                 "rms_high_m", "worst_error_m",
             ),
             {"worst_error_m": "the row is the bound"},
         ),
         Table(
-            "freedoms",
+            "fit_degrees_of_freedom",
             "A free parameter of the energy fit, in addition to the rows above",
-            "`freedoms.parquet` of `access-av evaluate`",
+            "`fit_degrees_of_freedom.parquet` of `access-av evaluate`",
             (
                 "freedom", "free_numbers", "solved_numbers", "claims_reproduced",
                 "agree_by_construction", "agree_by_arithmetic", "average_saving_percent",
@@ -544,18 +554,19 @@ TABLES: Mapping[str, Table] = {
             {"average_saving_percent": "the claim is not judged"},
         ),
         Table(
-            "chosen",
+            "assumptions",
             "A value of an open choice of the paper: the shipped value or an alternative",
-            "`chosen.parquet` of `access-av evaluate --unknowns`; `access-av chosen --json`",
+            "`assumptions.parquet` of `access-av evaluate --sensitivity`; `access-av chosen "
+            "--json`",
             (
-                "what", "value", "why", "is_shipped", "executions", "worst_error_m",
+                "what", "value", "why", "is_shipped", "aoa_estimates", "worst_error_m",
                 "rms_error_m", "rms_std_m", "fixed_rms_m", "every_ssb_rms_m",
             ),
         ),
         Table(
-            "unknowns",
+            "sensitivity",
             "A claim and an open choice of the paper",
-            "`unknowns.parquet` of `access-av evaluate --unknowns`",
+            "`sensitivity.parquet` of `access-av evaluate --sensitivity`",
             (
                 "claim", "dimension", "first", "total", "first_low", "first_high", "total_low",
                 "total_high",

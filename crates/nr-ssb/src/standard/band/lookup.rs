@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bands_tell_the_size_of_a_burst_set() {
+    fn the_band_determines_the_size_of_a_burst_set() {
         let sizes = |spacing, mhz: f64| {
             let LikelyLmax { likely, certain } = likely_lmax(spacing, Some(1e6 * mhz));
             (likely.count(), certain)

@@ -1,6 +1,6 @@
 //! Whole recordings through the receivers.
 
-use nr_ssb::receiver::{HeardSsb, Receiver, ReceiverConfig, Seen, Window, WindowReceiver};
+use nr_ssb::receiver::{Receiver, ReceiverConfig, Seen, TrackedSsb, Window, WindowReceiver};
 use nr_ssb::{Complex32, Tone};
 
 /// Samples of each block of a stream.
@@ -11,7 +11,7 @@ pub fn stream(
     config: ReceiverConfig,
     [rate_hz, centre_hz]: [f64; 2],
     samples: &[Vec<Complex32>],
-    take: &mut dyn FnMut(&HeardSsb),
+    take: &mut dyn FnMut(&TrackedSsb),
 ) -> Vec<Tone> {
     let mut receiver = Receiver::new(config, rate_hz, centre_hz).unwrap();
     let mut tones = Vec::new();

@@ -71,7 +71,7 @@ impl Live {
         (self.last_angle_s, self.last_burst) = (None, None);
         (self.has_samples, self.empty_stretches) = (false, 0);
         self.interval_s = None;
-        (self.executions, self.listened) = (0, 0);
+        (self.aoa_estimates, self.bursts_received) = (0, 0);
         Ok(())
     }
 

@@ -63,9 +63,9 @@ impl ConsistencyMonitor {
         }
     }
 
-    /// Adds the result of an angle with `noise_ratio` times its specified variance. Angles without
+    /// Adds the result of an angle with `noise_scale` times its specified variance. Angles without
     /// an innovation are ignored.
-    pub fn see(&mut self, head: &RadioHead, verdict: &UpdateVerdict, noise_ratio: f64) {
+    pub fn see(&mut self, head: &RadioHead, verdict: &UpdateVerdict, noise_scale: f64) {
         let refused = match verdict.reason {
             UpdateReason::Consistent => 0.0,
             UpdateReason::Outlier => 1.0,
@@ -74,7 +74,7 @@ impl ConsistencyMonitor {
         let Some(distance) = verdict.mahalanobis_squared else {
             return;
         };
-        let capped = distance.min(verdict.threshold.unwrap_or(distance)) / noise_ratio;
+        let capped = distance.min(verdict.threshold.unwrap_or(distance)) / noise_scale;
         self.angles = self.angles.saturating_add(1);
         let is_it = |it: &&mut HeadStatistics| (it.pci, it.ssb_index) == (head.pci, head.ssb_index);
         let Some(head) = self.heads.iter_mut().find(is_it) else {

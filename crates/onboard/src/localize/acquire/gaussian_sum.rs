@@ -137,7 +137,7 @@ clone_in_place! {
         /// Whether an uncertain hypothesis is penalised for its uncertainty.
         is_as_stated: bool,
         /// Prior probability of a bias, for the filter of the located vehicle.
-        bias_probability: f64,
+        multipath_bias_probability: f64,
     }
 }
 
@@ -170,7 +170,7 @@ impl GaussianSum {
             return Self::as_stated(&config, heads);
         }
         Self {
-            bias_probability: config.bias_probability,
+            multipath_bias_probability: config.multipath_bias_probability,
             ..Self::new(config.as_stated(), road, either_direction, heads)
         }
     }
@@ -180,7 +180,7 @@ impl GaussianSum {
     pub(super) fn as_stated(config: &EkfConfig, heads: &[RadioHead]) -> Self {
         Self {
             is_as_stated: true,
-            bias_probability: config.bias_probability,
+            multipath_bias_probability: config.multipath_bias_probability,
             ..Self::new(config.as_stated(), None, true, heads)
         }
     }
@@ -206,7 +206,7 @@ impl GaussianSum {
     }
 
     /// Whether its filters have the same states as a filter that they are compared with.
-    pub fn is_of_the_model_of(&self, ekf: &Ekf) -> bool {
+    pub fn has_model_of(&self, ekf: &Ekf) -> bool {
         self.config.estimates_bias() == ekf.is_with_bias()
     }
 
@@ -218,7 +218,7 @@ impl GaussianSum {
             hypotheses: Vec::new(),
             places: 0,
             is_as_stated: false,
-            bias_probability: config.bias_probability,
+            multipath_bias_probability: config.multipath_bias_probability,
         };
         made.restart();
         made
@@ -450,7 +450,7 @@ impl GaussianSum {
             }
         }
         if !one.ekf.is_with_bias() {
-            one.ekf.begin_bias(self.bias_probability);
+            one.ekf.begin_bias(self.multipath_bias_probability);
         }
         (other_way < OTHER_WAY).then_some(one.ekf)
     }

@@ -159,7 +159,7 @@ impl RelocalizationTest {
         } else {
             let ratio = self.search.best() - self.of_filter;
             let share = if is_confirming || self.may_mislead {
-                self.independent_share()
+                self.information_fraction()
             } else {
                 1.0
             };
@@ -185,7 +185,7 @@ impl RelocalizationTest {
     fn against_start(&self) -> f64 {
         let ratio = self.search.evidence() - self.of_filter;
         if ratio > 0.0 {
-            ratio * self.independent_share() / self.misfit()
+            ratio * self.information_fraction() / self.misfit()
         } else {
             ratio
         }
@@ -196,7 +196,7 @@ impl RelocalizationTest {
         (-2.0 * self.search.best() / f64::from(self.angles.max(1))).max(1.0)
     }
 
-    fn independent_share(&self) -> f64 {
+    fn information_fraction(&self) -> f64 {
         f64::from(self.independent) / f64::from(self.angles.max(1))
     }
 

@@ -130,8 +130,8 @@ impl Solution {
     }
 
     /// Returns the ratio of the angles' measured variance to the specified one, if it is estimated.
-    fn noise_ratio(&self) -> f64 {
-        (self.monitor()).map_or(1.0, |it| it.bank().noise_ratio())
+    fn noise_scale(&self) -> f64 {
+        (self.monitor()).map_or(1.0, |it| it.bank().noise_scale())
     }
 
     fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
@@ -348,8 +348,8 @@ impl Relocalizer {
     fn search_about(&self, solution: &Solution, now_s: f64, is_wide: bool) -> Option<GaussianSum> {
         let (ekf, heads) = (solution.ekf(), self.setup.heads.as_slice());
         let mut config = *ekf.config();
-        if config.heard_noise_ratio.is_some() {
-            config.set_noise_ratio(Some(solution.noise_ratio()));
+        if config.measured_noise_scale.is_some() {
+            config.set_noise_scale(Some(solution.noise_scale()));
         }
         let road = self.setup.road.as_ref();
         let mut search = match road {
@@ -485,7 +485,7 @@ impl Localizer for Relocalizer {
         // The hypotheses of a search predict angles with the states of the filter that they are
         // compared with.
         let is_of_other_model = |test: &RelocalizationTest| {
-            (self.solution.as_ref()).is_some_and(|it| !test.search.is_of_the_model_of(it.ekf()))
+            (self.solution.as_ref()).is_some_and(|it| !test.search.has_model_of(it.ekf()))
         };
         if self.phase == Phase::Given {
             self.begin_of_start(now_s);
@@ -500,13 +500,13 @@ impl Localizer for Relocalizer {
         }
         let begun_s = solution.begun_s();
         let verdict = solution.update(head, measured);
-        let (has_begun_anew, noise_ratio) = (solution.begun_s() > begun_s, solution.noise_ratio());
+        let (has_begun_anew, noise_scale) = (solution.begun_s() > begun_s, solution.noise_scale());
         if has_begun_anew && self.is_lost() && !self.is_of_start() {
             // The filter that was lost has been replaced.
             self.end_search();
             self.consistency.reset();
         }
-        self.consistency.see(head, &verdict, noise_ratio);
+        self.consistency.see(head, &verdict, noise_scale);
         self.advance(now_s);
         Ok(verdict)
     }

@@ -6,7 +6,7 @@
 //! changes after some distance. Each angle also has a short-lived error of the same level. The
 //! process depends on distance, not on time, because the error is constant at standstill. The bias
 //! is estimated together with the state, see
-//! [`CorrelatedBias`](super::correlated_bias::CorrelatedBias); this module weights the jump
+//! [`MultipathBias`](super::multipath_bias::MultipathBias); this module weights the jump
 //! hypotheses of an angle by Bayes' rule.
 
 use crate::gaussian::Innovation;

@@ -1,10 +1,10 @@
 //! Time-correlated (multipath) bias of each radio head's angles, estimated together with the state:
 //! a jump process, whose hypotheses of value and level are merged to one Gaussian after each angle.
 
-mod correlated_bias;
 mod jump_process;
+mod multipath_bias;
 mod range_states;
 
-pub use correlated_bias::CorrelatedBias;
 pub(in crate::localize) use jump_process::{JumpHypotheses, MOST_VARIANCE, independent, repeats};
+pub use multipath_bias::MultipathBias;
 pub(in crate::localize) use range_states::{CLOCK, DRIFT, FIRST_OFFSET, RANGE_SCALE, RangeTerms};

@@ -1,8 +1,8 @@
 //! States of the ranges, estimated together with the vehicle's state: scale error, offset and drift
 //! of the vehicle's clock, and one offset per radio head. They follow the angles' biases in
-//! [`CorrelatedBias`], so that vehicle, biases and range states remain one Gaussian.
+//! [`MultipathBias`], so that vehicle, biases and range states remain one Gaussian.
 
-use super::correlated_bias::{CorrelatedBias, HeadBias};
+use super::multipath_bias::{HeadBias, MultipathBias};
 use crate::gaussian::dot;
 use crate::localize::ekf::state::{Belief, STATES};
 use crate::radio_head::RadioHead;
@@ -17,7 +17,7 @@ pub(in crate::localize) const FIRST_OFFSET: usize = 3;
 /// Derivative of a range by its four range states: number of the state, and factor.
 pub(in crate::localize) type RangeTerms = [(usize, f64); 4];
 
-impl CorrelatedBias {
+impl MultipathBias {
     /// Adds the states of the ranges of these radio heads.
     pub fn add_ranges(&mut self, model: &RangeModel, heads: &[RadioHead]) {
         let old = self.heads.len();

@@ -32,7 +32,7 @@ pub struct EkfConfig {
     /// Fraction of correct angles that the gate rejects.
     pub outlier_probability: f64,
     /// Ratio of the measured variance of the angles to the specified one, if it is used.
-    pub heard_noise_ratio: Option<f64>,
+    pub measured_noise_scale: Option<f64>,
     /// Lane keeping model, with a map.
     pub lane_keeping: LaneKeeping,
     /// Curvature model of the path, without a map.
@@ -83,12 +83,12 @@ pub struct EkfConfig {
     /// See `yaw_noise_rad_per_sqrt_m`.
     pub yaw_noise_rad_per_sqrt_rad: f64,
     /// Standard deviation of the angles' time offset (s); 0 means exact times.
-    pub lateness_std_s: f64,
+    pub angle_time_offset_std_s: f64,
     /// Specified time-correlated noise of the angles.
-    pub phase_bias: PhaseBias,
+    pub correlated_noise: CorrelatedNoise,
     /// Prior probability that the angles of a radio head have a time-correlated (multipath) bias; 0 if the filter
     /// estimates no bias.
-    pub bias_probability: f64,
+    pub multipath_bias_probability: f64,
     /// Model of the ranges, if the vehicle measures any.
     pub ranging: Option<RangeModel>,
     /// Minimum interval between odometry samples that is reported as a gap (s).
@@ -103,7 +103,7 @@ const FORGETTING_TURN_RAD: f64 = 0.5;
 /// Specified time-correlated noise of the electrical angle, independent for each radio head: a
 /// first-order Gauss–Markov process over time and distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PhaseBias {
+pub struct CorrelatedNoise {
     /// Stationary standard deviation (rad).
     pub std_rad: f64,
     /// Maximum time-correlated fraction of each angle's own variance.
@@ -117,7 +117,7 @@ pub struct PhaseBias {
     pub correlation_m: f64,
 }
 
-impl PhaseBias {
+impl CorrelatedNoise {
     /// Returns the decorrelation after a time (s) and a motion (m, rad), in correlation lengths.
     /// Neither time nor distance alone decorrelates the noise: at standstill the error is constant,
     /// and over distance the sensor is the same. A turn exposes another part of the array to the
@@ -167,9 +167,9 @@ struct Usual {
     scale_per_sqrt_m: f64,
     mounting_std_rad: f64,
     /// At walking pace, turns reveal a time offset.
-    lateness_std_s: f64,
+    angle_time_offset_std_s: f64,
     /// Prior probability of a time-correlated (multipath) bias of a radio head's angles.
-    bias_probability: f64,
+    multipath_bias_probability: f64,
 }
 
 /// Road vehicle, and the minimum noise of any odometer.
@@ -179,10 +179,10 @@ const ROAD: Usual = Usual {
     odometer_m_per_sqrt_s: 0.0,
     scale_per_sqrt_m: 0.0,
     mounting_std_rad: 0.0,
-    lateness_std_s: 0.0,
+    angle_time_offset_std_s: 0.0,
     // Each of the four levels of a bias, the smallest of which is a calibration residual, is
     // equally probable.
-    bias_probability: 0.75,
+    multipath_bias_probability: 0.75,
 };
 
 /// Differential drive.
@@ -192,9 +192,9 @@ const DIFFERENTIAL: Usual = Usual {
     odometer_m_per_sqrt_s: 0.02,
     scale_per_sqrt_m: 0.03,
     mounting_std_rad: 0.02,
-    lateness_std_s: 0.1,
+    angle_time_offset_std_s: 0.1,
     // Wheel slip or a wrong heading shifts the angles of a small robot like a bias does.
-    bias_probability: 0.0,
+    multipath_bias_probability: 0.0,
 };
 
 impl EkfConfig {
@@ -257,12 +257,13 @@ impl EkfConfig {
         // A vehicle without integrity monitoring trusts its sources, unless a probability is
         // specified.
         let is_monitored = vehicle.integrity_monitor().is_some();
-        let usual_bias_probability = if is_monitored {
-            usual.bias_probability
+        let usual_multipath_bias_probability = if is_monitored {
+            usual.multipath_bias_probability
         } else {
             0.0
         };
-        let bias_probability = (receiver.phase_bias_probability).unwrap_or(usual_bias_probability);
+        let multipath_bias_probability =
+            (receiver.multipath_bias_probability).unwrap_or(usual_multipath_bias_probability);
         let mut config = Self {
             drive: vehicle.drive,
             array: ArrayModel {
@@ -274,7 +275,7 @@ impl EkfConfig {
             rician_k: 10f64.powf(0.1 * site.rician_k_db),
             wrong_lobe: None,
             outlier_probability: settings.outlier_probability,
-            heard_noise_ratio: None,
+            measured_noise_scale: None,
             lane_keeping,
             path_bend: PathBend {
                 curvature_per_m: settings.curvature_rms_per_m,
@@ -316,33 +317,35 @@ impl EkfConfig {
                 .max(SIGMAS_OF_SWING * keeping.pull_per_m() * vehicle.top_speed_mps()),
             yaw_noise_rad_per_sqrt_m: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_m),
             yaw_noise_rad_per_sqrt_rad: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_rad),
-            lateness_std_s: receiver.lateness_std_s.unwrap_or(usual.lateness_std_s),
-            phase_bias: PhaseBias {
-                std_rad: receiver.phase_bias_std_rad,
-                share: receiver.phase_bias_share.unwrap_or(0.0),
+            angle_time_offset_std_s: receiver
+                .angle_time_offset_std_s
+                .unwrap_or(usual.angle_time_offset_std_s),
+            correlated_noise: CorrelatedNoise {
+                std_rad: receiver.correlated_noise_std_rad,
+                share: receiver.correlated_noise_fraction.unwrap_or(0.0),
                 is_found: true,
-                correlation_s: receiver.phase_bias_correlation_s,
-                correlation_m: receiver.phase_bias_correlation_m,
+                correlation_s: receiver.noise_correlation_time_s,
+                correlation_m: receiver.noise_correlation_distance_m,
             },
-            bias_probability,
+            multipath_bias_probability,
             ranging: (vehicle.ranging.as_ref()).map(|it| RangeModel::new(it, array.position_m)),
             gap_s: 5.0 / odometer.rate_hz,
             top_speed_mps: 1.5 * vehicle.top_speed_mps(),
         };
-        config.set_noise_ratio(None);
+        config.set_noise_scale(None);
         config
     }
 
     /// Returns the assumed ratio of the angles' variance to the specified one.
-    pub fn noise_ratio(&self) -> f64 {
-        self.heard_noise_ratio.unwrap_or(1.0)
+    pub fn noise_scale(&self) -> f64 {
+        self.measured_noise_scale.unwrap_or(1.0)
     }
 
     /// Sets the ratio of the angles' variance to the specified one, as with a lower Rician K;
     /// `None` for the specified variance.
-    pub fn set_noise_ratio(&mut self, ratio: Option<f64>) {
-        self.heard_noise_ratio = ratio;
-        let rician_k = self.rician_k / self.noise_ratio();
+    pub fn set_noise_scale(&mut self, ratio: Option<f64>) {
+        self.measured_noise_scale = ratio;
+        let rician_k = self.rician_k / self.noise_scale();
         let wrong_lobe = (self.array.measurand).wrong_lobe_probability(rician_k);
         self.wrong_lobe = Some(wrong_lobe).filter(|&it| it > self.outlier_probability);
     }
@@ -350,26 +353,26 @@ impl EkfConfig {
     /// Returns the maximum ratio of the variance: that of scatter as strong as the direct wave (a
     /// Rician K of 0 dB). Larger deviations are not scatter around a line of sight, and averaging
     /// does not remove them.
-    pub const fn most_noise_ratio(&self) -> f64 {
+    pub const fn max_noise_scale(&self) -> f64 {
         self.rician_k.max(1.0)
     }
 
     /// Returns the configuration without bias estimation and with the specified noise of the angles.
     #[must_use]
     pub fn as_stated(mut self) -> Self {
-        self.set_noise_ratio(None);
-        self.bias_probability = 0.0;
+        self.set_noise_scale(None);
+        self.multipath_bias_probability = 0.0;
         self
     }
 
     /// Whether a time-correlated bias of the angles is estimated.
     pub const fn estimates_bias(&self) -> bool {
-        self.bias_probability > 0.0
+        self.multipath_bias_probability > 0.0
     }
 
     /// Returns the measured ratio of the variance relative to the ratio that the filter assumes.
     pub fn unexpected_noise(&self, heard: f64) -> f64 {
-        let expects = self.heard_noise_ratio.is_some() || self.estimates_bias();
+        let expects = self.measured_noise_scale.is_some() || self.estimates_bias();
         if expects { 1.0 } else { heard }
     }
 
@@ -380,7 +383,7 @@ impl EkfConfig {
     pub fn scatter_variance(&self, travelled_m: f64, aperture: f64, toward: f64) -> f64 {
         let scatter = (self.array.measurand).scatter_variance(self.rician_k, aperture);
         let correlation = self.array.correlation(travelled_m, toward);
-        self.noise_ratio() * scatter * correlation.max(1.0)
+        self.noise_scale() * scatter * correlation.max(1.0)
     }
 
     /// Returns the variance that several angles share: scatter, and the survey errors, which are

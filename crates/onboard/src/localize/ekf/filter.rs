@@ -5,13 +5,13 @@ use std::sync::Arc;
 use super::config::EkfConfig;
 use super::odometer::{SampleInterval, SpeedJumps};
 use super::state::{
-    Belief, LATENESS, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS, YAW_RATE_SCALE,
+    ANGLE_TIME_OFFSET, Belief, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
-use super::white_share::{Residual, WhiteShare};
+use super::white_noise_fraction::{Residual, WhiteNoiseFraction};
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::CERTAIN_SIGMAS;
 use crate::gaussian::smoother::Journal;
-use crate::localize::bias::CorrelatedBias;
+use crate::localize::bias::MultipathBias;
 use crate::localize::output::InitialPose;
 use crate::observation::{MeasurementKind, OdometrySample};
 use crate::radio_head::RadioHead;
@@ -61,7 +61,7 @@ clone_in_place! {
         pub(super) heads: Vec<Head>,
         pub(super) belief: Belief,
         /// Biases of the radio heads' angles, correlated over metres.
-        pub(super) bias: CorrelatedBias,
+        pub(super) bias: MultipathBias,
         pub(super) odometry: Option<OdometrySample>,
         pub(super) driven_m: f64,
         pub(super) turned_rad: f64,
@@ -73,7 +73,7 @@ clone_in_place! {
         /// Distance by the speeds (m) since the odometer's distance last changed.
         pub(super) unread_m: f64,
         /// White fraction of the angles' noise.
-        pub(super) white: WhiteShare,
+        pub(super) white: WhiteNoiseFraction,
     }
 }
 
@@ -109,15 +109,15 @@ impl Ekf {
             sample_interval: SampleInterval::default(),
             speed_jumps: SpeedJumps::default(),
             unread_m: 0.0,
-            white: WhiteShare::new(config.phase_bias.share),
+            white: WhiteNoiseFraction::new(config.correlated_noise.share),
         };
         ekf.update_off_map();
         ekf
     }
 
     /// Returns the biases of the angles and the states of the ranges before any measurement.
-    pub(super) fn biases(config: &EkfConfig, heads: &[RadioHead]) -> CorrelatedBias {
-        let mut biases = CorrelatedBias::new(heads.len(), config.bias_probability);
+    pub(super) fn biases(config: &EkfConfig, heads: &[RadioHead]) -> MultipathBias {
+        let mut biases = MultipathBias::new(heads.len(), config.multipath_bias_probability);
         if let Some(model) = &config.ranging {
             biases.add_ranges(model, heads);
         }
@@ -189,8 +189,8 @@ impl Ekf {
 
     /// Sets the ratio of the angles' variance to the specified one; `None` for the specified
     /// variance.
-    pub(in crate::localize) fn set_noise_ratio(&mut self, ratio: Option<f64>) {
-        self.config.set_noise_ratio(ratio);
+    pub(in crate::localize) fn set_noise_scale(&mut self, ratio: Option<f64>) {
+        self.config.set_noise_scale(ratio);
     }
 
     /// Returns the distance driven since the start (m).
@@ -264,7 +264,7 @@ pub struct EstimatedConstants {
     /// Residual phase per antenna after calibration (rad).
     pub phase_rad: EstimatedConstant,
     /// Time offset of the angles in addition to the specified one (s).
-    pub lateness_s: EstimatedConstant,
+    pub angle_time_offset_s: EstimatedConstant,
 }
 
 impl EstimatedConstants {
@@ -290,7 +290,11 @@ impl EstimatedConstants {
                 (config.mounting_rad, config.mounting_std_rad),
             ),
             phase_rad: constant(PHASE, 0.0, (config.phase_rad, config.phase_std_rad)),
-            lateness_s: constant(LATENESS, 0.0, (0.0, config.lateness_std_s)),
+            angle_time_offset_s: constant(
+                ANGLE_TIME_OFFSET,
+                0.0,
+                (0.0, config.angle_time_offset_std_s),
+            ),
         }
     }
 

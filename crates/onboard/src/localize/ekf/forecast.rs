@@ -2,7 +2,7 @@
 //! angles, and smoothed poses.
 
 use super::angle_model::{AngleModel, locate};
-use super::config::PhaseBias;
+use super::config::CorrelatedNoise;
 use super::filter::Ekf;
 use super::motion::{Reading, Step};
 use super::predict::MOST_STEPS;
@@ -79,8 +79,8 @@ impl Ekf {
             variance,
             measurement_variance,
         } = predicted.innovation;
-        let bias = self.phase_bias();
-        let unbiased = PhaseBias {
+        let bias = self.correlated_noise();
+        let unbiased = CorrelatedNoise {
             std_rad: 0.0,
             ..bias
         };
@@ -160,9 +160,9 @@ impl Ekf {
         let (kind, head) = (known.kind, &known.known);
         let angle_model = AngleModel::of_kind(kind, head, pose, &frame, &belief.mean, array)?;
         let travelled_m = self.driven_m + ahead_m - known.last_update_m;
-        let own = (self.config.noise_ratio() * thermal(angle_model.range_m)).sqrt();
+        let own = (self.config.noise_scale() * thermal(angle_model.range_m)).sqrt();
         let mut variance = self
-            .phase_bias()
+            .correlated_noise()
             .variance(own, f64::INFINITY, (travelled_m, 0.0))
             + self.config.shared_variance(travelled_m, &angle_model);
         let predicted = belief.variance_along(&angle_model.row) + variance;

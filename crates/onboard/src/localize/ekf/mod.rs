@@ -18,7 +18,7 @@ mod prior;
 mod range;
 pub mod state;
 mod update;
-mod white_share;
+mod white_noise_fraction;
 
 pub use angle_model::ArrayModel;
 pub use config::EkfConfig;

@@ -424,7 +424,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_is_the_same_whatever_road_it_is_told_beside() {
+    fn a_path_does_not_depend_on_the_curvature_of_the_road() {
         let driven = Pose::default().offset_left(2.0);
         let end = driven.along_arc(30.0, 0.02);
         for kappa in [0.0, 0.05, -0.03] {

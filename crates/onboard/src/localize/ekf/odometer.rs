@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_lost_is_seen_whatever_share_it_is_up_to_half() {
+    fn lost_samples_are_detected_up_to_a_fraction_of_one_half() {
         for every in [2, 3, 10] {
             let mut sample_interval = SampleInterval::default();
             // The first interval spans a lost sample.

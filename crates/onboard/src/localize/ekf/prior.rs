@@ -6,8 +6,8 @@ use super::angle_model::locate;
 use super::config::EkfConfig;
 use super::filter::Ekf;
 use super::state::{
-    ACROSS, ALONG, Belief, CURVATURE, DATUM, HEADING, LATENESS, MOUNTING, PHASE, SCALE, STATES,
-    YAW_RATE_BIAS, YAW_RATE_SCALE,
+    ACROSS, ALONG, ANGLE_TIME_OFFSET, Belief, CURVATURE, DATUM, HEADING, MOUNTING, PHASE, SCALE,
+    STATES, YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
 use crate::geometry::{Pose, wrap_angle};
 use crate::localize::output::InitialPose;
@@ -30,7 +30,7 @@ impl Ekf {
         for state in DATUM {
             sigma[state] = config.datum_std_m;
         }
-        sigma[LATENESS] = config.lateness_std_s;
+        sigma[ANGLE_TIME_OFFSET] = config.angle_time_offset_std_s;
         let mut mean = [0.0; STATES];
         mean[SCALE] = config.odometer_scale - 1.0;
         mean[YAW_RATE_BIAS] = config.yaw_rate_bias_radps;
@@ -99,7 +99,7 @@ impl Ekf {
     /// Returns a copy that expects the specified noise of the angles.
     pub(in crate::localize) fn nominal(&self) -> Self {
         let mut ekf = self.clone();
-        ekf.set_noise_ratio(None);
+        ekf.set_noise_scale(None);
         ekf
     }
 
@@ -112,7 +112,7 @@ impl Ekf {
 
     /// Estimates a bias of each radio head from now on, with this prior probability; none if it is 0.
     pub(in crate::localize) fn begin_bias(&mut self, probability: f64) {
-        self.config.bias_probability = probability;
+        self.config.multipath_bias_probability = probability;
         let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
         self.bias = Self::biases(&self.config, &heads);
     }

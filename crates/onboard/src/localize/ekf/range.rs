@@ -2,7 +2,7 @@
 //!
 //! A range is `(1 + s) R + c + b` with the distance R to the radio head, the scale error s, the
 //! vehicle clock c (one-way delays only) and the offset b of the radio head. The range states are
-//! part of [`CorrelatedBias`](crate::localize::bias::CorrelatedBias).
+//! part of [`MultipathBias`](crate::localize::bias::MultipathBias).
 
 use super::angle_model::{ArrayModel, LineOfSight, locate};
 use super::filter::Ekf;

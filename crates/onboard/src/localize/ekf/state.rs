@@ -26,7 +26,7 @@ pub const MOUNTING: usize = 6;
 /// Constant residual of the phase calibration in the electrical angle (rad per element).
 pub const PHASE: usize = 7;
 /// Time offset of the angles in addition to the specified one (s).
-pub const LATENESS: usize = 8;
+pub const ANGLE_TIME_OFFSET: usize = 8;
 /// Scale error κ of a yaw rate measured by wheels: it measures `(1 + κ)` times the heading change.
 pub const YAW_RATE_SCALE: usize = 9;
 /// Displacement of all radio heads relative to the site plan, in x and y (m).

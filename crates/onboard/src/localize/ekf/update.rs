@@ -1,11 +1,11 @@
 //! Measurement update: prediction, innovation, gate, and updated state.
 
 use super::angle_model::{AngleModel, locate};
-use super::config::PhaseBias;
+use super::config::CorrelatedNoise;
 use super::filter::Ekf;
 use super::motion::Reading;
-use super::state::{ACROSS, ALONG, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
-use super::white_share::Residual;
+use super::state::{ACROSS, ALONG, ANGLE_TIME_OFFSET, HEADING, SCALE, STATES, YAW_RATE_BIAS};
+use super::white_noise_fraction::Residual;
 use crate::gaussian::{Innovation, with_outliers};
 use crate::geometry::wrap_angle;
 use crate::localize::bias::{self, JumpHypotheses, MOST_VARIANCE};
@@ -14,7 +14,7 @@ use crate::observation::{AngleMeasurement, MeasurementKind};
 use crate::radio_head::RadioHead;
 
 /// Maximum estimated time offset of the angles (s).
-const MOST_LATENESS_S: f64 = 0.5;
+const MAX_ANGLE_TIME_OFFSET_S: f64 = 0.5;
 
 /// Probability that an angle is wrong if its estimator does not consider it resolved.
 const WRONG_IF_UNRESOLVED: f64 = 0.5;
@@ -69,7 +69,7 @@ pub(in crate::localize) struct PredictedMeasurement {
 impl PredictedMeasurement {
     /// Returns the fraction that is independent of the previous angle, if a time-correlated bias is
     /// estimated.
-    pub fn independent_share(&self) -> f64 {
+    pub fn information_fraction(&self) -> f64 {
         bias::independent(self.moved.0.abs())
     }
 }
@@ -82,7 +82,7 @@ impl Ekf {
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> Result<PredictedMeasurement, UpdateReason> {
-        let sigma = measured.phase_sigma_rad * self.config.noise_ratio().sqrt();
+        let sigma = measured.phase_sigma_rad * self.config.noise_scale().sqrt();
         let usable = measured.time_s.is_finite()
             && measured.phase_rad.is_finite()
             && sigma.is_finite()
@@ -117,7 +117,7 @@ impl Ekf {
             MeasurementKind::AngleAtHead => 0.0,
         };
         let moved = (travelled_m, turned_rad);
-        let stated = self.phase_bias().variance(sigma, elapsed_s, moved);
+        let stated = self.correlated_noise().variance(sigma, elapsed_s, moved);
         let (row, strayed) = (ahead.as_ref()).map_or((angle_model.row, 0.0), |ahead| {
             ahead.seen_before(&angle_model.row)
         });
@@ -158,7 +158,7 @@ impl Ekf {
     /// Returns the variance of an angle's systematic errors: surveys, specified correlated noise,
     /// odometry since its newest sample, second-order terms (rad²).
     pub(in crate::localize) fn systematic_variance(&self, predicted: &PredictedMeasurement) -> f64 {
-        let bias = self.config.phase_bias.std_rad;
+        let bias = self.config.correlated_noise.std_rad;
         predicted.survey_variance
             + bias * bias
             + predicted.coasted_variance
@@ -173,24 +173,25 @@ impl Ekf {
         mean: &[f64; STATES],
     ) -> Option<AngleModel> {
         let (map, array) = (self.map.as_deref(), &self.config.array);
-        if self.config.lateness_std_s == 0.0 {
+        if self.config.angle_time_offset_std_s == 0.0 {
             let (pose, frame) = locate(mean, 0.0, map);
             return AngleModel::of_kind(kind, head, pose, &frame, mean, array);
         }
         let speed_mps = self.speed_mps();
-        let (mut pose, frame) = locate(mean, -speed_mps * mean[LATENESS], map);
+        let (mut pose, frame) = locate(mean, -speed_mps * mean[ANGLE_TIME_OFFSET], map);
         let mut rate_radps = 0.0;
         if map.is_none() {
             let read = self.odometry.and_then(|sample| sample.yaw_rate_radps);
             let top = self.config.top_yaw_rate_radps;
             rate_radps =
                 read.filter(|rate| rate.abs() <= top).unwrap_or_default() - mean[YAW_RATE_BIAS];
-            pose.heading_rad -= rate_radps * mean[LATENESS];
+            pose.heading_rad -= rate_radps * mean[ANGLE_TIME_OFFSET];
         }
         let mut angle_model = AngleModel::of_kind(kind, head, pose, &frame, mean, array)?;
         let (sin, cos) = (pose.heading_rad - frame.direction_rad).sin_cos();
         let row = &mut angle_model.row;
-        row[LATENESS] = -speed_mps * (row[ALONG] * cos / frame.stretch + row[ACROSS] * sin)
+        row[ANGLE_TIME_OFFSET] = -speed_mps
+            * (row[ALONG] * cos / frame.stretch + row[ACROSS] * sin)
             - rate_radps * row[HEADING];
         Some(angle_model)
     }
@@ -275,8 +276,8 @@ impl Ekf {
     }
 
     /// Returns the time-correlated noise of the angles with its estimated fraction.
-    pub(super) fn phase_bias(&self) -> PhaseBias {
-        let mut bias = self.config.phase_bias;
+    pub(super) fn correlated_noise(&self) -> CorrelatedNoise {
+        let mut bias = self.config.correlated_noise;
         if bias.is_found {
             bias.share = self.white.stays(bias.share);
         }
@@ -286,7 +287,7 @@ impl Ekf {
     /// Learns the time-correlated fraction of a radio head's noise; `before` is the state before
     /// the update.
     fn learn_what_stays(&mut self, predicted: &PredictedMeasurement, before: &[f64; STATES]) {
-        let stated = self.config.phase_bias;
+        let stated = self.config.correlated_noise;
         let Some(head) = self.heads.get_mut(predicted.head) else {
             return;
         };
@@ -332,7 +333,8 @@ impl Ekf {
         let mean = &mut self.belief.mean;
         let scale = self.config.odometer_scale;
         mean[SCALE] = mean[SCALE].clamp(0.5 * scale - 1.0, 2.0 * scale - 1.0);
-        mean[LATENESS] = mean[LATENESS].clamp(-MOST_LATENESS_S, MOST_LATENESS_S);
+        mean[ANGLE_TIME_OFFSET] =
+            mean[ANGLE_TIME_OFFSET].clamp(-MAX_ANGLE_TIME_OFFSET_S, MAX_ANGLE_TIME_OFFSET_S);
     }
 
     pub(super) fn verdict(&self, reason: UpdateReason, mahalanobis2: Option<f64>) -> UpdateVerdict {

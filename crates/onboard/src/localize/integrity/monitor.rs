@@ -317,14 +317,14 @@ impl IntegrityMonitor {
         time_s: f64,
     ) -> impl Iterator<Item = (&'a Ekf, Hypothesis)> {
         let told = bank.leader().pose(time_s);
-        let heard_noise_ratio = bank.noise_ratio();
+        let measured_noise_scale = bank.noise_scale();
         let negligible = NEGLIGIBLE * self.level.risk();
         (bank.hypotheses())
             .filter(move |(probability, _)| *probability > negligible)
             .filter_map(move |(probability, right)| {
                 let pose = right.pose(time_s);
-                let noise_ratio = right.config().unexpected_noise(heard_noise_ratio);
-                let hypothesis = Hypothesis::new(probability, &pose, noise_ratio, &told);
+                let noise_scale = right.config().unexpected_noise(measured_noise_scale);
+                let hypothesis = Hypothesis::new(probability, &pose, noise_scale, &told);
                 hypothesis.map(|it| (right, it))
             })
     }
@@ -341,7 +341,7 @@ mod tests {
     const MOST_DEVIATIONS: f64 = 5.0;
 
     #[test]
-    fn whoever_takes_over_covers_who_told_the_position_before() {
+    fn the_new_solution_covers_the_previous_one() {
         // The odometer measures 1.5 times the distance, and a radio head is blocked later: neither
         // explains the other.
         const READS: f64 = 1.5;

@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn along_a_far_separation_it_is_the_one_sided_quantile() {
+    fn for_a_large_separation_the_radius_is_the_one_sided_quantile() {
         // Φ⁻¹(0.99) = 2.326.
         let found = levels(
             1e-2,

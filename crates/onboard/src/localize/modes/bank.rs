@@ -13,7 +13,7 @@
 //! including those without one further radio head.
 
 use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP};
-use super::noise_ratio::NoiseRatio;
+use super::noise_scale::NoiseScale;
 use super::subsets::{CLEARED, DETECTED, HeadTest, RECOVERY_S, Subsets, exclude};
 use super::table::{Carry, Mode, ModeId, TABLE};
 use crate::clone_in_place::clone_in_place;
@@ -136,7 +136,7 @@ clone_in_place! {
         /// Filter of all fault-free radio heads with the nominal model.
         pub(super) nominal: Ekf,
         pub(super) modes: Vec<ModeFilter>,
-        noise: NoiseRatio,
+        noise: NoiseScale,
         /// Prior probability of a fault of each radio head.
         head_prior: f64,
         pub(super) subsets: Subsets,
@@ -171,7 +171,7 @@ impl Bank {
             modes,
             head_prior: faults.of_radio_head(is_separable),
             nominal,
-            noise: NoiseRatio::new(count),
+            noise: NoiseScale::new(count),
         }
     }
 
@@ -307,7 +307,7 @@ impl Bank {
     }
 
     /// Returns the ratio of the angles' measured variance to the specified one.
-    pub const fn noise_ratio(&self) -> f64 {
+    pub const fn noise_scale(&self) -> f64 {
         self.noise.ratio()
     }
 
@@ -355,10 +355,10 @@ impl Bank {
         if let Some(number) = number {
             self.update_subsets(number, head, measured);
         }
-        let noise_ratio = number.map_or(1.0, |number| self.noise.core_ratio_of(number));
+        let noise_scale = number.map_or(1.0, |number| self.noise.core_ratio_of(number));
         let predicted = self.nominal.predict_measurement(head, measured);
         for it in &mut self.modes {
-            (it.mode.adapt)(&mut it.ekf, noise_ratio);
+            (it.mode.adapt)(&mut it.ekf, noise_scale);
             it.update((&self.nominal, &predicted), head, measured);
         }
         let most = (self.modes.iter()).fold(LikelihoodRatio::NONE, |most, it| most.max(it.ratio));
@@ -579,7 +579,7 @@ mod tests {
         let (site, vehicle) = trip();
         let mut config = EkfConfig::new(&site, &vehicle);
         // A filter that estimates biases has no test of single radio heads.
-        config.bias_probability = 0.0;
+        config.multipath_bias_probability = 0.0;
         let heads = RadioHead::heard(&site, &vehicle);
         let start = InitialPose {
             pose: Pose::default(),
@@ -609,7 +609,7 @@ mod tests {
     }
 
     #[test]
-    fn the_culprit_is_named_and_nobody_else() {
+    fn only_the_faulty_source_is_named() {
         let odds = 9.2;
         let (sound, _) = after(0.0, &[]);
         assert_eq!(sound.faulty_head(odds), None);
@@ -619,7 +619,7 @@ mod tests {
     }
 
     #[test]
-    fn what_takes_over_has_never_heard_the_excluded() {
+    fn the_replacing_filter_never_processed_the_excluded_radio_head() {
         let (mut bank, without) = after(0.3, &[2]);
         bank.exclude(2);
         assert_eq!(bank.nominal().belief(), without.belief());

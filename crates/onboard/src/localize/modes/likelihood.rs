@@ -72,8 +72,8 @@ impl LikelihoodRatio {
             && !(predicted.excluded || by_nominal.excluded)
         {
             let ratio = density(ekf, predicted) / density(nominal, by_nominal);
-            let share = independent_share(ekf, predicted);
-            let share = share.min(independent_share(nominal, by_nominal));
+            let share = information_fraction(ekf, predicted);
+            let share = share.min(information_fraction(nominal, by_nominal));
             self.0 = (self.0 + share * ratio.ln()).max(-CERTAIN);
         }
     }
@@ -127,7 +127,7 @@ pub(in crate::localize) fn log_likelihood(
         let jumps = predicted.hypotheses.as_ref();
         let density = jumps.map_or(TAU.recip(), |jumps| jumps.density);
         let exact = (TAU * predicted.own_variance).sqrt().recip();
-        return predicted.independent_share() * (density / exact).ln();
+        return predicted.information_fraction() * (density / exact).ln();
     }
     let innovation = predicted.innovation;
     if predicted.excluded || innovation.mahalanobis2() > ekf.config().gate {
@@ -171,7 +171,7 @@ fn first_variance(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
 
 /// Returns the fraction of an angle that is independent of the previous one of its radio head. A
 /// filter that estimates a time-correlated bias predicts the dependent part.
-fn independent_share(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
+fn information_fraction(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
     if predicted.hypotheses.is_some() {
         return 1.0;
     }

@@ -3,7 +3,7 @@
 
 mod bank;
 mod likelihood;
-mod noise_ratio;
+mod noise_scale;
 mod odometry_test;
 mod range_update;
 mod subsets;

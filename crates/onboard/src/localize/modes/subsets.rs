@@ -314,7 +314,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn filters_are_those_of_the_radio_heads_heard_lately() {
+    fn subset_filters_exist_for_recently_received_radio_heads() {
         let (known, _, ekf) = trip();
         let heads: Vec<RadioHead> = (0..8).map(|pci| RadioHead { pci, ..known[0] }).collect();
         for keeps_first in [false, true] {

@@ -120,8 +120,8 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
     // Without a map, the radio heads define the frame.
     Mode {
         id: ModeId::DisplacedSite,
-        applies: |nominal, faults| faults.all_radio_heads > 0.0 && nominal.has_map(),
-        prior: |_, faults| faults.all_radio_heads,
+        applies: |nominal, faults| faults.site_frame_offset > 0.0 && nominal.has_map(),
+        prior: |_, faults| faults.site_frame_offset,
         alter: |ekf| {
             ekf.uncalibrate_array();
             ekf.displace_site(1.5);
@@ -134,10 +134,10 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
         id: ModeId::NoisyAngles,
         applies: |nominal, _| !nominal.config().estimates_bias(),
         prior: |_, _| 0.02,
-        alter: |ekf| ekf.set_noise_ratio(Some(1.0)),
+        alter: |ekf| ekf.set_noise_scale(Some(1.0)),
         adapt: |ekf, ratio| {
-            let most = ekf.config().most_noise_ratio();
-            ekf.set_noise_ratio(Some(ratio.min(most)));
+            let most = ekf.config().max_noise_scale();
+            ekf.set_noise_scale(Some(ratio.min(most)));
         },
         on_rebase: Carry::Nothing,
         misleads: true,
@@ -177,7 +177,7 @@ pub(in crate::localize) mod trip {
             heading_std_rad: 0.01,
         };
         let mut config = EkfConfig::new(&site, &vehicle);
-        config.bias_probability = probability;
+        config.multipath_bias_probability = probability;
         let ekf = Ekf::new(config, Some(Arc::new(road.clone())), &heads, &start);
         (heads, road, ekf)
     }
@@ -225,7 +225,7 @@ mod tests {
         /// End of reception (s); 0 for none.
         heard_until_s: f64,
         /// Prior probability of a bias.
-        bias_probability: f64,
+        multipath_bias_probability: f64,
     }
 
     /// Final error of a filter (m).
@@ -235,7 +235,7 @@ mod tests {
     /// head and distance: returns the bank, and the errors of its selected filter and of a mode's
     /// filter.
     fn drive(world: &World, until_s: f64, off_rad: impl Fn(usize, f64) -> f64) -> (Bank, Distance) {
-        let (heads, road, ekf) = trip_with_bias(world.bias_probability);
+        let (heads, road, ekf) = trip_with_bias(world.multipath_bias_probability);
         let mut bank = Bank::new(&ekf, &heads, &IntegritySettings::default(), 0.0);
         let mut noise = ChaCha8Rng::seed_from_u64(1);
         let mut distance_m = 0.0;
@@ -348,10 +348,10 @@ mod tests {
             ..World::default()
         };
         let (bank, _) = drive(&world, 30.0, EXACT);
-        assert!(bank.noise_ratio() > 20.0);
+        assert!(bank.noise_scale() > 20.0);
         let (_, noisy) = bank.mode(ModeId::NoisyAngles).unwrap();
         // Relative to the specified K of 10 dB.
-        assert!((noisy.config().noise_ratio() - 10.0).abs() < 1e-9);
+        assert!((noisy.config().noise_scale() - 10.0).abs() < 1e-9);
     }
 
     #[test]
@@ -387,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn slip_since_the_start_is_probable_and_of_a_sound_odometer_it_is_not() {
+    fn slip_since_the_start_is_detected_and_a_sound_odometer_is_not() {
         let odds = |scale| {
             let scale = (scale, 0.0);
             let (bank, _) = drive(
@@ -406,7 +406,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bank_begun_anew_is_about_what_is_stated_whatever_leads() {
+    fn a_restarted_bank_uses_the_specified_values_for_any_selected_hypothesis() {
         let world = World {
             scale: (0.2, 0.0),
             ..World::default()
@@ -418,7 +418,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_of_the_speed_counts_as_slip_before_any_angle_tells() {
+    fn a_jump_of_the_speed_counts_as_slip_before_the_next_angle() {
         for scale in [-0.1, 0.1] {
             let world = World {
                 scale: (scale, 20.0),
@@ -450,7 +450,7 @@ mod tests {
             0.3 * ChaCha8Rng::seed_from_u64(number).sample::<f64, _>(StandardNormal)
         };
         let world = World {
-            bias_probability: MULTIPATH,
+            multipath_bias_probability: MULTIPATH,
             ..World::default()
         };
         let (bank, off_m) = drive(&world, 60.0, bias_rad);
@@ -462,11 +462,11 @@ mod tests {
 
     /// A bias of each radio head could also explain a displaced site plan.
     #[test]
-    fn a_displaced_site_leads_beside_estimated_biases() {
+    fn a_displaced_site_is_selected_although_biases_are_estimated() {
         let moved_m = [1.2, -1.6];
         let world = World {
             moved_m,
-            bias_probability: MULTIPATH,
+            multipath_bias_probability: MULTIPATH,
             ..World::default()
         };
         let (bank, off_m) = drive(&world, 60.0, EXACT);

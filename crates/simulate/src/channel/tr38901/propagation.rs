@@ -37,7 +37,7 @@ pub struct Tr38901Propagation {
     head: RadioHead,
     array_m: f64,
     wavenumber_per_m: f64,
-    line_of_sight_only: bool,
+    oracle_nlos_rejection: bool,
     blockage: Blockage,
     state: Track,
     clear: Channel,
@@ -92,7 +92,7 @@ impl Tr38901Propagation {
             head,
             array_m,
             wavenumber_per_m: TAU / link.site.wavelength_m(),
-            line_of_sight_only: settings.line_of_sight_only,
+            oracle_nlos_rejection: settings.oracle_nlos_rejection,
             blockage: Blockage::new(settings.blockage, link),
             state,
             clear,
@@ -122,7 +122,7 @@ impl Tr38901Propagation {
         let clear = soft * soft * clear.0;
         let hidden = (1.0 - soft * soft) * hidden.0;
         let total = clear + hidden;
-        let is_silent = self.line_of_sight_only && soft < LINE_OF_SIGHT;
+        let is_silent = self.oracle_nlos_rejection && soft < LINE_OF_SIGHT;
         let gain = if is_silent { 0.0 } else { total };
         Mix {
             gain_db: 10.0 * gain.log10() + self.budget.path_loss_db(sight.distance_m),

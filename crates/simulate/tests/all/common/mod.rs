@@ -89,9 +89,9 @@ pub fn logs(scenario: &Scenario, seed: u64) -> (OdometryLog, AngleLog, RunRecord
             .collect(),
         ..OdometryLog::default()
     };
-    let logged = record.executions.iter().map(|execution| LoggedAngle {
-        ssb: execution.ssb,
-        measured: execution.measured.unwrap(),
+    let logged = record.aoa_estimates.iter().map(|angle_result| LoggedAngle {
+        ssb: angle_result.ssb,
+        measured: angle_result.measured.unwrap(),
     });
     let angles = AngleLog {
         angles: logged.collect(),

@@ -1,7 +1,8 @@
 """Interpretations of the paper: scenarios that set the parameters which it does not specify.
 
-An interpretation is a TOML file with ``like = "paper"`` in ``readings/``; ``readings/index.toml``
-contains their order, and the parameters that were selected in view of the paper's claims.
+An interpretation is a TOML file with ``extends = "paper"`` in ``interpretations/``;
+``interpretations/index.toml`` contains their order, and the parameters that were selected in view
+of the paper's claims.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ SHIPPED = "gate"
 
 
 @dataclass(frozen=True)
-class Reading:
+class Interpretation:
     """One way to read the paper.
 
     Attributes
@@ -58,7 +59,7 @@ class Reading:
         """Its t_max; ``None`` where it has no controller."""
         resolved = self.scenario.resolved()
         settings = json.loads(resolved.to_json())["vehicle"]["wake_up"]
-        t_max_ms = settings.get("due", settings).get("t_max_ms")
+        t_max_ms = settings.get("trigger", settings).get("t_max_ms")
         return None if t_max_ms is None else t_max_ms / 1e3
 
     def keeps(self, longest_gap_s: float) -> bool:
@@ -68,18 +69,18 @@ class Reading:
 
 
 def names() -> list[str]:
-    """Names of the shipped readings, in the evaluation's order.
+    """Names of the shipped interpretations, in the evaluation's order.
 
     Examples
     --------
     >>> names()[:2]
     ['every-ssb', 'wake-ups']
     """
-    return list(shipped("paper", "readings", "index.toml"))
+    return list(shipped("paper", "interpretations", "index.toml"))
 
 
-def load(name_or_path: str) -> Reading:
-    """A shipped reading by its name, or else a scenario file that is one.
+def load(name_or_path: str) -> Interpretation:
+    """A shipped interpretation by its name, or else a scenario file that is one.
 
     Raises
     ------
@@ -93,24 +94,26 @@ def load(name_or_path: str) -> Reading:
     >>> load("gate-t-max").wake_up["latest_ms"]
     240.0
     """
-    index = shipped("paper", "readings", "index.toml")
+    index = shipped("paper", "interpretations", "index.toml")
     if name_or_path in index:
         entry = index[name_or_path]
-        with resources.as_file(resources.files(__package__).joinpath("readings")) as place:
+        with resources.as_file(resources.files(__package__).joinpath("interpretations")) as place:
             scenario = Scenario.load(str(place / f"{name_or_path}.toml"))
-        return Reading(
+        return Interpretation(
             name_or_path, entry["title"], scenario, tuple(entry["chosen"]), entry["keeps_t_max"]
         )
     if not Path(name_or_path).exists() and name_or_path not in Scenario.names():
-        raise InputError(f"no reading {name_or_path}; there are: {', '.join(index)}; or a file")
+        raise InputError(
+            f"no interpretation {name_or_path}; there are: {', '.join(index)}; or a file"
+        )
     scenario = Scenario.load(name_or_path)
     check_trip(scenario)
     title = scenario.description or scenario.name
-    return Reading(scenario.name, title, scenario, OPEN, keeps_t_max=False)
+    return Interpretation(scenario.name, title, scenario, OPEN, keeps_t_max=False)
 
 
-def load_all(chosen: Iterable[str] = ()) -> list[Reading]:
-    """These readings, or all that are shipped."""
+def load_all(chosen: Iterable[str] = ()) -> list[Interpretation]:
+    """These interpretations, or all that are shipped."""
     return [load(name) for name in list(chosen) or names()]
 
 
@@ -143,7 +146,8 @@ def check_trip(scenario: Scenario) -> None:
     if differs:
         raise InputError(
             f"scenario {scenario.name}: {differs[0]} is not the paper's, whose claims `access-av "
-            f"evaluate` judges on the paper's trip; for errors, executions and energy of this one: "
+            "evaluate` judges on the paper's trip; for errors, angle estimates and energy of this "
+            "one: "
             f"access-av run {scenario.name}; for what any localizer could reach: access-av bound "
             f"{scenario.name}"
         )

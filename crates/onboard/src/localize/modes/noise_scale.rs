@@ -23,7 +23,7 @@ clone_in_place! {
     /// expected value (von Neumann 1941), for each radio head and for all. A constant error, such
     /// as that of a fault, does not contribute.
     #[derive(Debug, PartialEq)]
-    pub struct NoiseRatio {
+    pub struct NoiseScale {
         heads: Vec<HeadNoise>,
         of_all: Ratio,
     }
@@ -67,7 +67,7 @@ impl Ratio {
     }
 }
 
-impl NoiseRatio {
+impl NoiseScale {
     /// Creates the ratio for a number of radio heads.
     pub fn new(heads: usize) -> Self {
         let heard = HeadNoise {
@@ -159,8 +159,8 @@ mod tests {
     }
 
     /// Angles at a given distance in wavelengths, with these residuals.
-    fn heard(apart_wavelengths: f64, mut residual_rad: impl FnMut(i32) -> f64) -> NoiseRatio {
-        let mut noise = NoiseRatio::new(1);
+    fn heard(apart_wavelengths: f64, mut residual_rad: impl FnMut(i32) -> f64) -> NoiseScale {
+        let mut noise = NoiseScale::new(1);
         for number in 0..2000 {
             let place_wavelengths = apart_wavelengths * f64::from(number);
             noise.see(
@@ -223,8 +223,8 @@ mod tests {
     }
 
     #[test]
-    fn each_radio_head_is_as_noisy_as_it_is_heard_to_be() {
-        let mut noise = NoiseRatio::new(3);
+    fn the_noise_of_each_radio_head_is_estimated_from_its_angles() {
+        let mut noise = NoiseScale::new(3);
         for number in 0..2000 {
             let sign = f64::from(1 - 2 * (number % 2));
             let place_wavelengths = 2.0 * f64::from(number);

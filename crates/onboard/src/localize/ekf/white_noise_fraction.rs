@@ -17,10 +17,10 @@ const OF_MOST: f64 = 0.973_345;
 
 /// Half the mean squared difference of successive angles divided by their specified variance (von
 /// Neumann 1941). Constant errors, of the angles or of the position, do not contribute. In
-/// contrast, the bank's `NoiseRatio` estimates the total noise relative to the specified one, with
+/// contrast, the bank's `NoiseScale` estimates the total noise relative to the specified one, with
 /// filters that do not use the radio head, including tails.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct WhiteShare {
+pub(super) struct WhiteNoiseFraction {
     share: f64,
     pairs: u32,
 }
@@ -34,7 +34,7 @@ pub(super) struct Residual {
     pub variance: f64,
 }
 
-impl WhiteShare {
+impl WhiteNoiseFraction {
     /// Creates the estimate with a prior of the time-correlated fraction.
     pub const fn new(stays: f64) -> Self {
         Self {
@@ -74,9 +74,9 @@ mod tests {
 
     /// Estimates the fraction for angles with a time-correlated `share` that is retained by the
     /// factor `kept` between angles, and a fraction of outliers.
-    fn found(share: f64, kept: f64, outliers: f64) -> WhiteShare {
+    fn found(share: f64, kept: f64, outliers: f64) -> WhiteNoiseFraction {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let (mut white, mut last) = (WhiteShare::new(0.25), None);
+        let (mut white, mut last) = (WhiteNoiseFraction::new(0.25), None);
         let mut stays: f64 = rng.sample(StandardNormal);
         for _ in 0..2000 {
             let [new, own]: [f64; 2] = [rng.sample(StandardNormal), rng.sample(StandardNormal)];
@@ -119,8 +119,8 @@ mod tests {
     }
 
     #[test]
-    fn no_more_than_stated_stays() {
-        assert_eq!(WhiteShare::new(0.25).stays(0.25), 0.25);
+    fn the_correlated_fraction_does_not_exceed_the_configured_maximum() {
+        assert_eq!(WhiteNoiseFraction::new(0.25).stays(0.25), 0.25);
         assert_eq!(found(0.8, 0.98, 0.0).stays(0.25), 0.25);
         assert!(found(0.0, 0.0, 0.0).stays(0.25) < 0.12);
     }

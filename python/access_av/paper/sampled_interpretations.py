@@ -19,6 +19,7 @@ from access_av.device.platform import Platform
 from access_av.paper.claims import margins
 from access_av.paper.driver import Driver
 from access_av.paper.evaluation import Case, cases, outcome_of
+from access_av.paper.interpretations import OPEN, Interpretation
 from access_av.paper.open_choices import (
     CONTROLLER,
     GATE,
@@ -33,7 +34,6 @@ from access_av.paper.open_choices import (
     world_changes,
 )
 from access_av.paper.outcome import Drives, Numbers
-from access_av.paper.readings import OPEN, Reading
 from access_av.paper.statements import stated_claims
 from access_av.run.campaign import Shard, Task
 
@@ -45,21 +45,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sample:
-    """Readings and how they do by the claims.
+    """Interpretations and how they do by the claims.
 
     Attributes
     ----------
     dimensions
         Sampled values.
     coordinates
-        One row per reading, from 0 to 1.
+        One row per interpretation, from 0 to 1.
     world
-        Which world each reading is in.
+        Which world each interpretation is in.
     margins
         Margins of each claim, in the order of the interpretations.
     longest_gap_s
         Longest time between two estimates in any mode.
-    executions
+    aoa_estimates
         Number of estimates of adaptive MUSIC in the platform's first mode.
     worst_error_m
         Worst error of adaptive MUSIC in any mode.
@@ -70,16 +70,16 @@ class Sample:
     world: Numbers
     margins: Mapping[str, Numbers]
     longest_gap_s: Numbers
-    executions: Numbers
+    aoa_estimates: Numbers
     worst_error_m: Numbers
 
     def held(self) -> Numbers:
-        """How many claims each reading meets."""
+        """How many claims each interpretation meets."""
         held = [margin >= 0.0 for margin in self.margins.values()]
         return np.asarray(np.sum(held, axis=0), dtype=np.float64)
 
     def best(self) -> list[int]:
-        """Readings in order: most claims first, of those the ones that miss the rest by least."""
+        """Returns the interpretations, ordered by the number of met claims, then by the margin."""
         short = np.sum([np.clip(margin, -1.0, 0.0) for margin in self.margins.values()], axis=0)
         return [int(index) for index in np.lexsort((-short, -self.held()))]
 
@@ -99,7 +99,7 @@ def sample(
     everything: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Sample | None:
-    """Draw readings, and judge each by the paper's claims.
+    """Draw interpretations, and judge each by the paper's claims.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def sample(
         },
         **{
             name: np.concatenate([part[name] for part in found])
-            for name in ("longest_gap_s", "executions", "worst_error_m")
+            for name in ("longest_gap_s", "aoa_estimates", "worst_error_m")
         },
     )
 
@@ -200,7 +200,7 @@ def judge(
     """
     platform = Platform(_core.Platform.from_toml(board))
     driver = Driver(platform, runs, seed, threads=1, count=0)
-    clock = {"vehicle.wake_up.due.serving_ssb": world.get("serving_ssb", "first-after")}
+    clock = {"vehicle.wake_up.trigger.ssb_selection": world.get("ssb_selection", "first-after")}
     paper = Scenario.load("paper").with_overrides(world_changes(world) | clock)
     scenarios = [paper.with_overrides(controller_changes(point, world)) for point in controllers]
     drives: list[tuple[Case, Drives]] = []
@@ -220,31 +220,31 @@ def judge(
     first = outcome.adaptive[platform.modes[0].number]
     return {
         "longest_gap_s": np.max(gaps_s, axis=0),
-        "executions": first.executions,
+        "aoa_estimates": first.aoa_estimates,
         "worst_error_m": np.max([each.worst_m for each in outcome.adaptive.values()], axis=0),
         **{name: np.broadcast_to(margin, count) for name, margin in margins(outcome).items()},
     }
 
 
-def _side_by_side(readings: list[Drives]) -> Drives:
-    """One setting under several readings, as variants."""
+def _side_by_side(interpretations: list[Drives]) -> Drives:
+    """One setting under several interpretations, as variants."""
 
     def joined(name: str) -> Any:
-        return np.concatenate([np.atleast_1d(getattr(each, name)) for each in readings])
+        return np.concatenate([np.atleast_1d(getattr(each, name)) for each in interpretations])
 
     return Drives(
         **{
             name: joined(name)
-            for name in ("executions", "worst_x_m", "worst_y_m", "rms_error_m", "horizontal_m")
+            for name in ("aoa_estimates", "worst_x_m", "worst_y_m", "rms_error_m", "horizontal_m")
         },
         longest_gap_s=joined("longest_gap_s"),
     )
 
 
-def as_reading(values: Mapping[str, Any], name: str = "found") -> Reading:
+def as_interpretation(values: Mapping[str, Any], name: str = "found") -> Interpretation:
     """Returns a sampled point as an interpretation."""
     scenario = Scenario.from_toml(as_toml(values, name))
-    return Reading(name, "Found by the search", scenario, OPEN, keeps_t_max=True)
+    return Interpretation(name, "Found by the search", scenario, OPEN, keeps_t_max=True)
 
 
 def as_toml(values: Mapping[str, Any], name: str = "found") -> str:
@@ -257,10 +257,10 @@ def as_toml(values: Mapping[str, Any], name: str = "found") -> str:
         if isinstance(value, dict):
             table, key = path, ""
         tables.setdefault(table.replace("[0]", ""), {}).update({key: value} if key else value)
-    tables["vehicle"] = {"like": "paper", **tables["vehicle"]}
+    tables["vehicle"] = {"extends": "paper", **tables["vehicle"]}
     kept = ("name", "position_m", "pci")
     tables["site.radio_heads"] = {it: head[it] for it in kept} | tables["site.radio_heads"]
-    lines = ['like = "paper"', f'name = "{name}"', 'description = "Found by access-av search"']
+    lines = ['extends = "paper"', f'name = "{name}"', 'description = "Found by access-av search"']
     for table, entries in tables.items():
         lines += ["", f"[[{table}]]" if table == "site.radio_heads" else f"[{table}]"]
         lines += [f"{key} = {_toml(value)}" for key, value in entries.items()]
@@ -300,7 +300,7 @@ class Confirmed:
 def confirmed(
     campaign: Campaign, platform: Platform, found: Sample, *, runs: int, seed: int
 ) -> list[Confirmed]:
-    """Drive the best readings again, and then the neighbours of the one that remains the best.
+    """Simulates the best interpretations again, then the neighbours of the best one.
 
     A neighbour differs by a tenth of a controller's dimension, or by another choice. The one that
     meets most claims comes first; of several, the one that the search had first.

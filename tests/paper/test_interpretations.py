@@ -13,7 +13,7 @@ import synthetic
 from access_av import Scenario, SettingsError
 from access_av.device.platform import Platform
 from access_av.errors import InputError
-from access_av.paper import ablation, readings
+from access_av.paper import ablation, interpretations
 from access_av.paper.driver import Driver
 from access_av.paper.evaluation import evaluate_with
 from access_av.report.paper.evaluation import render
@@ -33,45 +33,52 @@ def driver() -> Driver:
 
 
 def test_one_of_them_is_the_shipped_scenario() -> None:
-    shipped, paper = readings.load(readings.SHIPPED).scenario, Scenario.load("paper")
+    shipped, paper = interpretations.load(interpretations.SHIPPED).scenario, Scenario.load("paper")
     named = {"name": "paper", "description": paper.description}
     assert shipped.with_overrides(named) == paper
 
 
-@pytest.mark.parametrize("name", readings.names())
+@pytest.mark.parametrize("name", interpretations.names())
 def test_t_max_is_kept_by_every_reading_that_claims_to(name: str, driver: Driver) -> None:
-    reading = readings.load(name)
+    interpretation = interpretations.load(name)
     for base_ms in BASE_MS:
-        place = "due.base_ms" if reading.is_gated else "base_ms"
-        scenario = reading.scenario.with_overrides({f"vehicle.wake_up.{place}": base_ms})
+        place = "trigger.base_ms" if interpretation.is_gated else "base_ms"
+        scenario = interpretation.scenario.with_overrides({f"vehicle.wake_up.{place}": base_ms})
         gap_s = driver.drive(scenario).drives.longest_gap_s
         assert gap_s >= base_ms / 1e3 - 1e-9
-        if reading.keeps_t_max:
-            assert reading.keeps(float(gap_s)), gap_s
-    if not reading.keeps_t_max:
-        assert not reading.keeps(float(gap_s)), "it could claim to keep t_max"
+        if interpretation.keeps_t_max:
+            assert interpretation.keeps(float(gap_s)), gap_s
+    if not interpretation.keeps_t_max:
+        assert not interpretation.keeps(float(gap_s)), "it could claim to keep t_max"
 
 
 def test_only_gates_wait_for_a_better_ssb() -> None:
-    gated = {name for name in readings.names() if readings.load(name).is_gated}
-    assert gated == {"factory", *(name for name in readings.names() if name.startswith("gate"))}
+    gated = {name for name in interpretations.names() if interpretations.load(name).is_gated}
+    assert gated == {
+        "factory",
+        *(name for name in interpretations.names() if name.startswith("gate")),
+    }
     assert len(gated) == 7
 
 
 def test_a_controller_of_no_gain_makes_no_difference(driver: Driver) -> None:
     """Algorithm 1 with gains of zero is the constant t_base; the report has to say so."""
-    gate = readings.load("gate")
-    idle = readings.Reading(
+    gate = interpretations.load("gate")
+    idle = interpretations.Interpretation(
         "gate",
         "idle",
-        gate.scenario.with_overrides({f"vehicle.wake_up.due.{k}": 0.0 for k in ("kp", "ki", "kd")}),
+        gate.scenario.with_overrides(
+            {f"vehicle.wake_up.trigger.{k}": 0.0 for k in ("kp", "ki", "kd")}
+        ),
         (),
         keeps_t_max=False,
     )
     evaluation = evaluate_with(driver, idle)
     found = ablation.ablate(driver, evaluation)
     assert [each.matters for each in found] == [0, 0, 0, 0]
-    assert all(each.gain_m == 0.0 and each.executions == each.constant_executions for each in found)
+    assert all(
+        each.gain_m == 0.0 and each.aoa_estimates == each.constant_aoa_estimates for each in found
+    )
     study = replace(synthetic.study(), evaluations=[evaluation], ablations=found)
     page = render(study)
     assert "makes no difference" in page
@@ -79,10 +86,10 @@ def test_a_controller_of_no_gain_makes_no_difference(driver: Driver) -> None:
 
 
 def test_behind_the_gate_algorithm_1_is_idle(driver: Driver) -> None:
-    found = ablation.ablate(driver, evaluate_with(driver, readings.load("gate")))
+    found = ablation.ablate(driver, evaluate_with(driver, interpretations.load("gate")))
     assert [each.matters for each in found] == [0, 0, 0, 0]
     for each in found:
-        assert abs(each.executions - each.constant_executions) < 0.03 * each.executions
+        assert abs(each.aoa_estimates - each.constant_aoa_estimates) < 0.03 * each.aoa_estimates
 
 
 @pytest.mark.parametrize("name", [name for name in Scenario.names() if name != "paper"])
@@ -96,8 +103,8 @@ def test_claims_are_not_judged_on_another_trip(
 
 
 def test_an_unknown_reading_is_named() -> None:
-    with pytest.raises(InputError, match="no reading gaet; there are: every-ssb"):
-        readings.load("gaet")
+    with pytest.raises(InputError, match="no interpretation gaet; there are: every-ssb"):
+        interpretations.load("gaet")
 
 
 def test_a_reading_that_contradicts_itself_is_named_and_the_others_are_judged(
@@ -105,41 +112,49 @@ def test_a_reading_that_contradicts_itself_is_named_and_the_others_are_judged(
 ) -> None:
     file = tmp_path / "hasty.toml"
     file.write_text(
-        'like = "paper"\nname = "hasty"\n[vehicle]\nlike = "paper"\n'
+        'extends = "paper"\nname = "hasty"\n[vehicle]\nextends = "paper"\n'
         '[vehicle.wake_up]\npolicy = "pid"\nt_max_ms = 110.0\n'
     )
     done = access_av(
-        "evaluate", "--reading", file, "--reading", "gate", "--runs", "1", "--out", tmp_path / "e"
+        "evaluate",
+        "--interpretation",
+        file,
+        "--interpretation",
+        "gate",
+        "--runs",
+        "1",
+        "--out",
+        tmp_path / "e",
     )
     assert done.code == 0, done.err
     told = " ".join(done.out.split())
     assert "Not evaluated: hasty" in told
     assert "wake_up.t_max_ms" in told
     claims = json.loads((tmp_path / "e/claims.json").read_text())
-    assert {claim["reading"] for claim in claims} == {"gate"}
-    alone = access_av("evaluate", "--reading", file, "--runs", "1", "--out", tmp_path / "f")
+    assert {claim["interpretation"] for claim in claims} == {"gate"}
+    alone = access_av("evaluate", "--interpretation", file, "--runs", "1", "--out", tmp_path / "f")
     assert alone.code == 2
     assert "wake_up.t_max_ms" in alone.err
 
 
 def test_an_explicit_contradiction_is_refused() -> None:
-    changes = {"vehicle.wake_up.due.base_ms": 300.0}
-    with pytest.raises(SettingsError, match=r"wake_up\.due\.position_uncertainty_m"):
+    changes = {"vehicle.wake_up.trigger.base_ms": 300.0}
+    with pytest.raises(SettingsError, match=r"wake_up\.trigger\.position_uncertainty_m"):
         Scenario.load("paper").with_overrides(changes)
-    late = {"vehicle.wake_up.latest_ms": 100.0, "vehicle.wake_up.due.base_ms": 150.0}
+    late = {"vehicle.wake_up.latest_ms": 100.0, "vehicle.wake_up.trigger.base_ms": 150.0}
     with pytest.raises(SettingsError, match=r"wake_up\.latest_ms"):
         Scenario.load("paper").with_overrides(late)
 
 
 def test_t_max_follows_from_the_position_uncertainty_unless_it_is_stated() -> None:
-    gate = readings.load("gate")
-    assert gate.wake_up["due"]["position_uncertainty_m"] == 1.0
+    gate = interpretations.load("gate")
+    assert gate.wake_up["trigger"]["position_uncertainty_m"] == 1.0
     assert gate.t_max_s == pytest.approx(0.24, abs=1e-12), "1 m at 15 km/h"
     for changes, t_max_s in (
         ({"position_uncertainty_m": 2.0}, 0.48),
         ({"t_max_ms": 300.0}, 0.3),
     ):
-        paths = {f"vehicle.wake_up.due.{key}": value for key, value in changes.items()}
+        paths = {f"vehicle.wake_up.trigger.{key}": value for key, value in changes.items()}
         changed = replace(gate, scenario=gate.scenario.with_overrides(paths))
         assert changed.t_max_s == pytest.approx(t_max_s, abs=1e-12)
 
@@ -150,9 +165,9 @@ def test_algorithm_1_of_no_gain_is_the_fixed_interval(
     base_ms: float, serving: str, driver: Driver
 ) -> None:
     """One clock: both execute at the same SSBs, whatever the base wake-up time."""
-    scenario = readings.load("every-ssb").scenario.with_overrides(
+    scenario = interpretations.load("every-ssb").scenario.with_overrides(
         {f"vehicle.wake_up.{name}": 0.0 for name in ("kp", "ki", "kd")}
-        | {"vehicle.wake_up.base_ms": base_ms, "vehicle.wake_up.serving_ssb": serving}
+        | {"vehicle.wake_up.base_ms": base_ms, "vehicle.wake_up.ssb_selection": serving}
     )
     one, other = (
         driver.drive(each).drives for each in (scenario, ablation.fixed(scenario, base_ms))
@@ -162,5 +177,5 @@ def test_algorithm_1_of_no_gain_is_the_fixed_interval(
     gap_s = float(rounds(base_ms / period_ms)) * period_ms / 1e3
     assert one.longest_gap_s == pytest.approx(gap_s)
     # Algorithm 1 has no wake-up time before its second SSB: one estimate more, at the beginning.
-    assert abs(float(one.executions[0] - other.executions[0])) <= 1.0
+    assert abs(float(one.aoa_estimates[0] - other.aoa_estimates[0])) <= 1.0
     assert float(one.rms_error_m[0]) == pytest.approx(float(other.rms_error_m[0]), rel=0.3)

@@ -123,7 +123,7 @@ impl HeadBias {
 clone_in_place! {
     /// Biases of all radio heads; empty if they are not estimated.
     #[derive(Debug, PartialEq)]
-    pub struct CorrelatedBias {
+    pub struct MultipathBias {
         /// Biases, then the states of the ranges (see [`range_states`](super::range_states)).
         pub(super) heads: Vec<HeadBias>,
         /// Number of biases.
@@ -133,7 +133,7 @@ clone_in_place! {
     }
 }
 
-impl CorrelatedBias {
+impl MultipathBias {
     /// Creates the biases of a number of radio heads with a prior probability; empty if it is 0.
     pub fn new(radio_heads: usize, probability: f64) -> Self {
         let count = if probability > 0.0 { radio_heads } else { 0 };
@@ -422,7 +422,7 @@ mod tests {
     }
 
     /// Processes an angle of a radio head like the filter.
-    fn take(errors: &mut CorrelatedBias, belief: &mut Belief, head: usize, way_m: f64, rad: f64) {
+    fn take(errors: &mut MultipathBias, belief: &mut Belief, head: usize, way_m: f64, rad: f64) {
         let seen = belief.innovation(rad - belief.mean[0], &row(), OWN_VARIANCE);
         let hypotheses = errors.weigh(head, way_m, &seen, &row()).unwrap();
         errors.take(belief, head, way_m, &row(), &hypotheses, None);
@@ -431,7 +431,7 @@ mod tests {
     const ALL: usize = STATES + 2;
 
     /// State and biases as one Gaussian.
-    fn whole(belief: &Belief, errors: &CorrelatedBias) -> Gaussian<ALL> {
+    fn whole(belief: &Belief, errors: &MultipathBias) -> Gaussian<ALL> {
         let mut whole = Gaussian::<ALL>::independent([0.0; ALL], [0.0; ALL]);
         for i in 0..STATES {
             whole.mean[i] = belief.mean[i];
@@ -511,7 +511,7 @@ mod tests {
 
     #[test]
     fn state_and_errors_have_the_moments_of_the_mixture() {
-        let (mut errors, mut belief) = (CorrelatedBias::new(2, EVEN), unknown());
+        let (mut errors, mut belief) = (MultipathBias::new(2, EVEN), unknown());
         let mut motion = identity::<STATES>();
         (motion[0][1], motion[1][1]) = (0.3, 0.9);
         let mut whole_motion = identity::<ALL>();
@@ -572,7 +572,7 @@ mod tests {
     }
 
     #[test]
-    fn the_state_is_as_uncertain_as_it_says_where_errors_are_as_assumed() {
+    fn the_filter_is_consistent_if_errors_agree_with_the_model() {
         const RUNS: u32 = 400;
         // Two radio heads, with an angle of each every 0.3 m: the short-lived error is independent
         // between angles.
@@ -580,7 +580,7 @@ mod tests {
         for (way_m, bound_m) in [(2.0, 0.3), (20.0, 0.1)] {
             let (mut nees, mut square, mut within) = (0.0, 0.0, 0);
             for _ in 0..RUNS {
-                let (mut errors, mut belief) = (CorrelatedBias::new(2, EVEN), unknown());
+                let (mut errors, mut belief) = (MultipathBias::new(2, EVEN), unknown());
                 let truth: f64 = random.sample(StandardNormal);
                 let mut drawn = [0, 1].map(|_| Drawn {
                     level: VARIANCES[random.random_range(0..LEVELS)].sqrt(),
@@ -615,8 +615,8 @@ mod tests {
     }
 
     #[test]
-    fn its_size_is_found_within_metres_and_found_anew_where_it_changes() {
-        let (mut errors, mut belief) = (CorrelatedBias::new(1, EVEN), unknown());
+    fn the_bias_size_is_estimated_within_metres_and_again_after_a_change() {
+        let (mut errors, mut belief) = (MultipathBias::new(1, EVEN), unknown());
         belief.covariance[0][0] = 1e-6;
         for predict_measurement in 0..300 {
             let error_rad = 0.01 * f64::from(predict_measurement % 7 - 3);
@@ -636,7 +636,7 @@ mod tests {
 
     #[test]
     fn who_stands_learns_nothing() {
-        let (mut errors, mut belief) = (CorrelatedBias::new(1, EVEN), unknown());
+        let (mut errors, mut belief) = (MultipathBias::new(1, EVEN), unknown());
         for _ in 0..30 {
             take(&mut errors, &mut belief, 0, 0.1, 0.02);
         }

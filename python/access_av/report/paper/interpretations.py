@@ -1,4 +1,4 @@
-"""The report's first section: the readings, and the claims under each."""
+"""The report's first section: the interpretations, and the claims under each."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ OVERVIEW_PX = 300
 PROMISED = (("accuracy", 0), ("energy", -1))
 
 
-def readings(study: Study) -> str:
+def interpretations(study: Study) -> str:
     """Interpretations, the claim groups that hold under each, and the supporting claims."""
     rows = []
     for index, half in enumerate(summary.halves(study), start=1):
-        claims = study.of(half.reading.name)
+        claims = study.of(half.interpretation.name)
         t_max = "kept" if half.keeps_t_max else "exceeded"
-        if half.reading.keeps_t_max and not half.keeps_t_max:
+        if half.interpretation.keeps_t_max and not half.keeps_t_max:
             t_max = "claimed, and exceeded"
         rows.append(
             (
-                f"<b>{index} {escape(half.reading.title)}</b>"
-                f"<small>{escape(half.reading.scenario.description)} · "
-                f"<code>{escape(half.reading.name)}</code></small>",
+                f"<b>{index} {escape(half.interpretation.title)}</b>"
+                f"<small>{escape(half.interpretation.scenario.description)} · "
+                f"<code>{escape(half.interpretation.name)}</code></small>",
                 _met(half.accuracy),
                 _met(half.energy),
                 f"{t_max}, {half.longest_gap_s:.2f} s",
@@ -54,7 +54,7 @@ def readings(study: Study) -> str:
             )
         )
     head = (
-        "Reading",
+        "Interpretation",
         "Accuracy half",
         "Energy half",
         "t_max",
@@ -69,16 +69,16 @@ def readings(study: Study) -> str:
 
 
 def overview(study: Study, specs: dict[str, Spec]) -> str:
-    """The one picture: what each reading obtains of the paper's two promises."""
+    """The one picture: what each interpretation obtains of the paper's two promises."""
     rows = []
     for index, half in enumerate(summary.halves(study), start=1):
-        by_id = {it.id: it.obtained for it in study.of(half.reading.name)}
+        by_id = {it.id: it.obtained for it in study.of(half.interpretation.name)}
         worst_m, saving = (by_id[half_of(name)[at]] for name, at in PROMISED)
         if worst_m is not None and saving is not None:
             rows.append(
                 {
                     "number": str(index),
-                    "reading": half.reading.title,
+                    "interpretation": half.interpretation.title,
                     "worst": worst_m,
                     "saving": saving,
                     "keeps": ("neither", "accuracy", "saving", "both")[
@@ -115,7 +115,7 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
     base = alt.Chart(placed(table, "number", *axes, OVERVIEW_PX)).encode(
         x=x_axis,
         y=y_axis,
-        tooltip=["reading:N", alt.Tooltip("worst:Q", format=".3f"),
+        tooltip=["interpretation:N", alt.Tooltip("worst:Q", format=".3f"),
                  alt.Tooltip("saving:Q", format=".1f"), "keeps:N"],
     )  # fmt: skip
     kinds = ["neither", "accuracy", "saving", "both"]
@@ -130,11 +130,13 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
     specs["overview"] = finish(
         promised + lines + dots + numbers,
         height=OVERVIEW_PX,
-        description="Worst error and average saving of each reading, and what the paper promises",
+        description="Worst error and average saving of each interpretation, and what the paper "
+        "promises",
     )
     return figure(
         "overview",
-        "Each dot is a reading, its number that of the table below; the green field is what the "
+        "Each dot is an interpretation, its number that of the table below; the green field is "
+        "what the "
         "paper promises of both. Accuracy and saving ask for a further claim each (a2, e3).",
     )
 
@@ -150,7 +152,7 @@ def chosen(study: Study) -> str:
             f"<b>{escape(each.what)}</b>" if each.is_shipped else "",
             escape(each.value) if each.is_shipped else f"instead {escape(each.value)}",
             escape(each.why) if each.is_shipped else "",
-            f"{each.executions:.0f}",
+            f"{each.aoa_estimates:.0f}",
             f"{each.worst_error_m:.2f}",
             f"{each.rms_error_m:.3f} ± {each.rms_std_m:.3f}",
             f"{each.fixed_rms_m:.3f}",
@@ -159,7 +161,7 @@ def chosen(study: Study) -> str:
         for each in study.effects
     ]
     results = (
-        "Executions",
+        "Angle estimates",
         "Worst / m",
         "RMS / m",
         "Every 80 ms: RMS / m",
@@ -169,12 +171,12 @@ def chosen(study: Study) -> str:
 
 
 def matrix(study: Study) -> str:
-    """Every claim under every reading."""
-    columns = [study.of(each.reading.name) for each in study.evaluations]
+    """Every claim under every interpretation."""
+    columns = [study.of(each.interpretation.name) for each in study.evaluations]
     head = ("Claim", "Paper", *(str(index) for index in range(1, len(columns) + 1)))
     rows = [
         (
-            f"<b>{escape(_short(claims[0]))}</b> <span>{escape(claims[0].says)}</span>",
+            f"<b>{escape(_short(claims[0]))}</b> <span>{escape(claims[0].statement)}</span>",
             f"<span>{_value(claims[0], claims[0].stated)}</span>",
             *(_cell(claim) for claim in claims),
         )
@@ -186,8 +188,8 @@ def matrix(study: Study) -> str:
 def claims(study: Study) -> str:
     """Claims under the shown interpretation, with intervals and the weight of evidence."""
     rows = []
-    for claim in study.of(study.shown.reading.name):
-        turns = " " + badge("turns with the seed", "fit") if claim.turns_with_seed else ""
+    for claim in study.of(study.shown.interpretation.name):
+        turns = " " + badge("turns with the seed", "fit") if claim.seed_sensitive else ""
         if claim.seeds_met:
             turns += f"<small>met with {claim.seeds_met} seeds</small>"
         obtained = _value(claim, claim.obtained)
@@ -198,7 +200,7 @@ def claims(study: Study) -> str:
             obtained += f"<small>{_deviation_text(claim.deviation, claim.tolerance)}</small>"
         rows.append(
             (
-                f"<b>{escape(claim.says)}</b><small>{escape(claim.where)} · "
+                f"<b>{escape(claim.statement)}</b><small>{escape(claim.paper_section)} · "
                 f"<code>{escape(claim.id)}</code></small><small>{escape(claim.note)}</small>",
                 _value(claim, claim.stated),
                 obtained,
@@ -249,7 +251,7 @@ def _value(claim: Claim, value: object) -> str:
 
 def _short(claim: Claim) -> str:
     number, *words = claim.id.split("_")
-    # Two claims are e3: one of the saving, one of the executions.
+    # Two claims are e3: one of the saving, one of the angle estimates.
     return f"{number} {words[-1]}" if number == "e3" and words[-1] == "executions" else number
 
 
@@ -283,7 +285,7 @@ def _cell(claim: Claim) -> str:
     if not claim.is_judged:
         return badge("–", "fit")
     sign = summary.SIGNS[claim.verdict]
-    if claim.turns_with_seed:
+    if claim.seed_sensitive:
         sign += f" {claim.seeds_met or '?'}"
     plain = isinstance(claim.obtained, (int, float))
     value = f"<small>{escape(summary.shown_value(claim.obtained))}</small>" if plain else ""

@@ -13,7 +13,7 @@ use crate::standard::pci::Pci;
 
 /// Received SSB.
 #[derive(Debug, Clone, PartialEq)]
-pub struct HeardSsb {
+pub struct TrackedSsb {
     /// Physical cell identity.
     pub pci: Pci,
     /// SSB index (beam).
@@ -55,7 +55,7 @@ pub struct HeardSsb {
     pub tracked: bool,
 }
 
-impl HeardSsb {
+impl TrackedSsb {
     /// Converts a received SSB; `ratio` is the number of input samples per sample at the base rate.
     pub(super) fn new<const A: usize>(seen: &mut Seen<'_, A>, ratio: f64) -> Self {
         let ssb = seen.ssb;
