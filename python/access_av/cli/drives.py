@@ -338,6 +338,8 @@ def _lost(drive: Drive) -> bool:
 
 
 def _pose(text: str) -> tuple[float, float, float]:
+    if text.strip() == "scratch":
+        raise InputError("--start scratch was renamed in version 0.2.0: write --start unknown")
     try:
         x_m, y_m, heading_rad = (float(part) for part in text.split(","))
     except ValueError as error:

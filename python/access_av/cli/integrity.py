@@ -27,6 +27,7 @@ from access_av.cli.options import (
 from access_av.cli.side_by_side import PERCENTS, of_scenario, show_compared, write_compared
 from access_av.cli.side_by_side import records as as_records
 from access_av.cli.terminal import console, progress, table, width
+from access_av.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,6 +36,24 @@ if TYPE_CHECKING:
     from access_av.study.compare import Compared
 
 app = typer.Typer()
+
+# Maximum of --fault-scale: larger faults are outside the valid range of settings.
+MAX_FAULT_SCALE = 100.0
+
+
+def _scales(text: str) -> list[float]:
+    """Returns the multiples of the standard deviations that ``--fault-scale`` contains."""
+    try:
+        scales = [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise InputError(
+            f"--fault-scale {text}: write numbers and commas, for example 1,3,10"
+        ) from error
+    if not all(0.0 < scale <= MAX_FAULT_SCALE for scale in scales):
+        raise InputError(
+            f"--fault-scale {text}: numbers must be above 0 and at most {MAX_FAULT_SCALE:g}"
+        )
+    return scales
 
 
 @app.command(
@@ -50,9 +69,14 @@ def integrity(
         list[str] | None,
         typer.Option(help="Difference of truth and model; repeatable.", show_default="all"),
     ] = None,
-    hypotheses: Annotated[
-        bool, typer.Option("--hypotheses", help="Also the site's fault hypotheses, at three sizes.")
-    ] = False,
+    fault_scale: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N,N,…",
+            help="Also the site's fault hypotheses, at these multiples of their standard "
+            "deviations: 1,3,10.",
+        ),
+    ] = None,
     channel: Annotated[
         list[str] | None,
         typer.Option(help="'as set', K=5 (a true Rician K of 5 dB), umi, inf-sl, …; repeatable."),
@@ -97,13 +121,14 @@ def integrity(
     from access_av.run.result_cache import ResultCache
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
+    scales = [] if fault_scale is None else _scales(fault_scale)
     chosen = load_scenario(scenario)
     others = {name: load_scenario(name) for name in compare or ()}
     variants = of_scenario(chosen, vary, others)
     directory = ResultsDirectory.create("integrity", out)
     share = Shard.parse(shard)
-    if hypotheses:
-        fault = [*(fault or ()), *sized(chosen)]
+    if scales:
+        fault = [*(fault or ()), *sized(chosen, scales)]
     with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
         campaign = Campaign(ResultCache(directory.path / "parts"), pool, workers, share)
         driven = {

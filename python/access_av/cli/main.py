@@ -42,6 +42,7 @@ from access_av.cli.terminal import (
     write_what_can_be_written,
 )
 from access_av.errors import ImplausibleSettingsWarning, InputError
+from access_av.tables import renamed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -54,6 +55,9 @@ def _brief_usage_errors() -> Iterator[None]:
     try:
         yield
     except UsageError as error:
+        option, context = getattr(error, "option_name", None), error.ctx
+        if option and context and (message := renamed.option_message(option, context.command_path)):
+            error.message, error.possibilities = message, []
         error.message = brief(plain(error.message))
         raise
 
@@ -66,6 +70,12 @@ class _Commands(TyperGroup):
         if command and command.help:  # Join the lines of a paragraph.
             command.help = re.sub(r"(?<=\S)\n(?=\S)", " ", inspect.cleandoc(command.help))
         return command
+
+    def resolve_command(self, context: Any, words: list[str]) -> Any:
+        message = renamed.command_message(words[0])
+        if message and self.get_command(context, words[0]) is None:
+            context.fail(message)
+        return super().resolve_command(context, words)
 
     def make_context(self, *args: Any, **settings: Any) -> Any:
         with _brief_usage_errors():

@@ -90,8 +90,8 @@ def mismatches(scenario: _core.Scenario) -> dict[str, Overrides]:
     return {name: case for name, case in cases.items() if case or name == "none"}
 
 
-def hypotheses(scenario: _core.Scenario) -> dict[str, Overrides]:
-    """Returns fault hypotheses of a site at 1, 3 and 10 times the specified standard deviation.
+def hypotheses(scenario: _core.Scenario, scales: Iterable[float] = SIZES) -> dict[str, Overrides]:
+    """Returns fault hypotheses of a site at ``scales`` times the specified standard deviation.
 
     The default standard deviation is that of a typical survey, calibration or data sheet.
     Every other quantity is drawn from its stated standard deviation.
@@ -106,9 +106,9 @@ def hypotheses(scenario: _core.Scenario) -> dict[str, Overrides]:
     site = json.loads(scenario.site.to_json())
     vehicle = json.loads(scenario.vehicle.to_json())
     found: dict[str, Overrides] = {}
-    for size in SIZES:
-        for name, case in _of_size(site, vehicle, size).items():
-            found[f"{name} x {size}"] = case
+    for scale in scales:
+        for name, case in _of_size(site, vehicle, scale).items():
+            found[f"{name} x {scale:g}"] = case
     swapped = _swapped(site["radio_heads"])
     return found | ({"two cells swapped": swapped} if swapped else {})
 

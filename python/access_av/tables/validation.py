@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from access_av.errors import InputError
-from access_av.tables import csv_text
+from access_av.tables import csv_text, renamed
 from access_av.tables.columns.glossary import GLOSSARY
 from access_av.tables.columns.tables import TABLES
 from access_av.tables.results_directory import regular
@@ -71,7 +71,7 @@ def check(
     numbers, other = list(numbers), list(other)
     for name in (*other, *numbers):
         if name not in rows.columns:
-            hint = _advice(name, rows.columns)
+            hint = renamed.column_hint(name, rows.columns) or _advice(name, rows.columns)
             named = ", ".join(rows.columns)
             raise InputError(f"{where}: column {name} is missing; there are {named}{hint}")
     for name in other:
@@ -126,4 +126,5 @@ def check_types(rows: pl.DataFrame, where: str, what: str) -> None:
         is_text = GLOSSARY[name].unit == "text"
         fine = found == pl.String if is_text else found.is_numeric() or found == pl.Boolean
         if not (fine or found == pl.Null()):
-            raise InputError(f"{where}: not a table of {what}; `{name}` is {found}")
+            hint = "" if name in rows.columns else renamed.column_hint(name, rows.columns)
+            raise InputError(f"{where}: not a table of {what}; `{name}` is {found}{hint}")

@@ -47,6 +47,16 @@ pub enum SettingsError {
         /// The most similar allowed key, if one is similar.
         nearest: Option<String>,
     },
+    /// The key was renamed.
+    #[error("{file}: `{key}` was renamed in version 0.2.0: write `{new}`")]
+    RenamedKey {
+        /// Path of the file.
+        file: String,
+        /// Path of the old key.
+        key: String,
+        /// Path of the new key.
+        new: String,
+    },
     /// A key is missing, or its value has the wrong type.
     #[error("{file}: `{key}`: {message}")]
     Shape {
@@ -84,7 +94,11 @@ impl SettingsError {
                 key: path.to_owned(),
             };
         }
+        if let Self::RenamedKey { new, .. } = &mut self {
+            *new = format!("{path}.{new}");
+        }
         if let Self::UnknownKey { file, key, .. }
+        | Self::RenamedKey { file, key, .. }
         | Self::Shape { file, key, .. }
         | Self::Value { file, key, .. } = &mut self
         {

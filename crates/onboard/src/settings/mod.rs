@@ -21,6 +21,7 @@ mod radio;
 mod ranging;
 mod read;
 mod receiver;
+mod renamed;
 mod road;
 mod shipped;
 mod site;

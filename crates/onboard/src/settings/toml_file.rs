@@ -15,6 +15,7 @@ use super::error::SettingsError;
 use super::limits::check_limits;
 use super::overlay::{ends_in_tag, lay_over, set};
 use super::read::{from_table, parse};
+use super::renamed::refuse_renamed;
 
 /// Maximum length of a chain of `extends` keys.
 const MAX_EXTENDS: usize = 8;
@@ -198,6 +199,7 @@ fn apply_extends<T: TomlFile>(
     origin: &str,
     library: &dyn Library,
 ) -> Result<(), SettingsError> {
+    refuse_renamed(table, "", origin)?;
     let mut beside = origin.to_owned();
     for _ in 0..MAX_EXTENDS {
         let check = Check { file: &beside };
@@ -211,6 +213,7 @@ fn apply_extends<T: TomlFile>(
         let base = library.text(T::WHAT, T::SHIPPED, &name, &beside);
         let base = base.map_err(|error| error.beneath(&beside, "extends"))?;
         let mut laid = parse(&base.text, &base.origin)?;
+        refuse_renamed(&laid, "", &base.origin)?;
         lay_over(&mut laid, std::mem::take(table), "", check)?;
         *table = laid;
         beside = base.origin;

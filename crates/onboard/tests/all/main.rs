@@ -10,6 +10,7 @@ mod random_drives;
 mod ranges;
 mod receiver;
 mod recovery;
+mod renamed;
 mod settings;
 mod starts;
 mod tracker;
