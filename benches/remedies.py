@@ -39,14 +39,14 @@ def main() -> None:
     print(f"{plant.name}: study of {runs} pairs, {time.monotonic() - began_s:.0f} s")
 
     began_s = time.monotonic()
-    base = drive("as it is", scenario, asked.drives, SEED)
+    base = drive("unchanged", scenario, asked.drives, SEED)
     vehicles = json.loads(plant.to_json())["fleet"]["vehicles"]
     driven = {
         it.name: drive(it.name, scenario.with_overrides(dict(it.settings)), asked.drives, SEED)
         for it in remedies(scenario, vehicles)
     }
     print(f"{asked.drives} drives each, {time.monotonic() - began_s:.0f} s")
-    print(f"as it is: {percent:g} % within {base.percentile(percent).value:.3f} m")
+    print(f"unchanged: {percent:g} % within {base.percentile(percent).value:.3f} m")
     less = {name: it.delta_m(base, percent) for name, it in driven.items()}
     for number, name in enumerate(sorted(less, key=lambda it: less[it][0]), start=1):
         found, low, high = less[name]

@@ -31,7 +31,7 @@ def main() -> None:
         page = render_study(found)
         after = os.times()
         both_s = 0.5 * (after.user - before.user + after.system - before.system)
-        guarded = all(
+        protected = all(
             it.scenario.vehicle.alert_limit_m is not None
             for it in [
                 *(found.nominal, found.poor_los),
@@ -39,9 +39,9 @@ def main() -> None:
             ]
         )
         on_front = found.recommended in found.front
-        short |= both_s > MOST_S or not (guarded and on_front)
+        short |= both_s > MOST_S or not (protected and on_front)
         print(
-            f"{name:<8} {both_s:5.1f} s  front {on_front}  guarded {guarded}  "
+            f"{name:<8} {both_s:5.1f} s  front {on_front}  protected {protected}  "
             f"{len(page.encode()) / 1e6:.2f} MB  {found.point and found.point.name}",
             flush=True,
         )

@@ -29,7 +29,7 @@ def main() -> int:
     parser.add_argument("--channel", action="append")
     asked = parser.parse_args()
     short = 0
-    print(f"{'scenario':24} {'channel':7} 90 %  99 %  ok %   beyond  level/error  J  99 % told")
+    print(f"{'scenario':24} {'channel':7} 90 %  99 %  ok %   beyond  level/error  J  99 % informed")
     for name in asked.only or Scenario.names():
         scenario = Scenario.load(name)
         if json.loads(scenario.vehicle.to_json())["name"] == "paper":

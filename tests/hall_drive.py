@@ -94,7 +94,7 @@ def textbook(drive: HallDrive) -> tuple[np.ndarray, np.ndarray]:
     """Kalman filter over pose, odometer scale, bias and mounting: poses and covariances."""
     state = np.array([*drive.start, 1.0, 0.0, 0.0])
     stds = [START_STD[0], START_STD[0], START_STD[1], SCALE_STD, BIAS_STD_RADPS, MOUNTING_STD_RAD]
-    covariance, heard = np.diag(stds) ** 2, 0
+    covariance, received = np.diag(stds) ** 2, 0
     poses, covariances = [state[:3].copy()], [covariance[:2, :2].copy()]
     for k in range(1, drive.time_s.size):
         length = (drive.distance_m[k] - drive.distance_m[k - 1]) / state[3]
@@ -109,9 +109,9 @@ def textbook(drive: HallDrive) -> tuple[np.ndarray, np.ndarray]:
         covariance = f @ covariance @ f.T
         covariance[:3, :3] += NOISE_M**2 * abs(length) * np.outer(along, along)
         covariance[:3, :3] += TURN_NOISE_RAD**2 * STEP_S * np.outer(turned, turned)
-        while heard < len(drive.angles) and drive.angles[heard, 0] <= drive.time_s[k] + 1e-9:
-            _, pci, measured = drive.angles[heard]
-            heard += 1
+        while received < len(drive.angles) and drive.angles[received, 0] <= drive.time_s[k] + 1e-9:
+            _, pci, measured = drive.angles[received]
+            received += 1
             head, at = HEADS_M[int(pci)], state[:3] + np.array([0.0, 0.0, state[5]])
             dx, dy, square = head[0] - at[0], head[1] - at[1], 0.0
             square = dx * dx + dy * dy + head[2] ** 2

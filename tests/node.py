@@ -47,11 +47,11 @@ class Broker:
         assert self.process.stdout is not None
         assert self.process.stdout.readline().strip() == "ready"
 
-    def heard(self) -> list[dict[str, Any]]:
+    def received(self) -> list[dict[str, Any]]:
         """Stops the broker and returns the received messages."""
         self.process.terminate()
-        heard, _ = self.process.communicate(timeout=10.0)
-        return [json.loads(line) for line in heard.splitlines() if line.startswith("{")]
+        received, _ = self.process.communicate(timeout=10.0)
+        return [json.loads(line) for line in received.splitlines() if line.startswith("{")]
 
     def kill(self) -> None:
         """Ends the broker without notice to its clients."""

@@ -599,7 +599,7 @@ vehicle.wake_up.interval_ms = [2000.0, 8000.0]
 def run(
     access_av: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., Finished]:
-    """The command as it is typed in a directory, in this process."""
+    """Runs a command line in a directory, in this process."""
 
     def inside(cwd: Path, *arguments: str) -> Finished:
         monkeypatch.chdir(cwd)

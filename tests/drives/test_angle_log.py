@@ -74,10 +74,12 @@ def test_a_log_of_angles_locates_as_its_samples_do(
     by_parquet = located(out / "angles.parquet", out / "vehicle.toml")
     assert by_csv.poses.equals(by_parquet.poses)
     # The angles are equal: the log contains all angles that were estimated from the samples.
-    heard = by_samples.angles.join(rows, on=["time_s", "pci", "ssb_index"])
-    assert heard.height == by_samples.angles.height
-    np.testing.assert_allclose(heard["phase_rad"], heard["phase_rad_right"], atol=1e-12)
-    np.testing.assert_allclose(heard["phase_sigma_rad"], heard["phase_noise_sigma_rad"], rtol=1e-12)
+    received = by_samples.angles.join(rows, on=["time_s", "pci", "ssb_index"])
+    assert received.height == by_samples.angles.height
+    np.testing.assert_allclose(received["phase_rad"], received["phase_rad_right"], atol=1e-12)
+    np.testing.assert_allclose(
+        received["phase_sigma_rad"], received["phase_noise_sigma_rad"], rtol=1e-12
+    )
     apart_m = (
         (by_samples.poses["x_m"] - by_csv.poses["x_m"]) ** 2
         + (by_samples.poses["y_m"] - by_csv.poses["y_m"]) ** 2

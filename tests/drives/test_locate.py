@@ -408,7 +408,7 @@ def test_a_drive_is_located_by_variants_side_by_side(access_av: Cli, tmp_path: P
     compared = pl.read_parquet(tmp_path / "out" / "compared.parquet")
     assert tuple(compared.columns) == TABLES["compared"].columns
     assert compared["variant"].to_list() == [
-        "as it is",
+        "unchanged",
         "vehicle.odometer.scale = 1.03",
         str(other),
     ]

@@ -96,7 +96,7 @@ def test_the_suggested_upgrades_reach_the_next_service_level() -> None:
     assert math.isclose(levels["6"].share, found.cheapest.share, rel_tol=1e-12)
     shares = {change.what: change.share for change in found.changes}
     assert all(found.share < share for share in shares.values())
-    # The same holds for the radio heads of the plan.
+    # This is equal for the radio heads of the plan.
     told = {it.level.name: it.share for it in bound(planned.scenario).verdicts}
     assert math.isclose(shares[f"a radio head at {planned.chosen[0]}"], told["6"], rel_tol=1e-12)
 
@@ -208,14 +208,14 @@ def test_cases_of_an_integrity_campaign_stand_side_by_side(
     assert done.code == 0, done.err
     cases = json.loads(done.out)["cases"]
     varied = "vehicle.integrity.risk_per_hour = 0.001"
-    assert [case["variant"] for case in cases] == ["as it is"] * 2 + [varied] * 2
+    assert [case["variant"] for case in cases] == ["unchanged"] * 2 + [varied] * 2
     compared = pl.read_parquet(tmp_path / "out" / "compared.parquet")
     assert tuple(compared.columns) == columns.TABLES["compared"].columns
     # Each case next to its counterpart.
     assert compared["variant"].to_list() == [
         f"{case}, as set, 4 radio heads: {variant}"
         for case in ("none", "array 1 degree off")
-        for variant in ("as it is", varied)
+        for variant in ("unchanged", varied)
     ]
     as_it_is, other = (compared["percentile_m"].gather_every(2, at) for at in (0, 1))
     assert compared["delta_m"].to_list()[::2] == [None, None]

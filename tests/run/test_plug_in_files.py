@@ -58,8 +58,8 @@ def test_compare_takes_plug_ins(access_av: Callable[..., Finished], folder: Path
     done = access_av("run", "short.toml", "--runs", "2", *compare, "--out", "out")
     assert done.code == 0, done.err
     rows = pl.read_parquet(folder / "out/compared.parquet")
-    assert rows["variant"].unique(maintain_order=True).to_list() == ["as it is", *texts]
-    changed = rows.filter(pl.col("variant") != "as it is")
+    assert rows["variant"].unique(maintain_order=True).to_list() == ["unchanged", *texts]
+    changed = rows.filter(pl.col("variant") != "unchanged")
     assert (changed["delta_m"] != 0.0).all()
     # The energy of an estimate is what the plug-in states.
     found = simulated(folder, estimator=plug_in_files.load("estimator", "mine.py:Mine"))

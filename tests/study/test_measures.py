@@ -29,7 +29,7 @@ FREE = {"site.rician_k_db": 11.0}
 
 @pytest.fixture(scope="module")
 def real() -> Driven:
-    return drive("as it is", PLANT.scenario(), 2, 1)
+    return drive("unchanged", PLANT.scenario(), 2, 1)
 
 
 def made(real: Driven, name: str, scenario: _core.Scenario, level_m: float, seed: int) -> Driven:
@@ -80,7 +80,7 @@ def test_the_cheapest_set_that_meets_the_target_is_found(
         ratio = float(np.prod([ratios[it] for it in name.split(" + ")]))
         return made(real, name, scenario, level_m * ratio, seed)
 
-    before = made(real, "as it is", PLANT.scenario(), level_m, 1)
+    before = made(real, "unchanged", PLANT.scenario(), level_m, 1)
     changes = [Remedy(name, name, FREE, name, 1) for name in ratios]
     planned: list[int] = []
     found = measures(
@@ -128,7 +128,7 @@ def test_seeds_agree_or_the_difference_is_judged(
             found, bursts_received=np.full(RUNS, count), aoa_estimates=np.full(RUNS, 3 * count)
         )
 
-    nominal = made(real, "as it is", PLANT.scenario(), 0.2, 1)
+    nominal = made(real, "unchanged", PLANT.scenario(), 0.2, 1)
     found = operate(PLANT, Targets.of(PLANT), nominal, RUNS, 1, simulate, lambda _: None)
     assert found.point is not None
     assert found.chosen in found.front
@@ -150,7 +150,7 @@ def test_a_target_of_a_stretch_is_judged_there_only(real: Driven) -> None:
     )
     targets = Targets.of(plant)
     assert [it.name for it in targets.each] == ["whole trip", "gate", "586 to 588 m"]
-    driven = made(real, "as it is", plant.scenario(), 0.01, 1)
+    driven = made(real, "unchanged", plant.scenario(), 0.01, 1)
     along_m = np.interp(driven.time_s, targets.time_s, targets.along_m)
     driven.errors_m[:, along_m > 589.0] = 0.2
     judgements = [it.judgement.holds for it in targets.results(driven)]

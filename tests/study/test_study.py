@@ -1,4 +1,4 @@
-"""A plant's question: every figure of its answer, computed again from the tables beside it."""
+"""A plant's question: every figure of its answer, recomputed from its tables."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ PICTURE = base64.b64decode(
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What the command wrote of the short plant."""
+    """Results of the command for the short plant."""
     from access_av.cli.main import main
 
     folder = tmp_path_factory.mktemp("study")
@@ -170,7 +170,7 @@ def errors(results: Path, variant: str) -> Any:
 
 
 def percentile(values: Any, percent: float) -> float:
-    """The least error that so many percent are no larger than."""
+    """Smallest error that a percentage of all errors does not exceed."""
     pooled = np.sort(np.asarray(values).ravel())
     return float(pooled[int(np.ceil(percent / 100.0 * pooled.size)) - 1])
 
@@ -178,7 +178,7 @@ def percentile(values: Any, percent: float) -> float:
 def test_percentiles_and_shares_are_those_of_the_errors(
     results: Path, said: dict[str, Any], page: str
 ) -> None:
-    for key, variant in (("nominal", "as it is"), ("poor_los", "poor line of sight")):
+    for key, variant in (("nominal", "unchanged"), ("poor_los", "poor line of sight")):
         found = errors(results, variant)
         assert said[key]["runs"] == len(found)
         assert said[key]["target_error_m"] == pytest.approx(percentile(found, 90.0))
@@ -194,7 +194,7 @@ def test_remedies_are_driven_in_the_same_worlds(
 ) -> None:
     prices = {"survey the radio heads": (2, 20.0), "calibrate the antennas": (6, 150.0 * 0.92)}
     pairs = said["before_measures"]["runs"]
-    before = errors(results, "as it is")[:pairs]
+    before = errors(results, "unchanged")[:pairs]
     assert said["before_measures"]["target_error_m"] == pytest.approx(percentile(before, 90.0))
     single = [it for it in said["remedies"] if len(it["settings"]) == 1]
     assert len(single) == 7
@@ -325,7 +325,7 @@ def test_places_are_those_of_the_road(results: Path, said: dict[str, Any], page:
         assert f"{places[name][9]:.3f} m" in page
     # Levels and reliability, again from the errors' table.
     route = along_route(Plant.from_toml(PLANT).scenario())
-    rows = pl.read_parquet(results / "errors.parquet").filter(variant="as it is")
+    rows = pl.read_parquet(results / "errors.parquet").filter(variant="unchanged")
     along_m = np.interp(rows["time_s"], route["time_s"], route["along_m"])
     near = rows.filter(pl.Series(np.abs(along_m - 10.5) <= 5.0))["protection_level_m"]
     at = places.row(10, named=True)
@@ -346,9 +346,9 @@ def test_places_are_those_of_the_road(results: Path, said: dict[str, Any], page:
 
 def test_variants_stand_side_by_side(results: Path, page: str) -> None:
     compared = pl.read_parquet(results / "compared.parquet").filter(percent=90.0)
-    assert compared["variant"].to_list() == ["as it is", "site.rician_k_db = 3"]
+    assert compared["variant"].to_list() == ["unchanged", "site.rician_k_db = 3"]
     first, second = compared["percentile_m"]
-    assert first == pytest.approx(percentile(errors(results, "as it is"), 90))
+    assert first == pytest.approx(percentile(errors(results, "unchanged"), 90))
     assert compared["delta_m"].to_list() == [None, pytest.approx(second - first)]
     assert "site.rician_k_db = 3" in page
 
@@ -434,7 +434,7 @@ def test_the_animated_drive_is_the_first_one(results: Path) -> None:
         assert off_m == pytest.approx(np.hypot(row["error_x_m"], row["error_y_m"]), abs=0.006)
         assert level_m == pytest.approx(row["protection_level_m"], abs=0.006)
         assert steps[step]["x_m"] == pytest.approx(row["true_x_m"], abs=0.06)
-    mine = errors(results, "as it is")[0]
+    mine = errors(results, "unchanged")[0]
     assert np.hypot(*driven.select("error_x_m", "error_y_m").to_numpy().T)[::5] == pytest.approx(
         mine, abs=1e-6
     )
@@ -507,7 +507,7 @@ def test_each_target_is_judged_on_its_stretch_and_all_by_the_worst(
     route = along_route(Plant.from_toml(PLANT).scenario())
     rows = pl.read_parquet(results / "targets.parquet")
     drives = pl.read_parquet(results / "drives.parquet")
-    for key, variant in (("nominal", "as it is"), ("poor_los", "poor line of sight")):
+    for key, variant in (("nominal", "unchanged"), ("poor_los", "poor line of sight")):
         table = pl.read_parquet(results / "errors.parquet").filter(variant=variant)
         time_s = table.filter(run=0).sort("time_s")["time_s"]
         along_m = np.interp(time_s, route["time_s"], route["along_m"])
@@ -535,7 +535,7 @@ def test_reliability_is_counted_from_the_drives(
 ) -> None:
     drives = pl.read_parquet(results / "drives.parquet")
     steps = ("ok_steps", "level_steps", "suspected_steps", "unavailable_steps")
-    named = [("as it is", said["nominal"]), ("poor line of sight", said["poor_los"])]
+    named = [("unchanged", said["nominal"]), ("poor line of sight", said["poor_los"])]
     named += [(it["name"], it) for it in said["remedies"]]
     for variant, figures in named:
         mine = drives.filter(variant=variant)

@@ -191,10 +191,10 @@ def test_a_recording_in_real_time_is_not_read_where_nothing_is_wanted(tmp_path: 
     wheels.close()
     assert node.returncode == 0, said
     records = lines(tmp_path / "node.jsonl")
-    heard = sorted({round(it["time_s"]) for it in records if it["type"] == "verdict"})
+    received = sorted({round(it["time_s"]) for it in records if it["type"] == "verdict"})
     # Found at the start, and after three seconds' sleep each in the one window there is.
-    assert heard[0] == 0
-    assert heard[-2:] == [heard[-1] - 3, heard[-1]]
+    assert received[0] == 0
+    assert received[-2:] == [received[-1] - 3, received[-1]]
     later = [it for it in records if it["type"] == "verdict" and it["time_s"] > 1.0]
     assert all(it["accepted"] for it in later), later
     # Each radio head by the search at the start, and then where it is expected.
@@ -254,7 +254,7 @@ localized_after_s = 0.5
         node.terminate()
         _, self.said = node.communicate(timeout=10.0)
         self.exit_code = node.returncode
-        self.mqtt = broker.heard()
+        self.mqtt = broker.received()
         self.records = lines(folder / "node.jsonl")
 
     def browse(self, address: str) -> None:
@@ -463,7 +463,7 @@ def test_two_tabs_come_back_after_a_restart(drive: Path, tmp_path: Path) -> None
                 assert not tab.errors
                 if "ACCESS_AV_AXE" in os.environ:
                     assert layout.hindrances(tab) == []
-    broker.heard()
+    broker.received()
 
 
 @pytest.mark.skipif(not SCHEMAS.exists(), reason=f"no {SCHEMAS} (ACCESS_AV_DATA)")
@@ -471,7 +471,7 @@ def test_the_position_is_one_of_vda_5050_2_1(drive: Path, tmp_path: Path) -> Non
     broker = Broker()
     with driven_by_udp(drive, tmp_path, free_port(), broker):
         time.sleep(1.5)
-    positions = broker.heard()
+    positions = broker.received()
     schema = json.loads((SCHEMAS / "state-2.1.schema").read_text(encoding="utf-8"))
     # The time stamp is that of the header of a message of VDA 5050.
     position = schema["properties"]["agvPosition"]

@@ -156,7 +156,7 @@ def test_the_broker_publishes_not_localized_after_the_node_has_ended(
     assert driven.end(number) == (0 if number == signal.SIGTERM else -signal.SIGKILL)
     time.sleep(1.0)
     retained = broker.retained()
-    messages = broker.heard()
+    messages = broker.received()
     assert any(it["localized"] for it in messages[:-1])
     assert max(it["theta"] for it in messages) > 2.5
     assert min(it["theta"] for it in messages) < -2.5
@@ -212,7 +212,7 @@ def test_a_pipeline_that_gives_no_record_is_not_localized(tmp_path: Path) -> Non
     time.sleep(6.5)
     node.terminate()
     node.wait(timeout=10.0)
-    messages = broker.heard()
+    messages = broker.received()
     times = [datetime.fromisoformat(it["timestamp"]).timestamp() for it in messages]
     last = max(k for k, it in enumerate(messages) if it["localized"])
     assert last > 10
@@ -234,7 +234,7 @@ def test_a_killed_broker_is_reported_and_connected_again(
     driven.wait_for(lambda it: len(events(it, "info")) == 1, limit_s=5.0)
     time.sleep(1.0)
     assert driven.end() == 0
-    messages = again.heard()
+    messages = again.received()
     assert len(messages) > 5
     assert messages[-1]["localized"] is False
     valid(messages)

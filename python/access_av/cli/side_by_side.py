@@ -26,11 +26,11 @@ def variants(
     changed: Callable[[T, dict[str, Any]], T],
 ) -> dict[str, T]:
     """Returns baseline, variants with other key values, and other files, by their labels."""
-    from access_av.run.pairs import AS_IT_IS
+    from access_av.run.pairs import UNCHANGED
     from access_av.study.compare import varied
 
     of_keys = {label: changed(as_it_is, it) for label, it in varied(vary or ())}
-    return {AS_IT_IS: as_it_is, **of_keys, **others}
+    return {UNCHANGED: as_it_is, **of_keys, **others}
 
 
 def of_scenario(

@@ -270,8 +270,8 @@ def joined(design: Design, parts: Sequence[Part]) -> Driven:
     core, vehicle = design.platform.core, design.scenario.vehicle
     duration_s = float(track_s[-1])
     energies = [
-        core.energy_j(vehicle, int(estimated), int(heard), duration_s)
-        for estimated, heard in zip(aoa_estimates, bursts_received, strict=True)
+        core.energy_j(vehicle, int(estimated), int(received), duration_s)
+        for estimated, received in zip(aoa_estimates, bursts_received, strict=True)
     ]
     energy_j = np.array([np.inf if each is None else sum(each[:3]) for each in energies])
     if "estimator" in design.plug_ins:

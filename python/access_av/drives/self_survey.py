@@ -209,9 +209,9 @@ def survey(
     vehicle = _core.Vehicle.load(vehicle) if isinstance(vehicle, str) else vehicle
     logged = [it if isinstance(it, SurveyDrive) else read_drive(it) for it in drives]
     model = _Model(site, vehicle, position_std_m, mounting_std_rad, phase_std_rad)
-    heard = {head for drive in logged for head in drive.log.heads}
-    if not heard & set(model.heads):
-        which = ", ".join(f"pci={pci} ssb_index={index}" for pci, index in sorted(heard)[:8])
+    received = {head for drive in logged for head in drive.log.heads}
+    if not received & set(model.heads):
+        which = ", ".join(f"pci={pci} ssb_index={index}" for pci, index in sorted(received)[:8])
         raise InputError(f"no angle is to a radio head of {site.name}; received: {which or 'none'}")
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         return _identify(_Problem(model, logged, pool, progress))

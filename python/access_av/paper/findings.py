@@ -316,8 +316,8 @@ def _d2(outcome: Outcome) -> Finding:
     found = _design_space(outcome)
     return Finding(
         found.value,
-        note="That others do not qualify is not asked: modes 6 and 7 have the same base wake-up "
-        "time, so the same drives and errors, and mode 7 is within the budget (d1).",
+        note="Whether other modes qualify is not evaluated: modes 6 and 7 have the same base "
+        "wake-up time, so the same drives and errors, and mode 7 is within the budget (d1).",
     )
 
 

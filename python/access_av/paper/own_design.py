@@ -224,9 +224,9 @@ class Fair:
 def fair(driver: Driver, evaluation: Evaluation) -> list[Fair]:
     """Compares the paper's method and the proposed one in mode 0 with equal information.
 
-    Told the road, the paper's method needs its angles for nothing, since it takes no more than the
-    heading from them; what it does then is what the tracker does with one angle. The bound stands
-    with a real odometer only, because the model of the localizer has no exact odometer.
+    With the road, the paper's method does not need its angles, because it uses them for the heading
+    only; its result is that of the localizer with one angle. The bound is computed with a real
+    odometer only, because the model of the localizer has no exact odometer.
     """
     mode = driver.platform.modes[0]
     base_ms = mode.base_wake_up_ms["music"]

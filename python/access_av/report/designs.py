@@ -197,7 +197,7 @@ def _over_time(driven: Sequence[Driven], known: pl.DataFrame) -> Spec:
     """Returns the chart of the selected design's RMS error over the drive."""
     nearest = known.head(MOST_TRACKS)
     names = [
-        f"{design}: {choice or 'as it is'}"
+        f"{design}: {choice or 'unchanged'}"
         for design, choice in nearest.select("design", "choice").iter_rows()
     ]
     tracks = pl.concat(

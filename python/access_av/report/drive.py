@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 SHOWN_PERCENTS = (50.0, 90.0, 99.0)
 
 
-def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str = "") -> str:
+def render_drive(scenario: Scenario, result: Simulation, seed: int, appendix: str = "") -> str:
     """Returns the runs of one scenario as a self-contained HTML page.
 
     Parameters
@@ -37,7 +37,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str 
         Result of :func:`access_av.simulate` with ``keep_trajectories=True``.
     seed
         Seed of the simulation.
-    beside
+    appendix
         HTML section with the comparison of variants.
     """
     if result.trajectories is None or result.aoa_estimates is None:
@@ -90,7 +90,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str 
                 service_levels(levels),
             )
         )
-    sections.append(beside)
+    sections.append(appendix)
     sections.append(
         section(
             "Provenance",

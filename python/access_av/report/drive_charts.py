@@ -9,7 +9,7 @@ import altair as alt
 import polars as pl
 
 from access_av.report.chart import BLUE, GREEN, LEAST_M, ORANGE, finish, thinned
-from access_av.report.played import heard_of, played, steps_of
+from access_av.report.played import played, received_of, steps_of
 from access_av.report.site_map import Frame, heads_of
 from access_av.statistics.consistency import horizontal_error_m
 
@@ -203,7 +203,7 @@ def drive_on_map(scenario: Scenario, result: Simulation) -> Spec:
     line = alt.Chart(way).mark_line(color=BLUE, strokeWidth=2.5)
     layers = [*frame.beneath(site), frame.put(line, order="time_s:Q"), *frame.masts(heads)]
     return finish(
-        played(frame, alt.LayerChart(layer=layers), steps, heard_of(result), heads),
+        played(frame, alt.LayerChart(layer=layers), steps, received_of(result), heads),
         height=frame.height_px,
         description="Map of a drive, with the radio heads",
     )

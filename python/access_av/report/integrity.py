@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
 from access_av.report.parts import figure, source, table, tile, warnings
-from access_av.run.pairs import AS_IT_IS
+from access_av.run.pairs import UNCHANGED
 from access_av.tables.numbers import number
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ HEAD = (
 def _world(case: dict[str, Any]) -> str:
     """Returns the difference of truth and nominal model of a case, and its variant."""
     world = "nominal" if case["mismatch"] == "none" else str(case["mismatch"])
-    return world if case["variant"] == AS_IT_IS else f"{world}; {case['variant']}"
+    return world if case["variant"] == UNCHANGED else f"{world}; {case['variant']}"
 
 
 def render_integrity(

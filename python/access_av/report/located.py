@@ -32,7 +32,7 @@ def render_located(
     vehicle: Vehicle,
     numbers: dict[str, float],
     truth: pl.DataFrame | None = None,
-    beside: str = "",
+    appendix: str = "",
 ) -> str:
     """Returns a located drive as a self-contained HTML page.
 
@@ -46,7 +46,7 @@ def render_located(
         Result of :func:`access_av.drives.summary`.
     truth
         Result of :func:`access_av.drives.read_tum`, if the truth is known.
-    beside
+    appendix
         HTML section with the comparison of variants.
     """
     specs: dict[str, Spec] = {}
@@ -79,7 +79,7 @@ def render_located(
         compared, places = _compared(drive.angles), ""
         if not compared.is_empty():
             specs |= {"angles": charts.angles(compared), "heads": charts.heads(compared)}
-            places = figure("angles") + figure("heads", title="By radio head")
+            places = figure("angles") + figure("heads", title="Each radio head")
         sections.append(
             section(
                 "Angles",
@@ -88,7 +88,7 @@ def render_located(
                 places + _by_head(drive.angles),
             )
         )
-    sections.append(beside)
+    sections.append(appendix)
     nominal = source("Site with all default values", site.to_toml())
     nominal += source("Vehicle with all default values", vehicle.to_toml())
     sections.append(section("Provenance", "", nominal))

@@ -71,9 +71,9 @@ def track(drive: Drive, lines: dict[str, pl.DataFrame], site: Site, steps: pl.Da
         color=_colours(TRACKS, lines),
     )
     layers = alt.LayerChart(layer=[*frame.beneath(site), driven, *frame.masts(heads, ORANGE)])
-    heard = drive.angles.filter("accepted").select("time_s", "pci", "ssb_index")
+    received = drive.angles.filter("accepted").select("time_s", "pci", "ssb_index")
     return finish(
-        played(frame, layers, steps, heard, heads),
+        played(frame, layers, steps, received, heads),
         height=frame.height_px,
         description="Track of the vehicle, with the radio heads",
     )

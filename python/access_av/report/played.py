@@ -40,7 +40,7 @@ def steps_of(result: Simulation, run: int = 0) -> pl.DataFrame:
     )
 
 
-def heard_of(result: Simulation, run: int = 0) -> pl.DataFrame:
+def received_of(result: Simulation, run: int = 0) -> pl.DataFrame:
     """Returns the angles of one simulated run: ``time_s``, ``pci`` and ``ssb_index``."""
     if result.aoa_estimates is None:
         raise ValueError("the animation needs angle estimates: set keep_trajectories=True")
@@ -51,7 +51,7 @@ def played(
     frame: Frame,
     base: alt.LayerChart,
     steps: pl.DataFrame,
-    heard: pl.DataFrame,
+    received: pl.DataFrame,
     heads: pl.DataFrame,
 ) -> alt.LayerChart:
     """Returns a map with one drive at the time of a slider.
@@ -63,7 +63,7 @@ def played(
     steps
         ``time_s``, ``x_m``, ``y_m``, ``searching``, ``integrity``, ``protection_level_m`` and
         ``error_m`` of a drive; unknown values of the last three are null.
-    heard
+    received
         ``time_s``, ``pci`` and ``ssb_index`` of each angle.
     heads
         Radio heads of :func:`access_av.report.site_map.heads_of`.
@@ -83,7 +83,7 @@ def played(
         ),
     )
     lines = (
-        heard.with_columns(
+        received.with_columns(
             step=((pl.col("time_s") - began_s) / step_s - 1e-6).ceil().cast(pl.Int64)
         )
         .select("step", "pci", "ssb_index")

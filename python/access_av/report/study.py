@@ -36,14 +36,14 @@ if TYPE_CHECKING:
 MOST_PLACES = 30
 
 
-def render_study(study: Study, beside: str = "") -> str:
+def render_study(study: Study, appendix: str = "") -> str:
     """A study as an HTML page that loads nothing.
 
     Parameters
     ----------
     study
         Result of :func:`access_av.study_plant`.
-    beside
+    appendix
         A section on other variants, as HTML.
     """
     specs: dict[str, Spec] = {
@@ -73,7 +73,7 @@ def render_study(study: Study, beside: str = "") -> str:
         + _remedies(study)
         + operation_section(study)
         + money_section(study)
-        + beside
+        + appendix
         + _unverified(study)
         + section(
             "Provenance",
@@ -232,8 +232,8 @@ def _where(study: Study) -> str:
         )
         + figure(
             "signal",
-            "Dilution: by how many metres an error of one degree in every angle shows along the "
-            "road. It is geometry alone; the error is what the odometer makes of it besides.",
+            "Dilution: along-road error in metres for an error of one degree in every angle. It "
+            "depends on the geometry only; the position error also depends on the odometer.",
             "Geometry and signal",
         )
         + f"</div>{_places(study)}",

@@ -12,7 +12,7 @@ import polars as pl
 from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, finish, thinned
 from access_av.report.labels import domain, placed
 from access_av.report.labels import layers as labels
-from access_av.report.played import heard_of, played, steps_of
+from access_av.report.played import played, received_of, steps_of
 from access_av.report.site_map import Frame, heads_of
 from access_av.report.study_parts import numbered
 from access_av.study.economy import trip_j
@@ -104,9 +104,9 @@ def road_map(study: Study) -> Spec:
         )
         number = alt.Chart(worst).mark_text(fontSize=12, fontWeight="bold", color="#ffffff", dy=1)
         layers += [frame.put(disc), frame.put(number, text="number:N")]
-    steps, heard = steps_of(study.example_run), heard_of(study.example_run)
+    steps, received = steps_of(study.example_run), received_of(study.example_run)
     return finish(
-        played(frame, alt.LayerChart(layer=layers), steps, heard, heads),
+        played(frame, alt.LayerChart(layer=layers), steps, received, heads),
         height=frame.height_px,
         description="Map of the road, coloured by the error that the target speaks of",
     )

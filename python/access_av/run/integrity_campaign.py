@@ -13,7 +13,7 @@ from access_av import _core
 from access_av.errors import InputError
 from access_av.run.campaign import Task
 from access_av.run.fault_injection import Overrides, hypotheses, mismatches
-from access_av.run.pairs import AS_IT_IS, ErrorSamples
+from access_av.run.pairs import UNCHANGED, ErrorSamples
 from access_av.run.simulation import Simulation
 from access_av.statistics.alarms import Alarms
 from access_av.statistics.consistency import horizontal_error_m
@@ -54,7 +54,7 @@ class Case:
     asked_risk_per_hour: float
     scenario: _core.Scenario
     trajectories: pl.DataFrame
-    variant: str = AS_IT_IS
+    variant: str = UNCHANGED
 
     @property
     def alert_limit_m(self) -> float:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from access_av.statistics.percentiles import Percentile
 
 # Baseline of the comparison of variants.
-AS_IT_IS = "as it is"
+UNCHANGED = "unchanged"
 DRIVES = "drives"
 # A vehicle with a larger error is off its lane and that of the opposite direction, in metres.
 LOST_M = 5.0

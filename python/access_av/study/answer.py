@@ -116,7 +116,7 @@ def study_plant(
     present = full
     of_operations = few * (len(operations(scenario)) + LIKELY_FINALISTS)
     after = fewest + of_operations
-    nominal = driven("as it is", scenario, full)
+    nominal = driven("unchanged", scenario, full)
     needs_measures = force_remedies or not targets.judgement(nominal).holds
     changes = remedies(scenario, fleet["vehicles"]) if needs_measures else []
     present, after = fewest, of_operations + pairs * len(changes)

@@ -34,7 +34,7 @@ class Operation:
     Attributes
     ----------
     name
-        Name in tables; ``as it is`` for the vehicle's own.
+        Name in tables; ``unchanged`` for the vehicle's own.
     method, wake_up
         In words.
     settings
@@ -104,7 +104,7 @@ def operations(scenario: _core.Scenario) -> list[Operation]:
     """Operations that a study simulates; the vehicle's own comes first."""
     vehicle = json.loads(scenario.resolved().vehicle.to_json())
     method, own = vehicle["estimator"]["method"], in_words(vehicle["wake_up"])
-    found = [Operation("as it is", method, own, {})]
+    found = [Operation("unchanged", method, own, {})]
     period_ms = json.loads(scenario.site.to_json())["ssb"]["period_ms"]
     for interval_ms in FIXED_MS:
         wake_up: dict[str, Any] = {"policy": "fixed", "interval_ms": interval_ms}

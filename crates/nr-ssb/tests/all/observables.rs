@@ -139,7 +139,7 @@ fn a_first_path_is_found_in_multipath_or_reported_as_uncertain() {
 /// Observed SSB: beam, start and phase reference in input samples, phases of both antennas.
 type Phases = (u8, f64, [f64; 2]);
 
-/// Receives two beams at 11.52 Msps, 1.1 MHz beside the centre, without the samples of some ranges.
+/// Receives two beams at 11.52 Msps, 1.1 MHz from the centre, without the samples of some ranges.
 fn receive_with_gaps(gaps: &[(usize, usize)]) -> Vec<Phases> {
     let spacing = SubcarrierSpacing::Khz30;
     let mut cell = air::Cell::random(&mut air::rng(7), spacing, 2);

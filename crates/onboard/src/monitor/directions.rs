@@ -26,7 +26,7 @@ const LEAST_SNR_DB: f64 = 13.0;
 /// Minimum share of the power of the second wave.
 const LEAST_SHARE: f64 = 0.15;
 /// Minimum ratio of the share of the second wave to the residual of both. Scatter has about 1, because two waves explain
-/// half of the three dimensions beside the first wave at most.
+/// half of the three dimensions next to the first wave at most.
 const LEAST_RATIO: f64 = 4.0;
 /// Number of steering vectors.
 const DIRECTIONS: usize = 64;

@@ -157,8 +157,8 @@ def _gain_chart(study: Study) -> Spec:
     return finish(
         zero + span + dots,
         height=34 * len(order) + 60,
-        description="What Algorithm 1 gains in RMS error over a constant, by interpretation and "
-        "mode",
+        description="Reduction of the RMS error by Algorithm 1, compared with a constant, by "
+        "interpretation and mode",
     )
 
 

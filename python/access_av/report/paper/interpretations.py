@@ -143,7 +143,7 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
 
 def chosen(study: Study) -> str:
     """Assumptions where the paper is not specific, and the effects of alternatives."""
-    head = ("What is open", "Chosen", "Why")
+    head = ("Unspecified", "Chosen", "Why")
     if not study.effects:
         rows = [tuple(escape(it[key]) for key in ("what", "value", "why")) for it in entries()]
         return table(head, rows)
