@@ -312,14 +312,15 @@ TUM = b"0.0 0 0 0 0 0 0 1\n0.3 0.1 0 0 0 0 0 1\n"
     ("truth", "code"),
     [
         (b"these are words\n", 2),
-        (TUM.decode().encode("utf-16"), 2),
+        (TUM.decode().encode("utf-16"), 0),
+        (TUM.decode().encode("utf-16-le"), 2),
         (TUM.replace(b"0.3 0.1", b"0.3 nan"), 2),
         # The heading of the reference is not used.
         (TUM.replace(b"0 1\n", b"0 0\n"), 0),
         (b"", 2),
         (b"\xef\xbb\xbf# a comment\n" + TUM, 0),
     ],
-    ids=["words", "utf-16", "nan", "no-turn", "empty", "bom-and-comment"],
+    ids=["words", "utf-16", "utf-16-without-mark", "nan", "no-turn", "empty", "bom-and-comment"],
 )
 def test_truths_that_are_none(
     access_av: Cli, drive: Path, tmp_path: Path, truth: bytes, code: int

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import shlex
 import shutil
 import subprocess
@@ -20,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-import layout
 from access_av import Scenario, columns
 from access_av.designs import driven
 from access_av.designs.driven import Design, Driven, designs_of, in_worlds
@@ -31,10 +29,9 @@ from access_av.designs.suggested import suggested
 from access_av.designs.table import Constraints, rows_of, rows_of_worlds, what_to_change
 from access_av.device.platform import Platform
 from access_av.errors import InputError
-from access_av.report.designs import MOST_NAMES, render_designs
+from access_av.report.designs import render_designs
 from access_av.run.campaign import Campaign, CampaignError, Shard, Task, executor
 from access_av.run.result_cache import ResultCache
-from browser import Browser
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -379,28 +376,6 @@ def test_page_of_many_designs_draws() -> None:
     page = render_designs(Scenario.load("paper"), driven, rows_of(driven), rows_of_worlds(driven))
     assert "energy of a trip / J" in page
     assert len(page) < 6_000_000
-
-
-@pytest.mark.parametrize("count", [12, 300])
-def test_designs_are_numbered_without_overlap(count: int, tmp_path: Path) -> None:
-    if (program := layout.chromium()) is None:
-        pytest.skip("no chromium to measure the page with")
-    rng = np.random.default_rng(count)
-    pairs = [(float(rng.uniform(0.1, 9.0)), float(rng.uniform(0.1, 1.0))) for _ in range(count)]
-    driven = cloud(4, pairs)
-    page = render_designs(Scenario.load("paper"), driven, rows_of(driven), rows_of_worlds(driven))
-    (tmp_path / "page.html").write_text(page, encoding="utf-8")
-    found = re.search(r"const charts = (.*?);\n", page)
-    assert found is not None
-    spec = json.loads(found.group(1))["designs"]
-    [rows] = [rows for rows in spec["datasets"].values() if "label" in rows[0]]
-    numbers = [int(name) for row in rows for name in layout.names(row["label"])]
-    assert len(numbers) == len(set(numbers)) == min(count, MOST_NAMES)
-    assert set(numbers) >= set(front(driven)[:MOST_NAMES])
-    with Browser(program, (tmp_path / "page.html").as_uri()) as browser:
-        for width in (1300, 400):
-            browser.resize(width, 900)
-            assert layout.label_faults(browser, "designs", spec, width) == []
 
 
 def test_the_table_has_its_documented_columns() -> None:

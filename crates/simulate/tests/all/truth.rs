@@ -302,9 +302,9 @@ fn invalid_deviations_are_rejected() {
     for (name, key, value, told, allowed) in [
         (
             "yard",
-            "truth.drw",
-            Value::from("none"),
-            "truth.drw",
+            "truth.sample_error",
+            Value::from(false),
+            "truth.sample_error",
             "did you mean `sample_errors`?",
         ),
         (
