@@ -40,7 +40,7 @@ const SUDDEN_MPS: f64 = 1.0;
 const QUANTILE: f64 = 4.753;
 /// Number of consecutive tests at standstill that must exceed the threshold.
 const CONFIRMATIONS: u32 = 2;
-/// Threshold of the cumulative log-likelihood ratio: false-alarm rate 1e-6 for each excursion from zero (Wald).
+/// Threshold of one cumulative log-likelihood ratio: false-alarm rate 1e-6 for each excursion from zero (Wald).
 const EVIDENCE: f64 = 13.8;
 /// Maximum of one radio head's sum: with two radio heads, one of them can reach the threshold.
 const MOST_EVIDENCE: f64 = 14.5;
@@ -241,10 +241,11 @@ impl MotionMonitor {
                 .references
                 .iter()
                 .filter_map(|it| it.evidence.get(which));
-            let (sum, largest) = evidence.fold((0.0, 0.0_f64), |(sum, largest), it| {
-                (sum + it, largest.max(*it))
-            });
-            sum - largest > EVIDENCE
+            let (sum, largest, heads) = (evidence.filter(|it| **it > 0.0))
+                .fold((0.0, 0.0_f64, 0.0), |(sum, largest, heads), it| {
+                    (sum + it, largest.max(*it), heads + 1.0)
+                });
+            sum - largest > evidence_threshold(heads - 1.0)
         };
         (0..)
             .zip(faults)
@@ -392,6 +393,16 @@ impl MotionMonitor {
         } else {
             self.confirmed.1 += burst.good;
         }
+    }
+}
+
+/// Threshold of the sum of this number of cumulative sums. The height of an excursion from zero has at most an
+/// exponential distribution (Wald), so that twice the sum of n heights has a χ² distribution with 2n degrees of freedom.
+fn evidence_threshold(sums: f64) -> f64 {
+    if sums > 1.0 {
+        0.5 * chi_squared(2.0 * sums)
+    } else {
+        EVIDENCE
     }
 }
 
