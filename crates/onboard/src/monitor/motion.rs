@@ -411,3 +411,26 @@ fn chi_squared(freedom: f64) -> f64 {
     let share = 2.0 / (9.0 * freedom);
     freedom * (1.0 - share + QUANTILE * share.sqrt()).powi(3)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thresholds_of_sums_are_quantiles_of_the_gamma_distribution() {
+        // Quantiles at the probability 1e-6 of exceedance (scipy.stats.gamma.isf).
+        for (sums, quantile) in [
+            (1.0, 13.82),
+            (2.0, 16.69),
+            (3.0, 19.13),
+            (7.0, 27.32),
+            (15.0, 41.02),
+        ] {
+            let threshold = evidence_threshold(sums);
+            assert!(
+                (threshold / quantile - 1.0).abs() < 0.06,
+                "{sums}: {threshold}"
+            );
+        }
+    }
+}
