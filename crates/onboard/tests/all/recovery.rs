@@ -51,13 +51,13 @@ struct Drive {
 }
 
 impl Drive {
-    /// Creates a drive that starts at the origin with the given start `told`.
-    fn new(told: Pose) -> Self {
+    /// Creates a drive that starts at the origin with a configured start.
+    fn new(start: Pose) -> Self {
         let site = Site::from_toml(SITE, "hall", &Shipped).unwrap();
         let vehicle = Vehicle::from_toml(VEHICLE, "robot", &Shipped).unwrap();
         Self {
             heads: RadioHead::heard(&site, &vehicle),
-            localizer: built_in(&site, &vehicle, told).unwrap(),
+            localizer: built_in(&site, &vehicle, start).unwrap(),
             rng: ChaCha8Rng::seed_from_u64(1),
             truth: Pose::default(),
             steps: 0,

@@ -25,7 +25,7 @@ use super::relocalization_test::RelocalizationTest;
 use crate::BoxError;
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::RadialQuantile;
-use crate::geometry::Area;
+use crate::geometry::{Area, Pose};
 use crate::localize::ekf::Ekf;
 use crate::localize::integrity::IntegrityMonitor;
 use crate::localize::localizer::{Localizer, Recovered, copy_into};
@@ -263,6 +263,17 @@ impl Relocalizer {
         self.consistency.reset();
     }
 
+    /// Replaces the solution with the pose `from` by the result of a search at time `now_s`.
+    fn take_over(&mut self, found: Ekf, from: Pose, now_s: f64) {
+        let [x_m, y_m, turned_rad] = from.offset_of(found.pose(now_s).pose);
+        self.recovered = Some(Recovered {
+            time_s: now_s,
+            moved_m: x_m.hypot(y_m),
+            turned_rad,
+        });
+        self.track(found, now_s);
+    }
+
     /// Updates the search for the heading, and replaces the solution by its result.
     fn search_heading(&mut self, now_s: f64) {
         let Some(solution) = &self.solution else {
@@ -278,13 +289,7 @@ impl Relocalizer {
         };
         if let Some(found) = search.found().cloned() {
             let from = solution.pose(now_s).pose;
-            let [x_m, y_m, turned_rad] = from.offset_of(found.pose(now_s).pose);
-            self.recovered = Some(Recovered {
-                time_s: now_s,
-                moved_m: x_m.hypot(y_m),
-                turned_rad,
-            });
-            self.track(found, now_s);
+            self.take_over(found, from, now_s);
             self.heading = None;
         } else if search.is_over(ekf) {
             self.heading = None;
@@ -434,13 +439,7 @@ impl Relocalizer {
             Transition::TakeOver => {
                 if let Some(found) = self.test.as_ref().and_then(|it| it.search.found()) {
                     let from = solution.pose(now_s).pose;
-                    let [x_m, y_m, turned_rad] = from.offset_of(found.pose(now_s).pose);
-                    self.recovered = Some(Recovered {
-                        time_s: now_s,
-                        moved_m: x_m.hypot(y_m),
-                        turned_rad,
-                    });
-                    self.track(found, now_s);
+                    self.take_over(found, from, now_s);
                 }
             }
             Transition::End { rests } => {

@@ -207,6 +207,17 @@ impl Ekf {
         )
     }
 
+    /// Returns the distance driven since the newest odometry, its variance, and the step over this
+    /// distance unless it is zero.
+    #[inline]
+    pub(super) fn coast(&self, time_s: f64) -> (f64, f64, Option<Step>) {
+        let (ahead_m, variance) = self.coasting(time_s);
+        let step = (ahead_m != 0.0)
+            .then(|| Reading::exact(ahead_m * (1.0 + self.belief.mean[SCALE])))
+            .map(|reading| self.step(&self.belief, &reading));
+        (ahead_m, variance, step)
+    }
+
     /// Returns the speed along the heading (m/s).
     pub fn speed_mps(&self) -> f64 {
         let reading = self.odometry.map_or(0.0, |sample| sample.speed_mps);

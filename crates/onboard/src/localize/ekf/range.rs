@@ -6,8 +6,7 @@
 
 use super::angle_model::{ArrayModel, LineOfSight, locate};
 use super::filter::Ekf;
-use super::motion::Reading;
-use super::state::{ALONG, DATUM, SCALE, STATES};
+use super::state::{ALONG, DATUM, STATES};
 use crate::gaussian::Innovation;
 use crate::localize::bias::{CLOCK, DRIFT, FIRST_OFFSET, RANGE_SCALE, RangeTerms};
 use crate::localize::output::{UpdateReason, UpdateVerdict};
@@ -51,17 +50,9 @@ impl Ekf {
         if !usable {
             return Err(UpdateReason::Unusable);
         }
-        if measured.time_s < self.time_s() {
-            return Err(UpdateReason::TooLate);
-        }
-        let (index, head) = (self.heads.iter().enumerate())
-            .find(|(_, mine)| mine.is(head))
-            .ok_or(UpdateReason::UnknownRadioHead)?;
+        let (index, head) = self.head_of(head, measured.time_s)?;
         // Predict to the time of the range.
-        let (ahead_m, ahead_variance) = self.coasting(measured.time_s);
-        let ahead = (ahead_m != 0.0)
-            .then(|| Reading::exact(ahead_m * (1.0 + self.belief.mean[SCALE])))
-            .map(|reading| self.step(&self.belief, &reading));
+        let (_, ahead_variance, ahead) = self.coast(measured.time_s);
         let mean = (ahead.as_ref()).map_or(&self.belief.mean, |ahead| &ahead.mean);
         let (pose, frame) = locate(mean, 0.0, self.map.as_deref());
         let antenna = ArrayModel {

@@ -2,8 +2,7 @@
 
 use super::angle_model::{AngleModel, locate};
 use super::config::CorrelatedNoise;
-use super::filter::Ekf;
-use super::motion::Reading;
+use super::filter::{Ekf, Head};
 use super::state::{ACROSS, ALONG, ANGLE_TIME_OFFSET, HEADING, SCALE, STATES, YAW_RATE_BIAS};
 use super::white_noise_fraction::Residual;
 use crate::gaussian::{Innovation, with_outliers};
@@ -75,6 +74,24 @@ impl PredictedMeasurement {
 }
 
 impl Ekf {
+    /// Returns the radio head of a measurement, and its index.
+    ///
+    /// # Errors
+    /// [`UpdateReason::TooLate`] before the filter's time; [`UpdateReason::UnknownRadioHead`].
+    #[inline]
+    pub(super) fn head_of(
+        &self,
+        head: &RadioHead,
+        time_s: f64,
+    ) -> Result<(usize, &Head), UpdateReason> {
+        if time_s < self.time_s() {
+            return Err(UpdateReason::TooLate);
+        }
+        (self.heads.iter().enumerate())
+            .find(|(_, mine)| mine.is(head))
+            .ok_or(UpdateReason::UnknownRadioHead)
+    }
+
     /// Predicts an angle to a radio head.
     #[inline]
     pub(in crate::localize) fn predict_measurement(
@@ -90,17 +107,9 @@ impl Ekf {
         if !usable {
             return Err(UpdateReason::Unusable);
         }
-        if measured.time_s < self.time_s() {
-            return Err(UpdateReason::TooLate);
-        }
-        let (index, head) = (self.heads.iter().enumerate())
-            .find(|(_, mine)| mine.is(head))
-            .ok_or(UpdateReason::UnknownRadioHead)?;
-        let (ahead_m, ahead_variance) = self.coasting(measured.time_s);
+        let (index, head) = self.head_of(head, measured.time_s)?;
         // Between the newest odometry and the angle, the vehicle moves laterally within its lane.
-        let ahead = (ahead_m != 0.0)
-            .then(|| Reading::exact(ahead_m * (1.0 + self.belief.mean[SCALE])))
-            .map(|reading| self.step(&self.belief, &reading));
+        let (ahead_m, ahead_variance, ahead) = self.coast(measured.time_s);
         let mean = (ahead.as_ref()).map_or(&self.belief.mean, |ahead| &ahead.mean);
         let angle_model = self
             .angle_model(measured.kind, &head.known, mean)
