@@ -1,8 +1,8 @@
 """Builds the documentation site: `make docs`.
 
 The pages in `docs/` also link to files outside that folder, as a repository's pages do. A site
-needs all its pages in one folder. This script copies them, adapts their links, and runs zensical
-in strict mode.
+needs all its pages in one folder. This script copies them, adapts their links, generates the
+reference pages, and runs zensical in strict mode.
 """
 
 from __future__ import annotations
@@ -13,6 +13,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import commands_page
+import python_page
+import rust_page
+import settings_page
+
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "target" / "docs"
 # Pages outside `docs/`, and their names in the site.
@@ -22,6 +27,13 @@ OUTSIDE = {
     "CONTRIBUTING.md": "contributing.md",
     "notes/experiments.md": "experiments.md",
 }
+# Generated pages, and their names in the site. In the repository, a link leads to the generator.
+GENERATED = {
+    "docs/site/settings_page.py": ("settings.md", settings_page.page),
+    "docs/site/commands_page.py": ("commands.md", commands_page.page),
+    "docs/site/python_page.py": ("python-api.md", python_page.page),
+    "docs/site/rust_page.py": ("rust-api.md", rust_page.page),
+}
 LINK = re.compile(r"(!?)\[([^]]*)\]\(([^)#\s]*)(#[^)\s]*)?\)")
 
 
@@ -30,6 +42,8 @@ def site_name(file: Path) -> str | None:
     inside = file.relative_to(ROOT).as_posix()
     if file.parent == ROOT / "docs":
         return "index.md" if file.name == "README.md" else file.name
+    if inside in GENERATED:
+        return GENERATED[inside][0]
     return OUTSIDE.get(inside)
 
 
@@ -61,6 +75,8 @@ def main() -> None:
         name = site_name(page)
         assert name is not None
         (pages / name).write_text(adapted(page), encoding="utf-8")
+    for name, text in GENERATED.values():
+        (pages / name).write_text(text() + "\n", encoding="utf-8")
     for picture in (ROOT / "docs").glob("*.[ps][nv]g"):
         shutil.copy(picture, pages)
     shutil.copy(Path(__file__).parent / "zensical.toml", BUILD)

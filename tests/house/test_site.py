@@ -1,7 +1,8 @@
-"""`make docs` builds the documentation site without warnings."""
+"""`make docs` builds the documentation site without warnings, with complete reference pages."""
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import access_av
 from conftest import ROOT
 
 SITE_LIMIT_BYTES = 5_000_000
@@ -24,3 +26,18 @@ def test_site_builds_without_warnings() -> None:
     files = [file for file in (ROOT / "target/docs/site").rglob("*") if file.is_file()]
     assert (ROOT / "target/docs/site/estimator.html") in files
     assert sum(file.stat().st_size for file in files) <= SITE_LIMIT_BYTES
+    # The reference pages contain every key, command and public name.
+    pages = ROOT / "target/docs/pages"
+    settings = (pages / "settings.md").read_text(encoding="utf-8")
+    for kind in ("Site", "Vehicle", "Scenario", "Plant", "Platform"):
+        schema = json.loads(getattr(access_av, kind).schema_json())
+        tables = [schema, *schema["$defs"].values()]
+        for table in [one for it in tables for one in it.get("oneOf", [it])]:
+            for key, item in table.get("properties", {}).items():
+                assert "const" in item or f"| `{key}` |" in settings, key
+    commands = (pages / "commands.md").read_text(encoding="utf-8")
+    for command in ("run", "study", "locate", "vehicle schema"):
+        assert f"## access-av {command}\n" in commands
+    python = (pages / "python-api.md").read_text(encoding="utf-8")
+    for name in access_av.__all__:
+        assert name.startswith("_") or f"`access_av.{name}`" in python, name
