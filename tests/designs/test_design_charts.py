@@ -31,7 +31,6 @@ def test_designs_are_numbered_without_overlap(count: int, tmp_path: Path) -> Non
     page = render_designs(Scenario.load("paper"), driven, rows_of(driven), rows_of_worlds(driven))
     (tmp_path / "page.html").write_text(page, encoding="utf-8")
     found = re.search(r"const charts = (.*?);\n", page)
-    assert found is not None
     spec = json.loads(found.group(1))["designs"]
     [rows] = [rows for rows in spec["datasets"].values() if "label" in rows[0]]
     numbers = [int(name) for row in rows for name in layout.names(row["label"])]

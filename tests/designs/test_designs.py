@@ -30,7 +30,8 @@ from access_av.designs.table import Constraints, rows_of, rows_of_worlds, what_t
 from access_av.device.platform import Platform
 from access_av.errors import InputError
 from access_av.report.designs import render_designs
-from access_av.run.campaign import Campaign, CampaignError, Shard, Task, executor
+from access_av.run.campaign import Campaign, CampaignError, Task
+from access_av.run.campaign import campaign as opened
 from access_av.run.result_cache import ResultCache
 
 if TYPE_CHECKING:
@@ -114,25 +115,9 @@ def test_same_bytes_whoever_computes(tmp_path: Path, whole: dict[str, bytes]) ->
     assert len(whole) == 12
     for number, pool in enumerate([ThreadPoolExecutor(3), ProcessPoolExecutor(2)]):
         with pool:
-            found = Campaign(ResultCache(tmp_path / str(number)), pool, 2).run(tasks())
+            found = Campaign(ResultCache(tmp_path / str(number)), pool).run(tasks())
         assert contents(tmp_path / str(number)) == whole
         assert all(np.array_equal(found[i]["x"], part(i)["x"]) for i in range(12))
-
-
-def test_shards_make_the_whole(tmp_path: Path, whole: dict[str, bytes]) -> None:
-    parts = ResultCache(tmp_path / "shards")
-    first = Campaign(parts, shard=Shard(1, 3)).run(tasks())
-    assert sum(each is None for each in first) == 8
-    for number in (2, 3):
-        last = Campaign(parts, shard=Shard(number, 3)).run(tasks())
-    assert None not in last
-    assert contents(parts.path) == whole
-
-
-@pytest.mark.parametrize("text", ["0/2", "3/2", "1", "a/b", "1/2/3", "-1/2"])
-def test_bad_shards_are_refused(text: str) -> None:
-    with pytest.raises(InputError, match="write I/N"):
-        Shard.parse(text)
 
 
 def test_two_campaigns_in_one_directory(tmp_path: Path, whole: dict[str, bytes]) -> None:
@@ -164,7 +149,7 @@ def test_a_full_disk_names_the_part_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: dict[str, bytes]
 ) -> None:
     parts = ResultCache(tmp_path / "full")
-    Campaign(parts, shard=Shard(1, 2)).run(tasks())
+    Campaign(parts).run(tasks()[::2])
 
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
@@ -201,8 +186,8 @@ def test_workers_that_die_lose_nothing_that_is_finished(
 ) -> None:
     parts = ResultCache(tmp_path / "dying")
     with pytest.raises(CampaignError, match=r"workers are gone.*the same command goes on"):
-        Campaign(parts, Dying(5), 1).run(tasks())
-    assert 0 < len(contents(parts.path)) <= 5
+        Campaign(parts, Dying(5)).run(tasks())
+    assert len(contents(parts.path)) == 5
     Campaign(parts).run(tasks())
     assert contents(parts.path) == whole
 
@@ -210,7 +195,7 @@ def test_workers_that_die_lose_nothing_that_is_finished(
 def test_an_error_of_the_task_is_its_own(tmp_path: Path) -> None:
     bad = Task({"bad": 1}, int, ("not a number",))
     with ThreadPoolExecutor(1) as pool, pytest.raises(ValueError, match="invalid literal"):
-        Campaign(ResultCache(tmp_path), pool, 1).run([bad])
+        Campaign(ResultCache(tmp_path), pool).run([bad])
 
 
 # Forks a campaign, kills it after each of the instants, and then lets it finish.
@@ -246,23 +231,56 @@ def test_killed_at_20_random_instants_it_finishes_with_the_same_bytes(
     assert contents(parts) == whole
 
 
-def test_no_scheduler_is_said() -> None:
-    pytest.importorskip("distributed")
-    with pytest.raises(InputError, match="no scheduler there"), executor("tcp://127.0.0.1:1"):
+# Recipes of executors, as a user writes them.
+RECIPES = {
+    "threads": (
+        "concurrent.futures",
+        "from concurrent.futures import ThreadPoolExecutor\n"
+        "def make():\n    return ThreadPoolExecutor(2)\n",
+    ),
+    "dask": (
+        "distributed",
+        "from distributed import Client, LocalCluster\n"
+        "def make():\n"
+        "    cluster = LocalCluster(n_workers=2, processes=False, dashboard_address=None)\n"
+        "    return Client(cluster).get_executor(pure=False)\n",
+    ),
+    "executorlib": (
+        "executorlib",
+        "from executorlib import SingleNodeExecutor\n"
+        "def make():\n    return SingleNodeExecutor(max_workers=2)\n",
+    ),
+}
+
+
+@pytest.mark.parametrize("recipe", RECIPES)
+def test_a_recipe_gives_the_same_bytes(
+    tmp_path: Path, whole: dict[str, bytes], recipe: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module, text = RECIPES[recipe]
+    # Other processes import the work of the tasks from this file.
+    here = [str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, here)))
+    pytest.importorskip(module, reason=f"{module} is not installed")
+    (tmp_path / "recipe.py").write_text(text)
+    with opened(tmp_path / "parts", f"{tmp_path / 'recipe.py'}:make") as kept:
+        kept.run(tasks())
+    assert contents(tmp_path / "parts") == whole
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("def make():\n    return 3\n", "returns int; it must return a concurrent.futures.Exec"),
+        ("def make():\n    raise OSError('no scheduler')\n", "OSError: no scheduler"),
+        ("make = 1\n", "no class or function make"),
+    ],
+)
+def test_an_executor_that_cannot_be_used_is_named(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "recipe.py"
+    file.write_text(text)
+    with pytest.raises(InputError, match=message), opened(tmp_path, f"{file}:make"):
         pass
-
-
-def test_dask_gives_the_same_bytes(tmp_path: Path, whole: dict[str, bytes]) -> None:
-    distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(
-            n_workers=2, processes=False, dashboard_address=None, threads_per_worker=1
-        ) as cluster,
-        executor(cluster.scheduler_address) as (pool, workers),
-    ):
-        assert workers == 2
-        Campaign(ResultCache(tmp_path / "dask"), pool, workers).run(tasks())
-    assert contents(tmp_path / "dask") == whole
 
 
 # A cluster of one's own, of which one process dies once three parts are there.
@@ -270,7 +288,8 @@ DYING = """
 import json, subprocess, sys, threading, time
 from pathlib import Path
 sys.path.insert(0, {tests!r})
-from access_av.run.campaign import Campaign, CampaignError, executor
+from distributed import Client
+from access_av.run.campaign import Campaign, CampaignError
 from access_av.run.result_cache import ResultCache
 from test_designs import tasks
 parts, file = Path({parts!r}), Path({parts!r}) / "scheduler.json"
@@ -290,8 +309,8 @@ try:
         time.sleep(0.05)
     address = json.loads(file.read_text())["address"]
     threading.Thread(target=kill, daemon=True).start()
-    with executor(address) as (pool, count):
-        Campaign(ResultCache(parts), pool, count).run(tasks(12, 0.2))
+    with Client(address).get_executor(pure=False) as pool:
+        Campaign(ResultCache(parts), pool).run(tasks(12, 0.2))
     print("finished")
 except CampaignError as error:
     print(error)
@@ -435,7 +454,6 @@ def test_a_design_is_judged_in_the_worst_of_its_worlds(
     assert list(space.worlds) == ["rician_k_db 5", "rician_k_db 15"]
     designs = in_worlds(Scenario.load("paper"), space.grid(), space.worlds)
     found = search(Campaign(ResultCache(tmp_path)), designs, runs=3, seed=1)
-    assert found is not None
     assert found.drives == 2 * 2 * 3
     rows, of_worlds = rows_of(found.driven), rows_of_worlds(found.driven)
     assert rows["p99_error_m"].to_list() == pytest.approx([0.2, 0.9])
@@ -505,9 +523,7 @@ def by_halving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, halving: bool
     designs = in_worlds(Scenario.load("paper"), space.grid(), space.worlds)
     assert len(designs) == 120
     campaign = Campaign(ResultCache(tmp_path / str(halving)))
-    found = search(campaign, designs, runs=20, seed=1, halving=halving)
-    assert found is not None
-    return found
+    return search(campaign, designs, runs=20, seed=1, halving=halving)
 
 
 def test_halving_finds_the_front_of_the_grid_with_a_quarter_of_the_drives(
@@ -608,7 +624,7 @@ def test_command_on_any_scenario(tmp_path: Path, run: Callable[..., Finished]) -
     assert (tmp_path / "o/again/designs.parquet").read_bytes() == before
     assert len(list((tmp_path / "o/results/parts").glob("*.npz"))) == 2
     for bad, message in (
-        (("designs", *asked, "--shard", "5/2"), "write I/N"),
+        (("designs", *asked, "--shard", "5/2"), "write --executor FILE.py:NAME"),
         (("choose", "nowhere"), "no designs here"),
     ):
         done = run(tmp_path, *bad)

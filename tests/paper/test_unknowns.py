@@ -24,7 +24,7 @@ from access_av.paper.open_choices import (
     world_changes,
 )
 from access_av.paper.unknowns import sobol
-from access_av.run.campaign import Campaign, Shard
+from access_av.run.campaign import Campaign
 from access_av.run.result_cache import ResultCache
 
 if TYPE_CHECKING:
@@ -109,18 +109,6 @@ def test_a_search_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.M
     again = sample(tmp_path)
     assert len(judged) == 3
     assert all((again.margins[name] == margin).all() for name, margin in found.margins.items())
-
-
-def test_shares_of_a_search_make_the_whole(tmp_path: Path) -> None:
-    whole = sample(tmp_path / "whole")
-    shares = ResultCache(tmp_path / "shares")
-    first, last = (
-        sampled_interpretations.sample(Campaign(shares, shard=Shard(number, 2)), BOARD, **SMALL)
-        for number in (1, 2)
-    )
-    assert first is None
-    assert last is not None
-    assert all((last.margins[name] == margin).all() for name, margin in whole.margins.items())
 
 
 def test_without_a_gate_t_max_is_kept_everywhere(tmp_path: Path) -> None:

@@ -9,9 +9,8 @@ import typer
 
 from access_av.cli.options import (
     MISSED,
-    OTHER_SHARES,
     AsJson,
-    DaskOption,
+    ExecutorOption,
     MaxError,
     MaxRms,
     Out,
@@ -19,7 +18,6 @@ from access_av.cli.options import (
     Runs,
     ScenarioArgument,
     Seed,
-    ShardOption,
     Threads,
     announce,
     load_scenario,
@@ -70,8 +68,7 @@ def designs(
     ] = None,
     runs: Runs = 20,
     seed: Seed = 1,
-    shard: ShardOption = "1/1",
-    dask: DaskOption = None,
+    executor: ExecutorOption = None,
     threads: Threads = None,
     out: Out = None,
     as_json: AsJson = False,
@@ -90,15 +87,13 @@ def designs(
     from access_av.designs.table import rows_of, rows_of_worlds
     from access_av.errors import InputError
     from access_av.report.designs import render_designs
-    from access_av.run.campaign import Campaign, Shard, executor
-    from access_av.run.result_cache import ResultCache
+    from access_av.run.campaign import campaign
     from access_av.tables.results_directory import RESULTS, ResultsDirectory, json_text
 
     chosen = load_scenario(scenario)
     read = Space.read(space)
-    share = Shard.parse(shard)
-    if optuna is not None and (sobol is not None or halving or share != Shard()):
-        raise InputError("--optuna selects the designs itself: omit --sobol, --halving and --shard")
+    if optuna is not None and (sobol is not None or halving):
+        raise InputError("--optuna selects the designs itself: omit --sobol and --halving")
     every = []
     if optuna is None:
         choices = read.grid() if sobol is None else read.sobol(sobol)
@@ -108,18 +103,12 @@ def designs(
             new = [it for it in worlds[0].scenario.warnings() if str(it) not in said]
             said |= {str(it) for it in new}
             announce(f"{space}: {worlds[0].label}", new)
-    with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
-        campaign = Campaign(ResultCache(RESULTS / "parts"), pool, workers, share)
+    with progress("Driving") as tick, campaign(RESULTS / "parts", executor, threads) as kept:
         found = (
-            search(campaign, every, runs=runs, seed=seed, halving=halving, progress=tick)
+            search(kept, every, runs=runs, seed=seed, halving=halving, progress=tick)
             if optuna is None
-            else suggested(
-                campaign, chosen, read, count=optuna, runs=runs, seed=seed, progress=tick
-            )
+            else suggested(kept, chosen, read, count=optuna, runs=runs, seed=seed, progress=tick)
         )
-    if found is None:
-        console.print(OTHER_SHARES.format(shard))
-        return
     rows, of_worlds = rows_of(found.driven), rows_of_worlds(found.driven)
     directory = ResultsDirectory.create(f"designs-{chosen.name}", out)
     directory.write_table(TABLE, rows)

@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from access_av.cli.options import (
-    OTHER_SHARES,
     AsJson,
     Compare,
-    DaskOption,
+    ExecutorOption,
     Out,
     Percents,
     Runs,
     ScenarioArgument,
     Seed,
-    ShardOption,
     Threads,
     Vary,
     load_scenario,
@@ -94,8 +92,7 @@ def integrity(
     vary: Vary = None,
     compare: Compare = None,
     percentile: Percents = None,
-    shard: ShardOption = "1/1",
-    dask: DaskOption = None,
+    executor: ExecutorOption = None,
     out: Out = None,
     as_json: AsJson = False,
 ) -> None:
@@ -116,9 +113,8 @@ def integrity(
     from access_av.report.compared import compared_section
     from access_av.report.integrity import render_integrity
     from access_av.run import integrity_campaign
-    from access_av.run.campaign import Campaign, Shard, executor
+    from access_av.run.campaign import campaign
     from access_av.run.fault_injection import hypotheses as sized
-    from access_av.run.result_cache import ResultCache
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
     scales = [] if fault_scale is None else _scales(fault_scale)
@@ -126,14 +122,13 @@ def integrity(
     others = {name: load_scenario(name) for name in compare or ()}
     variants = of_scenario(chosen, vary, others)
     directory = ResultsDirectory.create("integrity", out)
-    share = Shard.parse(shard)
     if scales:
         fault = [*(fault or ()), *sized(chosen, scales)]
-    with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
-        campaign = Campaign(ResultCache(directory.path / "parts"), pool, workers, share)
+    parts = directory.path / "parts"
+    with progress("Driving") as tick, campaign(parts, executor, threads) as kept:
         driven = {
             label: integrity_campaign.drive(
-                campaign,
+                kept,
                 variant,
                 runs=runs,
                 seed=seed,
@@ -147,9 +142,6 @@ def integrity(
         }
     cases = []
     for label, its in driven.items():
-        if its is None:
-            console.print(OTHER_SHARES.format(shard))
-            return
         cases += [replace(case, variant=label) for case in its]
     beside = _beside(cases, sorted(percentile or PERCENTS))
     write_compared(beside, directory)

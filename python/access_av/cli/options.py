@@ -42,8 +42,14 @@ Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Value of one key of the file; repeatable."),
 ]
-ShardOption = Annotated[str, typer.Option(metavar="I/N", help="Run only part I of N parts.")]
-DaskOption = Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")]
+ExecutorOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE.py:NAME",
+        help="Function that returns a concurrent.futures.Executor, for example of a cluster.",
+        show_default="threads",
+    ),
+]
 MaxRms = Annotated[
     float | None, typer.Option(min=0.0, help="Maximum RMS error over all runs, in m.")
 ]
@@ -70,9 +76,6 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 # Exit code if no result meets the requirement.
 MISSED = 3
-
-# Message of a part of a campaign whose other parts are missing.
-OTHER_SHARES = "Part {} is complete. Run the other parts, then repeat this command."
 
 
 def overridden(given: Iterable[str] | None) -> dict[str, Any]:

@@ -10,16 +10,14 @@ import typer
 
 from access_av.cli.options import (
     MISSED,
-    OTHER_SHARES,
     AsJson,
-    DaskOption,
+    ExecutorOption,
     MaxError,
     Out,
     PercentileOption,
     PlatformOption,
     Runs,
     Seed,
-    ShardOption,
     Threads,
 )
 from access_av.cli.terminal import console, progress, show_points, table
@@ -58,7 +56,7 @@ def evaluate(
         Path | None, typer.Option(help="Claims file, in the format of paper.toml.")
     ] = None,
     threads: Threads = None,
-    dask: DaskOption = None,
+    executor: ExecutorOption = None,
     out: Out = None,
 ) -> None:
     """Evaluate the paper's claims under its interpretations, and write the report.
@@ -69,12 +67,12 @@ def evaluate(
     """
     from access_av.cli.paper_tables import show_study
     from access_av.report.paper import results
-    from access_av.run.campaign import Campaign, executor
-    from access_av.run.result_cache import ResultCache
+    from access_av.run.campaign import campaign
     from access_av.tables.results_directory import RESULTS
 
     names = [*(interpretation or []), *([scenario] if scenario else [])]
-    with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
+    parts = RESULTS / "parts"
+    with progress("Driving") as tick, campaign(parts, executor, threads) as kept:
         made, directory = results.run(
             names,
             platform,
@@ -83,9 +81,7 @@ def evaluate(
             seeds=seeds,
             threads=threads,
             out=out,
-            unknowns=Campaign(ResultCache(RESULTS / "parts"), pool, workers)
-            if sensitivity
-            else None,
+            unknowns=kept if sensitivity else None,
             stated=None if claims is None else _claims(claims),
             progress=tick,
         )
@@ -183,8 +179,7 @@ def search(
     ] = 200,
     seed: Seed = 1,
     threads: Threads = None,
-    shard: ShardOption = "1/1",
-    dask: DaskOption = None,
+    executor: ExecutorOption = None,
     out: Annotated[
         Path | None, typer.Option(help="Scenario file to write for the best interpretation.")
     ] = None,
@@ -198,16 +193,14 @@ def search(
     from access_av.cli.paper_tables import show_search
     from access_av.device.platform import Platform
     from access_av.paper.sampled_interpretations import as_toml, confirmed, sample
-    from access_av.run.campaign import Campaign, Shard, executor
-    from access_av.run.result_cache import ResultCache
+    from access_av.run.campaign import campaign
     from access_av.tables.results_directory import RESULTS, write_whole
 
     board = Platform.load(platform)
-    share = Shard.parse(shard)
-    with progress("Worlds") as tick, executor(dask, threads) as (pool, workers):
-        campaign = Campaign(ResultCache(RESULTS / "parts"), pool, workers, share)
+    parts = RESULTS / "parts"
+    with progress("Worlds") as tick, campaign(parts, executor, threads) as kept:
         found = sample(
-            campaign,
+            kept,
             board,
             worlds=worlds,
             controllers=controllers,
@@ -215,10 +208,7 @@ def search(
             seed=seed,
             progress=tick,
         )
-        if found is None:
-            console.print(OTHER_SHARES.format(shard))
-            return
-        checked = confirmed(campaign, board, found, runs=confirm, seed=seed + 1) if confirm else []
+        checked = confirmed(kept, board, found, runs=confirm, seed=seed + 1) if confirm else []
     show_search(found, checked)
     if out is not None:
         best = checked[0].values if checked else found.values(found.best()[0])

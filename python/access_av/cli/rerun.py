@@ -28,7 +28,7 @@ NOT_CONTENT = ("written", "command", "directory", "duration_s", "inputs", "commi
 # Folders of intermediate results, which a command that was stopped continues from.
 NOT_RESULTS = ("parts",)
 # Options that decide where and by whom results are computed, not what they are.
-WHERE = ("--out", "--shard", "--dask", "--threads")
+WHERE = ("--out", "--executor", "--threads")
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import typer
 from access_av.cli.options import (
     MISSED,
     AsJson,
-    DaskOption,
+    ExecutorOption,
     MaxError,
     MaxRms,
     Out,
@@ -56,7 +56,7 @@ def tune(
     ] = 64,
     runs: Runs = 20,
     seed: Seed = 1,
-    dask: DaskOption = None,
+    executor: ExecutorOption = None,
     threads: Threads = None,
     out: Out = None,
     as_json: AsJson = False,
@@ -74,17 +74,16 @@ def tune(
     from access_av.designs.table import Constraints, row_of
     from access_av.designs.tune import space_of
     from access_av.designs.tune import tune as search
-    from access_av.run.campaign import Campaign, executor
-    from access_av.run.result_cache import ResultCache
+    from access_av.run.campaign import campaign
     from access_av.tables.results_directory import RESULTS, ResultsDirectory, json_text
 
     chosen = load_scenario(
         scenario, overrides={"vehicle.platform": {"name": platform, "mode": mode}}
     )
     constraints = Constraints(max_energy_j, max_rms_m, max_worst_m, max_error_m, percentile)
-    with progress("Tuning") as tick, executor(dask, threads) as (pool, workers):
+    with progress("Tuning") as tick, campaign(RESULTS / "parts", executor, threads) as kept:
         found = search(
-            Campaign(ResultCache(RESULTS / "parts"), pool, workers),
+            kept,
             chosen,
             constraints,
             designs=designs,

@@ -206,7 +206,7 @@ def drive(
     runs: int,
     seed: int,
     progress: Callable[[int, int], None] | None = None,
-) -> list[dict[str, NDArray[Any]] | None]:
+) -> list[dict[str, NDArray[Any]]]:
     """Simulates each design from run ``first_run``; designs with equal runs are simulated once."""
     texts = [(design.driven, tuple(design.plug_ins.items())) for design in designs]
     different = list(dict.fromkeys(texts))

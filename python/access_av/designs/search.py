@@ -61,7 +61,7 @@ def search(
     seed: int,
     halving: bool = False,
     progress: Callable[[int, int], None] | None = None,
-) -> Found | None:
+) -> Found:
     """Simulates the designs.
 
     Parameters
@@ -72,11 +72,6 @@ def search(
         Number of runs of each remaining design in each environment.
     halving
         Whether inferior designs are dropped early; all designs use the same runs.
-
-    Returns
-    -------
-    Found
-        ``None`` if parts of another shard are missing.
     """
     if not designs:
         raise InputError("no designs to drive")
@@ -92,8 +87,6 @@ def search(
         )
         kept = [parts for _, of_worlds in left for parts in of_worlds]
         for parts, part in zip(kept, made, strict=True):
-            if part is None:
-                return None
             parts.append(part)
         drives += len(every) * (upto - done)
         done = upto

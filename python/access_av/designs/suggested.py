@@ -63,9 +63,7 @@ def suggested(
         designs = in_worlds(scenario, asked, space.worlds)
         every = [one for worlds in designs for one in worlds]
         made = drive(campaign, every, first_run=0, runs=runs, seed=seed)
-        parts: list[Part] = [part for part in made if part is not None]
-        if len(parts) < len(made):
-            raise InputError("--optuna needs all runs: omit --shard")
+        parts: list[Part] = list(made)
         for number, (trial, worlds) in enumerate(zip(trials, designs, strict=True)):
             mine = parts[number * len(worlds) : (number + 1) * len(worlds)]
             driven = _judged(worlds, mine)

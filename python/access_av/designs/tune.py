@@ -206,7 +206,7 @@ def _driven(
 ) -> list[Driven]:
     made = drive(campaign, points, first_run=first_run, runs=runs, seed=seed)
     parts = zip(points, made, strict=True)
-    return [joined(point, [part]) for point, part in parts if part is not None]
+    return [joined(point, [part]) for point, part in parts]
 
 
 def _around(dimension: Dimension, value: float) -> Dimension:

@@ -35,7 +35,7 @@ from access_av.paper.open_choices import (
 )
 from access_av.paper.outcome import Drives, Numbers
 from access_av.paper.statements import stated_claims
-from access_av.run.campaign import Shard, Task
+from access_av.run.campaign import Task
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -98,7 +98,7 @@ def sample(
     seed: int = 1,
     everything: bool = False,
     progress: Callable[[int, int], None] | None = None,
-) -> Sample | None:
+) -> Sample:
     """Draw interpretations, and judge each by the paper's claims.
 
     Parameters
@@ -114,11 +114,6 @@ def sample(
         without, it is Algorithm 1 without a gate in worlds like the shipped one, which comes first.
     progress
         Called as ``progress(done, total)`` with numbers of worlds.
-
-    Returns
-    -------
-    Sample
-        ``None`` where parts are missing that another shard computes.
     """
     own = (*OPEN_CONTROLLER, GATE) if everything else CONTROLLER
     world = OPEN_WORLD if everything else WORLD
@@ -137,10 +132,7 @@ def sample(
         )
         for index in range(worlds)
     ]
-    parts = campaign.run(tasks, progress)
-    found = [part for part in parts if part is not None]
-    if len(found) < len(parts):
-        return None
+    found = campaign.run(tasks, progress)
     repeated = np.repeat(world_points, controllers, axis=0)
     return Sample(
         dimensions=(*world, *own),
@@ -305,7 +297,6 @@ def confirmed(
     A neighbour differs by a tenth of a controller's dimension, or by another choice. The one that
     meets most claims comes first; of several, the one that the search had first.
     """
-    whole = replace(campaign, shard=Shard())
 
     def again(worlds: Sequence[Mapping[str, Mapping[str, Any]]]) -> list[list[Confirmed]]:
         tasks = []
@@ -324,8 +315,7 @@ def confirmed(
                 )
                 for index, (label, values) in enumerate(labelled.items())
             ]
-            for labelled, part in zip(worlds, whole.run(tasks), strict=True)
-            if part is not None
+            for labelled, part in zip(worlds, campaign.run(tasks), strict=True)
         ]
 
     best = found.best()[:CANDIDATES]

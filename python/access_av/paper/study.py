@@ -220,7 +220,7 @@ def study(
             everything=True,
             progress=progress,
         )
-        hangs_on = None if drawn is None else sobol(drawn, drives)
+        hangs_on = sobol(drawn, drives)
     claims = {seed: judged(evaluations, stated)}
     for other in range(seed + 1, seed + seeds):
         again = Driver(platform, runs, other, threads, count=0, progress=progress, planned=planned)

@@ -1,36 +1,33 @@
-"""Campaigns: many tasks that do not depend on one another, with results in parts on disk.
+"""Campaigns: independent tasks, computed by any executor, with results in parts on disk.
 
-The content of a part does not depend on the computing process: threads, shards of an array job and
-Dask workers give identical bytes. A repeated campaign continues after an interruption.
+The content of a part does not depend on the executor: threads, processes and cluster workers give
+identical bytes. A repeated campaign continues after an interruption.
 """
 
 from __future__ import annotations
 
 import os
 from concurrent.futures import (
-    FIRST_COMPLETED,
     BrokenExecutor,
     CancelledError,
     Executor,
     Future,
     ThreadPoolExecutor,
-    wait,
+    as_completed,
 )
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from access_av.errors import InputError
+from access_av.run.plug_in_files import load
+from access_av.run.result_cache import ResultCache
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from numpy.typing import NDArray
-
-    from access_av.run.result_cache import ResultCache
-
-# Number of pending tasks per worker, so that no worker is idle.
-AHEAD = 4
 
 
 class CampaignError(InputError):
@@ -55,57 +52,16 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Shard:
-    """Part of a campaign that one of several jobs computes, counted from 1."""
-
-    number: int = 1
-    of: int = 1
-
-    @classmethod
-    def parse(cls, text: str) -> Shard:
-        """Reads a text such as ``2/8``.
-
-        Raises
-        ------
-        InputError
-            Invalid text.
-
-        Examples
-        --------
-        >>> Shard.parse("2/8")
-        Shard(number=2, of=8)
-        """
-        number, slash, of = text.partition("/")
-        if slash and number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of):
-            return cls(int(number), int(of))
-        raise InputError(f"--shard {text}: write I/N with I from 1 to N, for example 2/8")
-
-    def holds(self, index: int) -> bool:
-        """Returns whether a task belongs to this job, by its index."""
-        return index % self.of == self.number - 1
-
-
-@dataclass(frozen=True)
 class Campaign:
-    """Storage and workers of a campaign.
-
-    Attributes
-    ----------
-    executor
-        Executor as in :mod:`concurrent.futures`; sequential if ``None``.
-    workers
-        Number of parallel tasks.
-    """
+    """Storage and executor of a campaign; without an executor, tasks run one after the other."""
 
     parts: ResultCache
     executor: Executor | None = None
-    workers: int = 1
-    shard: Shard = field(default_factory=Shard)
 
     def run(
         self, tasks: Sequence[Task], progress: Callable[[int, int], None] | None = None
-    ) -> list[dict[str, NDArray[Any]] | None]:
-        """Computes the missing parts.
+    ) -> list[dict[str, NDArray[Any]]]:
+        """Returns the parts in the order of the tasks, and computes the missing ones.
 
         Parameters
         ----------
@@ -114,27 +70,20 @@ class Campaign:
         progress
             Called as ``progress(done, total)``.
 
-        Returns
-        -------
-        list
-            Parts in the order of the tasks; ``None`` if a part of another shard is missing.
-
         Raises
         ------
         CampaignError
             Lost workers.
         """
         found = [self.parts.read(task.depends_on) for task in tasks]
-        missing = [
-            index for index, part in enumerate(found) if part is None and self.shard.holds(index)
-        ]
+        missing = [index for index, part in enumerate(found) if part is None]
         done = len(tasks) - len(missing)
         for index, made in self._computed(tasks, missing):
             found[index] = self.parts.put(tasks[index].depends_on, made)
             done += 1
             if progress is not None:
                 progress(done, len(tasks))
-        return found
+        return [part for part in found if part is not None]
 
     def _computed(
         self, tasks: Sequence[Task], missing: Sequence[int]
@@ -143,58 +92,78 @@ class Campaign:
             for index in missing:
                 yield index, tasks[index].work(*tasks[index].arguments)
             return
-        waiting = list(reversed(missing))
         running: dict[Future[Mapping[str, NDArray[Any]]], int] = {}
+        lost: BaseException | None = None
         try:
-            while waiting or running:
-                while waiting and len(running) < AHEAD * self.workers:
-                    index = waiting.pop()
-                    task = tasks[index]
-                    running[self.executor.submit(task.work, *task.arguments)] = index
-                finished, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    yield running.pop(future), future.result()
-        except (Exception, CancelledError) as error:
-            if not _is_of_workers(error):
-                raise
-            raise CampaignError(
-                f"the workers are gone ({type(error).__name__}: {error}); what was finished is "
-                f"kept in {self.parts.path}, the same command goes on from there"
-            ) from error
+            for index in missing:
+                try:
+                    future = self.executor.submit(tasks[index].work, *tasks[index].arguments)
+                except BrokenExecutor as error:
+                    lost = error
+                    break
+                running[future] = index
+            for future in as_completed(list(running)):
+                index = running.pop(future)
+                try:
+                    made = future.result()
+                except (Exception, CancelledError) as error:
+                    if not _is_of_workers(error):
+                        raise
+                    # Keep what other workers have finished.
+                    lost = error
+                    continue
+                yield index, made
         finally:
             for future in running:
                 future.cancel()
+        if lost is not None:
+            raise CampaignError(
+                f"the workers are gone ({type(lost).__name__}: {lost}); what was finished is "
+                f"kept in {self.parts.path}, the same command goes on from there"
+            ) from lost
 
 
 def _is_of_workers(error: BaseException) -> bool:
     """Returns whether an error comes from the workers and not from the task."""
-    by_dask = type(error).__module__.startswith(("distributed", "dask"))
-    return by_dask or isinstance(error, (BrokenExecutor, CancelledError, ConnectionError))
+    by_cluster = type(error).__module__.startswith(("distributed", "dask", "executorlib"))
+    return by_cluster or isinstance(error, (BrokenExecutor, CancelledError, ConnectionError))
 
 
 @contextmanager
-def executor(dask: str | None = None, threads: int | None = None) -> Iterator[tuple[Executor, int]]:
-    """Yields workers and their number: of a Dask cluster by its address, otherwise threads.
+def campaign(
+    path: Path, factory: str | None = None, threads: int | None = None
+) -> Iterator[Campaign]:
+    """Yields a campaign whose executor is shut down at the end.
+
+    Parameters
+    ----------
+    path
+        Folder of the parts.
+    factory
+        ``FILE.py:NAME`` of a function that returns a :class:`concurrent.futures.Executor`. Default:
+        threads.
+    threads
+        Maximum number of threads. Default: one per core.
 
     Raises
     ------
     InputError
-        Scheduler not reachable, or Dask not installed.
+        The file, the function or its result is unusable, or the cluster cannot be reached.
     """
-    if dask is None:
-        cores = os.cpu_count() or 1
-        count = min(threads or cores, cores)
-        with ThreadPoolExecutor(count) as pool:
-            yield pool, count
-        return
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise InputError("--dask needs the extra: pip install 'access-av[dask]'") from error
-    try:
-        client = Client(dask, timeout="10s")
-    except (OSError, ValueError, TimeoutError) as error:
-        raise InputError(f"--dask {dask}: no scheduler there ({error})") from error
-    with client:
-        count = max(sum(client.nthreads().values()), 1)
-        yield client.get_executor(pure=False), count
+    cores = os.cpu_count() or 1
+    if factory is None:
+        pool: Any = ThreadPoolExecutor(min(threads or cores, cores))
+    else:
+        try:
+            pool = load("--executor", factory)()
+        except InputError:
+            raise
+        except Exception as error:
+            raise InputError(f"--executor {factory}: {type(error).__name__}: {error}") from error
+        if not isinstance(pool, Executor):
+            raise InputError(
+                f"--executor {factory}: returns {type(pool).__name__}; it must return a "
+                "concurrent.futures.Executor"
+            )
+    with pool:
+        yield Campaign(ResultCache(path), pool)

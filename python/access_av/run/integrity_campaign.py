@@ -145,7 +145,7 @@ def drive(
     heads: Sequence[int] | None = None,
     risks_per_hour: Sequence[float] | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> list[Case] | None:
+) -> list[Case]:
     """Simulates a scenario with every mismatch, channel and number of radio heads.
 
     Parameters
@@ -171,8 +171,7 @@ def drive(
     Returns
     -------
     list of Case
-        In the order mismatch, channel, heads, risk; ``None`` if parts of another shard are
-        missing.
+        In the order mismatch, channel, heads, risk.
 
     Raises
     ------
@@ -234,12 +233,9 @@ def drive(
         for count in (min(PART_RUNS, runs - first),)
     ]
     parts = campaign.run(tasks, progress)
-    here = [part for part in parts if part is not None]
-    if len(here) < len(parts):
-        return None
     each = len(parts) // len(grid)
     return [
-        Case(*case, pl.concat(map(_table, here[number * each : (number + 1) * each])))
+        Case(*case, pl.concat(map(_table, parts[number * each : (number + 1) * each])))
         for number, case in enumerate(grid)
     ]
 
