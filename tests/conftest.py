@@ -32,6 +32,7 @@ SLOW = {
     *("test_fault_campaign", "test_manifold"),
     *("test_study", "test_plant_guide"),
     *("test_labels", "test_notebook", "test_plug_in_files", "test_recomputed"),
+    "test_sensitivity",
     *("test_results", "test_rerun", "test_study_file"),
 }
 

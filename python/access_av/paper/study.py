@@ -50,7 +50,7 @@ class Study:
         MUSIC at fixed intervals, in ms.
     proposed_vs_paper
         Proposed method compared with the shipped interpretation, by power mode.
-    unknowns
+    sensitivity
         Sensitivity of the claims, if requested.
     unusable
         Interpretations that could not be evaluated, and why.
@@ -127,9 +127,7 @@ class Study:
         if self.effects:
             tables["assumptions"] = pl.DataFrame([asdict(each) for each in self.effects])
         if self.sensitivity is not None:
-            tables["sensitivity"] = pl.DataFrame(
-                [asdict(each) for each in self.sensitivity.indices]
-            )
+            tables |= self.sensitivity.tables()
         return tables
 
     def _runs(self) -> Iterator[pl.DataFrame]:

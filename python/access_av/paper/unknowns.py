@@ -11,11 +11,12 @@ environments with these polynomials ("fast bPCE": Marelli and Sudret, Structural
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import polars as pl
 
 from access_av.paper.statements import stated_claims
 
@@ -71,6 +72,8 @@ class Unknowns:
         Share by claim, with its 95 % interval.
     explained
         Share of the margin's variance that the expansion explains, by claim.
+    sample
+        The drawn interpretations and their margins, from which all other values follow.
     """
 
     indices: list[Index]
@@ -79,6 +82,7 @@ class Unknowns:
     explained: Mapping[str, float]
     interpretations: int
     runs: int
+    sample: Sample
 
     @property
     def matter(self) -> list[Index]:
@@ -92,6 +96,46 @@ class Unknowns:
             for each in self.indices
             if each.total >= MATTERS and "evidence" not in stated[each.claim]
         ]
+
+    def tables(self) -> dict[str, pl.DataFrame]:
+        """Indices, shares and sample; columns of :mod:`access_av.columns` by these names."""
+        sample = self.sample
+        points = [sample.values(index) for index in range(self.interpretations)]
+        rows = [
+            {
+                "interpretation_index": index,
+                "environment_index": int(sample.world[index]),
+                "dimension": dimension.name,
+                "coordinate": float(sample.coordinates[index, d]),
+                "num_choices": len(dimension.choices),
+                "drawn_value": str(points[index][dimension.name]),
+            }
+            for index in range(self.interpretations)
+            for d, dimension in enumerate(sample.dimensions)
+        ]
+        margins = [
+            {"interpretation_index": index, "claim": claim, "margin": float(margin)}
+            for claim, of_claim in sample.margins.items()
+            for index, margin in enumerate(of_claim)
+        ]
+        shares = [
+            {
+                "claim": claim,
+                "share_met": share,
+                "share_met_low": self.holds_interval[claim][0],
+                "share_met_high": self.holds_interval[claim][1],
+                "explained_variance": self.explained.get(claim),
+            }
+            for claim, share in self.holds.items()
+        ]
+        return {
+            "sensitivity": pl.DataFrame([asdict(each) for each in self.indices]),
+            "sensitivity_claims": pl.DataFrame(
+                shares, schema_overrides={"explained_variance": pl.Float64}
+            ),
+            "sensitivity_sample": pl.DataFrame(rows),
+            "sensitivity_margins": pl.DataFrame(margins),
+        }
 
 
 def sobol(sample: Sample, runs: int, *, seed: int = 0, count: int = RESAMPLES) -> Unknowns:
@@ -138,6 +182,7 @@ def sobol(sample: Sample, runs: int, *, seed: int = 0, count: int = RESAMPLES) -
         explained={name: fit.explained for name, fit in zip(names, fits, strict=True)},
         interpretations=len(sample.coordinates),
         runs=runs,
+        sample=sample,
     )
 
 

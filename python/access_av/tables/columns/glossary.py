@@ -422,6 +422,26 @@ _GLOSSARY = {
     "first_high": ("1", "Upper end of the 95 % interval of first"),
     "total_low": ("1", "Lower end of the 95 % interval of total"),
     "total_high": ("1", "Upper end of the 95 % interval of total"),
+    "share_met": ("1", "Share of the drawn interpretations that meet the claim"),
+    "share_met_low": ("1", "Lower end of the 95 % interval of share_met"),
+    "share_met_high": ("1", "Upper end of the 95 % interval of share_met"),
+    "explained_variance": (
+        "1",
+        "Share of the variance of the claim's margin that the polynomial expansion explains",
+    ),
+    "interpretation_index": ("1", "Number of the drawn interpretation, from 0"),
+    "environment_index": (
+        "1",
+        "Number of the environment, from 0; interpretations of one environment differ in the "
+        "controller only",
+    ),
+    "coordinate": ("1", "Position in the range of the open choice, from 0 to 1"),
+    "num_choices": ("1", "Number of values of the open choice; 0 for a continuous range"),
+    "drawn_value": ("text", "Value at the coordinate"),
+    "margin": (
+        "1",
+        "Margin of the claim relative to the value of the paper; at least 0 if the claim is met",
+    ),
     # Recordings.
     "name": ("text", "Name of the radio head"),
     "recording": ("text", "Path of the recording"),
