@@ -79,6 +79,7 @@ def main() -> None:
         (pages / name).write_text(text() + "\n", encoding="utf-8")
     for picture in (ROOT / "docs").glob("*.[ps][nv]g"):
         shutil.copy(picture, pages)
+    shutil.copy(Path(__file__).parent / "site.css", pages)
     shutil.copy(Path(__file__).parent / "zensical.toml", BUILD)
     command = [Path(sys.executable).parent / "zensical", "build", "--strict", "--clean"]
     sys.exit(subprocess.run(command, cwd=BUILD, check=False).returncode)

@@ -6,7 +6,7 @@ from access_av import interrupt
 
 
 def main() -> None:
-    """Run the command line; Ctrl-C counts from the first import on."""
+    """Runs the command line; Ctrl-C is handled from the first import on."""
     try:
         interrupt.guard()
         from access_av.cli.main import main as run
@@ -18,7 +18,7 @@ def main() -> None:
         raise
     except KeyboardInterrupt:
         interrupt.end()
-    except BaseException:  # what a library may have made of the interruption
+    except BaseException:  # a library may convert the interruption to another exception
         if interrupt.may_have_come():
             interrupt.end()
         raise

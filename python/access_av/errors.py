@@ -1,9 +1,9 @@
-"""Errors the user can put right."""
+"""Errors that the user can correct."""
 
 
 class InputError(ValueError):
-    """An input that cannot be used; the message says which, and what is allowed."""
+    """Invalid input; the message contains its name and the allowed values."""
 
 
 class ImplausibleSettingsWarning(UserWarning):
-    """Settings that are valid but not meant for each other; the message names key and remedy."""
+    """Valid settings whose combination is implausible; the message contains key and remedy."""

@@ -18,7 +18,7 @@ __all__ = ["INTERRUPTED", "clean", "end", "guard", "may_have_come", "writing"]
 
 
 def guard() -> None:
-    """From here on Ctrl-C ends the program, be it by an exception or without."""
+    """Makes Ctrl-C end the program: by an exception, otherwise after the timeout."""
     sys.unraisablehook = _ignore
     tells = watch()
     os.set_blocking(tells, False)
@@ -26,7 +26,7 @@ def guard() -> None:
 
 
 def may_have_come() -> bool:
-    """Whether Ctrl-C has come, or does at this moment."""
+    """Returns whether Ctrl-C was pressed, including the present moment."""
     try:
         time.sleep(0.1)
     except KeyboardInterrupt:
@@ -35,6 +35,6 @@ def may_have_come() -> bool:
 
 
 def _ignore(unraisable: sys.UnraisableHookArgs) -> None:
-    """Say nothing of an interruption that came where exceptions go nowhere; the thread ends it."""
+    """Suppresses the report of an interruption in code whose exceptions are ignored."""
     if not issubclass(unraisable.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(unraisable)

@@ -1,4 +1,4 @@
-"""Packages whose names come in when they are first used (PEP 562)."""
+"""Lazy import: names of a package are imported at their first use (PEP 562)."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 def attach(
     package: str, homes: Mapping[str, Sequence[str]], modules: Mapping[str, str] | None = None
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """``__getattr__`` and ``__dir__`` of a package.
+    """Returns ``__getattr__`` and ``__dir__`` of a package.
 
     Parameters
     ----------
     package
         The package's ``__name__``.
     homes
-        Names to find in the package, by the module that each is from.
+        Lazily imported names, by the module that defines them.
     modules
-        Modules to find in the package, by the names they have there; `import` finds them too.
+        Modules by their alias in the package; ``import`` also accepts the alias.
 
     Examples
     --------
@@ -51,9 +51,9 @@ def attach(
 
 
 class _Aliases:
-    """Imports a module that lies elsewhere: ``access_av.cost`` is ``access_av.economics.cost``.
+    """Imports aliases of modules: ``access_av.cost`` is ``access_av.economics.cost``.
 
-    Finder and loader without their base classes, whose import takes longer than the package's.
+    Finder and loader without their base classes, whose import is slower than that of the package.
     """
 
     def __init__(self, modules: Mapping[str, str]) -> None:
@@ -63,7 +63,7 @@ class _Aliases:
         return ModuleSpec(name, self) if name in self.modules else None  # type: ignore[arg-type]
 
     def create_module(self, _: ModuleSpec) -> None:
-        """Leave it to Python: what is made is replaced at once."""
+        """Uses Python's default module, which `exec_module` replaces."""
 
     def exec_module(self, module: ModuleType) -> None:
         sys.modules[module.__name__] = import_module(self.modules[module.__name__])

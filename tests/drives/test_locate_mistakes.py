@@ -248,7 +248,7 @@ def test_a_truth_of_another_time_is_refused(access_av: Cli, tmp_path: Path) -> N
     assert "it is from 1000000000.000 to 1000000004.950 s, the drive from 0.000 to" in done.err
     (tmp_path / "truth.tum").write_text("# time x y z qx qy qz qw\n")
     done = access_av(*arguments)
-    assert (done.code, "truth.tum: holds no pose" in done.err) == (2, True)
+    assert (done.code, "truth.tum: contains no pose" in done.err) == (2, True)
 
 
 def test_one_radio_head_elsewhere_is_named(tmp_path: Path) -> None:

@@ -163,7 +163,7 @@ def test_what_cannot_be_judged_is_named_and_the_others_are_judged() -> None:
     found = {
         claim.id: claim for claim in check_claims(synthetic.evaluation().outcome, stated=stated)
     }
-    for name, said in (("a1_adaptive_worst_m", "almost"), ("b1_not_ours", "nothing is obtained")):
+    for name, said in (("a1_adaptive_worst_m", "almost"), ("b1_not_ours", "no result exists")):
         assert found[name].verdict == NOT_JUDGED
         assert found[name].obtained is None
         assert said in found[name].note

@@ -547,7 +547,7 @@ def test_the_page_shows_the_tables(tables: Tables) -> None:
         given = claim["evidence"] in ("arithmetic", "by construction")
         words = f"{claim['evidence']}: {claim['verdict']}" if given else claim["verdict"]
         assert cells[5].startswith(words)
-        assert ("turns with the seed" in cells[5]) == claim["seed_sensitive"]
+        assert ("depends on the seed" in cells[5]) == claim["seed_sensitive"]
         if claim["tolerance"] is not None and claim["tolerance"] >= 0.01:
             percent = f"deviation {100 * claim['deviation']:.0f}%"
             assert percent in cells[2]

@@ -83,10 +83,10 @@ def test_sentences_are_made_from_what_was_obtained() -> None:
     met = {claim.id: replace(claim, verdict="reproduced") for claim in study.of("gate")}
     both = replace(study, claims=[*study.of("every-ssb"), *met.values()])
     assert "only if estimates wait" in summary.headline(both)
-    assert "which Algorithm 1 does not say" in summary.lead(both)
+    assert "which Algorithm 1 does not contain" in summary.lead(both)
     assert "Algorithm 1 makes no difference" in summary.lead(both)
     without = [replace(claim, interpretation="every-ssb") for claim in met.values()]
-    assert "under Algorithm 1 as it stands" in summary.headline(
+    assert "under the published Algorithm 1" in summary.headline(
         replace(study, claims=[*without, *study.of("gate")])
     )
 

@@ -1,1 +1,1 @@
-"""The command line: commands, a file per concern, and what they show; ``main`` joins them."""
+"""The command line: one file per group of commands; ``main`` combines them."""

@@ -25,9 +25,9 @@ app = typer.Typer()
 MANIFEST = "manifest.json"
 # Entries of a manifest that differ between two runs of the same command.
 NOT_CONTENT = ("written", "command", "directory", "duration_s", "inputs", "commit", "version")
-# Folders of intermediate results, which a command that was stopped continues from.
+# Folders of intermediate results, from which an interrupted command continues.
 NOT_RESULTS = ("parts",)
-# Options that decide where and by whom results are computed, not what they are.
+# Options without an influence on the results.
 WHERE = ("--out", "--executor", "--threads")
 
 
@@ -138,7 +138,7 @@ def _manifest(results: Path) -> dict[str, Any]:
 
 
 def _arguments(manifest: Mapping[str, Any]) -> list[str]:
-    """Returns the arguments of the command, without those that decide where it ran."""
+    """Returns the arguments of the command without the options of :data:`WHERE`."""
     _, *typed = map(str, manifest["command"])
     found, skipped = list[str](), False
     for argument in typed:
@@ -182,7 +182,7 @@ def _run(arguments: Sequence[str], where: Path, scratch: Path, keep: Path | None
         capture_output=True,
         text=True,
     )
-    # A command that found its target missed has written its results.
+    # A command with a missed target (exit code 3) has written its results, too.
     if done.returncode not in (0, MISSED) or not (out / MANIFEST).is_file():
         raise InputError(
             f"the command failed again (exit code {done.returncode}): "

@@ -275,7 +275,7 @@ def joined(design: Design, parts: Sequence[Part]) -> Driven:
     ]
     energy_j = np.array([np.inf if each is None else sum(each[:3]) for each in energies])
     if "estimator" in design.plug_ins:
-        # The energy that the estimator states; infinite if it states none.
+        # Energy per estimate of the plug-in; infinite if the plug-in specifies none.
         energy_j = np.nan_to_num(np.concatenate([part["energy_j"] for part in parts]), nan=np.inf)
     return Driven(
         design=design,

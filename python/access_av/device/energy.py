@@ -95,7 +95,7 @@ def above_idle(busy: Window, idle: Window) -> Interval:
         Constant equal values of both windows, because the sensor has stopped.
     """
     if busy.is_constant and idle.is_constant and busy.power_w.value == idle.power_w.value:
-        raise SensorError("the sensor stopped: it says the same, idle and busy")
+        raise SensorError("the sensor stopped: its value is equal, idle and busy")
     ratio = busy.duration_s / idle.duration_s
     idle_j = idle.energy_j.scaled(ratio)
     return Interval(
@@ -263,7 +263,7 @@ def energy_counted(
     added_j = np.sum(np.where(added_j < 0.0, added_j + np.array(ranges_j), added_j), axis=1)
     changes = np.flatnonzero(added_j) + 1
     if changes.size == 0:
-        raise SensorError("the counter stopped: it counts nothing")
+        raise SensorError("the counter stopped: its value does not change")
     look_s = float(np.median(np.diff(times_s)))
     gaps_s = np.diff(times_s[changes])
     period_s = max(float(np.median(gaps_s)) if gaps_s.size else duration_s, look_s)
@@ -307,7 +307,9 @@ def _refuse_stopped(times_s: NDArray[np.float64], changes: NDArray[np.int64], en
 def _refuse_jumps(power_w: NDArray[np.float64], times_s: NDArray[np.float64], unit: str) -> None:
     usual = float(np.median(power_w))
     if usual <= 0.0:
-        raise SensorError(f"the sensor says {usual:.3g} {unit}: it is not connected, or reversed")
+        raise SensorError(
+            f"the sensor reports {usual:.3g} {unit}: it is not connected, or reversed"
+        )
     wrong = (power_w > MOST_FACTOR * usual) | (power_w < usual / MOST_FACTOR)
     if wrong.any():
         at = int(np.argmax(wrong))

@@ -264,7 +264,8 @@ def _measure(
         energy_j = above_idle(busy, idle).scaled(1.0 / timing.executions)
         if energy_j.low <= 0.0:
             raise SensorError(
-                f"{energy_j.value:.3g} ± {energy_j.half_width:.3g} J is not distinct from idle"
+                f"{energy_j.value:.3g} ± {energy_j.half_width:.3g} J "
+                "does not differ from idle significantly"
             )
     except TooShortError:
         raise

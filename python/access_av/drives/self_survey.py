@@ -95,7 +95,7 @@ class Parameter:
 
     @property
     def is_as_believed(self) -> bool:
-        """Returns whether the estimate is within three prior standard deviations."""
+        """Returns whether the estimate is within three standard deviations of the prior."""
         return abs(self.found - self.before) < 3.0 * self.std_before
 
 
@@ -279,7 +279,7 @@ class _Problem:
         self.progress, self.done = progress, 0
 
     def meet(self, values: Numbers, stds: Numbers, used: list[Flags] | None) -> list[Met]:
-        """Returns innovations, variances and outlier flags of each drive."""
+        """Replays the drives; returns innovations, variances and outlier flags of each drive."""
         site, vehicle = self.model.nominal(values, stds)
 
         def drive(index: int) -> Met:

@@ -28,8 +28,8 @@ OF_EXTENT = (5, 95)
 UNITS = {"millimetres": 1e3, "centimetres": 1e2, "kilometres": 1e-3}
 EQUAL_EXTENTS = (0.7, 1.4)
 
-# Minimum error (m, RMS) of a drive that a motion of the truth may explain, and maximum share of the
-# error that remains then.
+# Minimum RMS error of a drive (m) for the search of a rigid motion of the truth, and maximum
+# remaining share of the error after this motion.
 MIN_ERROR_M = 1.0
 REMAINING = 0.1
 
@@ -82,7 +82,7 @@ def check(which: str, known: pl.DataFrame, true: pl.DataFrame, errors: pl.DataFr
 
 
 def explanation(poses: pl.DataFrame, errors: pl.DataFrame) -> str | None:
-    """Returns the motion of the truth that explains most of a drive's error; ``None`` without one.
+    """Returns the rigid motion of the truth that removes most of the error; ``None`` without one.
 
     A truth in another frame has a large error that one displacement, rotation or reflection of the
     whole truth removes.

@@ -1,1 +1,1 @@
-"""Money, carbon and energy of a fleet, with the sources of every figure."""
+"""Money, carbon and energy of a fleet; every figure has a source."""

@@ -1,7 +1,8 @@
-"""Cost, energy and carbon of a fleet, two ways side by side, with the user's own figures.
+"""Cost, energy and carbon of a fleet: comparison of two localization systems by given figures.
 
-Every figure is a range of low, central and high. A difference takes the least of one against the
-most of the other, so that its range holds whatever the figures turn out to be.
+Every figure is a range of low, central and high. The low end of a difference is the low end of one
+figure minus the high end of the other. Therefore the range of a difference contains every
+combination of the figures.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 FLEET = ("vehicles", "hours_per_day", "days_per_year", "years")
-# One of these says how often a vehicle drives.
+# Alternative keys for the number of trips of a vehicle per day.
 TRIPS = ("trips_per_day", "trip_s")
-# Operating times of the infrastructure: all day and every day without.
+# Operating times of the infrastructure. Default: 24 hours on 365 days.
 INFRASTRUCTURE = {"infrastructure_hours_per_day": 24.0, "infrastructure_days_per_year": 365.0}
 ITEM = ("units", "price", "yearly", "power_w", "embodied_kg")
 
@@ -34,13 +35,13 @@ class Way:
     Attributes
     ----------
     capital, yearly
-        Money to buy it and to run it for a year, electricity included.
+        Purchase price, and cost of one year including electricity.
     energy_day_kj
-        Energy of one vehicle on a day of work: its own equipment and its trips.
+        Energy of one vehicle on a working day: its equipment and its trips.
     fleet_day_mj
-        Energy of the fleet and the infrastructure on such a day.
+        Energy of the fleet and the infrastructure on a working day.
     embodied_kg, use_kg_per_year
-        CO2 equivalents of production, and of a year's electricity.
+        CO2 equivalents of production, and of the electricity of one year.
     """
 
     capital: Range
@@ -53,16 +54,17 @@ class Way:
 
 @dataclass(frozen=True)
 class Balance:
-    """Two ways, and what the second saves against the first.
+    """Comparison of two localization systems: savings of the second one.
 
     Attributes
     ----------
     saved
-        Money over the years of use.
+        Money saved over the years of use.
     saved_kg
-        CO2 equivalents over them.
+        CO2 equivalents saved over the years of use.
     payback_years
-        After how long the second has cost no more; ``None`` where it may never be so.
+        Time until the total cost of the second system is at most that of the first; ``None`` if
+        this may never occur.
     """
 
     currency: str
@@ -75,28 +77,28 @@ class Balance:
 
 
 def read(file: Path | None) -> Mapping[str, Any]:
-    """The figures of a file, or the example's.
+    """Reads the figures of a file; without a file, those of the example.
 
     Raises
     ------
     InputError
-        When it is no TOML.
+        If the file is not TOML.
     """
     return shipped("economics", "balance.toml") if file is None else toml.read(file)
 
 
 def text() -> str:
-    """The example file."""
+    """Returns the text of the example file."""
     return resources.files("access_av").joinpath("economics", "balance.toml").read_text("utf-8")
 
 
 def balance(figures: Mapping[str, Any]) -> Balance:
-    """Add up both ways.
+    """Computes cost, energy and carbon of both systems.
 
     Raises
     ------
     InputError
-        When a figure is missing or cannot be; names its key and what is allowed.
+        If a figure is missing or invalid; the message contains key and allowed values.
 
     Examples
     --------
@@ -141,7 +143,7 @@ def balance(figures: Mapping[str, Any]) -> Balance:
 
 
 def _trips(fleet: Mapping[str, Any], hours: float) -> float:
-    """Trips of one vehicle on a day of work: as stated, or one after the other."""
+    """Returns the trips of one vehicle per working day: the given number, or continuous driving."""
     given = [name for name in TRIPS if name in fleet]
     if len(given) != 1:
         raise InputError(
@@ -156,7 +158,7 @@ def _trips(fleet: Mapping[str, Any], hours: float) -> float:
 
 
 def _payback(more: Range, saved_yearly: Range) -> Range | None:
-    """Years until a larger capital is saved; 0 where it is not larger."""
+    """Returns the years until a larger purchase price is saved; 0 if the price is not larger."""
 
     def years(capital: float, yearly: float) -> float | None:
         if capital <= 0.0:
@@ -188,7 +190,7 @@ def _way(
             key = f"{name}.{place}[{index}]"
             _only(item, f"{key}.", {*ITEM, "name", "source"})
             if not item.get("source"):
-                raise InputError(f"{key}.source: missing; say where its figures are from")
+                raise InputError(f"{key}.source: missing; write the source of the figures")
             units = _range(item, f"{key}.units").scaled(count)
             capital = capital.plus(units.times(_range(item, f"{key}.price")))
             yearly = yearly.plus(units.times(_range(item, f"{key}.yearly")))
@@ -218,7 +220,7 @@ def _way(
 
 
 def _grid(figures: Mapping[str, Any]) -> Range:
-    """Carbon intensity in gCO2e per kWh."""
+    """Returns the carbon intensity of the electricity, in gCO2e per kWh."""
     if "grid_g_per_kwh" in figures:
         return _range(figures, "grid_g_per_kwh")
     name = figures.get("grid")
@@ -229,7 +231,7 @@ def _grid(figures: Mapping[str, Any]) -> Range:
 
 
 def _range(table: Mapping[str, Any], key: str) -> Range:
-    """One number, or low, central and high."""
+    """Reads one number, or a low, central and high value."""
     value = table.get(key.rpartition(".")[2])
     try:
         ends: list[Any] = (

@@ -1,6 +1,6 @@
-"""Greenhouse gas: embodied and use apart, low to high, per grid.
+"""Greenhouse gas of equipment: production (embodied) and use separately, as ranges, by grid.
 
-Every number carries its source (``carbon.toml``); nothing here is measured by this project.
+Every number has a source (``carbon.toml``); none was measured by this project.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ class Range:
 
     @classmethod
     def read(cls, entry: Mapping[str, float]) -> Range:
-        """Take the three values out of a fact."""
+        """Returns the range of an entry of the file."""
         return cls(float(entry["low"]), float(entry["central"]), float(entry["high"]))
 
     def scaled(self, factor: float) -> Range:
-        """All three values times a factor."""
+        """Returns all three values multiplied by a factor."""
         return Range(self.low * factor, self.central * factor, self.high * factor)
 
     def plus(self, other: Range) -> Range:
-        """The sum, end by end."""
+        """Returns the sum of low, central and high values."""
         return Range(self.low + other.low, self.central + other.central, self.high + other.high)
 
     def minus(self, other: Range) -> Range:
-        """The difference: least minus most is its low end, most minus least its high one."""
+        """Returns the difference; its low end is low minus high, its high end is high minus low."""
         return Range(self.low - other.high, self.central - other.central, self.high - other.low)
 
     def times(self, other: Range) -> Range:
-        """Low times low, central times central, high times high."""
+        """Returns the product of low, central and high values."""
         return Range(self.low * other.low, self.central * other.central, self.high * other.high)
 
 
@@ -56,18 +56,18 @@ class Footprint:
 
 
 def grids() -> dict[str, float]:
-    """Carbon intensity of electricity by region, in gCO2e per kWh, lowest first."""
+    """Returns the carbon intensity of electricity by region, in gCO2e per kWh, lowest first."""
     table = {k: float(v) for k, v in _facts()["grid"].items() if k != "source"}
     return dict(sorted(table.items(), key=lambda item: item[1]))
 
 
 def footprint(thing: str, units: int, grid: str) -> Footprint:
-    """Lifetime footprint of a number of ``"roadside_unit"`` or ``"onboard_box"``.
+    """Returns the lifetime footprint of devices: ``"roadside_unit"`` or ``"onboard_box"``.
 
     Raises
     ------
     KeyError
-        When the thing is unknown, or the grid is not one of :func:`grids`.
+        If the device is unknown, or the grid is not one of :func:`grids`.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def footprint(thing: str, units: int, grid: str) -> Footprint:
 
 
 def use_kg_per_year(energy_j_per_day: float, grid: str) -> float:
-    """Emissions of an energy per day, in a year, in kgCO2e.
+    """Returns the emissions of one year in kgCO2e, given the energy per day.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def use_kg_per_year(energy_j_per_day: float, grid: str) -> float:
 
 
 def grid_source() -> str:
-    """Where :func:`grids` has its values from."""
+    """Returns the source of the values of :func:`grids`."""
     return str(_facts()["grid"]["source"])
 
 

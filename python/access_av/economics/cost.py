@@ -19,13 +19,13 @@ class RoadsideUnitCost:
     source: str
 
     def total_usd(self, years: float) -> tuple[float, float]:
-        """Low and high cost over a number of years, without discounting."""
+        """Returns the low and high cost over a number of years, without discounting."""
         running = self.yearly_usd * years
         return self.capital_low_usd + running, self.capital_high_usd + running
 
 
 def roadside_units(units: int) -> RoadsideUnitCost:
-    """Cost of a number of roadside units.
+    """Returns the cost of a number of roadside units.
 
     Examples
     --------
@@ -43,19 +43,19 @@ def roadside_units(units: int) -> RoadsideUnitCost:
 
 
 def sensors() -> list[dict[str, Any]]:
-    """Sensors with ``name``, ``price_usd`` and ``source``: a LiDAR and a 5G adapter."""
+    """Returns a LiDAR and a 5G adapter as ``name``, ``price_usd`` and ``source``."""
     return list(shipped("economics", "cost.toml")["sensor"])
 
 
 def sensor_cost_ratio() -> float:
-    """How many 5G adapters one LiDAR costs."""
+    """Returns the price of a LiDAR divided by that of a 5G adapter."""
     lidar, adapter = sensors()
     return float(lidar["price_usd"] / adapter["price_usd"])
 
 
 @dataclass(frozen=True)
 class Saving:
-    """Energy that one way of driving saves against another, trip by trip.
+    """Energy saved by one configuration, compared with another one.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Saving:
     trip_s
         Duration of the trip.
     duty
-        Share of the day that is driven, trip after trip.
+        Share of the day in which the vehicle drives.
 
     Examples
     --------
@@ -78,14 +78,14 @@ class Saving:
 
     @property
     def trips_per_day(self) -> float:
-        """Trips of one vehicle in 24 hours."""
+        """Returns the number of trips of one vehicle in 24 hours."""
         return 86_400.0 * self.duty / self.trip_s
 
     @property
     def per_day_kj(self) -> float:
-        """One vehicle, 24 hours."""
+        """Returns the energy saved by one vehicle in 24 hours."""
         return self.per_trip_j * self.trips_per_day / 1e3
 
     def fleet_per_day_mj(self, vehicles: int) -> float:
-        """A fleet, 24 hours."""
+        """Returns the energy saved by a fleet in 24 hours."""
         return self.per_day_kj * vehicles / 1e3

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from access_av.paper.interpretations import Interpretation
     from access_av.paper.outcome import Drives
 
-# Intervals of the front, in ms: from every SSB to beyond the paper's t_max.
+# Intervals of the front in ms, from every SSB to more than the paper's t_max.
 FRONT_MS = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 150.0, 180.0, 240.0, 320.0, 480.0, 1000.0)
 # Fraction of the error below which a difference is irrelevant.
 LEAST_SHARE = 0.05
@@ -38,16 +38,16 @@ class Ablation:
     aoa_estimates, constant_aoa_estimates
         With the controller and with the constant.
     rms_error_m, constant_rms_m
-        RMS errors of both.
+        RMS errors with the controller and with the constant.
     gain_m
         RMS error with the constant minus that with the controller.
     gain_low_m, gain_high_m
-        Its paired 95 % interval: both drive the same runs, which are resampled together.
+        Ends of the paired 95 % interval of ``gain_m`` by a joint bootstrap over the common runs.
     matters
-        1 where the controller helps, -1 where it harms, 0 where it makes no difference. It makes
-        one where the whole interval is beyond :data:`LEAST_SHARE` of the error.
+        1: the controller helps, -1: it harms, 0: no relevant difference. A difference is relevant
+        if the whole interval exceeds :data:`LEAST_SHARE` of the error.
     constant
-        Drives with the constant.
+        Runs with the constant.
     """
 
     interpretation: str
@@ -69,7 +69,7 @@ class Ablation:
 
 
 def ablate(driver: Driver, evaluation: Evaluation) -> list[Ablation]:
-    """The ablation of an interpretation in every power mode that drives differently."""
+    """Returns the ablation of an interpretation in every power mode with different runs."""
     found = []
     base_seen = set()
     for case in cases(driver.platform):
@@ -89,7 +89,7 @@ def ablate(driver: Driver, evaluation: Evaluation) -> list[Ablation]:
 def compare(
     interpretation: str, mode: int, drives: Drives, constant: Drives, constant_ms: float
 ) -> Ablation:
-    """Drives with the controller against drives with the constant, on the same runs."""
+    """Compares runs with the controller and runs with the constant, with equal seeds."""
     gains_m = constant.rms_error_m - drives.rms_error_m
     low_m, high_m = np.quantile(gains_m[1:], (0.025, 0.975)) if len(gains_m) > 1 else (0.0, 0.0)
     least_m = LEAST_SHARE * float(drives.rms_error_m[0])
@@ -110,12 +110,12 @@ def compare(
 
 
 def front(driver: Driver, interpretation: Interpretation) -> list[tuple[float, Drives]]:
-    """MUSIC at fixed intervals from the shortest to the longest, in the interpretation's world."""
+    """Simulates MUSIC at fixed intervals in the environment of an interpretation."""
     return [(ms, driver.drive(fixed(interpretation.scenario, ms)).drives) for ms in FRONT_MS]
 
 
 def fixed(scenario: Scenario, interval_ms: float) -> Scenario:
-    """The scenario with MUSIC at a fixed interval."""
+    """Returns the scenario with MUSIC at a fixed interval."""
     return scenario.with_overrides(
         {
             "vehicle.estimator.method": "music",
@@ -140,9 +140,9 @@ def _fixed(
 def _gated(
     driver: Driver, interpretation: Interpretation, drives: Drives, base_ms: float
 ) -> tuple[float, Drives]:
-    """A constant behind the same gate: of those that an SSB period apart, the nearest in number.
+    """Returns a constant with the same SNR gate and the nearest number of angle estimates.
 
-    More is never due than at the base wake-up time, and less the longer the constant is.
+    Candidates are multiples of the SSB period. The number of estimates decreases with the constant.
     """
     period_ms = paper_numbers()["wake_up"]["ssb_period_ms"]
     latest_ms = interpretation.wake_up.get("latest_ms", np.inf)

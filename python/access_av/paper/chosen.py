@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from access_av._core import Scenario
     from access_av.paper.driver import Driver
 
-# Drives of an alternative: a table that says what matters, not a verdict.
+# Number of runs of an alternative, sufficient for a comparison but not for a verdict.
 RUNS = 30
 BASE_MS, EVERY_SSB_MS = 80.0, 20.0
 
 
 @dataclass(frozen=True)
 class Effect:
-    """The shipped interpretation in mode 0 with one thing chosen otherwise.
+    """Result of the shipped interpretation in mode 0 with one alternative value.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ def effects(
         for other in entry["alternatives"]:
             there = _driven(driver, paper.with_overrides(other["changes"]))
             found.append(Effect(what, other["value"], why, False, **there))
-        # A world is driven through once.
+        # An environment is used only once, so that its traces can be deleted.
         del driver.traces[1:]
         if progress is not None:
             progress(index + 1, len(chosen))

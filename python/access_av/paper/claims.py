@@ -31,27 +31,28 @@ INDEPENDENT = "independent"
 CALIBRATED = "calibrated"
 BY_CONSTRUCTION = "by construction"
 ARITHMETIC = "arithmetic"
-# From the one that says most to the one that says least.
+# Kinds of evidence, the strongest first.
 EVIDENCE = (INDEPENDENT, CALIBRATED, BY_CONSTRUCTION, ARITHMETIC)
 # Kinds whose claims are not counted as reproduced: no simulation can contradict them.
 NO_EVIDENCE = (BY_CONSTRUCTION, ARITHMETIC)
 
-# A verdict turns with the seed unless its margin is this many standard deviations of the difference
-# between two seeds away from zero: 99 % of other seeds agree.
+# Minimum margin of a seed-independent verdict, in standard deviations of the difference between two
+# seeds: 99 % of other seeds give the same verdict.
 SAFE_DEVIATIONS = 2.58
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement of the paper under one interpretation, and what is obtained for it.
+    """One statement of the paper, and the simulated result under one interpretation.
 
     Attributes
     ----------
     interval
-        95 % interval of ``obtained`` over the runs; ``None`` where nothing is drawn, or for modes.
+        95 % interval of ``obtained`` over the runs; ``None`` for results that are not random, and
+        for sets of modes.
     seed_sensitive
-        Whether other runs may give another verdict: by its margin's spread over the runs, or
-        because another seed that was tried did.
+        Whether other runs may give another verdict: by the standard deviation of the margin, or
+        because another seed gave one.
     verdict
         One of :data:`VERDICTS`.
     evidence
@@ -61,9 +62,9 @@ class Claim:
     tolerance
         Maximum allowed deviation; ``None`` without one.
     spread
-        How far single trips depart from a mean over the runs, where the claim is of one.
+        Deviation of single trips from the mean, if the claim is about a mean over the runs.
     met_by_seed
-        Whether the claim is met by the runs of each seed, where it was judged with several.
+        Whether the claim is met with each seed, if several seeds were simulated.
     """
 
     interpretation: str
@@ -85,12 +86,12 @@ class Claim:
 
     @property
     def reproduced(self) -> bool:
-        """Whether the claim is met, and evidence supports it: not by arithmetic or construction."""
+        """Whether the claim is met by evidence other than arithmetic or construction."""
         return self.verdict == REPRODUCED
 
     @property
     def met(self) -> bool:
-        """Whether the claim is met, whatever the kind of evidence."""
+        """Whether the claim is met, with any kind of evidence."""
         return self.verdict in (REPRODUCED, AGREES)
 
     @property
@@ -100,7 +101,7 @@ class Claim:
 
     @property
     def seeds_met(self) -> str:
-        """With how many of its seeds it is met, where they disagree; else nothing."""
+        """Text with the number of seeds that meet the claim; empty if all seeds agree."""
         met = self.met_by_seed.values()
         return f"{sum(met)}/{len(met)}" if 0 < sum(met) < len(met) else ""
 
@@ -110,10 +111,10 @@ def evidence(
     chosen: Collection[str],
     freedoms: Collection[str] = energy_fit.SHIPPED,
 ) -> str:
-    """Returns the weight of evidence of a met claim; ``chosen`` was chosen with the claims known.
+    """Returns the kind of evidence of a met claim.
 
-    ``freedoms`` are those of the energies per execution: what one of them solves for is met by
-    construction.
+    ``chosen`` are parameters that were selected with the claims known. ``freedoms`` are the fit
+    parameters of the energies: a claim that determines one of them is met by construction.
 
     Examples
     --------
@@ -136,21 +137,21 @@ def check_claims(
     freedoms: Collection[str] = energy_fit.SHIPPED,
     stated: Mapping[str, Any] | None = None,
 ) -> list[Claim]:
-    """Judge every claim of the paper, in the paper's order.
+    """Evaluates every claim of the paper, in the paper's order.
 
     Parameters
     ----------
     outcome
         Campaigns of one interpretation; variants after the first are resamples of its runs.
     interpretation
-        Its name.
+        Name of the interpretation.
     chosen
         Parameters of the interpretation that were chosen with the claims known.
     freedoms
         Degrees of freedom of the fitted energies per estimate.
     stated
-        Claims as ``paper.toml`` has them; its own when ``None``. One that cannot be judged says why
-        in its note, and the others are judged.
+        Claims in the format of ``paper.toml``. Default: this file. The note of a claim that cannot
+        be evaluated contains the reason.
     """
     return [
         _judge(claim_id, entry, outcome, interpretation, evidence(entry, chosen, freedoms))
@@ -159,7 +160,7 @@ def check_claims(
 
 
 def margins(outcome: Outcome) -> dict[str, Numbers]:
-    """Returns the margin of each claim in every variant, without claims that cannot be judged."""
+    """Returns the margins of the claims in every variant; omits claims without a value."""
     found = {}
     for claim_id, entry in stated_claims().items():
         if entry["rule"] == NOT_TESTABLE:
@@ -172,7 +173,7 @@ def margins(outcome: Outcome) -> dict[str, Numbers]:
 
 
 def with_seeds(claims: Mapping[int, list[Claim]]) -> list[Claim]:
-    """The claims of the first seed, with the verdicts of the others; all in the same order."""
+    """Returns the claims of the first seed with the verdicts of the other seeds."""
     first, *_ = claims.values()
     made = []
     for index, claim in enumerate(first):
@@ -183,7 +184,7 @@ def with_seeds(claims: Mapping[int, list[Claim]]) -> list[Claim]:
 
 
 def as_records(claims: list[Claim]) -> list[dict[str, Any]]:
-    """Give the claims as plain values, for JSON."""
+    """Returns the claims as plain values for JSON."""
     return [asdict(claim) for claim in claims]
 
 
@@ -197,7 +198,9 @@ def _judge(
     else:
         try:
             if claim_id not in FINDINGS:
-                raise InputError(f"nothing is obtained for it; claims are: {', '.join(FINDINGS)}")
+                raise InputError(
+                    f"no result exists for this claim; claims are: {', '.join(FINDINGS)}"
+                )
             finding = FINDINGS[claim_id](outcome)
             by = np.atleast_1d(margin(entry, finding.value))
             met = bool(by[0] >= 0.0)
@@ -229,12 +232,12 @@ def _judge(
 
 
 def _tolerance(entry: Mapping[str, Any]) -> float | None:
-    """Maximum allowed deviation under the rule ``about``."""
+    """Returns the maximum allowed deviation of the rule ``about``."""
     return float(entry.get("tolerance", 0.0)) if entry["rule"] == "about" else None
 
 
 def _deviation(entry: Mapping[str, Any], value: Any) -> float | None:
-    """Maximum relative deviation under the rule ``about``."""
+    """Returns the maximum relative deviation of the rule ``about``."""
     if entry["rule"] != "about":
         return None
     exact = margin({**entry, "tolerance": 0.0}, value)

@@ -33,12 +33,12 @@ SURE = 1.96
 
 @dataclass(frozen=True)
 class Point:
-    """One way to localize in one power mode, over the same runs.
+    """One localization method in one power mode, with equal runs.
 
     Attributes
     ----------
     energy_j
-        Energy of a trip, by extent of the parameters: low, value, high.
+        Energy of a trip by the end of the parameter ranges: low, value, high.
     boundary
         Components that the energy includes.
     """
@@ -52,12 +52,13 @@ class Point:
 
 @dataclass(frozen=True)
 class Compared:
-    """Paper and ours in a power mode.
+    """Comparison of the paper's method and the proposed method in a power mode.
 
     Attributes
     ----------
     paper, policy, engine
-        The paper's adaptive point; our tracker and policy in its accounting; and on our engine.
+        The paper's adaptive point; the proposed tracker and policy in the paper's accounting; and
+        both with the proposed engine.
     rms_error_reduction_m
         RMS error of the paper minus that of the proposed method: mean and 95 % interval.
     """
@@ -70,17 +71,17 @@ class Compared:
 
     @property
     def policy_ratio(self) -> float:
-        """Our energy over the paper's in its accounting, where the range is worst for us."""
+        """Maximum energy ratio of proposed and paper's method, in the paper's accounting."""
         return _worst_ratio(self.policy, self.paper)
 
     @property
     def engine_ratio(self) -> float:
-        """Returns the energy saved on the proposed engine."""
+        """Maximum energy ratio of proposed and paper's method, with the proposed engine."""
         return _worst_ratio(self.engine, self.paper)
 
     @property
     def is_better(self) -> bool:
-        """In error, with 95 %, and in energy in its own accounting, over the whole range."""
+        """Whether error (with 95 % confidence) and energy (over the whole range) are smaller."""
         return self.rms_error_reduction_m[1] > 0.0 and self.policy_ratio < 1.0
 
 
@@ -92,7 +93,7 @@ def compare(
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Compared]:
-    """Compare in every power mode, on the paper's trip under one of its interpretations."""
+    """Compares both methods in every power mode, on the paper's trip under one interpretation."""
     scenario = load(interpretation).scenario
     papers = Platform(Platform.load(PAPERS_BOARD).core.with_overrides({"receiver.counted": True}))
     ours = Platform.load(OUR_BOARD)

@@ -1,4 +1,4 @@
-"""Simulates each setting once, one after another."""
+"""Simulation of the settings of an evaluation, each once, with a memory of the results."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from access_av.statistics.percentiles import Percentile
 
 RESAMPLES = 200
-# Percentiles are over every 25th SSB, half a second apart: closer errors are correlated.
+# Percentiles use every 25th SSB (0.5 s), because closer errors are correlated.
 SPARSE = 25
 # Methods of the paper that are simulated in every environment.
 TAPED = tuple(method.replace("_", "-") for method in METHODS)
@@ -33,14 +33,14 @@ TAPED = tuple(method.replace("_", "-") for method in METHODS)
 
 @dataclass(frozen=True)
 class Driven:
-    """A setting's drives, their statistics at each SSB, and some of their horizontal errors."""
+    """Results of a setting: runs, statistics at each SSB, and some horizontal errors."""
 
     drives: Drives
     steps: pl.DataFrame
     error_m: NDArray[np.float32]
 
     def percentiles(self) -> list[Percentile]:
-        """Percentiles of the horizontal error, over all runs and times."""
+        """Returns percentiles of the horizontal error over all runs and times."""
         driven_s = len(self.error_m) * float(self.steps["time_s"][-1])
         independent = max(1, int(driven_s / INDEPENDENT_S))
         return percentiles(self.error_m, independent=independent, resamples=RESAMPLES)
@@ -48,7 +48,7 @@ class Driven:
 
 @dataclass
 class Driver:
-    """Simulates settings on one platform with one seed, and remembers what it has driven."""
+    """Simulates settings on one platform with one seed, and stores the results."""
 
     platform: Platform
     runs: int
@@ -63,14 +63,14 @@ class Driver:
 
     @property
     def trip_s(self) -> float:
-        """Duration of the trip that was driven."""
+        """Returns the duration of the simulated trip."""
         steps = next(iter(self.known.values())).steps
         return float(steps.select(pl.col("time_s").max()).item())
 
     def drive(self, scenario: Scenario) -> Driven:
-        """Many drives of a scenario, from memory where another one is the same but for its name."""
+        """Simulates runs of a scenario, unless an equal scenario was simulated before."""
         first_mode = self.platform.modes[0].number
-        # A power mode acts by its base wake-up time, which is written out here.
+        # A power mode affects the runs only by its base wake-up time, which is resolved here.
         scenario = scenario.resolved(self.platform.core).with_overrides(
             {"name": "drive", "description": "", "vehicle.platform.mode": first_mode}
         )
@@ -83,7 +83,7 @@ class Driver:
         return self.known[key]
 
     def _simulate(self, scenario: Scenario) -> Simulation:
-        """From tape, so that a world's angles are estimated once for all policies in it."""
+        """Simulates with measurement traces, which estimate each angle once for all policies."""
         core, threads = self.platform.core, self.threads
         serving = [it for it in self.traces if it.serve(scenario, platform=core)]
         if not serving:
@@ -96,8 +96,8 @@ class Driver:
                 threads=threads,
             )
             serving = [it for it in [made] if it and it.serve(scenario, platform=core)]
-            # A tape takes 100 MB: the first world, which most interpretations are in, and the
-            # latest stay.
+            # A trace takes 100 MB. Keep that of the first environment, which most interpretations
+            # use, and the latest ones.
             self.traces = [*self.traces[:1], *serving]
         if not serving:
             return simulate(
@@ -118,7 +118,7 @@ class Driver:
         drives = Drives.of_runs(
             found.runs["aoa_estimates"].to_numpy().astype(np.float64), found.errors_m, weights
         )
-        # The sample in double precision.
+        # The original sample has double precision.
         exact: dict[str, Any] = {}
         for axis in "xy":
             worst_m = getattr(drives, f"worst_{axis}_m").copy()

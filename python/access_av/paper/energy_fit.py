@@ -38,25 +38,26 @@ if TYPE_CHECKING:
     from access_av.paper.outcome import Numbers
 
 HIGH_SAVING_MODES = (6, 7)
-# Claims of the budget that only mode 7 keeps, and of the wide one that the modes it lists keep.
+# Claims about the budget of 210 J, which only mode 7 meets, and about 260 J, which the listed modes
+# meet.
 NARROW_BUDGET, WIDE_BUDGET = "d1_budget_210_j", "d2_budget_260_j_rms_015_m"
 NEEDED_MODES = {0, 7, *of_claim(WIDE_BUDGET)}
-# Distance kept from a stated bound, so that another seed does not cross it.
+# Relative margin to a stated bound, so that another seed does not cross the bound.
 MARGIN = 0.02
-# How far the factor may take ESPRIT's and Root-MUSIC's power from their ratio in mode 0.
+# Range of the common factor of ESPRIT's and Root-MUSIC's power ratio.
 LEAST_FACTOR, MOST_FACTOR = 0.5, 2.0
 
 
 @dataclass(frozen=True)
 class Freedom:
-    """Something that the energies per execution may be chosen by.
+    """A degree of freedom of the fit.
 
     Attributes
     ----------
     says
         Description.
     free, solved
-        Numbers that it adds, and how many of them are solved for from stated figures.
+        Number of additional parameters, and number of these that are solved from stated figures.
     """
 
     says: str
@@ -64,8 +65,8 @@ class Freedom:
     solved: int
 
 
-# Without any there is one number, MUSIC's power in mode 0, solved for from its sum there; it goes
-# with the clock as that of a busy core does, and the methods draw the same.
+# The minimum fit has one parameter: the power of MUSIC in mode 0, solved from its stated sum. It
+# depends on the clock like that of a busy core and is equal for all methods.
 NONE = Freedom("the power of a busy core by its clock, the same for all methods", 1, 1)
 FREEDOMS = {
     "ratio": Freedom("one power ratio per method, the same in all modes", 2, 2),
@@ -76,7 +77,7 @@ SHIPPED = ("ratio", "mode")
 
 
 def numbers(freedoms: Collection[str] = SHIPPED) -> tuple[int, int]:
-    """How many numbers a fit is free in, and how many of them are solved for.
+    """Returns the number of parameters of a fit, and the number of solved ones.
 
     Examples
     --------
@@ -98,7 +99,7 @@ class ModeDemand:
     base_wake_up_s
         Base wake-up time by method.
     fixed_aoa_estimates
-        Angle estimates at that interval, by method.
+        Angle estimates at the base wake-up time, by method.
     adaptive_aoa_estimates
         Angle estimates of adaptive MUSIC, mean over the runs; an array for several interpretations
         at once.
@@ -111,14 +112,14 @@ class ModeDemand:
 
 
 def busy_core_power_w(cpu_hz: float) -> float:
-    """Wall power of the board with one busy core (MLPerf fit, see the module's text)."""
+    """Returns the wall power of the board with one busy core (see the module docstring)."""
     return 6.97 + 0.148 * float((cpu_hz / 1.2e9) ** 3.96)
 
 
 def fit_energy(
     modes: Mapping[int, ModeDemand], freedoms: Collection[str] = SHIPPED
 ) -> dict[int, dict[str, Numbers]]:
-    """Energy per execution in joules, by mode and method.
+    """Returns the energy per execution in joules, by mode and method.
 
     Parameters
     ----------
@@ -130,12 +131,12 @@ def fit_energy(
     Returns
     -------
     dict
-        ``energies[mode][method]``, arrays where the angle estimates are.
+        ``energies[mode][method]``; arrays if the angle estimates are arrays.
 
     Raises
     ------
     InputError
-        When a mode that the paper gives figures for is missing.
+        If a mode with figures in the paper is missing.
     """
     if not modes.keys() >= NEEDED_MODES:
         raise InputError(
@@ -162,7 +163,7 @@ def fit_energy(
 
 
 def _fit_music(modes: Mapping[int, ModeDemand], *, own: bool) -> dict[int, Numbers]:
-    """MUSIC's energies; without a power of its own in each mode, those of the prior."""
+    """Returns MUSIC's energies; those of the prior unless each mode has its own power."""
     sums_j = paper_numbers()["energy_j"]
     narrow_j, wide_j = (
         float(of_claim(claim, "query")["max_energy_j"]) for claim in (NARROW_BUDGET, WIDE_BUDGET)
@@ -198,7 +199,7 @@ def _fit_music(modes: Mapping[int, ModeDemand], *, own: bool) -> dict[int, Numbe
 def _power_ratios_in_mode_0(
     modes: Mapping[int, ModeDemand], music_j: Numbers
 ) -> dict[str, Numbers]:
-    """Power of each method while it computes, relative to MUSIC, in mode 0."""
+    """Returns the computing power of each method relative to MUSIC, in mode 0."""
     fixed_j = paper_numbers()["energy_j"]["fixed_mode_0"]
     zero = modes[0]
     music_w = music_j / zero.base_wake_up_s["music"]
@@ -212,14 +213,14 @@ def _power_ratios_in_mode_0(
 
 
 def _follower(demand: ModeDemand, music_j: Numbers, method: str, ratio: Numbers) -> Numbers:
-    """Energy of an execution that draws ``ratio`` times MUSIC's power for its own base time."""
+    """Returns the energy of an execution with ``ratio`` times MUSIC's power."""
     return music_j * ratio * demand.base_wake_up_s[method] / demand.base_wake_up_s["music"]
 
 
 def _common_factor(
     modes: Mapping[int, ModeDemand], music: Mapping[int, Numbers], ratio: Mapping[str, Numbers]
 ) -> Numbers:
-    """Solve the average saving for the factor; the saving is linear in its inverse."""
+    """Returns the factor for a stated saving, which is linear in its inverse."""
     wanted: float = of_claim("e4_average_saving_percent") / 100.0
     constant = scaled = np.zeros(())
     for mode, demand in modes.items():

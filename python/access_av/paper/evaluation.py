@@ -46,7 +46,7 @@ class Setting:
     base_wake_up_ms: float
 
     def apply(self, scenario: Scenario) -> Scenario:
-        """The scenario with this method, and with this interval where it is a fixed one."""
+        """Returns the scenario with this method and, for a fixed interval, with this interval."""
         changes: dict[str, Any] = {"vehicle.estimator.method": self.method.replace("_", "-")}
         if not self.adaptive:
             changes["vehicle.wake_up"] = fixed_interval(scenario, self.base_wake_up_ms)
@@ -54,7 +54,7 @@ class Setting:
 
 
 def fixed_interval(scenario: Scenario, interval_ms: float) -> dict[str, Any]:
-    """Wake-up settings of a fixed interval, on the clock of the scenario's own policy."""
+    """Returns the wake-up settings of a fixed interval, with the SSB selection of the scenario."""
     wake_up = json.loads(scenario.to_json())["vehicle"]["wake_up"]
     clock = wake_up.get("trigger", wake_up).get("ssb_selection", "first-after")
     return {"policy": "fixed", "interval_ms": interval_ms, "ssb_selection": clock}
@@ -70,7 +70,7 @@ class Case:
 
 
 def cases(platform: Platform) -> list[Case]:
-    """Every operating point of the three campaigns on a platform."""
+    """Returns every operating point of the three campaigns on a platform."""
     for mode in platform.modes:
         if missing := [method for method in METHODS if method not in mode.base_wake_up_ms]:
             raise InputError(
@@ -106,7 +106,7 @@ class Evaluation(Result):
     outcome
         Numbers for the verdicts on the claims.
     refitted
-        Whether the energies per estimate were fitted to the paper, or are the platform's.
+        Whether the energies per estimate were fitted to the paper; otherwise those of the platform.
     freedoms
         Degrees of freedom of the fit, of :data:`access_av.paper.energy_fit.FREEDOMS`.
     duration_s, origin
@@ -149,13 +149,13 @@ class Evaluation(Result):
 
     @property
     def longest_gap_s(self) -> float:
-        """Longest time between two adaptive estimates, in any mode and run."""
+        """Maximum time between two adaptive estimates, over all modes and runs."""
         return max(float(drives.longest_gap_s) for drives in self.outcome.adaptive.values())
 
     def refit(self, freedoms: Sequence[str]) -> Evaluation:
         """Returns the evaluation with energies per estimate fitted with other degrees of freedom.
 
-        Nothing changes where they are the platform's own. Operating points keep theirs.
+        Energies of the platform are not changed. The table of operating points is not changed.
         """
         if not self.refitted:
             return self
@@ -164,11 +164,11 @@ class Evaluation(Result):
         return replace(self, outcome=outcome, freedoms=tuple(freedoms))
 
     def campaign(self, name: str) -> pl.DataFrame:
-        """Operating points of one campaign."""
+        """Returns the operating points of one campaign."""
         return self.points.filter(pl.col("campaign") == name)
 
     def series(self, point: Mapping[str, Any]) -> pl.DataFrame:
-        """Errors against time at an operating point."""
+        """Returns the errors over time at an operating point."""
         keys = ("method", "adaptive", "base_wake_up_ms")
         return self.errors.filter(*(pl.col(key) == point[key] for key in keys))
 
@@ -182,21 +182,21 @@ def evaluate(
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Evaluation:
-    """Run the three campaigns under one interpretation.
+    """Simulates the three campaigns under one interpretation.
 
     Parameters
     ----------
     interpretation
-        An interpretation, its name or path, or a scenario. Its estimator is replaced by each
-        campaign's, its wake-up policy by the fixed campaigns' intervals.
+        An interpretation, its name or path, or a scenario. Each campaign replaces the estimator;
+        the fixed campaigns also replace the wake-up policy.
     platform
         A platform, or the name or path of one.
     runs
-        Drives per setting.
+        Runs per setting.
     seed
         Seed of all random streams.
     threads
-        Worker threads, one per core at most and when ``None``. Results do not depend on it.
+        Worker threads. Default and maximum: one per core. Results do not depend on it.
     progress
         Called as ``progress(done, total)`` with numbers of drives.
 
@@ -250,7 +250,7 @@ def evaluate_with(driver: Driver, interpretation: Interpretation) -> Evaluation:
         points=pl.DataFrame(
             [_point(case, outcome, refitted) | errors[case.setting] for case in wanted],
             infer_schema_length=None,
-            # Without a single figure there would be no type either.
+            # A column without any value would have no type.
             schema_overrides={
                 **dict.fromkeys(("energy_j", *names()), pl.Float64),
                 "energy_provenance": pl.String,
@@ -277,9 +277,9 @@ def outcome_of(
 ) -> tuple[Outcome, bool]:
     """Returns the numbers for the verdicts, and whether the energies were fitted.
 
-    A platform whose energies were fitted to the paper gets those that fit the interpretation's own
-    angle estimates, those of the first variant unless ``fit_each``; one that was measured keeps its
-    figures.
+    If the platform's energies are fitted to the paper, they are fitted again to the angle estimates
+    of the interpretation: to the first variant, or to each one with ``fit_each``. Measured energies
+    are not changed.
     """
     every_ssb = {case.setting.method: each for case, each in drives if case.mode is None}
     fixed, adaptive = {}, {}

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class MissingFigureError(Exception):
-    """A power mode or an energy that a claim is about and the platform does not have."""
+    """Missing power mode or energy of the platform, which a claim needs."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Finding:
     conflict
         Remark if the claim is not met.
     spread
-        How far single trips depart from the mean.
+        Deviation of single trips from the mean.
     """
 
     value: Numbers | Mapping[Any, Any] | list[Any]
@@ -87,7 +87,7 @@ def _a2(outcome: Outcome) -> Finding:
     }
     mode, method = min(shares, key=lambda key: shares[key][0])
     least = np.min(np.broadcast_arrays(*shares.values()), axis=0)
-    return Finding(least, note=f"Closest rival: {label(method)} in mode {mode}.")
+    return Finding(least, note=f"Smallest difference: {label(method)} in mode {mode}.")
 
 
 def _a3(outcome: Outcome) -> Finding:
@@ -117,13 +117,13 @@ def _fixed_worst(outcome: Outcome, method: str) -> Numbers:
 
 
 def _errors_accumulate(outcome: Outcome) -> Finding:
-    """How much larger errors are in the last quarter of the trip than in the first."""
+    """Returns the ratio of the mean errors in the last and in the first quarter of the trip."""
     ratios = {case: drives.late_to_early for case, drives in outcome.fixed.items()}
     mode, method = min(ratios, key=lambda key: ratios[key][0])
     return Finding(
         np.min(np.broadcast_arrays(*ratios.values()), axis=0),
-        note=f"Mean error of the last quarter over that of the first; least: {label(method)} in "
-        f"mode {mode}.",
+        note="Mean error of the last quarter divided by that of the first; minimum: "
+        f"{label(method)} in mode {mode}.",
     )
 
 
@@ -145,12 +145,12 @@ def _adaptive(outcome: Outcome, mode: int) -> Drives:
 
 
 def energy_j(outcome: Outcome, mode: int, method: str, *, adaptive: bool = False) -> Numbers:
-    """Energy of a trip in a mode.
+    """Returns the energy of a trip in a mode.
 
     Raises
     ------
     MissingFigureError
-        When the platform lacks the mode, or an energy per execution of the method in it.
+        If the platform has no such mode, or no energy per execution of the method.
     """
     drives = _adaptive(outcome, mode) if adaptive else None
     if drives is None:
@@ -166,7 +166,7 @@ def energy_j(outcome: Outcome, mode: int, method: str, *, adaptive: bool = False
 
 
 def savings_percent(outcome: Outcome, mode: int) -> dict[str, Numbers]:
-    """Energy that adaptive MUSIC saves in a mode, against each fixed method."""
+    """Returns the energy saving of adaptive MUSIC in a mode, relative to each fixed method."""
     adaptive_j = energy_j(outcome, mode, "music", adaptive=True)
     return {
         method: np.asarray(100.0 * (1.0 - adaptive_j / energy_j(outcome, mode, method)))
@@ -183,7 +183,7 @@ def _e1(outcome: Outcome) -> Finding:
 
 
 def _aoa_estimates(outcome: Outcome, modes: tuple[int, ...]) -> Finding:
-    """The trip's duration over the base wake-up time, which is how the paper counts."""
+    """Returns the duration of the trip divided by the base wake-up time, as in the paper."""
     counts, driven = {}, []
     for method in METHODS:
         base_ms = [_base_wake_up_ms(outcome, mode)[method] for mode in modes]
@@ -192,8 +192,8 @@ def _aoa_estimates(outcome: Outcome, modes: tuple[int, ...]) -> Finding:
         driven.append(f"{label(method)} {least:.0f}")
     return Finding(
         counts,
-        note="The trip's duration over the base wake-up time. An SSB comes every 20 ms, and no "
-        f"estimate sooner than the base wake-up time allows: driven, {', '.join(driven)}.",
+        note="The trip's duration over the base wake-up time. With an SSB every 20 ms "
+        f"and the base wake-up time as minimum interval, the runs have: {', '.join(driven)}.",
     )
 
 
@@ -227,12 +227,12 @@ def _most_in_mode_0(outcome: Outcome) -> Finding:
     most = max(adaptive, key=lambda mode: np.atleast_1d(adaptive[mode])[0])
     return Finding(
         np.min(np.broadcast_arrays(*ratios.values()), axis=0),
-        note=f"Mode 0 over the next: {each}. Adaptive MUSIC takes most in mode {most}.",
+        note=f"Mode 0 over the next: {each}. Adaptive MUSIC needs most estimates in mode {most}.",
     )
 
 
 def _refrigerators(_: Outcome) -> Finding:
-    """Result computed from the savings in the paper, without simulation."""
+    """Returns the number of refrigerators, computed from the paper's savings without simulation."""
     kwh = float(of_claim("e6_fleet_of_100_saved_per_day_mj")) / 3.6
     each_kwh = float(paper_numbers()["day"]["refrigerator_kwh"])
     return Finding(
@@ -253,7 +253,7 @@ def _e3_saving(outcome: Outcome) -> Finding:
     )
     return Finding(
         np.minimum(*(_mean_saving_percent(outcome, mode) for mode in (6, 7))),
-        note=f"Mean over the three fixed methods, the lesser of both modes ({each}).",
+        note=f"Mean over the three fixed methods, minimum of both modes ({each}).",
     )
 
 
@@ -263,23 +263,23 @@ def _e4(outcome: Outcome) -> Finding:
     return Finding(
         np.mean(means, axis=0),
         note=(
-            "Mean over modes and methods. Against fixed MUSIC alone, where the energy per "
-            f"execution cancels out and nothing is fitted: {music[0]:.1f} %."
+            "Mean over modes and methods. Relative to fixed MUSIC only, which needs no "
+            f"fitted energy: {music[0]:.1f} %."
         ),
-        conflict="ESPRIT and Root-MUSIC draw MUSIC's power times one ratio each, the same in every "
-        "mode. A further factor in modes 1 to 5 can be solved for so that it comes true, and "
-        "nothing else speaks for one.",
+        conflict="The power of ESPRIT and Root-MUSIC is that of MUSIC times one ratio each, equal "
+        "in all modes. A further factor in modes 1 to 5 could be solved from this claim, but has "
+        "no other reason.",
     )
 
 
 def saved_per_trip_j(outcome: Outcome, mode: int) -> Numbers:
-    """Energy saving of adaptive MUSIC in a mode relative to MUSIC at its base wake-up time."""
+    """Returns the energy saving of adaptive MUSIC relative to MUSIC at its base wake-up time."""
     adaptive_j = energy_j(outcome, mode, "music", adaptive=True)
     return np.asarray(energy_j(outcome, mode, "music") - adaptive_j)
 
 
 def saving(outcome: Outcome, mode: int) -> Saving:
-    """Energy saving per day and fleet, for the original sample."""
+    """Returns the energy saving per day and fleet, for the original sample."""
     return Saving(
         per_trip_j=float(saved_per_trip_j(outcome, mode)[0]),
         trip_s=outcome.trip_s,
@@ -329,7 +329,7 @@ def _both_at_once(outcome: Outcome) -> Finding:
 
 
 def _settings(*names: str) -> Callable[[Outcome], Finding]:
-    """Values of the interpretation for the settings that the paper specifies."""
+    """Returns the values of the interpretation for the settings that the paper specifies."""
 
     def find(outcome: Outcome) -> Finding:
         if missing := [name for name in names if name not in outcome.settings]:

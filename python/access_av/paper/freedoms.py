@@ -19,29 +19,29 @@ if TYPE_CHECKING:
     from access_av.paper.claims import Claim
     from access_av.paper.evaluation import Evaluation
 
-# Returns the degrees of freedom cumulatively.
+# Sets of degrees of freedom, each with one more than the previous set.
 LADDER = tuple(tuple(FREEDOMS)[:count] for count in range(len(FREEDOMS) + 1))
 
 
 @dataclass(frozen=True)
 class FitOption:
-    """The claims under a fit of so much freedom.
+    """Claims under a fit with a set of degrees of freedom.
 
     Attributes
     ----------
     freedoms
-        All that the fit is free in.
+        Degrees of freedom of the fit.
     says
-        The one that comes with this step.
+        Description of the degree of freedom that this set adds.
     free, solved
-        How many numbers are free, and how many of them are solved for.
+        Number of fit parameters, and number of solved ones.
     reproduced, by_construction, by_arithmetic
         Number of claims under the shown interpretation that are reproduced, and of those that agree
         by construction or by arithmetic, which are not counted as reproduced.
     average_saving_percent
         Result of claim e4 under the shown interpretation.
     energy, both
-        Interpretations that keep the energy half, and of those the ones that keep both.
+        Interpretations that meet the energy claims, and those that meet both claim groups.
     """
 
     freedoms: tuple[str, ...]
@@ -56,7 +56,7 @@ class FitOption:
     both: tuple[str, ...]
 
     def as_row(self) -> dict[str, Any]:
-        """A row of the table ``fit_degrees_of_freedom``."""
+        """Returns a row of the table ``fit_degrees_of_freedom``."""
         return {
             "freedom": self.says,
             "free_numbers": self.free,
@@ -71,12 +71,12 @@ class FitOption:
 
     @property
     def is_shipped(self) -> bool:
-        """Whether the claims are judged by this fit."""
+        """Whether this fit determines the verdicts."""
         return self.freedoms == SHIPPED
 
 
 def met_halves(claims: Sequence[Claim]) -> tuple[bool, bool]:
-    """Whether the claims of one interpretation keep the accuracy half, and the energy half."""
+    """Returns whether an interpretation meets the accuracy claims, and the energy claims."""
     met = {claim.id for claim in claims if claim.met}
     return met.issuperset(half("accuracy")), met.issuperset(half("energy"))
 
@@ -87,18 +87,18 @@ def ladder(
     shown: str,
     stated: Mapping[str, Any] | None = None,
 ) -> list[FitOption]:
-    """The claims under ever more freedom; nothing where no energies were fitted.
+    """Returns the claims for each set of degrees of freedom; empty without fitted energies.
 
     Parameters
     ----------
     evaluations
-        One of each interpretation.
+        One evaluation per interpretation.
     claims
-        Theirs, under the shipped fit.
+        Claims of all interpretations under the shipped fit.
     shown
         Name of the interpretation whose claims are counted.
     stated
-        Claims as ``paper.toml`` has them; its own when ``None``.
+        Claims in the format of ``paper.toml``. Default: this file.
     """
     stated = stated_claims() if stated is None else stated
     # Verdicts without energies are unchanged.

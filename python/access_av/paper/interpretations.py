@@ -22,20 +22,20 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 OPEN = ("radio", "controller")
-# The one that the scenario `paper` is.
+# Interpretation of the scenario `paper`.
 SHIPPED = "gate"
 
 
 @dataclass(frozen=True)
 class Interpretation:
-    """One way to read the paper.
+    """An interpretation of the paper.
 
     Attributes
     ----------
     chosen
-        Parameters of :data:`OPEN` that were chosen with the paper's claims known.
+        Parameters of :data:`OPEN` that were selected with the paper's claims known.
     keeps_t_max
-        Whether it claims to keep t_max.
+        Whether the time between two estimates is meant to be at most t_max.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Interpretation:
 
     @property
     def wake_up(self) -> dict[str, Any]:
-        """Its wake-up settings."""
+        """Wake-up settings of the interpretation."""
         return dict(json.loads(self.scenario.to_json())["vehicle"]["wake_up"])
 
     @property
@@ -56,20 +56,20 @@ class Interpretation:
 
     @property
     def t_max_s(self) -> float | None:
-        """Its t_max; ``None`` where it has no controller."""
+        """The paper's t_max in seconds; ``None`` without a controller."""
         resolved = self.scenario.resolved()
         settings = json.loads(resolved.to_json())["vehicle"]["wake_up"]
         t_max_ms = settings.get("trigger", settings).get("t_max_ms")
         return None if t_max_ms is None else t_max_ms / 1e3
 
     def keeps(self, longest_gap_s: float) -> bool:
-        """Whether a longest time between two estimates keeps t_max, to the next SSB."""
+        """Returns whether a maximum gap is at most t_max plus one SSB period."""
         period_s = paper_numbers()["wake_up"]["ssb_period_ms"] / 1e3
         return self.t_max_s is None or longest_gap_s < self.t_max_s + period_s - 1e-9
 
 
 def names() -> list[str]:
-    """Names of the shipped interpretations, in the evaluation's order.
+    """Returns the names of the shipped interpretations, in the order of the evaluation.
 
     Examples
     --------
@@ -80,14 +80,14 @@ def names() -> list[str]:
 
 
 def load(name_or_path: str) -> Interpretation:
-    """A shipped interpretation by its name, or else a scenario file that is one.
+    """Loads a shipped interpretation by its name, or a scenario file by its path.
 
     Raises
     ------
     SettingsError
-        When the file cannot be used; names the key and what is allowed.
+        If the file is invalid; the message contains the key and the allowed values.
     InputError
-        When its trip is not the paper's; names the command that serves.
+        If its trip is not the paper's; the message contains a suitable command.
 
     Examples
     --------
@@ -113,17 +113,17 @@ def load(name_or_path: str) -> Interpretation:
 
 
 def load_all(chosen: Iterable[str] = ()) -> list[Interpretation]:
-    """These interpretations, or all that are shipped."""
+    """Loads these interpretations, or all shipped ones."""
     return [load(name) for name in list(chosen) or names()]
 
 
 def check_trip(scenario: Scenario) -> None:
-    """Refuse a scenario whose trip the paper's claims do not speak of.
+    """Rejects a scenario whose trip differs from that of the paper's claims.
 
     Raises
     ------
     InputError
-        Naming what differs, and the command that serves.
+        The message contains the difference and a suitable command.
 
     Examples
     --------

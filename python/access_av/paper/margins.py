@@ -1,7 +1,7 @@
 """Margins of the claims: the rules of ``paper.toml``.
 
-A margin is relative to what is stated, unless that is 0; it is positive where the claim is met, and
-continuous, so that it has an interval and a sensitivity. Obtained values may be arrays over
+A margin is relative to the stated value, unless this is 0. It is positive if the claim is met. It
+is continuous, so that it has an interval and a sensitivity. Obtained values may be arrays over
 variants.
 """
 
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from access_av.paper.outcome import Numbers
 
 
-# Settings that differ by less are the same.
+# Maximum relative difference of equal settings.
 ROUNDED = 1e-3
 
 
 def margin(entry: Mapping[str, Any], obtained: Any) -> Numbers:
-    """The margin of an obtained value under a claim's entry; below zero where it is not met.
+    """Returns the margin of an obtained value under a claim; negative if the claim is not met.
 
     Raises
     ------
     InputError
-        When the entry's rule is none of :data:`RULES`; names those there are.
+        If the rule of the claim is not in :data:`RULES`.
 
     Examples
     --------
@@ -48,7 +48,7 @@ def _least(margins: list[Numbers]) -> Numbers:
 
 
 def _each(compare: Callable[[float, Any, float], Numbers]) -> Callable[..., Numbers]:
-    """A comparison of numbers, or of several by name of which all have to be met."""
+    """Returns a comparison of numbers; of several numbers by name, all must be met."""
 
     def rule(entry: Mapping[str, Any], obtained: Any) -> Numbers:
         stated, tolerance = entry["stated"], float(entry.get("tolerance", 0.0))
@@ -64,7 +64,7 @@ def _at_most(stated: float, obtained: Any, _: float) -> Numbers:
 
 
 def _above(stated: float, obtained: Any, _: float) -> Numbers:
-    # The next number below: what equals the bound is not above it.
+    # Use the next smaller number, because a value equal to the bound is not above it.
     return np.asarray((obtained - np.nextafter(stated, np.inf)) / (stated or 1.0))
 
 
@@ -113,7 +113,7 @@ def _both(entry: Mapping[str, Any], obtained: Mapping[str, Numbers]) -> Numbers:
 def _equal(entry: Mapping[str, Any], obtained: Any) -> Numbers:
     stated = np.asarray(entry["stated"], dtype=np.float64)
     found = np.asarray(obtained, dtype=np.float64)
-    # The paper prints fewer digits of a clock than the board's makers.
+    # The paper rounds clock frequencies.
     alike = found.shape == stated.shape and np.allclose(found, stated, rtol=ROUNDED, atol=0.0)
     return np.asarray(0.0 if alike else -1.0)
 

@@ -47,7 +47,7 @@ class Dimension:
     choices: tuple[str, ...] = ()
 
     def at(self, coordinate: float) -> Any:
-        """The value at a coordinate from 0 to 1.
+        """Returns the value at a coordinate from 0 to 1.
 
         Examples
         --------
@@ -62,7 +62,7 @@ class Dimension:
 
     @property
     def range_text(self) -> str:
-        """Its range in words."""
+        """Range as text."""
         return ", ".join(self.choices) if self.choices else f"{self.low:g} to {self.high:g}"
 
 
@@ -81,10 +81,11 @@ OPEN_WORLD = (
     Dimension("axis", "array's axis", choices=("along", "across")),
     Dimension("odometer", "odometer", choices=("exact", "real")),
     Dimension("grid_deg", "MUSIC's grid / degrees", choices=("none", "0.5", "1")),
-    # The clock of fixed intervals too.
+    # The SSB selection also applies to fixed intervals.
     Dimension("ssb_selection", "between two SSBs", choices=("first-after", "last-before")),
 )
-# The world of the shipped scenario, up to its shadowing, which lasts for less than the range does.
+# Environment of the shipped scenario; its shadowing has a shorter correlation than the range
+# permits.
 SHIPPED_WORLD = (0.5, 0.875, 0.25, 0.0, 0.75, 1.0 / 3.0)
 CONTROLLER = (
     Dimension("link_error_db", "link budget off by / dB", -6.0, 6.0),
@@ -114,7 +115,7 @@ def world_changes(point: Mapping[str, Any]) -> dict[str, Any]:
         "vehicle.receiver.snapshots": round(point["snapshots"]),
     }
     if point.get("axis") == "across":
-        # To the right, where its ends are as far from the radio head as they can be.
+        # An array to the right, so that its axis is perpendicular to the direction of driving.
         changes["vehicle.array.mounting_rad"] = -0.5 * math.pi
     if point.get("odometer") == "real":
         changes["vehicle.odometer.scale_std"] = 0.003
@@ -157,7 +158,7 @@ def controller_changes(point: Mapping[str, Any], world: Mapping[str, Any]) -> di
 
 
 def latin_hypercube(count: int, dimensions: int, seed: int) -> Numbers:
-    """Points from 0 to 1 of which every dimension is covered evenly.
+    """Returns points from 0 to 1 that cover every dimension evenly.
 
     Examples
     --------
@@ -171,7 +172,7 @@ def latin_hypercube(count: int, dimensions: int, seed: int) -> Numbers:
 
 
 def named(dimensions: Sequence[Dimension], coordinates: Sequence[float]) -> dict[str, Any]:
-    """The values at coordinates, by the names of the dimensions."""
+    """Returns the values at coordinates, by the names of the dimensions."""
     return {
         dimension.name: dimension.at(float(coordinate))
         for dimension, coordinate in zip(dimensions, coordinates, strict=True)

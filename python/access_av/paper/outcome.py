@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 Numbers: TypeAlias = NDArray[np.float64]
-# Every fifth SSB is kept of the errors of resamples against time. Maxima, and all figures of the
-# sample itself, are over every SSB.
+# Interval, in SSBs, of the stored errors over time of resamples. Maxima, and all figures of the
+# original sample, use every SSB.
 EVERY = 5
 
 
@@ -31,9 +31,9 @@ class Drives:
     aoa_estimates, worst_x_m, worst_y_m, rms_error_m
         Arrays over variants. Worst is along the track, of the mean over runs of the absolute error.
     horizontal_m
-        Mean absolute errors in x and y, put together, against time: variants by every fifth SSB.
+        Root sum square of the mean absolute errors in x and y, shape (variants, every fifth SSB).
     longest_gap_s
-        Longest time between two estimates of any run.
+        Maximum time between two estimates, over all runs.
     besides_j
         Energy other than that of the estimates, if the platform includes it.
     worst_of_runs_m
@@ -59,13 +59,13 @@ class Drives:
 
     @property
     def worst_m(self) -> Numbers:
-        """The larger of X and Y."""
+        """Maximum of X and Y."""
         return np.maximum(self.worst_x_m, self.worst_y_m)
 
     def share_below(self, other: Drives) -> Numbers:
-        """Share of the track on which the mean error is below that of other drives.
+        """Returns the share of the track on which the mean error is below that of other runs.
 
-        The first variant is over every SSB if both are known there, resamples over every fifth.
+        The first variant uses every SSB if both have these errors; resamples use every fifth SSB.
         """
         found = np.asarray((self.horizontal_m < other.horizontal_m).mean(axis=1), dtype=np.float64)
         if self.track_m is not None and other.track_m is not None:
@@ -74,7 +74,7 @@ class Drives:
 
     @property
     def late_to_early(self) -> Numbers:
-        """Mean error of the last quarter of the trip divided by that of the first quarter."""
+        """Returns the mean error of the last quarter of the trip over that of the first."""
         found = _late_to_early(self.horizontal_m)
         if self.track_m is not None:
             found[0] = _late_to_early(self.track_m[None, :])[0]
@@ -84,7 +84,7 @@ class Drives:
     def of_runs(
         cls, aoa_estimates: Numbers, errors_m: NDArray[np.float32], weights: Numbers
     ) -> Drives:
-        """Drives from their runs.
+        """Returns the statistics of runs.
 
         Parameters
         ----------
@@ -172,5 +172,5 @@ def resamples(runs: int, count: int, seed: int = 0) -> Numbers:
 def _late_to_early(errors_m: Numbers) -> Numbers:
     quarter = errors_m.shape[1] // 4
     early, late = errors_m[:, :quarter], errors_m[:, -quarter:]
-    # The start is exact: its error is 0, and a nanometre stands for it.
+    # An exact start has an error of 0, which is replaced by a nanometre.
     return np.asarray(late.mean(axis=1) / np.maximum(early.mean(axis=1), 1e-9), dtype=np.float64)

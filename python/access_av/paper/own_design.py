@@ -27,13 +27,12 @@ if TYPE_CHECKING:
     from access_av.paper.evaluation import Evaluation
     from access_av.paper.outcome import Drives, Numbers
 
-# Horizontal error that it keeps with a probability of 90 %: the paper's 0.3 m.
+# Target error of the proposed policy with a probability of 90 %: the paper's 0.3 m.
 BOUND_M = 0.3
-# A wake-up comes before the bound demands it that takes so much variance away: chosen on this
-# trip, so that without the road it keeps the bound by it alone.
+# Minimum variance reduction of an early wake-up. The value was selected on this trip so that it
+# meets the target error without a road map.
 MIN_VARIANCE_REDUCTION_M2 = BOUND_M**2 / 200.0
-# It listens for SSBs so much stronger than the link budget says: three standard deviations of the
-# paper's fading.
+# SNR headroom of an early reception: three standard deviations of the paper's fading.
 HEADROOM_DB = 9.0
 
 
@@ -44,7 +43,7 @@ class Comparison:
     Attributes
     ----------
     map
-        Whether the tracker knows the road's course.
+        Whether the tracker has a road map.
     energy_j, papers_energy_j
         Energy of a trip; ``None`` if the platform has no value.
     rms_error_reduction_m, rms_error_reduction_low_m, rms_error_reduction_high_m
@@ -52,7 +51,7 @@ class Comparison:
     estimates_saved, estimates_saved_low, estimates_saved_high
         Difference of the numbers of estimates, with its paired 95 % interval.
     ours
-        Drives of our tracker.
+        Runs of the proposed tracker.
     """
 
     mode: int
@@ -79,12 +78,12 @@ class Comparison:
 
     @property
     def is_better(self) -> bool:
-        """In error and energy at once, with 95 % each."""
+        """Whether error and energy are both smaller, each with 95 % confidence."""
         return self.rms_error_reduction_low_m > 0.0 and self.estimates_saved_low > 0.0
 
 
 def tracked(scenario: Scenario, base_ms: float, *, knows_road: bool = True) -> Scenario:
-    """The scenario with our tracker, waking up when its own error asks for it."""
+    """Returns the scenario with the proposed tracker and uncertainty-driven wake-up."""
     return scenario.with_overrides(
         {
             "vehicle.localizer.kind": "tracker",
@@ -97,7 +96,7 @@ def tracked(scenario: Scenario, base_ms: float, *, knows_road: bool = True) -> S
                 "policy": "uncertainty",
                 "target_error_m": BOUND_M,
                 "base_ms": base_ms,
-                "min_variance_reduction_m2": 1e6,  # only where the bound demands it
+                "min_variance_reduction_m2": 1e6,  # wake up only for the target error
             },
         }
     )
@@ -114,7 +113,7 @@ def _ours(scenario: Scenario, base_ms: float, *, knows_road: bool) -> Scenario:
 
 
 def compare(driver: Driver, evaluation: Evaluation) -> list[Comparison]:
-    """Ours in every power mode, with the road's course and without it."""
+    """Compares the proposed method in every power mode, with and without a road map."""
     found = []
     for mode in driver.platform.modes:
         for knows_road in (True, False):
@@ -168,7 +167,7 @@ REAL = {
     "vehicle.start.position_std_m": 0.1,
     "vehicle.start.heading_std_rad": 0.02,
 }
-# One estimate, at the start: no trip lasts so long.
+# Interval for a single estimate at the start: longer than any trip.
 ONCE_MS = 3.6e6
 
 
@@ -183,12 +182,12 @@ class Fair:
     knows_road
         Whether the method has a map of the road.
     who
-        ``paper``, ``ours``, ``one angle``, or ``bound``: what no localizer can do better than, with
-        an angle at every SSB.
+        ``paper``, ``ours``, ``one angle``, or ``bound``: the lower bound of any localizer with an
+        angle at every SSB.
     rms_low_m, rms_high_m
         95 % interval of ``rms_m`` over the runs.
     drives
-        The drives; ``None`` of the bound.
+        Runs; ``None`` for the bound.
     """
 
     real_odometer: bool
@@ -203,12 +202,12 @@ class Fair:
 
     @property
     def variant(self) -> str:
-        """Odometer, road map and method, as the table of runs names them."""
+        """Odometer, road map and method, in the notation of the table of runs."""
         odometer = "real odometer" if self.real_odometer else "exact odometer"
         return f"{odometer}, {'' if self.knows_road else 'no '}road map, {self.who}"
 
     def as_row(self) -> dict[str, Any]:
-        """A row of the table ``equal_information``."""
+        """Returns a row of the table ``equal_information``."""
         return {
             "real_odometer": self.real_odometer,
             "map": self.knows_road,
@@ -233,7 +232,7 @@ def fair(driver: Driver, evaluation: Evaluation) -> list[Fair]:
     found = []
     for real in (False, True):
         if real:
-            # Another world, through which only MUSIC is driven.
+            # Another environment, in which only MUSIC is simulated.
             driver = replace(driver, methods=("music",), known={}, traces=[], progress=None)
         paper = evaluation.scenario.with_overrides(
             {"vehicle.platform.mode": mode.number, "vehicle.estimator.method": "music"}

@@ -1,4 +1,4 @@
-"""Tables of runs and of resamples, from which intervals and shares can be computed again."""
+"""Tables of runs and resamples, sufficient to compute intervals and shares again."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def of_drives(drives: Drives, energy_per_execution_j: float | None, **key: Any) 
     Parameters
     ----------
     drives
-        The setting's drives. Without single runs the table is empty.
+        Runs of the setting. The table is empty without single runs.
     energy_per_execution_j
         Energy per angle estimate; ``None`` if unknown.
     key
@@ -132,6 +132,6 @@ def resamples_of(evaluation: Evaluation) -> list[pl.DataFrame]:
 
 
 def joined(tables: Iterable[pl.DataFrame]) -> pl.DataFrame:
-    """Returns one table of many; an empty one without any."""
+    """Joins tables; returns an empty table without input."""
     found = [table for table in tables if not table.is_empty()]
     return pl.concat(found) if found else pl.DataFrame()

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sample:
-    """Interpretations and how they do by the claims.
+    """Sampled interpretations and the margins of their claims.
 
     Attributes
     ----------
@@ -54,15 +54,15 @@ class Sample:
     coordinates
         One row per interpretation, from 0 to 1.
     world
-        Which world each interpretation is in.
+        Index of the environment of each interpretation.
     margins
         Margins of each claim, in the order of the interpretations.
     longest_gap_s
-        Longest time between two estimates in any mode.
+        Maximum time between two estimates, over all modes.
     aoa_estimates
         Number of estimates of adaptive MUSIC in the platform's first mode.
     worst_error_m
-        Worst error of adaptive MUSIC in any mode.
+        Maximum error of adaptive MUSIC, over all modes.
     """
 
     dimensions: tuple[Dimension, ...]
@@ -74,7 +74,7 @@ class Sample:
     worst_error_m: Numbers
 
     def held(self) -> Numbers:
-        """How many claims each interpretation meets."""
+        """Returns the number of claims that each interpretation meets."""
         held = [margin >= 0.0 for margin in self.margins.values()]
         return np.asarray(np.sum(held, axis=0), dtype=np.float64)
 
@@ -84,7 +84,7 @@ class Sample:
         return [int(index) for index in np.lexsort((-short, -self.held()))]
 
     def values(self, index: int) -> dict[str, Any]:
-        """Sampled values of an interpretation."""
+        """Returns the sampled values of an interpretation."""
         return named(self.dimensions, self.coordinates[index].tolist())
 
 
@@ -99,21 +99,22 @@ def sample(
     everything: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Sample:
-    """Draw interpretations, and judge each by the paper's claims.
+    """Draws interpretations, and evaluates the paper's claims under each.
 
     Parameters
     ----------
     campaign
-        Who judges, and where each world with its controllers is kept.
+        Workers, and storage of each environment with its controllers.
     worlds, controllers
-        How many worlds, and how many controllers in each.
+        Number of environments, and number of controllers in each.
     runs
-        Drives per setting.
+        Runs per setting.
     everything
-        Whether all that the paper leaves open is drawn, a gate and a real head's power included;
-        without, it is Algorithm 1 without a gate in worlds like the shipped one, which comes first.
+        Whether all unspecified parameters are drawn, including an SNR gate and the power of a real
+        radio head. Otherwise Algorithm 1 without a gate is simulated in environments similar to the
+        shipped one, which is the first.
     progress
-        Called as ``progress(done, total)`` with numbers of worlds.
+        Called as ``progress(done, total)`` with numbers of environments.
     """
     own = (*OPEN_CONTROLLER, GATE) if everything else CONTROLLER
     world = OPEN_WORLD if everything else WORLD
@@ -157,7 +158,7 @@ def _task(
     runs: int,
     seed: int,
 ) -> Task:
-    """A part: several controllers in one world."""
+    """Returns one part: several controllers in one environment."""
     board = platform.to_toml()
     return Task(
         depends_on={
@@ -175,7 +176,7 @@ def _task(
 
 
 def _rule(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Part of a claim that determines its margin."""
+    """Returns the part of a claim that determines its margin."""
     return {key: entry.get(key) for key in ("rule", "stated", "tolerance", "query")}
 
 
@@ -186,9 +187,9 @@ def judge(
     runs: int,
     seed: int,
 ) -> dict[str, Numbers]:
-    """Margins of all claims, and the longest gap, of several controllers in one world.
+    """Returns margins of all claims and maximum gap, for several controllers in one environment.
 
-    ``board`` is the platform as TOML: it may come from another machine. On one thread.
+    ``board`` is the platform as TOML, because the task may run on another machine. Uses one thread.
     """
     platform = Platform(_core.Platform.from_toml(board))
     driver = Driver(platform, runs, seed, threads=1, count=0)
@@ -219,7 +220,7 @@ def judge(
 
 
 def _side_by_side(interpretations: list[Drives]) -> Drives:
-    """One setting under several interpretations, as variants."""
+    """Returns one setting under several interpretations, as variants."""
 
     def joined(name: str) -> Any:
         return np.concatenate([np.atleast_1d(getattr(each, name)) for each in interpretations])
@@ -265,7 +266,8 @@ def _toml(value: Any) -> str:
     return json.dumps(value)
 
 
-# How many of the best are driven again: with few runs, the best of many owes some to luck.
+# Number of best interpretations that are simulated again, because a maximum over few runs is
+# biased.
 CANDIDATES = 8
 
 
@@ -278,9 +280,9 @@ class Confirmed:
     label
         Rank in the search, or the parameter that differs from the best one.
     held
-        How many claims it meets.
+        Number of met claims.
     missed
-        Ids of the others.
+        Ids of the claims that are not met.
     """
 
     label: str
@@ -294,8 +296,8 @@ def confirmed(
 ) -> list[Confirmed]:
     """Simulates the best interpretations again, then the neighbours of the best one.
 
-    A neighbour differs by a tenth of a controller's dimension, or by another choice. The one that
-    meets most claims comes first; of several, the one that the search had first.
+    A neighbour differs by a tenth of the range of one controller parameter, or by another choice.
+    The order is by the number of met claims, then by the order of the search.
     """
 
     def again(worlds: Sequence[Mapping[str, Mapping[str, Any]]]) -> list[list[Confirmed]]:

@@ -13,7 +13,7 @@ ADAPTIVE_LABEL = label("music", adaptive=True)
 
 
 def paper_numbers() -> dict[str, Any]:
-    """The whole of ``paper.toml``: settings, energies, one entry per claim.
+    """Returns the content of ``paper.toml``: settings, energies, one entry per claim.
 
     Examples
     --------
@@ -24,7 +24,7 @@ def paper_numbers() -> dict[str, Any]:
 
 
 def stated_claims() -> dict[str, Any]:
-    """The entries of the claims by their ids, in the paper's order."""
+    """Returns the entries of the claims by their ids, in the paper's order."""
     return dict(paper_numbers()["claims"])
 
 
@@ -40,7 +40,7 @@ def of_claim(claim_id: str, key: str = "stated") -> Any:
 
 
 def half(name: str) -> tuple[str, ...]:
-    """Ids of the claims that are a half of the paper's promise, ``accuracy`` or ``energy``.
+    """Returns the ids of a claim group: ``accuracy`` or ``energy``.
 
     Examples
     --------

@@ -36,16 +36,16 @@ UNKNOWNS = (512, 2, 8)
 
 @dataclass(frozen=True)
 class Study:
-    """The paper under several interpretations.
+    """Evaluation of the paper under several interpretations.
 
     Attributes
     ----------
     evaluations
-        One per interpretation, in their order.
+        One evaluation per interpretation, in their order.
     claims
         Verdicts of all interpretations.
     ablations
-        Each interpretation with a constant in the controller's place, by power mode.
+        Each interpretation with a constant in place of the controller, by power mode.
     front
         MUSIC at fixed intervals, in ms.
     proposed_vs_paper
@@ -53,7 +53,7 @@ class Study:
     sensitivity
         Sensitivity of the claims, if requested.
     unusable
-        Interpretations that could not be evaluated, and why.
+        Interpretations that could not be evaluated, with the reason.
     fit_options
         Claims met with each degree of freedom of the energy fit.
     equal_information
@@ -76,16 +76,16 @@ class Study:
 
     @property
     def shown(self) -> Evaluation:
-        """Evaluation that the report shows in full: of the shipped interpretation, or the first."""
+        """Evaluation in the report: of the shipped interpretation, otherwise the first."""
         shipped = (each for each in self.evaluations if each.interpretation.name == SHIPPED)
         return next(shipped, self.evaluations[0])
 
     def of(self, interpretation: str) -> list[Claim]:
-        """The claims under one interpretation."""
+        """Returns the claims under one interpretation."""
         return [claim for claim in self.claims if claim.interpretation == interpretation]
 
     def tables(self) -> dict[str, pl.DataFrame]:
-        """Returns the written tables; columns as :mod:`access_av.columns` has them."""
+        """Returns the written tables; see :mod:`access_av.columns`."""
         named = {
             name: pl.concat(
                 [
@@ -131,7 +131,7 @@ class Study:
         return tables
 
     def _runs(self) -> Iterator[pl.DataFrame]:
-        """Yields the runs of every setting: operating points, and what they are compared with."""
+        """Yields the runs of every setting: operating points and their references."""
         for each in self.evaluations:
             yield from run_tables.runs_of(each)
         music: dict[str, Any] = {"method": "music", "mode": None, "base_wake_up_ms": None}
@@ -173,33 +173,32 @@ def study(
     stated: Mapping[str, Any] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Study:
-    """Evaluate interpretations, judge the claims, and hold them against constants and against ours.
+    """Evaluates interpretations and claims; compares with constants and with the proposed method.
 
     Parameters
     ----------
     seeds
-        With how many seeds the claims are judged, from ``seed`` on; all else is of it alone.
+        Number of seeds for the claims, starting at ``seed``; all other results use ``seed`` only.
     unknowns
-        Who draws a sample of what the paper leaves open, and where it is kept; without, none is
-        drawn, and nothing that was chosen is changed.
+        Campaign of the sensitivity analysis. Default: no sensitivity analysis and no alternative
+        assumptions.
     stated
-        Claims as ``paper.toml`` has them; its own when ``None``.
+        Claims in the format of ``paper.toml``. Default: this file.
 
     Raises
     ------
     InputError
-        When no interpretation can be evaluated; names why.
+        If no interpretation can be evaluated; the message contains the reason.
     """
     started = time.monotonic()
-    # Four adaptive settings and as many constants an interpretation; the fixed ones and the front
-    # once.
+    # Per interpretation four adaptive settings and four constants; fixed settings and front once.
     planned = 8 * len(chosen) + len({case.setting for case in cases(platform)}) + 24
     driver = Driver(platform, runs, seed, threads, progress=progress, planned=planned)
     evaluations, ablations, unusable = [], [], {}
     for interpretation in chosen:
         try:
             evaluations.append(evaluate_with(driver, interpretation))
-            # At once, while the driver has its world on tape.
+            # Compute the ablation now, while the driver has the traces of this environment.
             ablations += ablation.ablate(driver, evaluations[-1])
         except SettingsError as error:
             unusable[interpretation.name] = str(error)
@@ -253,7 +252,7 @@ def study(
 def judged(
     evaluations: Sequence[Evaluation], stated: Mapping[str, Any] | None = None
 ) -> list[Claim]:
-    """The claims under every interpretation."""
+    """Returns the claims under every interpretation."""
     return [
         claim
         for each in evaluations

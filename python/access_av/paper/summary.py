@@ -30,16 +30,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Half:
-    """Which halves hold under an interpretation, and what carries them.
+    """Claim groups that hold under an interpretation, with their conditions.
 
     Attributes
     ----------
     gated
-        Whether estimates wait for a better SSB, which the paper's Algorithm 1 does not say.
+        Whether estimates wait for a better SSB, which is not part of the paper's Algorithm 1.
     keeps_t_max
-        Whether no two estimates are further apart than its t_max, as measured.
+        Whether the maximum time between two estimates is at most t_max in the simulation.
     controller
-        In how many of the power modes the controller helps, makes no difference, and harms.
+        Numbers of power modes in which the controller helps, has no effect, and harms.
     """
 
     interpretation: Interpretation
@@ -52,7 +52,7 @@ class Half:
 
 
 def halves(study: Study) -> list[Half]:
-    """Which halves hold under each interpretation."""
+    """Returns the claim groups that hold under each interpretation."""
     found = []
     for each in study.evaluations:
         accuracy, energy = met_halves(study.of(each.interpretation.name))
@@ -80,7 +80,7 @@ def controller(ablations: Sequence[Ablation]) -> tuple[int, int, int]:
 
 
 def controller_text(counts: tuple[int, int, int]) -> str:
-    """Returns the counts in words.
+    """Returns the counts as text.
 
     Examples
     --------
@@ -152,11 +152,11 @@ def main_figures(study: Study) -> list[MainFigure]:
 
 
 def headline(study: Study) -> str:
-    """Which claim groups hold together, in a line."""
+    """Returns one line about the claim groups that hold together."""
     found = halves(study)
     both = [half for half in found if half.accuracy and half.energy]
     if any(not half.gated and half.keeps_t_max for half in both):
-        return "The paper's accuracy and its saving hold together under Algorithm 1 as it stands"
+        return "The paper's accuracy and its saving hold together under the published Algorithm 1"
     if both and all(half.gated for half in both):
         return "Accuracy and saving hold together only if estimates wait for a better SSB"
     if both:
@@ -192,7 +192,7 @@ def _saving_percent(study: Study, half: Half) -> float | None:
 
 
 def lead(study: Study) -> str:
-    """Which claim groups hold under which interpretations, and why."""
+    """Returns a paragraph about the claim groups that hold under each interpretation."""
     found = halves(study)
 
     def titles(chosen: list[Half]) -> str:
@@ -227,13 +227,13 @@ def lead(study: Study) -> str:
             sentences.append(
                 f"Under “{half.interpretation.title}” estimates wait for a better SSB, which "
                 "Algorithm 1 "
-                f"does not say; {t_max}, and Algorithm 1 {controller_text(half.controller)} "
-                "against a constant in its place."
+                f"does not contain; {t_max}. Compared with a constant, Algorithm 1 "
+                f"{controller_text(half.controller)}."
             )
         else:
             sentences.append(
                 f"Under “{half.interpretation.title}” {t_max}, and Algorithm 1 "
-                f"{controller_text(half.controller)} against as many fixed wake-ups."
+                f"{controller_text(half.controller)} compared with as many fixed wake-ups."
             )
     return " ".join(filter(None, [*sentences, bought_text(study)]))
 
@@ -252,7 +252,7 @@ def seeds_text(study: Study) -> str:
 
 
 def shown_value(value: Any) -> str:
-    """A claim's stated or obtained value; a table of settings row by row.
+    """Returns a stated or obtained value as text; a table of settings row by row.
 
     Examples
     --------
@@ -274,7 +274,7 @@ def counts(claims: Sequence[Claim]) -> dict[str, tuple[int, int]]:
 
 
 def counts_text(claims: Sequence[Claim]) -> str:
-    """Returns the numbers of reproduced claims, and apart from them of those without evidence.
+    """Returns the numbers of reproduced claims and, separately, of claims without evidence.
 
     Claims that agree by construction or by arithmetic are not counted as reproduced.
     """
@@ -291,7 +291,7 @@ def counts_text(claims: Sequence[Claim]) -> str:
 
 
 def ours_text(study: Study) -> str:
-    """Comparison of the proposed method with the paper's adaptive point, with and without a map."""
+    """Returns a text that compares the proposed method with the paper's adaptive point."""
     sentences = []
     for knows_road, who in (
         (False, "The tracker with uncertainty-driven wake-up and without a road map"),
@@ -317,7 +317,7 @@ def ours_text(study: Study) -> str:
 
 
 def fair_text(study: Study) -> str:
-    """Comparison of the proposed method and the paper's method with equal information."""
+    """Returns a text that compares both methods with equal information."""
     rms_m = {
         (each.real_odometer, each.knows_road, each.who): each.rms_m
         for each in study.equal_information

@@ -58,18 +58,18 @@ class Index:
 
     @property
     def half_width(self) -> float:
-        """Half the width of the total index's 95 % interval."""
+        """Half of the width of the 95 % interval of the total index."""
         return 0.5 * (self.total_high - self.total_low)
 
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Indices of all claims, and the share of the space in which each holds.
+    """Sobol indices of all claims, and the share of the parameter space in which each claim holds.
 
     Attributes
     ----------
     holds, holds_interval
-        Share by claim, with its 95 % interval.
+        Share of the parameter space by claim, with its 95 % interval.
     explained
         Share of the margin's variance that the expansion explains, by claim.
     sample
@@ -86,7 +86,7 @@ class Unknowns:
 
     @property
     def matter(self) -> list[Index]:
-        """Total indices of :data:`MATTERS` or more, of claims that something can speak for.
+        """Returns total indices of at least :data:`MATTERS`, for claims with evidence.
 
         Claims by construction and by arithmetic are excluded.
         """
@@ -139,10 +139,9 @@ class Unknowns:
 
 
 def sobol(sample: Sample, runs: int, *, seed: int = 0, count: int = RESAMPLES) -> Unknowns:
-    """Sobol indices of a sample of interpretations; claims whose margin never changes have none.
+    """Returns the Sobol indices of a sample; claims with a constant margin have none.
 
-    A margin m counts as m / (1 + |m|), so that what is missed a hundredfold does not outweigh all
-    else.
+    A margin m is replaced by m / (1 + |m|), so that extreme margins do not dominate the variance.
     """
     names = [name for name, margin in sample.margins.items() if np.ptp(margin) > 1e-9]
     margins = [sample.margins[name] / (1.0 + np.abs(sample.margins[name])) for name in names]
@@ -187,7 +186,7 @@ def sobol(sample: Sample, runs: int, *, seed: int = 0, count: int = RESAMPLES) -
 
 
 def expansion(coordinates: Numbers, levels: list[int]) -> tuple[list[tuple[int, ...]], Numbers]:
-    """Terms of the expansion, each the dimensions that it is of, and their values at the points.
+    """Returns the terms of the expansion (their dimensions), and their values at the points.
 
     Parameters
     ----------
@@ -229,18 +228,18 @@ def expansion(coordinates: Numbers, levels: list[int]) -> tuple[list[tuple[int, 
 
 @dataclass(frozen=True)
 class Fit:
-    """The polynomials that a claim's margin is made of.
+    """Polynomials of a claim's margin.
 
     Attributes
     ----------
     terms
-        The dimensions that each is of.
+        Dimensions of each polynomial.
     columns
-        Where it is in the whole basis.
+        Index of each polynomial in the basis.
     dimensions
-        How many dimensions there are.
+        Number of dimensions.
     explained
-        Share of the margin's variance that they explain.
+        Explained share of the margin's variance.
     """
 
     terms: list[tuple[int, ...]]
@@ -252,9 +251,9 @@ class Fit:
     def of(cls, terms: list[tuple[int, ...]], basis: Numbers, margin: Numbers) -> Fit:
         """Returns the polynomials with significant coefficients.
 
-        The strongest is taken first and the others are looked for in what it leaves (orthogonal
-        matching pursuit), until none stands out: in a basis that is orthogonal up to the draw, a
-        coefficient of noise has the variance of the residual, divided by the number of points.
+        Orthogonal matching pursuit: the polynomial with the largest coefficient is added, and the
+        next one is selected from the residual, until no coefficient is significant. The variance of
+        a noise coefficient is that of the residual divided by the number of points.
         """
         centred = margin - margin.mean()
         columns: list[int] = []
@@ -278,9 +277,9 @@ class Fit:
         )
 
     def indices(self, values: Numbers, margin: Numbers) -> Numbers:
-        """First-order and total indices in a sample, two rows, one column per dimension.
+        """Returns first-order and total indices, shape (2, dimensions).
 
-        ``values`` are the polynomials' at the sample's points.
+        ``values`` are the polynomials at the points of the sample.
         """
         found = np.zeros((2, self.dimensions))
         if not self.terms:
@@ -289,10 +288,10 @@ class Fit:
         design = values - values.mean(axis=0)
         coefficients, *_ = np.linalg.lstsq(design.T @ design, design.T @ centred, rcond=None)
         rest = centred - design @ coefficients
-        # Least squares explains some of any noise; that much is taken off each term's square.
+        # Subtract the share of the noise that least squares explains from each squared coefficient.
         unexplained = (rest @ rest) / max(len(rest) - design.shape[1] - 1, 1)
         squares = np.maximum(coefficients**2 - unexplained / len(rest), 0.0)
-        # The variance over the whole range, which does not hang on the points that were drawn.
+        # Variance over the whole range, independent of the drawn points.
         variance = max(squares.sum() + unexplained, 1e-12)
         for term, share in zip(self.terms, squares / variance, strict=True):
             found[1, list(term)] += share

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from access_av.radio.placement import Plan
 
 SHORTEST_PERIOD_MS = 5.0  # TS 38.331, ssb-periodicityServingCell
-MOST_ANTENNAS = 8  # of the bound
+MOST_ANTENNAS = 8  # maximum number of antennas of the bound
 
 
 @dataclass(frozen=True)

@@ -141,7 +141,7 @@ def layers(base: alt.Chart) -> tuple[alt.Chart, alt.Chart]:
 def _share(
     points: pl.DataFrame, column: str, ends: Sequence[float], log: bool
 ) -> NDArray[np.float64]:
-    """Positions between the ends of an axis, from 0 to 1."""
+    """Returns relative positions on an axis, from 0 to 1."""
     values = points[column].cast(pl.Float64).to_numpy()
     low, high = ends
     if log:
@@ -152,7 +152,7 @@ def _share(
 def _offsets(
     at: NDArray[np.float64], labels: dict[int, str], height_px: float
 ) -> dict[int, tuple[float, float]]:
-    """Offsets of labels, the most crowded point first; of several the one with least overlap."""
+    """Selects the offset with least overlap for each label, beginning at the most crowded point."""
     angles = np.pi / 4.0 + 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     tried = [
         (radius * math.cos(angle), -radius * math.sin(angle))
@@ -185,7 +185,7 @@ def _cost(
     at: NDArray[np.float64],
     height_px: float,
 ) -> float:
-    """Overlap of a label with labels, points and the margin, in pixels, over all widths."""
+    """Returns the overlap (px) of a label with labels, points and the margin, over all widths."""
     total = 0.0
     for other in others:
         depth = np.minimum(box[:, 2:], other[:, 2:]) - np.maximum(box[:, :2], other[:, :2])

@@ -46,7 +46,7 @@ def fill(template: str, specs: Mapping[str, Spec], **fields: object) -> str:
 
 def bundle() -> str:
     """Returns the code that draws charts; built once per process in one or two seconds."""
-    return vl_convert.javascript_bundle()  # type: ignore[call-arg]  # its stub errs
+    return vl_convert.javascript_bundle()  # type: ignore[call-arg]  # its type stub is wrong
 
 
 def _read(name: str) -> str:

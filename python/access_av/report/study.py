@@ -1,4 +1,4 @@
-"""The page of ``access-av study``: one plant's question, and everything its answer needs."""
+"""Report of ``access-av study``: verdict, map, remedies, operating point and cost of one plant."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ if TYPE_CHECKING:
     from access_av.report.chart import Spec
     from access_av.study.study_result import Study
 
-# Rows of the table along the road.
+# Maximum number of rows of the table along the road.
 MOST_PLACES = 30
 
 
 def render_study(study: Study, appendix: str = "") -> str:
-    """A study as an HTML page that loads nothing.
+    """Returns a study as a self-contained HTML page.
 
     Parameters
     ----------
     study
         Result of :func:`access_av.study_plant`.
     appendix
-        A section on other variants, as HTML.
+        HTML section with the comparison of variants.
     """
     specs: dict[str, Spec] = {
         "map": charts.road_map(study),
@@ -100,7 +100,10 @@ def _tiles(study: Study) -> str:
         it.percentile(study.percent).value for it in (study.nominal, study.poor_los)
     )
     made = [
-        tile(f"{nominal:.2f} m", f"error within which the vehicle is {study.percent:g} % of time"),
+        tile(
+            f"{nominal:.2f} m",
+            f"error that the vehicle does not exceed for {study.percent:g} % of time",
+        ),
         tile(f"{poor_los:.2f} m", "the same percentile with poor line of sight"),
     ]
     if lost_runs := study.nominal.lost_runs:
@@ -154,16 +157,16 @@ def _verdict(study: Study) -> str:
     channel = written["poor_channel"]["model"]
     return section(
         "Is it good enough?",
-        "Every value with a standard deviation is drawn for each drive. “Good enough”, or not: the "
-        "whole 95 % interval of the share within meets the target, or misses it; “probably”: only "
-        "the estimate does. All targets are met if each one is. "
-        f"Poor line of sight: channel model “{channel}” of TR 38.901.",
+        "Every value with a standard deviation is drawn for each drive. “Good enough”: the whole "
+        "95 % interval of the share of time within the error meets the target; “not good enough”: "
+        "the whole interval misses it; “probably”: only the estimate meets or misses it. All "
+        f"targets are met if each one is. Poor line of sight: channel model “{channel}” of TR 38.901.",
         table(head, rows, numbers=range(3, 7)) + _integrity(study, written),
     )
 
 
 def _integrity(study: Study, written: Mapping[str, Any]) -> str:
-    """Reliability of the position, and the settings it depends on."""
+    """Returns the section on the reliability of the position, with its settings."""
     integrity = written["vehicle"].get("integrity") or {}
     follows = math.isclose(study.alert_limit_m, 2.0 * study.error_m)
     limit = f"alert limit {study.alert_limit_m:g} m"
@@ -179,7 +182,7 @@ def _integrity(study: Study, written: Mapping[str, Any]) -> str:
     of_points = {it.driven.name: it.driven for it in study.points}
     drives += [it for name, it in of_points.items() if name != study.nominal.name]
     rows = reliability_rows(drives)
-    first = 2  # the others unfold
+    first = 2  # the other rows are collapsed
     head = ("Variant", "Lost drives", "State ok", *(it.words for it in NotOk), "Errors while ok")
     return (
         f"<h3>Reliability</h3><p>Integrity settings: {escape(', '.join(settings))}. State ok: the "
@@ -226,8 +229,8 @@ def _where(study: Study) -> str:
         + '<div class="charts">'
         + figure(
             "along",
-            "Levels are protection levels while the position may be relied on; the least RMS error "
-            "is that of any localizer. Dashed: the target.",
+            "Levels are protection levels in state ok. The least RMS error is the lower bound for "
+            "any localizer. Dashed: the target.",
             "Error along the road",
         )
         + figure(
@@ -241,7 +244,7 @@ def _where(study: Study) -> str:
 
 
 def _places(study: Study) -> str:
-    """Data of the charts along the road, as a collapsible table."""
+    """Returns the data of the charts along the road as a collapsible table."""
     step = math.ceil(study.places.height / MOST_PLACES)
     rows = [
         (
@@ -318,7 +321,7 @@ def _remedies(study: Study) -> str:
     )
     return section(
         "What reduces the error?",
-        f"{text} All rows are of the same {before.runs} drives in the same environments. Helps: "
+        f"{text} All rows use equal environments, {before.runs} drives each. Helps: "
         "the 95 % interval of the difference is below zero. Sets of measures are simulated from "
         "the cheapest on, if the product of their error ratios could meet the target.",
         table(head, rows, numbers=range(2, 6))

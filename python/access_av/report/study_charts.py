@@ -1,4 +1,4 @@
-"""Charts of a study: the road coloured by the error, the error along it, ways to operate."""
+"""Charts of a study: road coloured by the error, error along the road, operating points."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ MARGIN_M = 25.0
 SHARES = (0.5, 1.0, 1.5)
 COLOURS = ("#2f7ed8", "#56b4e9", "#e69f00", "#d55e00")
 STRETCHES = 300
-# Height of the chart of operating points: its labels need space on narrow screens.
+# Height of the chart of operating points (px), with space for labels on narrow screens.
 WAYS_PX = 420
 
 
 def road_map(study: Study) -> Spec:
-    """The road coloured by the target's percentile, what stands about it, and a drive played."""
+    """Returns the animated map: road coloured by the target's percentile, radio heads and walls."""
     site = study.nominal.scenario.site
     heads, places = heads_of(site), study.places
     step = max(1, places.height // STRETCHES)
@@ -108,7 +108,7 @@ def road_map(study: Study) -> Spec:
     return finish(
         played(frame, alt.LayerChart(layer=layers), steps, received, heads),
         height=frame.height_px,
-        description="Map of the road, coloured by the error that the target speaks of",
+        description="Map of the road, coloured by the percentile of the error in the target",
     )
 
 
@@ -137,7 +137,7 @@ def _stops(study: Study) -> list[dict[str, Any]]:
 
 
 def _at(study: Study, along_m: dict[str, float]) -> pl.DataFrame:
-    """Positions on the road by name, from their distances along it."""
+    """Returns named positions on the road, from their distances along the road."""
     last = study.places.height - 1
     rows = [
         (name, study.places.row(min(last, int(at)), named=True)) for name, at in along_m.items()
@@ -149,7 +149,7 @@ def _at(study: Study, along_m: dict[str, float]) -> pl.DataFrame:
 
 
 def along_road(study: Study) -> Spec:
-    """Error and protection level along the road, the bound, and the target."""
+    """Returns the chart of error, protection level, bound and target along the road."""
     names = {
         "target_error_m": f"{study.percent:g} % of errors within",
         "median_error_m": "half of them within",
@@ -184,7 +184,7 @@ def along_road(study: Study) -> Spec:
 
 
 def signal_along_road(study: Study) -> Spec:
-    """Dilution along the road, and the strongest radio head's SNR."""
+    """Returns the chart of dilution, and of the SNR of the strongest radio head, along the road."""
     rows = thinned(study.places.select("along_m", "along_road_error_per_degree_m", "best_snr_db"))
     x = alt.X("along_m:Q", title="along the road / m", scale=alt.Scale(nice=False))
     dilution = (
@@ -217,11 +217,11 @@ def signal_along_road(study: Study) -> Spec:
 
 
 def ways_to_operate(study: Study) -> Spec:
-    """Energy of a trip against the target's percentile, the front and the recommended point.
+    """Returns the chart of energy against the target's percentile, with front and recommendation.
 
     The numbers are those of :func:`access_av.report.study_parts.numbered`.
     """
-    kinds = ["recommended", "no other is better in both", "another is better"]
+    kinds = ["recommended", "no other point is better in both", "another is better"]
     rows = pl.DataFrame(
         [
             {
@@ -270,7 +270,7 @@ def ways_to_operate(study: Study) -> Spec:
         .encode(y="error_m:Q")
     )
     lines, numbers = labels(base)
-    # Points of the front are drawn over the others, the recommended one last.
+    # Draw the points of the front over the others, and the recommended one last.
     drawn = [points.transform_filter(alt.datum.kind == kind) for kind in reversed(kinds)]
     chart: Any = alt.layer(target, lines, *drawn, numbers)
     return finish(
@@ -281,7 +281,7 @@ def ways_to_operate(study: Study) -> Spec:
 
 
 def _round_values(values: pl.Series) -> list[float]:
-    """1, 2 and 5 times each power of ten about some values: a narrow axis has room for them."""
+    """Returns 1, 2 and 5 times powers of ten in a range, as ticks of a narrow axis."""
     low, high = (float(it) for it in (values.min(), values.max()))  # type: ignore[arg-type]
     powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     return [round(step * 10.0**power, 9) for power in powers for step in (1.0, 2.0, 5.0)]

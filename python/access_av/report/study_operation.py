@@ -1,4 +1,4 @@
-"""Sections of the page of a study on the operating point and the costs."""
+"""Sections of a study's report on the operating point and the costs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def operation_section(study: Study) -> str:
-    """The recommended operating point, its rivals, and its energy."""
+    """Returns the section on the recommended operating point, its rivals, and its energy."""
     point, day = study.point, study.day
     if point is None or day is None:
         return section("How to operate it", "The vehicle’s platform has no figure of energy.", "")
@@ -62,7 +62,7 @@ def operation_section(study: Study) -> str:
 
 
 def _agreement(study: Study) -> str:
-    """Whether the seeds agree, in words."""
+    """Returns whether the seeds agree, as text."""
     named = " and ".join(f"“{it}”" for it in dict.fromkeys(study.recommendation.by_seed))
     match study.recommendation.agreement:
         case Agreement.AGREED:
@@ -74,7 +74,10 @@ def _agreement(study: Study) -> str:
                 f"than {MATTERS_SHARE:.0%}."
             )
         case Agreement.UNDECIDED:
-            return f"Two seeds recommend {named}: these drives do not decide; --runs adds drives."
+            return (
+                f"Two seeds recommend {named}: these drives are too few for a decision; --runs "
+                "adds drives."
+            )
 
 
 def _rivals(study: Study) -> str:
@@ -139,7 +142,7 @@ def _composition(study: Study, point: Point, day: economy.Day) -> str:
 
 
 def _numbered(study: Study) -> str:
-    """Every point of the chart, by energy."""
+    """Returns the table of all points of the chart, by energy."""
     rows = [
         (
             str(number),
@@ -156,7 +159,7 @@ def _numbered(study: Study) -> str:
 
 
 def _points(study: Study) -> str:
-    """Every operation in its mode of least energy, then the power modes of the recommended one."""
+    """Returns the table of operations in the best mode, then in all power modes."""
     point = study.point
     least: dict[str, Point] = {}
     for it in study.points:
@@ -218,7 +221,7 @@ def _fleet_day(study: Study, it: Point) -> str:
 
 
 def money_section(study: Study) -> str:
-    """Money and carbon of each kind of localization; empty without a recommendation."""
+    """Returns the section on money and carbon; empty without a recommendation."""
     if not study.ways:
         return ""
     fleet = json.loads(study.plant.to_json())["fleet"]
@@ -253,9 +256,9 @@ def money_section(study: Study) -> str:
         "What does it cost?",
         f"Low … central … high, in {study.prices.currency}, without discounting. Vehicles and "
         f"infrastructure are on {fleet['hours_per_day']:g} h on {fleet['days_per_year']:g} days a "
-        "year. The cells are there anyway and are not counted; a computer counts with its price, "
-        f"production and idle power. {published} of {len(used)} figures are published ones and "
-        "unverified for this plant.",
+        "year. The cells of the network exist already and are not counted; a computer counts "
+        f"with its price, production and idle power. {published} of {len(used)} figures "
+        "are published ones and unverified for this plant.",
         table(money_head, money, numbers=range(1, 4))
         + table(carbon_head, carbon, numbers=range(1, 4))
         + sources(study, used),

@@ -1,4 +1,4 @@
-"""Parts of the page of a study that several of its sections use."""
+"""Functions that several sections of a study's report use."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 
 def lost(driven: Driven) -> str:
-    """Number of lost drives."""
+    """Returns the number of lost drives as text."""
     runs = driven.lost_runs
     return badge(f"LOST in {runs} of {driven.runs}", "no") if runs else f"0 of {driven.runs}"
 
 
 def reliability_rows(drives: Iterable[Driven]) -> list[tuple[str, ...]]:
-    """Lost drives, state ``ok``, reasons otherwise and errors while ``ok``, one row per variant."""
+    """Returns the reliability of each variant: lost drives, state ``ok``, reasons, errors."""
     rows = []
     for driven in drives:
         reasons, beyond = driven.not_ok_shares, driven.exceedances
@@ -42,17 +42,17 @@ def reliability_rows(drives: Iterable[Driven]) -> list[tuple[str, ...]]:
 
 
 def ok(driven: Driven) -> str:
-    """Share of the time in state ``ok``."""
+    """Returns the share of the time in state ``ok`` as text."""
     return "–" if driven.ok_share is None else f"{driven.ok_share:.1%}"
 
 
 def count(number: int, what: str) -> str:
-    """A number of things."""
+    """Returns a number with its noun."""
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def sources(study: Study, keys: list[str]) -> str:
-    """A table of figures and their sources, to unfold."""
+    """Returns a collapsed table of figures and their sources."""
     rows = [
         (
             escape(key.replace("_", " ")),
@@ -69,28 +69,28 @@ def sources(study: Study, keys: list[str]) -> str:
 
 
 def digits(value: float) -> str:
-    """A number with three digits at least."""
+    """Returns a number with at least three digits."""
     return f"{value:,.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
 
 
 def ends(values: Range) -> str:
-    """A range, low to high."""
+    """Returns a range as text, low to high."""
     texts = dict.fromkeys(map(digits, (values.low, values.central, values.high)))
     return " … ".join(texts)
 
 
 def joules(value: float) -> str:
-    """An energy."""
+    """Returns an energy as text."""
     return f"{digits(value)} J"
 
 
 def joules_range(values: Range) -> str:
-    """A range of an energy."""
+    """Returns a range of an energy as text."""
     return f"{ends(values)} J"
 
 
 def watts(power_w: Mapping[str, float]) -> str:
-    """A range of a power."""
+    """Returns a range of a power as text."""
     texts = dict.fromkeys(f"{power_w[extent]:.3g}" for extent in ("low", "value", "high"))
     return " … ".join(texts)
 

@@ -25,16 +25,16 @@ PHASE_STD_RAD = 0.03
 SCALE_STD = 0.003
 GAIN_STD_DB = 0.5
 LATE_S = 0.01
-# No file may say that an angle is older.
+# Maximum time offset of an angle that the settings permit (s).
 LATEST_S = 0.4
-# And how far one leaves an electrical angle off where a radio head is behind something.
+# Error of an electrical angle from a hidden radio head (rad).
 HIDDEN_RAD = 0.05
 
-# Slip grows, and phase and gain drift, to their size over so long.
+# Time in which slip, phase drift and gain drift reach their size (s).
 GROWS_S = 300.0
 DRIFTS_M = 1000.0
 
-# Bursts: so long, so often.
+# Duration of a blockage and time between two blockages (s).
 HIDDEN_S = 5.0
 HIDDEN_EVERY_S = 20.0
 LONGEST_S = 600.0
@@ -43,7 +43,7 @@ LONGEST_S = 600.0
 def mismatches(scenario: _core.Scenario) -> dict[str, Overrides]:
     """Returns the differences between truth and nominal model by name: overrides of the scenario.
 
-    Every other quantity is drawn from its stated standard deviation.
+    Every other quantity is drawn from its specified standard deviation.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def hypotheses(scenario: _core.Scenario, scales: Iterable[float] = SIZES) -> dic
     """Returns fault hypotheses of a site at ``scales`` times the specified standard deviation.
 
     The default standard deviation is that of a typical survey, calibration or data sheet.
-    Every other quantity is drawn from its stated standard deviation.
+    Every other quantity is drawn from its specified standard deviation.
 
     Examples
     --------
@@ -163,7 +163,7 @@ def _of_size(site: Overrides, vehicle: Overrides, size: float) -> dict[str, Over
 
 
 def _moved(heads: list[Overrides], by_m: Iterable[Any]) -> Overrides:
-    """Returns displaced radio heads; empty if they have no distinct names."""
+    """Returns the overrides of displaced radio heads; empty if their names are not unique."""
     names = [head["name"] for head in heads]
     if not all(names) or len(set(names)) < len(names):
         return {}
@@ -176,7 +176,7 @@ def _moved(heads: list[Overrides], by_m: Iterable[Any]) -> Overrides:
 
 
 def _swapped(heads: list[Overrides]) -> Overrides:
-    """Exchanges the cells of the first two radio heads."""
+    """Returns radio heads of which the first two have exchanged cells."""
     if len(heads) < 2 or not _moved(heads[:2], np.zeros((2, 3))):
         return {}
     first, second = heads[:2]

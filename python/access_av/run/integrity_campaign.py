@@ -33,7 +33,7 @@ PART_RUNS = 5
 
 @dataclass(frozen=True)
 class Case:
-    """One cell of the campaign.
+    """One case of the campaign.
 
     Attributes
     ----------
@@ -157,8 +157,8 @@ def drive(
     runs, seed
         Number of runs per case, and seed.
     only
-        Names out of :func:`~access_av.hypotheses.mismatches`, all of which are driven when
-        ``None``, and :func:`~access_av.hypotheses.hypotheses`.
+        Names out of :func:`~access_av.hypotheses.mismatches`, (default: all of them), and of
+        :func:`~access_av.hypotheses.hypotheses`.
     channel_names
         See :func:`channels`.
     heads

@@ -1,4 +1,4 @@
-"""Errors of a variant in rows that pair with another's: drives, or stretches of one drive."""
+"""Errors of a variant in paired rows: runs, or sections of one drive."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 # Baseline of the comparison of variants.
 UNCHANGED = "unchanged"
 DRIVES = "drives"
-# A vehicle with a larger error is off its lane and that of the opposite direction, in metres.
+# Error of a lost vehicle in metres: more than the width of a two-lane road.
 LOST_M = 5.0
-# Longest time with a larger error that does not count as lost: a vehicle can stop and be localized
-# again, in seconds.
+# Maximum time with an error above :data:`LOST_M`, in seconds: the vehicle stops and is localized
+# again.
 LOST_S = 5.0
 STRETCHES = f"stretches of {INDEPENDENT_S:g} s of one drive"
 
@@ -38,7 +38,7 @@ class ErrorSamples:
     name
         Name in tables.
     errors_m
-        Shape (rows, epochs); infinite as long as the place is searched for.
+        Shape (rows, epochs); infinite during the search for the position.
     duration_s
         Duration of a row.
     rows
@@ -57,22 +57,22 @@ class ErrorSamples:
 
     @property
     def independent(self) -> int:
-        """How many of the errors are as good as independent of each other."""
+        """Number of independent errors."""
         return max(1, int(self.runs * self.duration_s / INDEPENDENT_S))
 
     @property
     def energy_j(self) -> float | None:
-        """Energy of a trip; ``None`` where nothing is known of it."""
+        """Energy of a trip; ``None`` if it is unknown."""
         return None
 
     def percentile(self, percent: float) -> Percentile:
-        """A percentile of the error with its 95 % interval."""
+        """Returns a percentile of the error with its 95 % interval."""
         [found] = percentiles(self.errors_m, [percent], independent=self.independent)
         return found
 
     @property
     def lost(self) -> NDArray[np.bool_]:
-        """Whether the vehicle is lost, for each row; see :attr:`lost_runs`."""
+        """Whether the vehicle is lost, by row; see :attr:`lost_runs`."""
         known = np.logical_or.accumulate(np.isfinite(self.errors_m), axis=1)
         beyond = known & ~(self.errors_m <= LOST_M)
         never = ~known[:, -1] if known.shape[1] else np.zeros(self.runs, dtype=bool)
@@ -107,13 +107,13 @@ class ErrorSamples:
         return None
 
     def delta_m(self, baseline: ErrorSamples, percent: float) -> tuple[float, float, float]:
-        """Difference of a percentile to the baseline's in metres, in pairs of rows.
+        """Returns the paired difference of a percentile to that of the baseline, in metres.
 
         Returns
         -------
         tuple of float
-            This variant minus the baseline, and the ends of the 95 % interval; negative where this
-            variant is more accurate.
+            Variant minus baseline, and the ends of the 95 % interval; negative if the variant is
+            more accurate.
         """
         runs = min(self.runs, baseline.runs)
         return paired_difference(self.errors_m[:runs], baseline.errors_m[:runs], percent)

@@ -31,7 +31,7 @@ def load(role: str, text: str) -> Any:
     Raises
     ------
     InputError
-        If the text is none, the file cannot be executed, or it has no such name.
+        If the text has another form, the file cannot be executed, or the name is not defined.
     """
     file, _, name = text.rpartition(":")
     if not file.endswith(".py") or not name.isidentifier():

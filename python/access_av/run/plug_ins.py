@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-# Attributes by which an estimator states the energy or the time of one estimate.
+# Attributes of an estimator with the energy or the time of one estimate.
 COSTS = ("energy_per_execution_j", "time_per_execution_s")
 # Number of arguments of a factory: none, or site, vehicle and start.
 FACTORY_ARGUMENTS = (0, 3)
@@ -27,12 +27,12 @@ MUTATORS = frozenset(
         *("remove", "clear", "update", "add", "discard", "setdefault", "sort", "reverse"),
     )
 )
-# Longest distance in instructions between a container and the key under which it is written.
+# Maximum distance, in byte-code instructions, between the load of a container and a write to it.
 NEARBY = 3
 
 
 class Factory:
-    """Makes the plug-in of each run; the core calls it as ``factory(site, vehicle, start)``.
+    """Creates the plug-in of each run; the core calls it as ``factory(site, vehicle, start)``.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Factory:
     make
         Function of site, vehicle and start.
     stating
-        Object whose attributes :data:`COSTS` state what an estimate takes.
+        Object with the attributes :data:`COSTS`: energy or time of an estimate.
     """
 
     def __init__(self, role: str, make: Callable[..., Any], stating: Any) -> None:
@@ -52,7 +52,7 @@ class Factory:
             setattr(self, name, getattr(stating, name, None))
 
     def __call__(self, *arguments: Any) -> Any:
-        """Makes an object; a factory that returns one object twice is rejected."""
+        """Creates an object; a factory that returns the same object twice is rejected."""
         made = self._make(*arguments)
         if not isinstance(made, FUNCTIONS):
             self._remember(made)
@@ -116,7 +116,7 @@ def factory(plug_in: Any, role: str) -> Factory | None:
 
 
 def _function(plug_in: Any) -> Any:
-    """The class or function under partial applications."""
+    """Returns the class or function inside ``functools.partial`` objects."""
     while isinstance(plug_in, functools.partial):
         plug_in = plug_in.func
     if isinstance(plug_in, types.MethodType) and isinstance(plug_in.__self__, type):
@@ -125,7 +125,7 @@ def _function(plug_in: Any) -> Any:
 
 
 def _arguments(plug_in: Any) -> tuple[int, bool]:
-    """Number of required positional arguments, and whether it takes any number of them."""
+    """Returns the number of required positional arguments, and whether ``*args`` exists."""
     try:
         parameters = inspect.signature(plug_in).parameters.values()
     except ValueError:  # a built-in function without signature
@@ -155,7 +155,7 @@ def _allowed(role: str, name: str) -> str:
 
 
 def _state(function: Any) -> str | None:
-    """How a function keeps state between calls, as far as its code shows; ``None`` where not."""
+    """Returns the way in which a function keeps state between calls; ``None`` if none is found."""
     code = getattr(function, "__code__", None)
     if code is None:
         return None
@@ -179,7 +179,7 @@ def _state(function: Any) -> str | None:
 
 
 def _containers(function: Any) -> Iterator[tuple[str, Any]]:
-    """Containers of a function that outlive a call, by name."""
+    """Returns the containers of a function that persist between calls, by name."""
     outer = inspect.getclosurevars(function)
     defaults = inspect.signature(function).parameters.values()
     for name, value in (

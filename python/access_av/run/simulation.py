@@ -152,7 +152,7 @@ class Simulation(Result):
 
     @property
     def mean_error_m(self) -> float | None:
-        """Mean horizontal error over all known positions; ``None`` without single runs."""
+        """Mean horizontal error over all known positions; ``None`` without data of single runs."""
         errors_m = self.horizontal_errors_m
         if errors_m is None or np.isnan(errors_m).all():
             return None
@@ -294,10 +294,11 @@ def simulate(
     SettingsError
         Unusable scenario; the message names the key and the allowed values.
     TypeError
-        When an estimator, policy or localizer is an object that all runs would share, or a
-        function that keeps state.
+        If an estimator, policy or localizer is an object instead of a factory, or a function that
+        keeps state.
     ValueError
-        When an estimator, policy or localizer returns what it must not; names the call.
+        If an estimator, policy or localizer returns an invalid value; the message contains the
+        call.
     OSError
         Too many threads for the system.
 

@@ -127,7 +127,7 @@ def sweep(
     InputError
         If nothing is varied, or there are more than :data:`MAX_COMBINATIONS` combinations.
     SettingsError
-        If a combination cannot be used; names the key and what is allowed.
+        If a combination is invalid; the message contains the key and the allowed values.
 
     Examples
     --------
@@ -197,7 +197,7 @@ def _finite(value: float) -> float | None:
 
 
 def _shown(value: Any) -> Any:
-    """A value of a setting, or the name of a plug-in."""
+    """Returns a value of a setting as text, or the name of a plug-in."""
     if value is None:
         return "own of the scenario"
     return getattr(value, "__name__", type(value).__name__) if callable(value) else value

@@ -136,6 +136,6 @@ def _phases(truth: dict[str, Any], channels: int) -> NDArray[np.complex128] | No
     if not (np.isfinite(size) & (size > 0.0)).all():
         raise InputError(
             "`aoa:truth.channel_calibration_re` and `_im` must each be a list of "
-            f"{channels} numbers, one of each channel, and no gain be 0"
+            f"{channels} numbers, one per channel, without 0"
         )
     return np.asarray(gains / size, dtype=np.complex128)

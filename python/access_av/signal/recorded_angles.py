@@ -109,14 +109,14 @@ def estimate_bursts(
     metadata = json.loads(recording.metadata_json())
     annotations = metadata.get("annotations", [])
     if not annotations:
-        raise InputError(f"{path}: no `annotations`, so it is not known where the bursts are")
+        raise InputError(f"{path}: no `annotations`, so the positions of the bursts are unknown")
     truths = stated_truths(recording, metadata)
     told = spacing_wavelengths is not None
     if spacing_wavelengths is None:
         spacing_wavelengths = stated_spacing(truths, metadata, recording.centre_frequency_hz)
     places = None if told else stated_places(truths)
     if spacing_wavelengths is None and places is None:
-        raise InputError(f"{path}: the metadata states no antenna spacing; give --spacing")
+        raise InputError(f"{path}: the metadata contain no antenna spacing; give --spacing")
 
     calibration: NDArray[np.complex128] | None = None
     bursts = []

@@ -115,7 +115,8 @@ def switched_direction(
     if not counts.all():
         missing = int(np.flatnonzero(counts == 0)[0])
         raise ValueError(
-            f"elements never names antenna {missing}; every one from 0 to {antennas - 1} is needed"
+            f"elements does not contain antenna {missing}; every antenna from 0 to {antennas - 1} "
+            "is needed"
         )
     low, high = frequency_hz
     if not (np.isfinite([low, high]).all() and low <= high):

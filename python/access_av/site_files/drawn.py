@@ -95,7 +95,7 @@ class Drawn:
 
     @property
     def bends(self) -> int:
-        """Returns the number of sections with a turn of at least :data:`BEND_RAD`."""
+        """Returns the number of sections with a heading change of at least :data:`BEND_RAD`."""
         turns = [it.turn_rad for it in self.segments] or _turns(self.road_m)
         directions = itertools.groupby(
             turns, key=lambda turn: 0.0 if abs(turn) < STRAIGHT_RAD else math.copysign(1.0, turn)
@@ -114,7 +114,7 @@ def _turns(points: Sequence[tuple[float, float]]) -> Iterator[float]:
 
 
 def numbered(heads: Sequence[Head]) -> list[Head]:
-    """Appends a number to names that several radio heads have, as those of one block do.
+    """Appends a number to names that occur several times, as those of one DXF block.
 
     Examples
     --------
@@ -143,7 +143,7 @@ def checked(drawn: Drawn, road_file: str, heads_file: str, walls_file: str) -> D
     Raises
     ------
     InputError
-        For a road too short or too long, and radio heads or walls kilometres from it.
+        Road too short or too long, or radio heads or walls kilometres from the road.
     """
     points = list(drawn.road_m)
     length_m = drawn.length_m

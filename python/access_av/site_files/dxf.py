@@ -79,12 +79,12 @@ REMOVED = {
 
 
 def metres_per_unit(points: tuple[float, float, float, float], length_m: float) -> float:
-    """The drawing's scale, by two of its points and the length between them.
+    """Returns the scale of a drawing, from two points and the length between them.
 
     Raises
     ------
     InputError
-        When the points are one.
+        If both points are equal.
     """
     drawn = math.dist(points[:2], points[2:])
     if not (drawn > 0.0 and math.isfinite(drawn) and length_m > 0.0):
@@ -145,7 +145,7 @@ def read(
 
 
 def _load(path: Path) -> tuple[Any, dict[str, int]]:
-    """The drawing, and the damaged entities that ezdxf removed from any layer."""
+    """Reads a drawing; returns it with the damaged entities that ezdxf removed."""
     try:
         from ezdxf import recover
         from ezdxf.audit import AuditError
@@ -180,7 +180,7 @@ def _unconfirmed(drawing: Any) -> str:
 
 
 class _Reader:
-    """A drawing, and the entities of it that were not imported."""
+    """A drawing, and its entities that were not imported."""
 
     def __init__(self, path: Path, drawing: Any, scale_m: float) -> None:
         self.path, self.drawing, self.scale_m = path, drawing, scale_m
@@ -189,7 +189,7 @@ class _Reader:
         self.notes: list[str] = []
 
     def road(self, name: str) -> tuple[tuple[float, float, float], Sequence[Any], Sequence[Point]]:
-        """Joins all curves of a layer."""
+        """Returns the road: all curves of a layer, joined."""
         layer = Layer(name)
         found = list(self._curves(layer, ROAD_SAGITTA_M))
         if not found:
@@ -216,7 +216,7 @@ class _Reader:
         return (0.0, 0.0, 0.0), [], curves.flatten(joined, ROAD_SAGITTA_M)
 
     def heads(self, name: str) -> list[Head]:
-        """Points and block references of a layer."""
+        """Returns the radio heads: points and block references of a layer."""
         layer = Layer(name, whole=("POINT", "INSERT"))
         found = []
         for entity in layer.entities(self.model):
@@ -238,7 +238,7 @@ class _Reader:
         return found
 
     def walls(self, name: str) -> list[list[Point]]:
-        """Curves of a layer, each once."""
+        """Returns the walls: curves of a layer, without duplicates."""
         layer = Layer(name)
         walls: dict[tuple[tuple[int, int], ...], list[Point]] = {}
         for kind, curve in self._curves(layer, WALL_SAGITTA_M):
@@ -256,7 +256,7 @@ class _Reader:
         return list(walls.values())
 
     def _curves(self, layer: Layer, sagitta_m: float) -> Iterator[tuple[str, list[Vertex]]]:
-        """Curves with their types."""
+        """Returns curves with their types."""
         from ezdxf.lldxf.const import DXFError
 
         for entity in layer.entities(self.model):
@@ -270,7 +270,7 @@ class _Reader:
                 yield from ((entity.dxftype(), curve) for curve in found)
 
     def _report(self, layer: Layer, name: str) -> None:
-        """Counts what a layer has that was not imported, also outside of the model."""
+        """Counts the entities of a layer that were not imported, in all layouts."""
         for layout in self.drawing.layouts:
             if not layout.is_modelspace:
                 for entity in layout:
@@ -280,7 +280,7 @@ class _Reader:
             self.skipped[f"{self.path}, layer {name!r}: {what}"] += count
 
     def _held(self, layer: Layer, name: str) -> str:
-        """The layer's entities if there are any, else the names of all layers."""
+        """Describes the entities of a layer, or all layers, for an error message."""
         if layer.skipped:
             listed = ", ".join(f"{count} {what}" for what, count in layer.skipped.items())
             return f"Not importable on layer {name!r}: {listed}"

@@ -21,7 +21,7 @@ QUADRILATERALS = ("SOLID", "TRACE", "3DFACE")
 
 
 class UnsupportedError(ValueError):
-    """An entity that has no curve in plan."""
+    """Entity without a curve in plan."""
 
 
 def vertices(entity: Any, scale_m: float, sagitta_m: float) -> list[list[Vertex]]:
@@ -33,7 +33,7 @@ def vertices(entity: Any, scale_m: float, sagitta_m: float) -> list[list[Vertex]
     Raises
     ------
     UnsupportedError
-        When the entity is no curve.
+        If the entity is not a curve.
     """
     made = [
         curves.without_repeats([(scale_m * x, scale_m * y, bulge) for x, y, bulge in curve])
@@ -101,7 +101,7 @@ def _polyline(entity: Any, sagitta: float) -> list[list[Vertex]]:
 def _in_plan(
     entity: Any, rows: list[Vertex], elevation: float, sagitta: float
 ) -> list[list[Vertex]]:
-    """Object coordinates to plan coordinates; an arc seen from below turns the other way."""
+    """Converts object to plan coordinates; an arc seen from below changes its direction."""
     if entity.is_closed and rows:
         rows = [*rows, (*rows[0][:2], 0.0)]
     return [_to_plan(entity, rows, elevation, sagitta)]
@@ -119,7 +119,7 @@ def _to_plan(entity: Any, rows: list[Vertex], elevation: float, sagitta: float) 
 
 
 def _arc(entity: Any, sagitta: float) -> list[list[Vertex]]:
-    """An arc or circle as at most half circles, each an edge with a bulge."""
+    """Returns an arc or circle as edges with a bulge, each at most half a circle."""
     if entity.dxftype() == "ARC":
         start = math.radians(entity.dxf.start_angle)
         turn = math.radians(entity.dxf.end_angle) - start

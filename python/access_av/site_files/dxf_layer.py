@@ -10,8 +10,8 @@ if TYPE_CHECKING:
 
 # Largest depth of nested block references.
 NESTED = 32
-# Largest number of entities of a layer, block references resolved. A file of a few lines can nest
-# block arrays so that they have billions.
+# Largest number of entities of a layer, block references resolved. A short file can contain
+# billions of entities by nested block arrays.
 MAXIMUM_ENTITIES = 200_000
 
 
@@ -20,7 +20,7 @@ class TooManyError(ValueError):
 
 
 def layer_of(entity: Any, inherited: str = "0") -> str:
-    """Layer of an entity in lower case; block content on layer 0 has that of its reference."""
+    """Returns the layer of an entity in lower case; layer 0 is that of the block reference."""
     layer = str(entity.dxf.get("layer", "0")).lower()
     return inherited if layer == "0" else layer
 
@@ -107,7 +107,7 @@ class Layer:
             self.skip(insert, f"block {insert.dxf.name!r} has nothing on this layer")
 
     def _references(self, insert: Any) -> Iterator[Any]:
-        """Single references of a block array (MINSERT)."""
+        """Yields the single references of a block array (MINSERT)."""
         if insert.mcount > 1:
             yield from insert.multi_insert()
         else:
@@ -120,14 +120,14 @@ class Layer:
         return entity
 
     def _holds(self, insert: Any) -> bool:
-        """Whether a block has an entity of the types ``whole`` that is explicitly on the layer."""
+        """Returns whether a block has an entity of the types ``whole`` explicitly on the layer."""
         block = insert.block()
         return block is not None and any(
             it.dxftype() in self._whole and layer_of(it) == self.name != "0" for it in block
         )
 
     def _concerns(self, name: str, drawing: Any) -> bool:
-        """Whether a block has an entity explicitly on the layer, nested blocks included."""
+        """Returns whether a block, or a nested one, has an entity explicitly on the layer."""
         known = self._concerned.get(name)
         if known is not None:
             return known

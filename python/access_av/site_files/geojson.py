@@ -30,18 +30,18 @@ POINTS = ("Point", "MultiPoint")
 
 @dataclass
 class Shape:
-    """A geometry of a file: numbers are checked, collections resolved.
+    """A geometry of a file, with checked numbers and without collections.
 
     Attributes
     ----------
     kind
-        Type of the geometry as the file has it.
+        GeoJSON type of the geometry.
     lines
         Positions of each part: a point, a line, a ring.
     properties
         Properties of its feature.
     where
-        Member of the file that holds its coordinates.
+        Member of the file with its coordinates, for messages.
     used
         Whether it was imported.
     """
@@ -62,7 +62,7 @@ class Map:
     system
         Name of its reference system; ``None`` for longitude and latitude.
     other
-        Number of its features and geometries that hold no positions, by type.
+        Number of features and geometries without positions, by type.
     """
 
     path: Path
@@ -77,7 +77,7 @@ class Map:
         Raises
         ------
         InputError
-            When it is not GeoJSON, or a position is not two or three finite numbers.
+            If the file is not GeoJSON, or a position is not two or three finite numbers.
         """
         try:
             held = json.loads(regular(path, MOST_BYTES).read_text(encoding="utf-8-sig"))
@@ -89,11 +89,11 @@ class Map:
 
     @property
     def is_in_metres(self) -> bool:
-        """Whether its coordinates are metres of the plant's own frame."""
+        """Whether the coordinates are metres in the plant's frame."""
         return georeference.is_metres(self.system)
 
     def first(self) -> list[float]:
-        """The first position of the road, otherwise of the file."""
+        """Returns the first position of the road, otherwise of the file."""
         of_lines = [it for it in self.shapes if it.kind in LINES]
         return next(line[0] for it in (*of_lines, *self.shapes) for line in it.lines if line)
 
@@ -115,7 +115,7 @@ class Map:
         Raises
         ------
         InputError
-            When a position cannot be one of a plant, or the origin is far from it.
+            If a position is not plausible for a plant, or the origin is far from it.
         """
         if self.is_in_metres or not self.shapes:
             return None
@@ -138,12 +138,12 @@ class Map:
         return origin
 
     def road(self) -> list[tuple[float, float]]:
-        """The first line; the parts of a ``MultiLineString`` join at their ends.
+        """Returns the first line; the parts of a ``MultiLineString`` are joined at their ends.
 
         Raises
         ------
         InputError
-            When there is none, or parts do not join.
+            If there is no line, or the parts do not join.
         """
         for shape in self.shapes:
             if shape.kind not in LINES:
@@ -161,12 +161,12 @@ class Map:
         raise InputError(f"{self.path}: no LineString (the road) is in it{self._held()}")
 
     def heads(self) -> list[Head]:
-        """Every point as a radio head.
+        """Returns every point as a radio head.
 
         Raises
         ------
         InputError
-            When there is none, or one has no height or a wrong PCI.
+            If there is no point, or a point has no height or an invalid PCI.
         """
         found = []
         for shape in self.shapes:
@@ -179,7 +179,7 @@ class Map:
         return found
 
     def walls(self) -> list[list[tuple[float, float]]]:
-        """Lines that are not the road, and the rings of polygons.
+        """Returns the walls: lines other than the road, and the rings of polygons.
 
         Raises
         ------
@@ -198,7 +198,7 @@ class Map:
         return walls
 
     def skipped(self) -> dict[str, int]:
-        """Number of geometries that were not imported, by file and type."""
+        """Returns the number of geometries that were not imported, by file and type."""
         unused = Counter(it.kind for it in self.shapes if not it.used) + self.other
         return {f"{self.path}: {what}": count for what, count in unused.items()}
 
@@ -249,7 +249,7 @@ def _list(table: dict[str, Any], key: str) -> list[Any]:
 
 
 def _lines(path: Path, kind: str, coordinates: Any, where: str) -> list[list[list[float]]]:
-    """Positions of each part of a geometry: a point, a line, a ring (RFC 7946, 3.1)."""
+    """Returns the positions of each part of a geometry: a point, a line, a ring (RFC 7946, 3.1)."""
 
     def parts(held: Any) -> list[Any]:
         if not isinstance(held, list):
@@ -277,7 +277,7 @@ def _numbers(path: Path, at: Any, where: str) -> list[float]:
 
 
 def _is_finite(value: Any) -> bool:
-    """Whether a value is a finite number; JSON also has whole numbers beyond all floats."""
+    """Returns whether a value is a finite number within the range of floats."""
     if not isinstance(value, (int, float)) or isinstance(value, bool):
         return False
     try:
@@ -323,7 +323,7 @@ def _head(path: Path, at: Sequence[float], properties: dict[str, Any], where: st
 
 
 def text(drawn: Drawn, origin: Origin | None) -> str:
-    """A road, radio heads and walls as GeoJSON.
+    """Returns road, radio heads and walls as GeoJSON.
 
     Parameters
     ----------
@@ -335,7 +335,7 @@ def text(drawn: Drawn, origin: Origin | None) -> str:
     Raises
     ------
     InputError
-        When the origin cannot be one of a plant, or the plant is far from its zero.
+        If the origin is not plausible for a plant, or the plant is far from its zero.
     """
     if origin is not None:
         _check_zero(drawn, origin)

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 SEMI_MAJOR_M = 6_378_137.0
 FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
-# A plant's zero is at the plant: largest distance to its first point. The tangent plane shortens
+# Maximum distance (m) between the origin of a plant's map and the first point of a file. The
+# tangent plane shortens
 # lengths at this distance by 5 millionths.
 FARTHEST_ORIGIN_M = 20_000.0
 # Name of the frame of a plant in metres, as `export` writes it.
@@ -31,7 +32,7 @@ Place = tuple[float, float]
 
 
 def to_plane(longitude: float, latitude: float, origin: Origin) -> Place:
-    """Metres east and north of an origin, on the tangent plane of the ellipsoid of WGS 84.
+    """Returns metres east and north of an origin, on the tangent plane of the WGS 84 ellipsoid.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ def to_plane(longitude: float, latitude: float, origin: Origin) -> Place:
 
 
 def to_degrees(east_m: float, north_m: float, origin: Origin) -> Place:
-    """Longitude and latitude of a place in the frame of :func:`to_plane`.
+    """Returns longitude and latitude of a position in the frame of :func:`to_plane`.
 
     Examples
     --------
@@ -72,7 +73,7 @@ def to_degrees(east_m: float, north_m: float, origin: Origin) -> Place:
     normal_m = SEMI_MAJOR_M / math.sqrt(curve)
     meridian_m = normal_m * (1.0 - ECCENTRICITY_SQUARED) / curve
     east_per_degree = math.radians(normal_m) * math.cos(math.radians(latitude))
-    # Each step leaves the square of the distance over the Earth's radius: four are exact at 20 km.
+    # Each step reduces the relative error by the ratio of distance and Earth radius.
     for _ in range(8):
         x_m, y_m = to_plane(longitude, latitude, origin)
         longitude += (east_m - x_m) / east_per_degree
@@ -105,7 +106,7 @@ def check_origin(origin: Origin, first: Place, where: str) -> None:
     Raises
     ------
     InputError
-        When they are more than :data:`FARTHEST_ORIGIN_M` apart.
+        If origin and first point are more than :data:`FARTHEST_ORIGIN_M` apart.
     """
     away_m = _apart_m(origin, (first[1], first[0]))
     if away_m <= FARTHEST_ORIGIN_M:
@@ -122,17 +123,17 @@ def check_origin(origin: Origin, first: Place, where: str) -> None:
 
 
 def _apart_m(a: Origin, b: Origin) -> float:
-    """Chord between two positions, in metres."""
+    """Returns the chord between two positions, in metres."""
     return math.dist(_geocentric(a[1], a[0]), _geocentric(b[1], b[0]))
 
 
 def name_of(held: Any, where: str) -> str | None:
-    """Name of the reference system in the member ``crs`` (GeoJSON 2008); ``None`` without one.
+    """Returns the name of the reference system in ``crs`` (GeoJSON 2008); ``None`` without one.
 
     Raises
     ------
     InputError
-        When the member names none.
+        If ``crs`` contains no name.
     """
     if not isinstance(held, dict) or "crs" not in held:
         return None
@@ -152,12 +153,12 @@ def name_of(held: Any, where: str) -> str | None:
 
 
 def is_metres(name: str | None) -> bool:
-    """Whether coordinates are metres of a plant's own frame."""
+    """Returns whether coordinates are metres in a plant's frame."""
     return name is not None and name.lower() == METRES_NAME.lower()
 
 
 def is_wgs84(name: str) -> bool:
-    """Whether a name is one of longitude and latitude of WGS 84.
+    """Returns whether a name means longitude and latitude of WGS 84.
 
     Examples
     --------
@@ -169,17 +170,17 @@ def is_wgs84(name: str) -> bool:
 
 
 def to_wgs84(name: str | None, where: str) -> Callable[[Sequence[float]], Place] | None:
-    """The function from coordinates of a system to longitude and latitude of WGS 84.
+    """Returns the function from coordinates of a system to longitude and latitude of WGS 84.
 
     Returns
     -------
     callable or None
-        ``None`` where coordinates are longitude and latitude of WGS 84 already.
+        ``None`` if the coordinates are longitude and latitude of WGS 84.
 
     Raises
     ------
     InputError
-        For an unknown system, one that is not of the surface of the Earth, or without pyproj.
+        Unknown system, system that is neither geographic nor projected, or pyproj not installed.
     """
     if name is None or is_wgs84(name):
         return None
@@ -224,7 +225,7 @@ def to_wgs84(name: str | None, where: str) -> Callable[[Sequence[float]], Place]
     return transform
 
 
-# Names of the web map's projection before EPSG had one.
+# Old names of the web-map projection EPSG:3857.
 GOOGLE = {
     f"{prefix}{code}": "EPSG:3857"
     for prefix in ("EPSG:", "ESRI:", "URN:OGC:DEF:CRS:EPSG::", "URN:OGC:DEF:CRS:ESRI::")
@@ -235,7 +236,7 @@ GOOGLE = {
 def _within(area: Any, longitude: float, latitude: float) -> bool:
     west, east = area.west - AREA_MARGIN_DEG, area.east + AREA_MARGIN_DEG
     inside = west <= longitude <= east
-    if area.west > area.east:  # across the antimeridian
+    if area.west > area.east:  # the area crosses the antimeridian
         inside = longitude >= west or longitude <= east
     return bool(inside and area.south - AREA_MARGIN_DEG <= latitude <= area.north + AREA_MARGIN_DEG)
 

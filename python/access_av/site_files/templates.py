@@ -78,7 +78,7 @@ def new(
 
 
 def missing(kind: str, drawn: Drawn | None) -> list[str]:
-    """Names the keys that a new file needs and an import did not give."""
+    """Returns the required keys of a new file that the imported files do not contain."""
     if drawn is None or kind not in ("plant", "site"):
         return []
     prefix = "site." if kind == "plant" else ""

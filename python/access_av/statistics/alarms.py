@@ -16,18 +16,18 @@ class Alarms:
     Attributes
     ----------
     alarms
-        Their number.
+        Number of alarms.
     early
         Alarms at which the error was within the alert limit.
     suspicions
-        Early alarms at which the protection level was within it, too: a source was suspected,
-        nominally a false alarm.
+        Early alarms with a protection level within the alert limit: a source was suspected. Without
+        a fault, such an alarm is a false alarm.
     excursions
-        Times at which the error passed the alert limit.
+        Number of times that the error exceeded the alert limit.
     longest_silence_s
-        Longest time that the error had been beyond the alert limit while the state was ``ok``.
+        Maximum time with an error above the alert limit in state ``ok``.
     duration_s
-        Time driven, over all runs.
+        Total duration of all runs.
 
     Examples
     --------
@@ -48,12 +48,12 @@ class Alarms:
     duration_s: float
 
     def per_hour(self, count: int) -> float:
-        """Returns the number per hour of driving."""
+        """Returns the number of alarms per hour."""
         return count / (self.duration_s / 3600.0)
 
     @classmethod
     def of(cls, trajectories: pl.DataFrame, alert_limit_m: float) -> Alarms | None:
-        """Count in a table of trajectories; ``None`` where no step has a protection level."""
+        """Evaluates a table of trajectories; ``None`` if no step has a protection level."""
         steps = trajectories.filter(pl.col("protection_level_m").is_not_null()).sort(
             "run", "time_s", maintain_order=True
         )

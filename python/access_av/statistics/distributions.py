@@ -1,6 +1,6 @@
 """Quantiles of the chi-squared and beta distributions.
 
-SciPy is imported where it is needed: it takes longer than the rest of the package.
+SciPy is imported at first use, because its import is slower than that of the package.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import math
 
 
 def chi_squared_quantile(probability: float, freedom: float) -> float:
-    """Value that a chi-squared variable with ``freedom`` degrees stays below with ``probability``.
+    """Returns the quantile of the chi-squared distribution with ``freedom`` degrees of freedom.
 
     Inverts the regularized lower incomplete gamma function P(freedom / 2, x / 2) (NIST DLMF 8.2.4).
 
@@ -34,7 +34,7 @@ def chi_squared_quantile(probability: float, freedom: float) -> float:
 
 
 def beta_quantile(probability: float, a: float, b: float) -> float:
-    """Value that a beta variable with the shapes ``a`` and ``b`` stays below with ``probability``.
+    """Returns the quantile of the beta distribution with the shapes ``a`` and ``b``.
 
     Inverts the regularized incomplete beta function I_x(a, b) (NIST DLMF 8.17.2).
 
@@ -61,4 +61,4 @@ def _check(probability: float, *shapes: float) -> None:
         raise ValueError(f"`probability` is {probability}; it must be above 0 and below 1")
     for shape in shapes:
         if not (shape > 0.0 and math.isfinite(shape)):
-            raise ValueError(f"{shape} is no shape of a distribution; it must be above 0")
+            raise ValueError(f"{shape} is not a shape of a distribution; it must be above 0")

@@ -1,4 +1,4 @@
-"""How protection levels and errors went together."""
+"""Comparison of protection levels and errors."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ class Integrity:
     epochs
         Number of steps with a protection level.
     state_shares
-        Share of them in each state; that of ``ok`` is the availability.
+        Share of the steps in each state; the share of ``ok`` is the availability.
     median_level_over_error
-        Median of protection level by horizontal error.
+        Median of protection level divided by horizontal error.
     exceedances
-        Steps in state ``ok`` whose error lay beyond the protection level.
+        Steps in state ``ok`` with an error above the protection level.
     runs_with_exceedances
-        Runs with at least one of them.
+        Runs with at least one such step.
     exceedance_share
-        ``exceedances`` by the steps in state ``ok``; 0 where there is none.
+        ``exceedances`` divided by the steps in state ``ok``; 0 without such steps.
     exceedance_interval
-        Its 95 % interval by the bootstrap over whole runs. Its high end is 0 where nothing
-        happened: then ``run_interval`` says how little that means.
+        95 % interval of ``exceedance_share`` by the bootstrap over whole runs. The upper end is 0
+        without an exceedance; ``run_interval`` is then the informative interval.
     run_interval
         95 % interval of the share of runs with an exceedance, by Clopper and Pearson. Epochs of a
-        run hang together; runs do not.
+        run are correlated; runs are independent.
     by_run
         Number of steps of each run by state, ``beyond`` the level while ``ok``, and, from a
         campaign, ``too_wide``: degraded with a protection level above the alert limit.
@@ -81,12 +81,12 @@ class Integrity:
 
     @property
     def availability(self) -> float:
-        """Share of the epochs in state ``ok``."""
+        """Returns the share of the epochs in state ``ok``."""
         return self.state_shares["ok"]
 
     @classmethod
     def of(cls, trajectories: pl.DataFrame) -> Integrity | None:
-        """Count in a table of trajectories; ``None`` where no step has a protection level."""
+        """Evaluates a table of trajectories; ``None`` if no step has a protection level."""
         stated = _stated(trajectories)
         if stated.is_empty():
             return None
@@ -104,7 +104,7 @@ class Integrity:
     def of_runs(
         cls, counts: Mapping[str, NDArray[np.float64]], median_level_over_error: float
     ) -> Integrity:
-        """From the steps of each run in each state, and ``beyond`` the level while ``ok``.
+        """Evaluates counts: steps of each run by state, and ``beyond`` the level in state ``ok``.
 
         Examples
         --------
@@ -124,7 +124,7 @@ class Integrity:
             exceedances=int(by_run[:, 0].sum()),
             runs_with_exceedances=affected,
             exceedance_share=_share(by_run),
-            # Resamples of runs without any are without any.
+            # Without an exceedance, every resample has none.
             exceedance_interval=bootstrap_interval(by_run, _share) if affected else (0.0, 0.0),
             run_interval=clopper_pearson(affected, runs),
             by_run=counts,
@@ -132,7 +132,7 @@ class Integrity:
 
 
 def stanford_counts(trajectories: pl.DataFrame, alert_limit_m: float) -> dict[str, int]:
-    """Epochs in each region of the Stanford diagram of error against protection level.
+    """Returns the number of epochs in each region of the Stanford diagram (error and level).
 
     ``nominal``: error ≤ level ≤ limit. ``misleading``: level < error ≤ limit. ``hazardous``
     (hazardously misleading): level ≤ limit < error. ``unavailable``: level > limit, error ≤ level.
@@ -143,8 +143,8 @@ def stanford_counts(trajectories: pl.DataFrame, alert_limit_m: float) -> dict[st
     Parameters
     ----------
     trajectories
-        Columns ``trajectories`` of :mod:`access_av.columns`; steps without a protection level
-        count nowhere.
+        Columns ``trajectories`` of :mod:`access_av.columns`; steps without a protection level are
+        ignored.
     alert_limit_m
         Alert limit.
 
@@ -184,7 +184,7 @@ def stanford_counts(trajectories: pl.DataFrame, alert_limit_m: float) -> dict[st
 
 
 def _stated(trajectories: pl.DataFrame) -> pl.DataFrame:
-    """The steps with a protection level, and their ``error_m``."""
+    """Returns the steps with a protection level, and their ``error_m``."""
     return trajectories.filter(pl.col("protection_level_m").is_not_null()).select(
         "run", "protection_level_m", "integrity", error_m=horizontal_error_m()
     )

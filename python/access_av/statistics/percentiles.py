@@ -114,7 +114,8 @@ def percentiles(
     at least the error whose share, by Clopper and Pearson's 95 % interval, reaches the percentage.
     It is infinite if there are too few independent errors.
 
-    Few runs determine the tail poorly. If the errors of runs differ by a factor of 1.6 (one
+    Intervals of the tail are too short with few runs. If the errors of runs differ by a factor of
+    1.6 (one
     standard deviation), intervals of 20 runs cover the median in 95 % of the cases, the 90th
     percentile in 93 %, the 99th in 75 %; those of 40 runs in 96, 95 and 83 %.
 

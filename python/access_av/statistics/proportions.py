@@ -20,7 +20,7 @@ def clopper_pearson(
     Parameters
     ----------
     successes
-        How often it happened.
+        Number of successful trials.
     trials
         Number of independent trials.
     probability
@@ -57,7 +57,7 @@ def wilson(successes: int, trials: int, *, probability: float = 0.95) -> tuple[f
     Parameters
     ----------
     successes
-        How often it happened.
+        Number of successful trials.
     trials
         Number of independent trials.
     probability

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SEPARATORS = (",", ";", "\t")
 DECIMAL_COMMA = r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$"
 THOUSANDS = re.compile(r"[+-]?\d{1,3}([,.'\u2019 \u00a0\u202f]\d{3})+([.,]\d+)?")
-# First line of CSV files that Excel writes or reads: it gives the separator.
+# First line of CSV files of Excel, which contains the separator.
 SEPARATOR_LINE = re.compile(rb'"?sep=([,;|\t])"?', re.IGNORECASE)
 UTF32 = (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)
 UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
@@ -39,7 +39,7 @@ OTHER_FORMATS = {
 
 @dataclass(frozen=True)
 class Lines:
-    """Lines of a file that hold a header and rows.
+    """Header and rows of a file.
 
     Attributes
     ----------

@@ -58,4 +58,4 @@ def _named(arguments: Sequence[str]) -> Iterator[Path]:
                     if path.suffix == META and path.with_suffix(DATA).is_file():
                         yield path.with_suffix(DATA)
             except (OSError, ValueError):
-                continue  # no name of a file
+                continue  # not a file name

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 CONTENT = "result.json"
-# Every member has this time, so that equal results are equal bytes.
+# Time of every member of the archive, so that equal results have equal bytes.
 TIME = (1980, 1, 1, 0, 0, 0)
 # Names of the package of which a result file may contain objects.
 PACKAGE = "access_av"
@@ -89,7 +89,7 @@ class Result:
         Raises
         ------
         TypeError
-            If a field is no data; names its type.
+            If a field has a type that cannot be saved; the message contains the type.
         OSError
             If the file cannot be written.
         """
@@ -109,7 +109,7 @@ class Result:
         Raises
         ------
         InputError
-            If the file is no result of this class; names what it is.
+            If the file is not a result of this class; the message contains its class.
         OSError
             If the file cannot be read.
         """
@@ -128,7 +128,7 @@ def load(path: str | Path) -> Any:
     Raises
     ------
     InputError
-        If the file is no result.
+        If the file is not a result.
     OSError
         If the file cannot be read.
     """
@@ -148,7 +148,7 @@ def load(path: str | Path) -> Any:
 
 
 def same(first: Any, second: Any) -> bool:
-    """Whether two values have equal content; NaN equals NaN.
+    """Returns whether two values have equal content; NaN equals NaN.
 
     Examples
     --------
@@ -242,7 +242,7 @@ def _name(kind: type) -> str:
 
 
 class _Reader:
-    """Decodes what :class:`_Writer` encoded. Only classes of this package are made."""
+    """Decodes the output of :class:`_Writer`; creates only classes of this package."""
 
     def __init__(self, members: Mapping[str, bytes]) -> None:
         self.members = members

@@ -18,7 +18,7 @@ from access_av.tables.results_directory import regular
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-# Program of the process that tries to read a table.
+# Code of the separate process that reads a table first.
 TRY = "import sys, polars; polars.read_parquet(sys.argv[1], glob=False)"
 
 # Maximum file size in bytes.

@@ -1,4 +1,4 @@
-"""The report's sections on signal and accuracy."""
+"""Report sections on signal and accuracy."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TREND_SSBS = 100
 
 
 def signal(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
-    """SNR along the track, as the paper's figure of its trend has it."""
+    """Returns the section on the SNR along the track, with the trend of the paper's figure."""
     specs["snr"] = _snr_chart(evaluation)
     highest = _trend(evaluation).sort("mean_true_snr_db").row(-1, named=True)
     ends = evaluation.snr["mean_true_snr_db"].gather([0, evaluation.snr.height - 1])
@@ -45,7 +45,7 @@ def _trend(evaluation: Evaluation) -> pl.DataFrame:
 
 
 def _nearest_s() -> float:
-    """When the vehicle passes the radio head, from the paper's numbers: an arc of constant bend."""
+    """Returns the time at the radio head by the paper's numbers: an arc of constant curvature."""
     trip = paper_numbers()["trip"]
     length_m, turn_rad = trip["length_m"], np.radians(trip["bend_deg"])
     speed_mps, ramp_mps2 = trip["top_speed_kmh"] / 3.6, trip["acceleration_mps2"]
@@ -54,14 +54,14 @@ def _nearest_s() -> float:
     places_m = radius_m * np.array([np.sin(turned), 1.0 - np.cos(turned)])
     head_m = np.array(trip["radio_head_m"])[:, None]
     nearest_m = along_m[np.hypot(*(places_m - head_m)).argmin()]
-    # Past the ramp, where it happens, the speed is the top speed.
+    # The vehicle has its top speed there, after the acceleration.
     return float(nearest_m / speed_mps + 0.5 * speed_mps / ramp_mps2)
 
 
 def accuracy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
-    """Errors against time: a pair of charts for every SSB and for each base wake-up time."""
+    """Returns error charts over time, in x and y: for every SSB and for each base wake-up time."""
     every_ssb = evaluation.campaign("P")
-    panels = [("Every SSB (20 ms), what the radio would allow", every_ssb)]
+    panels = [("Every SSB (20 ms): limit of the radio signal", every_ssb)]
     reference = every_ssb.filter(pl.col("method") == "music")
     by_mode = pl.concat([evaluation.campaign("Q"), evaluation.campaign("R")])
     groups: dict[tuple[float, ...], list[int]] = {}
@@ -83,7 +83,7 @@ def accuracy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
 
 
 def accuracy_table(evaluation: Evaluation) -> str:
-    """Worst and RMS errors of every operating point."""
+    """Returns the table of maximum and RMS errors of every operating point."""
     rows = []
     for point in evaluation.points.unique(
         ["campaign", "method", "adaptive", "base_wake_up_ms"], maintain_order=True
@@ -110,7 +110,7 @@ def accuracy_table(evaluation: Evaluation) -> str:
 
 
 def _snr_chart(evaluation: Evaluation) -> Spec:
-    """SNR along the track (the paper's SNR figure)."""
+    """Returns the chart of the SNR along the track (the paper's SNR figure)."""
     line = (
         alt.Chart(thinned(_trend(evaluation)))
         .mark_line(color=BLUE, strokeWidth=2)
@@ -129,7 +129,7 @@ def _snr_chart(evaluation: Evaluation) -> Spec:
 
 
 def _error_chart(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spec:
-    """Error in one direction against time, one line per operating point in ``points``.
+    """Returns the chart of the error in one direction over time, one line per operating point.
 
     ``axis`` is ``"x"`` or ``"y"``.
     """
@@ -155,7 +155,8 @@ def _error_chart(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spe
                 scale=alt.Scale(
                     domain=names, range=[[4, 3] if name == EVERY_SSB else [1, 0] for name in names]
                 ),
-                # One legend for colours and symbols, because two could contradict each other.
+                # One legend for colours and symbols, because two legends could contradict each
+                # other.
                 legend=alt.Legend(title=None),
             ),
             opacity=alt.condition(picked, alt.value(1.0), alt.value(0.15)),
@@ -175,7 +176,7 @@ def _error_chart(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spe
 
 
 def _line_names(points: pl.DataFrame) -> list[str]:
-    """Names for a legend; MUSIC at every SSB has its own name in a comparison."""
+    """Returns the names of a legend; MUSIC at every SSB has its own name in a comparison."""
     mixed = points["campaign"].n_unique() > 1
     return [
         EVERY_SSB

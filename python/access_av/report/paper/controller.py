@@ -59,9 +59,9 @@ def contribution(study: Study, specs: dict[str, Spec]) -> str:
     details = table(head, rows, numbers=(1, 2, 4, 5))
     return (
         '<div class="charts">'
-        + figure("ablation", "RMS error with the constant less RMS error with Algorithm 1, same "
-                 "runs; right of zero it helps. Lines are paired 95 % intervals.",
-                 "Algorithm 1 against a constant of as many angle estimates")
+        + figure("ablation", "RMS error with the constant minus RMS error with Algorithm 1, "
+                 "equal runs; positive: Algorithm 1 helps. Lines are paired 95 % intervals.",
+                 "Algorithm 1 compared with a constant with as many angle estimates")
         + figure("front", "Down and left is better. The line is MUSIC at fixed intervals.",
                  "Error against angle estimates")
         + "</div><details><summary>Every interpretation and mode as a table</summary>"
@@ -70,7 +70,7 @@ def contribution(study: Study, specs: dict[str, Spec]) -> str:
 
 
 def fair(study: Study) -> str:
-    """Paper's method and proposed method with equal information."""
+    """Returns the section that compares both methods with equal information."""
     names = {
         "paper": "the paper's interpretation",
         "ours": "ours",
@@ -94,7 +94,7 @@ def fair(study: Study) -> str:
 
 
 def ours(study: Study) -> str:
-    """Proposed method and the paper's adaptive point in each mode."""
+    """Returns the section on the proposed method and the paper's adaptive point in each mode."""
     rows = [
         (
             str(each.mode) if each.map else f"{each.mode}, road unknown",
@@ -174,7 +174,7 @@ def _front_chart(study: Study) -> Spec:
             each.outcome.every_ssb["music"].rms_error_m[0]
             != (study.shown.outcome.every_ssb["music"].rms_error_m[0])
         ):
-            continue  # in another world
+            continue  # in another environment
         rows += [
             {"what": INTERPRETATION, "aoa_estimates": float(drives.aoa_estimates[0]),
              "rms": float(drives.rms_error_m[0]),

@@ -1,4 +1,4 @@
-"""The report's section on the design space."""
+"""Report section on the design space."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PROJECTION_PX, SPACE_PX = 260, 420
 
 
 def design(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
-    """The paper's axes, X and Y error and energy, as projections; and energy against RMS error."""
+    """Returns the section with energy against X, Y and RMS error."""
     for axis in "xy":
         specs[f"design-{axis}"] = _projection(evaluation, axis)
     specs["design-space"] = _chart(evaluation)
@@ -39,7 +39,7 @@ def design(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
 
 
 def _projection(evaluation: Evaluation, axis: str) -> Spec:
-    """The adaptive points of all modes, seen along one of the paper's two error axes."""
+    """Returns the chart of energy against one error axis, for the adaptive points of all modes."""
     points = evaluation.campaign("R").filter(pl.col("energy_j").is_not_null())
     columns = ("mode", "energy_j", "worst_error_x_m", "worst_error_y_m")
     rows = points.select(columns).with_columns(pl.col(pl.Float64).round(4))
@@ -66,12 +66,12 @@ def _projection(evaluation: Evaluation, axis: str) -> Spec:
 
 
 def _axis(channel: Any, column: str, title: str, ends: list[float]) -> Any:
-    """An axis of points with labels: its domain is that of the labels' positions."""
+    """Returns an axis whose domain is that of the label positions."""
     return channel(f"{column}:Q", title=title, scale=alt.Scale(domain=ends, nice=False))
 
 
 def queries(evaluation: Evaluation) -> str:
-    """The paper's questions to the design space, answered."""
+    """Returns the table of the paper's requirements and the operating points that meet them."""
     rows = []
     for query in _asked():
         found = explore(evaluation.campaign("R"), query)
@@ -87,7 +87,7 @@ def queries(evaluation: Evaluation) -> str:
 
 
 def _asked() -> list[Query]:
-    """Requirements of the paper, and the points that meet its first claim."""
+    """Returns the requirements of the paper, each with the points that meet it."""
     asked = [
         Query(**of_claim(claim, "query"))
         for claim in ("d1_budget_210_j", "d2_budget_260_j_rms_015_m")
@@ -96,7 +96,7 @@ def _asked() -> list[Query]:
 
 
 def _chart(evaluation: Evaluation) -> Spec:
-    """Accuracy against energy; two sliders are the query."""
+    """Returns the chart of error against energy; two sliders set the limits."""
     table = by_mode(evaluation).select(
         "mode",
         "mode_name",

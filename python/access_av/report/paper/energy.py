@@ -1,4 +1,4 @@
-"""The report's section on energy and angle estimates."""
+"""Report section on energy and angle estimates."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def energy_text(evaluation: Evaluation) -> str:
-    """Energies and their sources."""
+    """Returns a paragraph on the energies and their sources."""
     free, solved = numbers(evaluation.freedoms)
     return escape(
         "Energy of a trip is the number of angle estimates times the energy of one execution. "
@@ -37,14 +37,14 @@ def energy_text(evaluation: Evaluation) -> str:
             "estimates, not "
             "of the power."
             if evaluation.refitted
-            else "Energies per execution are the platform’s own."
+            else "Energies per execution are those of the platform file."
         )
         + _missing(evaluation)
     )
 
 
 def _missing(evaluation: Evaluation) -> str:
-    """Which energies the platform has no figure for."""
+    """Returns the energies for which the platform has no figure."""
     missing = [
         f"{label(method)} in mode {mode.number}"
         for mode in evaluation.platform.modes
@@ -63,7 +63,7 @@ def _savings(evaluation: Evaluation, mode: int) -> float | None:
 
 
 def energy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
-    """Energy and angle estimates of a trip in each mode."""
+    """Returns the section on energy and angle estimates of a trip in each mode."""
     specs["energy-bars"] = _energy_chart(evaluation)
     specs["aoa_estimates"] = _aoa_estimates_chart(evaluation)
     bars = figure("energy-bars", title="Energy of a trip")
@@ -71,9 +71,9 @@ def energy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
 
 
 def freedoms(study: Study) -> str:
-    """Claims met with each degree of freedom of the energy fit."""
+    """Returns the table of claims met with each degree of freedom of the energy fit."""
     if not study.fit_options:
-        return "<p>The platform's energies are its own: nothing was fitted.</p>"
+        return "<p>The energies are those of the platform file; none was fitted.</p>"
     titles = {each.interpretation.name: each.interpretation.title for each in study.evaluations}
 
     def named(interpretations: tuple[str, ...]) -> str:
@@ -93,18 +93,18 @@ def freedoms(study: Study) -> str:
         for index, each in enumerate(study.fit_options)
     ]
     head = (
-        "Free in the fit",
-        "Numbers free / solved for",
+        "Degree of freedom",
+        "Parameters: free / solved",
         f"“{study.shown.interpretation.title}”: reproduced / agree by construction / by arithmetic",
         "Average saving / %",
-        "Energy half kept by",
-        "Both halves kept by",
+        "Energy claims met by",
+        "Both claim groups met by",
     )
     return table(head, rows)
 
 
 def energy_table(evaluation: Evaluation) -> str:
-    """Energies, savings and angle estimates of each mode."""
+    """Returns the table of energies, savings and angle estimates of each mode."""
     paper = paper_numbers()["energy_j"]
     rows = []
     for mode in evaluation.platform.modes:
@@ -131,7 +131,7 @@ def energy_table(evaluation: Evaluation) -> str:
 
 
 def _energy_chart(evaluation: Evaluation) -> Spec:
-    """Energy per mode (the paper's energy figure), with the values the paper states as diamonds."""
+    """Returns the chart of the energy per mode; diamonds are the stated values of the paper."""
     paper = paper_numbers()["energy_j"]
     stated = [
         {"mode": 0, "line": LABELS[method], "energy_j": value}
@@ -163,7 +163,7 @@ def _energy_chart(evaluation: Evaluation) -> Spec:
 
 
 def _aoa_estimates_chart(evaluation: Evaluation) -> Spec:
-    """Angle estimates in a trip, per mode."""
+    """Returns the chart of angle estimates in a trip, per mode."""
     bars = _grouped_bars(evaluation, "aoa_estimates", "angle estimates in a trip", ".0f")
     return finish(
         bars, height=230, description="Angle estimates in one trip per power mode and method"

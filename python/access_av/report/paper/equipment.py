@@ -1,4 +1,4 @@
-"""The report's sections on cost and carbon: what need not be built, bought or burnt."""
+"""Report sections on cost and carbon: equipment and energy that are not needed."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from access_av.paper.evaluation import Evaluation
     from access_av.report.chart import Spec
 
-# The paper's four units and its fleet.
+# Number of roadside units, and fleet size, of the paper.
 UNITS_NOT_BUILT = 4
 FLEET = paper_numbers()["day"]["fleet"]
 
 
 def cost_text(evaluation: Evaluation) -> str:
-    """Cost of roadside units, and energy saved per day."""
+    """Returns a paragraph on the cost of roadside units and the energy saved per day."""
     units = cost.roadside_units(UNITS_NOT_BUILT)
     mode = evaluation.platform.modes[0].number
     try:
@@ -45,7 +45,7 @@ def cost_text(evaluation: Evaluation) -> str:
 
 
 def cost_section(specs: dict[str, Spec]) -> str:
-    """Roadside units over the years, and the sensors."""
+    """Returns the section on the cost of roadside units and sensors."""
     specs["rsu-cost"] = _roadside_unit_chart(UNITS_NOT_BUILT, years=10)
     specs["sensor-cost"] = _sensor_chart()
     return figure("rsu-cost", title=f"{UNITS_NOT_BUILT} roadside units over the years") + figure(
@@ -54,7 +54,7 @@ def cost_section(specs: dict[str, Spec]) -> str:
 
 
 def carbon_section(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
-    """Emissions of roadside units that are not built, of the computer, and of the energy saved."""
+    """Returns the section on emissions: roadside units, computer, and saved energy."""
     avoided = {
         grid: carbon.footprint("roadside_unit", UNITS_NOT_BUILT, grid) for grid in carbon.grids()
     }
@@ -108,7 +108,7 @@ def carbon_section(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
 
 
 def _roadside_unit_chart(units: int, years: int) -> Spec:
-    """Cost over the years of the roadside units that are not needed."""
+    """Returns the chart of the cost of the roadside units over the years."""
     entry = cost.roadside_units(units)
     rows = []
     for year in range(years + 1):
@@ -130,7 +130,7 @@ def _roadside_unit_chart(units: int, years: int) -> Spec:
 
 
 def _sensor_chart() -> Spec:
-    """Price of the sensors."""
+    """Returns the chart of the sensor prices."""
     table = pl.DataFrame(cost.sensors()).sort("price_usd", descending=True)
     base = alt.Chart(table).encode(
         y=alt.Y("name:N", title=None, sort=table["name"].to_list(), axis=alt.Axis(labelLimit=170)),
@@ -143,12 +143,12 @@ def _sensor_chart() -> Spec:
 
 
 def _grid_name(grid: str) -> str:
-    """Region of an electricity grid as a reader sees it."""
+    """Returns the display name of an electricity grid."""
     return grid.upper() if grid == "usa" else grid.capitalize()
 
 
 def _carbon_chart(footprints: dict[str, carbon.Footprint]) -> Spec:
-    """Lifetime emissions in operation by grid (value and range), with embodied emissions."""
+    """Returns the chart of lifetime emissions by grid (value and range), and of production."""
     any_one = next(iter(footprints.values()))
     rows = [
         {

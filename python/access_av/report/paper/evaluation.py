@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from access_av.paper.study import Study
     from access_av.report.chart import Spec
 
-# Kinds of evidence that are none, in the words of a tile.
+# Display names of the kinds of evidence that do not count.
 TILES = {BY_CONSTRUCTION: "by construction", ARITHMETIC: "by arithmetic"}
 NO_FIGURES = (
     "The source of the paper contains no figures: each \\includegraphics has an empty file name. "
@@ -39,19 +39,19 @@ TEMPLATE = resources.files(__package__).joinpath("evaluation.html")
 
 
 def render(study: Study, specs: dict[str, Spec] | None = None) -> str:
-    """The whole report as HTML.
+    """Returns the report as HTML.
 
     Parameters
     ----------
     study
-        The paper under several interpretations; the shown one's charts are drawn in full.
+        Evaluation of several interpretations; the charts are those of the shown one.
     specs
-        Takes the charts, by name.
+        Dictionary to which the charts are added, by name.
 
     Returns
     -------
     str
-        An HTML page that loads nothing.
+        A self-contained HTML page.
     """
     specs = {} if specs is None else specs
     evaluation = study.shown
@@ -94,7 +94,7 @@ def render(study: Study, specs: dict[str, Spec] | None = None) -> str:
 
 
 def _tiles(study: Study) -> str:
-    """Claims met under the shown interpretation, by weight of evidence."""
+    """Returns the tiles with the met claims of the shown interpretation, by kind of evidence."""
     name = study.shown.interpretation.title
     met = summary.counts(study.of(study.shown.interpretation.name))
     made = [
@@ -112,7 +112,7 @@ def _tiles(study: Study) -> str:
     made.append(
         tile(
             f"{better} of {len(without_map)}",
-            "modes in which ours is better in error and energy, the road known to neither",
+            "modes with less error and energy of the proposed method, both without a road map",
         )
     )
     return "".join(made)
@@ -148,7 +148,7 @@ def _provenance(evaluation: Evaluation) -> str:
     return (
         f"<p>{escape(NO_FIGURES)}</p>"
         "<p>Errors, angle estimates and SNR are simulated by this version from the scenario below "
-        "and the seed above. Prices and carbon factors carry their sources where they stand.</p>"
+        "and the seed above. Prices and carbon factors are listed with their sources.</p>"
         "<details><summary>Energy per execution, with its sources</summary>"
         + table(head, rows, numbers=(2,))
         + "</details>"

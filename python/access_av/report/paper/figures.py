@@ -1,4 +1,4 @@
-"""Charts of the report as pictures, for a page that runs no code."""
+"""Charts of the report as SVG, for pages without scripts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAMES = ("ablation", "front", "sobol", "share")
 
 
 def figures(specs: Mapping[str, Spec]) -> dict[str, str]:
-    """These charts as SVG, by their names."""
+    """Returns these charts as SVG, by their names."""
     return {
         name: vl_convert.vegalite_to_svg(specs[name] | {"width": WIDTH, "background": "white"})
         for name in NAMES

@@ -1,4 +1,4 @@
-"""The report's first section: the interpretations, and the claims under each."""
+"""First section of the report: the interpretations, and the claims under each."""
 
 from __future__ import annotations
 
@@ -27,14 +27,13 @@ if TYPE_CHECKING:
     from access_av.paper.study import Study
     from access_av.report.chart import Spec
 
-# The worst error and the average saving: the first claim of one half, the last of the other.
-# Height of the plot of the overview (px).
+# Claims of the overview chart (maximum error, average saving), and its height (px).
 OVERVIEW_PX = 300
 PROMISED = (("accuracy", 0), ("energy", -1))
 
 
 def interpretations(study: Study) -> str:
-    """Interpretations, the claim groups that hold under each, and the supporting claims."""
+    """Returns the section on the interpretations and the claim groups that hold under each."""
     rows = []
     for index, half in enumerate(summary.halves(study), start=1):
         claims = study.of(half.interpretation.name)
@@ -69,7 +68,7 @@ def interpretations(study: Study) -> str:
 
 
 def overview(study: Study, specs: dict[str, Spec]) -> str:
-    """The one picture: what each interpretation obtains of the paper's two promises."""
+    """Returns the chart of maximum error and average saving of each interpretation."""
     rows = []
     for index, half in enumerate(summary.halves(study), start=1):
         by_id = {it.id: it.obtained for it in study.of(half.interpretation.name)}
@@ -142,7 +141,7 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
 
 
 def chosen(study: Study) -> str:
-    """Assumptions where the paper is not specific, and the effects of alternatives."""
+    """Returns the table of assumptions, with the effects of alternatives."""
     head = ("Unspecified", "Chosen", "Why")
     if not study.effects:
         rows = [tuple(escape(it[key]) for key in ("what", "value", "why")) for it in entries()]
@@ -171,7 +170,7 @@ def chosen(study: Study) -> str:
 
 
 def matrix(study: Study) -> str:
-    """Every claim under every interpretation."""
+    """Returns the table of every claim under every interpretation."""
     columns = [study.of(each.interpretation.name) for each in study.evaluations]
     head = ("Claim", "Paper", *(str(index) for index in range(1, len(columns) + 1)))
     rows = [
@@ -186,10 +185,10 @@ def matrix(study: Study) -> str:
 
 
 def claims(study: Study) -> str:
-    """Claims under the shown interpretation, with intervals and the weight of evidence."""
+    """Returns the table of claims under the shown interpretation, with interval and evidence."""
     rows = []
     for claim in study.of(study.shown.interpretation.name):
-        turns = " " + badge("turns with the seed", "fit") if claim.seed_sensitive else ""
+        turns = " " + badge("depends on the seed", "fit") if claim.seed_sensitive else ""
         if claim.seeds_met:
             turns += f"<small>met with {claim.seeds_met} seeds</small>"
         obtained = _value(claim, claim.obtained)
@@ -251,12 +250,12 @@ def _value(claim: Claim, value: object) -> str:
 
 def _short(claim: Claim) -> str:
     number, *words = claim.id.split("_")
-    # Two claims are e3: one of the saving, one of the angle estimates.
+    # Two claims have the number e3: one about the saving, one about the angle estimates.
     return f"{number} {words[-1]}" if number == "e3" and words[-1] == "executions" else number
 
 
 def _kind(claim: Claim) -> str:
-    """Kind of a claim's badge: arithmetic and construction have their own."""
+    """Returns the badge of a claim; arithmetic and construction have separate badges."""
     if claim.evidence in NO_EVIDENCE and claim.is_judged:
         return claim.evidence.split()[-1]
     return {REPRODUCED: "yes", NOT_REPRODUCED: "no"}.get(claim.verdict, "fit")
@@ -281,7 +280,7 @@ def _met(held: bool) -> str:
 
 
 def _cell(claim: Claim) -> str:
-    """A claim's value and verdict in a small cell."""
+    """Returns value and verdict of a claim as a small table cell."""
     if not claim.is_judged:
         return badge("–", "fit")
     sign = summary.SIGNS[claim.verdict]

@@ -1,4 +1,4 @@
-"""The lines of the evaluation's charts: their names and colours."""
+"""Names and colours of the lines in the charts of the evaluation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from access_av.paper.evaluation import Evaluation
 
 EVERY_SSB = "MUSIC, 20 ms"
-# The paper's: black, red, green and blue; its black is a slate that a dark page shows as well.
+# Colours of the paper: black, red, green and blue; black is a slate that is visible on dark pages.
 COLOURS = {
     LABELS["music"]: "#5b6470",
     LABELS["esprit"]: "#d62728",
@@ -23,17 +23,17 @@ COLOURS = {
     ADAPTIVE_LABEL: "#1f77e0",
     EVERY_SSB: PURPLE,
 }
-# In the order of a chart's legend.
+# Names in the order of the legend.
 NAMES = [*(LABELS[method] for method in METHODS), ADAPTIVE_LABEL]
 
 
 def scale(names: list[str]) -> alt.Scale:
-    """The colours of these lines."""
+    """Returns the colour scale of these lines."""
     return alt.Scale(domain=names, range=[COLOURS[name] for name in names])
 
 
 def by_mode(evaluation: Evaluation) -> pl.DataFrame:
-    """Operating points of a power mode, with the name of their ``line``."""
+    """Returns the operating points of a power mode, with the name of their ``line``."""
     return evaluation.points.filter(pl.col("mode").is_not_null()).with_columns(
         pl.struct("method", "adaptive")
         .map_elements(

@@ -1,4 +1,4 @@
-"""A study's results on disk: evaluated, written with the report, opened again."""
+"""Results of an evaluation on disk: computing, writing with the report, reading."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ POINTS_FILE = "operating_points.parquet"
 
 
 def write(made: Study, directory: ResultsDirectory) -> None:
-    """Write tables, claims, report, scenarios, platform and manifest."""
+    """Writes tables, claims, report, scenarios, platform and manifest."""
     for name, table in made.tables().items():
         directory.write_table(f"{name}.parquet", table)
     directory.write_json("claims.json", as_records(made.claims))
@@ -57,7 +57,7 @@ def run(
     out: Path | None = None,
     **how: Any,
 ) -> tuple[Study, ResultsDirectory]:
-    """Evaluate these interpretations, or all that are shipped, and write the results."""
+    """Evaluates these interpretations, or all shipped ones, and writes the results."""
     chosen, board = load_all(names), Platform.load(platform)
     directory = ResultsDirectory.create("evaluate", out)
     made = study(chosen, board, runs=runs, seed=seed, **how)
@@ -71,22 +71,22 @@ def operating_points(
     *,
     progress: Callable[[int, int], None] | None = None,
 ) -> pl.DataFrame:
-    """Operating points of an earlier evaluation, or of a new one where there is none.
+    """Returns the operating points of an earlier evaluation, otherwise of a new one.
 
     Parameters
     ----------
     results
-        Directory of an evaluation. ``None`` takes ``results/latest`` if that is one, else the
-        newest one in ``results/`` and, where there is none, runs the paper's.
+        Directory of an evaluation. Default: ``results/latest`` if it is one, else the newest one in
+        ``results/``, else a new evaluation of the paper.
     interpretation
-        Under which interpretation.
+        Name of the interpretation.
     progress
-        Called as ``progress(done, total)`` while a new one runs.
+        Called as ``progress(done, total)`` during a new evaluation.
 
     Raises
     ------
     InputError
-        When ``results`` holds no evaluation, or not of that interpretation.
+        If ``results`` contains no evaluation of this interpretation.
     """
     if results is not None:
         file = results / POINTS_FILE
@@ -109,7 +109,7 @@ def operating_points(
 
 
 def _points(file: Path) -> pl.DataFrame:
-    """A table of operating points, with all its columns."""
+    """Reads a table of operating points, with all its columns."""
     points = validation.read(file, "table of operating points")
     validation.check_types(points, str(file), "operating_points")
     return points

@@ -1,4 +1,4 @@
-"""The report's section on what the claims hang on."""
+"""Report section on the sensitivity of the claims."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from access_av.report.chart import Spec
 
 DIMENSIONS = (*OPEN_WORLD, *OPEN_CONTROLLER, GATE)
-# Below this a total index is as good as none.
+# Minimum shown total index.
 LEAST_TOTAL = 0.05
 
 
 def unknowns(study: Study, specs: dict[str, Spec]) -> str:
-    """On what each claim hangs, and in how much of the space it holds."""
+    """Returns the section with the Sobol indices of each claim, and the share in which it holds."""
     found = study.sensitivity
     if found is None:
         return (
-            "<p>Not asked for. <code>access-av evaluate --sensitivity</code> draws interpretations "
-            "from what "
-            "the paper leaves open and says on what each claim hangs.</p>"
+            "<p>Not computed. <code>access-av evaluate --sensitivity</code> draws interpretations "
+            "from the ranges of the unspecified parameters, and computes the sensitivity of each "
+            "claim to each parameter.</p>"
         )
     specs["sobol"] = _index_chart(found)
     specs["share"] = _share_chart(found)
@@ -40,15 +40,15 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
     )
     return (
         f"<p>{found.interpretations} interpretations of {found.runs} runs each, drawn from the "
-        "ranges below. A "
-        "total index of 0.6 means: 60 % of what the claim's margin varies by involves that one "
-        "thing, by itself or together with others. Cells below "
-        f"{LEAST_TOTAL:.0%} are left empty; “unexplained” is what the expansion cannot say.</p>"
+        "ranges below. A total index of 0.6 means: 60 % of the variance of the claim's margin "
+        "involves this parameter, alone or together with others. Cells below "
+        f"{LEAST_TOTAL:.0%} are left empty; “unexplained” is the share of the variance that the "
+        "expansion does not explain.</p>"
         + f"<p>{escape(_width_text(found))}</p>"
         + figure("sobol", "Total Sobol index of each claim's margin.", "Sensitivity of the claims")
         + figure(
             "share",
-            "Bars are 95 % intervals over worlds.",
+            "Bars are 95 % intervals over environments.",
             "Share of the drawn interpretations in which each claim holds",
         )
         + f"<details><summary>The ranges</summary>{ranges}</details>"

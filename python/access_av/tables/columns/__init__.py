@@ -1,8 +1,8 @@
-"""The columns of every table that is written or returned: one name for one quantity.
+"""Columns of all written and returned tables: one name for one quantity.
 
-:data:`GLOSSARY` says once what a name means; :data:`TABLES` says which names a table has and when a
-value is null. Nothing else is in a table, and no value is NaN. ``docs/columns.md`` is made from
-this, and tests hold what is really produced to it.
+:data:`GLOSSARY` contains unit and meaning of each name; :data:`TABLES` contains the names of each
+table and the conditions of null values. Tables have no other columns and no NaN.
+``docs/columns.md`` is generated from both, and tests compare them with the produced tables.
 
 Examples
 --------

@@ -26,7 +26,10 @@ _GLOSSARY = {
     "std_before": ("any", "Standard deviation of the given value"),
     "found": ("any", "Estimate from the drives and the given value"),
     "std": ("any", "Standard deviation of the estimate"),
-    "is_learnt": ("true or false", "Whether the standard deviation has fallen by at least 30 %"),
+    "is_learnt": (
+        "true or false",
+        "Whether the survey reduced the standard deviation by at least 30 %",
+    ),
     # Time, run, place.
     "run": ("1", "Number of the run"),
     "runs": ("1", "Number of runs"),
@@ -56,8 +59,8 @@ _GLOSSARY = {
     "target_error_low_m": ("m", "Low end of the 95 % interval of target_error_m"),
     "target_error_high_m": ("m", "High end of the 95 % interval of target_error_m"),
     "target": ("text", "Name of the target"),
-    "from_m": ("m", "Beginning of the target's stretch, as distance along the road"),
-    "to_m": ("m", "End of the target's stretch, as distance along the road"),
+    "from_m": ("m", "Start of the target's section, as distance along the road"),
+    "to_m": ("m", "End of the target's section, as distance along the road"),
     "required_error_m": ("m", "Horizontal error that the target requires"),
     "within_low_share": ("1", "Low end of the 95 % interval of within_share"),
     "within_high_share": ("1", "High end of the 95 % interval of within_share"),
@@ -79,7 +82,7 @@ _GLOSSARY = {
     "reliable_share": ("1", "Share of the time in state ok, within 5 m of the position"),
     "along_road_error_per_degree_m": (
         "m",
-        "Position error along the road for an error of one degree in every angle",
+        "Position error along the road caused by an error of one degree in every angle",
     ),
     "heads_visible": ("1", "Radio heads with an expected SNR of -6 dB or more"),
     "best_snr_db": ("dB", "Expected SNR of the strongest radio head"),
@@ -316,9 +319,9 @@ _GLOSSARY = {
     "interpretation": ("text", "Name of the interpretation of the paper"),
     "campaign": (
         "text",
-        "P: every SSB; Q: fixed at what the computer manages; R: adaptive; constant: in place of "
-        "Algorithm 1; front: MUSIC at fixed intervals; tracker: that of this project; equal: both "
-        "with equal information",
+        "P: every SSB; Q: fixed at the computer's base wake-up time; R: adaptive; constant: in "
+        "place of Algorithm 1; front: MUSIC at fixed intervals; tracker: tracker of this project; "
+        "equal: both methods with equal information",
     ),
     "mode": ("1", "Power mode of the platform"),
     "mode_name": ("text", "Name of the power mode"),

@@ -23,7 +23,7 @@ def table(name: str) -> Table:
 
 
 def as_json(tables: list[Table]) -> dict[str, Any]:
-    """Tables as plain values."""
+    """Returns tables as plain values."""
     return {
         table.name: {"row": table.row, "where": table.where, "columns": table.records()}
         for table in tables

@@ -301,7 +301,7 @@ TABLES: Mapping[str, Table] = {
                 **_PERCENTILES_NULL,
                 **dict.fromkeys(
                     ("delta_m", "delta_low_m", "delta_high_m"),
-                    "one run has no interval; or the place is not known for so much of the time",
+                    "one run has no interval; or the position is unknown for more of the time",
                 ),
                 "energy_j": _NO_FIGURE,
             },
