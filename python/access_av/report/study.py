@@ -160,7 +160,8 @@ def _verdict(study: Study) -> str:
         "Every value with a standard deviation is drawn for each drive. “Good enough”: the whole "
         "95 % interval of the share of time within the error meets the target; “not good enough”: "
         "the whole interval misses it; “probably”: only the estimate meets or misses it. All "
-        f"targets are met if each one is. Poor line of sight: channel model “{channel}” of TR 38.901.",
+        "targets are met if each one is. "
+        f"Poor line of sight: channel model “{channel}” of TR 38.901.",
         table(head, rows, numbers=range(3, 7)) + _integrity(study, written),
     )
 

@@ -118,8 +118,8 @@ class Campaign:
                 future.cancel()
         if lost is not None:
             raise CampaignError(
-                f"the workers are gone ({type(lost).__name__}: {lost}); what was finished is "
-                f"kept in {self.parts.path}, the same command goes on from there"
+                f"the workers are gone ({type(lost).__name__}: {lost}); finished parts "
+                f"are in {self.parts.path}; repeat the command to continue"
             ) from lost
 
 
