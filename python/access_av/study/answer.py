@@ -1,4 +1,4 @@
-"""The drives that answer a plant's question."""
+"""Simulation of a plant study: selects the runs of each part and evaluates them."""
 
 from __future__ import annotations
 
@@ -47,30 +47,30 @@ def study_plant(
     force_remedies: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Study:
-    """Answers whether a plant's localization is good enough, where not, and what reduces the error.
+    """Evaluates a plant's localization: verdict, positions with large errors, remedies, cost.
 
     Parameters
     ----------
     plant
         A plant, or the name or path of one.
     runs
-        Drives with the nominal channel; other comparisons have fewer, in proportion. ``None``:
-        4 to 24, such that they take about a minute on two cores.
+        Runs with the nominal channel; other comparisons have proportionally fewer. Default: 4 to
+        24, so that the study takes about a minute on two cores.
     seed
-        Seed of all drives: measures and operations are driven in the same environments.
+        Seed of all runs: measures and operations are simulated in equal environments.
     threads
-        Worker threads; all cores when ``None``.
+        Worker threads. Default: all cores.
     force_remedies
-        Simulate measures also where all targets are met.
+        Whether to simulate measures even if all targets are met.
     progress
-        Called as ``progress(done, total)`` with numbers of drives.
+        Called as ``progress(done, total)`` with numbers of runs.
 
     Raises
     ------
     SettingsError
-        When the plant cannot be used; names the key and what is allowed.
+        If the plant is invalid; the message contains the key and the allowed values.
     InputError
-        When its vehicle has no integrity monitor.
+        If the vehicle has no integrity monitor.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def study_plant(
     done, after = 0, 0
 
     def plan(left: int) -> None:
-        """Sets the number of drives that are left of the present part of the study."""
+        """Sets the number of remaining runs of the present part of the study."""
         nonlocal present
         present = left
 
@@ -151,7 +151,7 @@ def study_plant(
 
 
 def _runs(scenario: _core.Scenario) -> int:
-    """Number of drives within the budget."""
+    """Returns the number of runs within the budget."""
     wake_up = json.loads(scenario.resolved().vehicle.to_json())["wake_up"]
     share = WOKEN_SHARE
     if wake_up["policy"] == "fixed":
@@ -161,7 +161,9 @@ def _runs(scenario: _core.Scenario) -> int:
 
 
 def _sure(scenario: _core.Scenario, percent: float) -> int:
-    """Number of drives from which on the percentile's interval has a finite high end."""
-    independent = math.log(0.025) / math.log(0.01 * percent)  # Clopper and Pearson, all within
-    # The size is from above: a trip takes a little less.
+    """Returns the minimum number of runs for a finite upper end of the percentile's interval."""
+    independent = math.log(0.025) / math.log(
+        0.01 * percent
+    )  # Clopper and Pearson with all errors within the bound
+    # Add 2 %, because the duration of a trip is an upper bound.
     return math.ceil(1.02 * independent * INDEPENDENT_S / scenario.size["duration_s"])

@@ -1,4 +1,4 @@
-"""Variants side by side: other files, or other values of a key, driven in the same worlds."""
+"""Comparison of variants (other files, or other values of a key) in equal environments."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class Compared:
     Attributes
     ----------
     driven
-        Its drives.
+        Runs of the variant.
     percents
-        Which percentiles of the error are compared.
+        Compared percentiles of the error.
     delta_m
-        Difference of each percentile to the first variant's, in pairs of drives, and the ends of
-        the 95 % interval: variant minus baseline; ``None`` of the baseline itself.
+        Paired difference of each percentile, variant minus baseline, and the ends of its 95 %
+        interval; ``None`` for the baseline.
     identical
         Whether all errors equal those of the baseline.
     """
@@ -46,14 +46,14 @@ class Compared:
     identical: bool = False
 
     def in_words(self, place: int = -1) -> str:
-        """Lost drives first, then the difference of one of the percentiles to the baseline's."""
+        """Returns lost runs and difference of a percentile to the baseline as text."""
         driven = self.driven
         lost = f"LOST in {driven.lost_runs} of {driven.runs} {driven.rows}"
         difference = self._difference(place)
         return f"{lost}; {difference}" if driven.lost_runs else difference
 
     def reliability(self) -> str:
-        """Share of the time by state, and errors beyond the protection level in state ``ok``."""
+        """Returns shares of the states, and errors above the level in state ``ok``, as text."""
         shares = self.driven.state_shares
         if shares is None:
             return "no monitor"
@@ -84,12 +84,12 @@ class Compared:
 
 
 def values(text: str) -> tuple[str, list[Any]]:
-    """Split ``KEY=a,b,c``; the values are read as TOML, and as plain text where they are none.
+    """Splits ``KEY=a,b,c``; the values are TOML, otherwise plain text.
 
     Raises
     ------
     InputError
-        When it is not that.
+        If the text has another form.
 
     Examples
     --------
@@ -108,12 +108,12 @@ def values(text: str) -> tuple[str, list[Any]]:
 
 
 def varied(vary: Sequence[str]) -> list[tuple[str, dict[str, Any]]]:
-    """Every combination of the values of some keys: a label, and what to override.
+    """Returns every combination of the values of some keys: label and overrides.
 
     Raises
     ------
     InputError
-        Where there are too many.
+        If there are too many combinations.
     """
     keys = [values(text) for text in vary]
     found = [
@@ -132,7 +132,7 @@ def varied(vary: Sequence[str]) -> list[tuple[str, dict[str, Any]]]:
 
 
 def combinations(vary: Sequence[str]) -> str:
-    """The combinations that ``--sweep`` options make, in words; empty without any.
+    """Returns the combinations of the ``--sweep`` options as text; empty without options.
 
     Examples
     --------
@@ -161,14 +161,14 @@ def compare(
     progress: Callable[[int, int], None] | None = None,
     plug_ins: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> list[Compared]:
-    """Drives variants in the same environments; the first one is the baseline.
+    """Simulates variants in equal environments; the first one is the baseline.
 
     Parameters
     ----------
     scenarios
         Variants by label.
     percents
-        Which percentiles of the error.
+        Compared percentiles of the error.
     """
     total, found = runs * len(scenarios), list[ErrorSamples]()
     for number, (label, scenario) in enumerate(scenarios.items()):
@@ -197,7 +197,7 @@ def beside_first(found: Sequence[ErrorSamples], percents: Sequence[float]) -> li
 
 
 def table(found: Sequence[Compared]) -> pl.DataFrame:
-    """One row per variant and percentile: columns ``compared`` of :mod:`access_av.columns`."""
+    """Returns one row per variant and percentile: columns ``compared``."""
     rows = []
     for it in found:
         for place, percent in enumerate(it.percents):

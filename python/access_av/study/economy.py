@@ -26,7 +26,7 @@ OURS, WITH_COMPUTER, LIDAR, ROADSIDE, UWB = (
     "roadside units",
     "UWB anchors and tags",
 )
-# Figures of prices.toml that are no money.
+# Suffixes of the figures in prices.toml that are not money.
 NO_MONEY = ("_g_per_kwh", "_power_w", "_embodied_kg", "_spacing_m")
 
 
@@ -41,7 +41,7 @@ class Prices:
     ranges, sources
         Values by the keys of ``[prices]`` and ``economics/prices.toml``; money in ``currency``.
     published
-        Keys whose figures are published ones, because the plant does not state them.
+        Keys with published figures, because the plant file does not contain them.
     """
 
     currency: str
@@ -51,7 +51,7 @@ class Prices:
 
     @classmethod
     def of(cls, plant: _core.Plant) -> Prices:
-        """The plant's, completed."""
+        """Returns the prices of a plant, completed by published figures."""
         own: dict[str, Any] = json.loads(plant.to_json()).get("prices", {})
         facts = dict(shipped("economics", "prices.toml"))
         of_currencies = facts.pop("currency")
@@ -77,8 +77,7 @@ class Day:
     trips_wh
         Additional energy of localization, for the trips of all vehicles.
     idle_wh
-        What the computers draw anyway while the vehicles are switched on; ``None`` without a
-        figure.
+        Idle energy of the computers while the vehicles are switched on; ``None`` without a figure.
     """
 
     trips_wh: Range
@@ -86,14 +85,14 @@ class Day:
 
     @property
     def idle_share(self) -> float | None:
-        """Share of idle in both together, by the central values."""
+        """Returns the share of the idle energy in the total, by the central values."""
         if self.idle_wh is None:
             return None
         return self.idle_wh.central / (self.idle_wh.central + self.trips_wh.central)
 
 
 def day(plant: _core.Plant, point: Point) -> Day:
-    """A day of the fleet at an operating point."""
+    """Returns the energy of a day of the fleet at an operating point."""
     fleet = json.loads(plant.to_json())["fleet"]
     trips = fleet["vehicles"] * fleet["trips_per_day"]
     switched_on_h = fleet["vehicles"] * fleet["hours_per_day"]
@@ -104,14 +103,14 @@ def day(plant: _core.Plant, point: Point) -> Day:
 
 
 def trip_j(point: Point) -> Range:
-    """Energy of a trip in joules, low to high, without the board that would idle."""
+    """Returns the energy of a trip in joules, low to high, without the idle energy of the board."""
     return _range(
         {extent: energy.estimates_j + energy.listening_j for extent, energy in point.energy.items()}
     )
 
 
 def composition(point: Point, day_of: Day, fleet: Mapping[str, Any]) -> dict[str, float]:
-    """Energy of the fleet's day by its parts, in Wh at the central values.
+    """Returns the energy of the fleet's day by part, in Wh at the central values.
 
     Keys: ``estimates``, ``receiver``, and ``idle`` if the platform has a figure.
     """
@@ -129,17 +128,18 @@ def _range(ends: Mapping[str, float]) -> Range:
 
 
 def anchors(prices: Prices, road_m: float) -> Range:
-    """Number of UWB anchors along a road, low to high."""
+    """Returns the number of UWB anchors along a road, low to high."""
     spacing = prices.ranges["uwb_anchor_spacing_m"]
     ends = (spacing.high, spacing.central, spacing.low)
     return Range(*(float(math.ceil(road_m / it)) for it in ends))
 
 
 def ways(plant: _core.Plant, point: Point, prices: Prices) -> dict[str, Way]:
-    """Money, energy and carbon of each way to localize the fleet, by its name.
+    """Returns money, energy and carbon of each localization system, by its name.
 
-    The cells are there anyway and are not counted. Vehicles and infrastructure are on for the same
-    hours: those of the fleet. Every computer is counted with its price, production and idle power.
+    The cells of the network exist already and are not counted. Vehicles and infrastructure are on
+    during the hours of the fleet. Every computer is counted with its price, production and idle
+    power.
     """
     written = json.loads(plant.to_json())
     road_m = along_route(plant.scenario())["along_m"].to_list()
@@ -195,12 +195,12 @@ def ways(plant: _core.Plant, point: Point, prices: Prices) -> dict[str, Way]:
 
 
 def total(way: Way, years: float) -> Range:
-    """Money over the years, without discounting."""
+    """Returns the money over the years, without discounting."""
     return way.capital.plus(way.yearly.scaled(years))
 
 
 def total_kg(way: Way, years: float) -> Range:
-    """CO2 equivalents over the years, production and use."""
+    """Returns the CO2 equivalents over the years, production and use."""
     return way.embodied_kg.plus(way.use_kg_per_year.scaled(years))
 
 

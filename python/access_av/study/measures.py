@@ -1,4 +1,4 @@
-"""Measures on one paired sample: single ones, and the cheapest set that meets the targets."""
+"""Measures that reduce the error: single ones, and the cheapest set that meets the targets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from access_av.study.targets import Targets
     from access_av.study.trips import Driven
 
-# Sets of measures that are simulated, from the cheapest on.
+# Maximum number of simulated sets of measures, the cheapest first.
 MOST_SETS = 4
 # A set is simulated if the product of its measures' error ratios is below the target times this
 # factor: the ratios of measures that act on the same error do not multiply.
@@ -42,14 +42,14 @@ class Measure:
     driven
         Its drives.
     error
-        Percentile of the error that the target of the whole trip names.
+        Error at the percentile of the target of the whole trip.
     delta_m
-        ``error`` minus that of the plant without the measure, in pairs of drives, and the ends of
-        the 95 % interval; negative where the measure helps.
+        Paired difference of ``error`` to the plant without the measure, and the ends of its 95 %
+        interval; negative if the measure helps.
     judgement
         Whether the drives meet all targets.
     cost
-        Its price, low to high.
+        Price of the measure, low to high.
     """
 
     remedies: tuple[Remedy, ...]
@@ -61,17 +61,17 @@ class Measure:
 
     @property
     def name(self) -> str:
-        """Names of its remedies."""
+        """Names of the remedies."""
         return " + ".join(it.name for it in self.remedies)
 
     @property
     def what(self) -> str:
-        """Its changes in words."""
+        """Description of the changes."""
         return "; ".join(it.what for it in self.remedies)
 
     @property
     def effect(self) -> Effect:
-        """Whether the measure helps."""
+        """Effect of the measure."""
         return Effect.of(self.delta_m)
 
     @property
@@ -89,7 +89,7 @@ class Measures:
     Attributes
     ----------
     before
-        Paired drives without any measure.
+        Paired runs without any measure.
     single
         Measures of one remedy, the most effective one first.
     sets
@@ -131,21 +131,21 @@ def measures(
     changes
         The remedies.
     before
-        Drives without any measure; measures get as many.
+        Runs without any measure; each measure gets an equal number.
     targets, prices
         Targets and prices of the plant.
     seed
         Seed of ``before``.
     simulate
-        Drives a scenario.
+        Simulates a scenario.
     plan
-        Called with the number of drives that are still to be simulated.
+        Called with the number of remaining runs.
     """
     runs = before.runs
 
     def measure(remedies: tuple[Remedy, ...]) -> Measure:
         changed = scenario
-        # A further radio head replaces the list of radio heads: keys of single ones come after it.
+        # Apply a new list of radio heads before the keys of single radio heads.
         for it in sorted(remedies, key=lambda one: "site.radio_heads" not in one.settings):
             changed = it.applied(changed)
         name = " + ".join(it.name for it in remedies)
@@ -179,7 +179,7 @@ def measures(
 
 
 def _sets(found: Measures, targets: Targets) -> list[tuple[Remedy, ...]]:
-    """Sets that are cheaper than the cheapest single measure and could meet the targets."""
+    """Returns sets that may meet the targets and are cheaper than any single measure."""
     percent, error_m = targets.each[0].percent, targets.each[0].error_m
     before_m = found.before.percentile(percent).value
     helping = [it for it in found.single if it.delta_m[0] < 0.0 and it.effect is not Effect.HARMS]
@@ -196,7 +196,7 @@ def _sets(found: Measures, targets: Targets) -> list[tuple[Remedy, ...]]:
             candidates.append((cost, before_m * ratio, tuple(it.remedies[0] for it in chosen)))
     likely = [it for it in candidates if it[1] <= PREDICTION_MARGIN * error_m]
     if not likely and limit is None:
-        # No set is expected to suffice: the most effective one shows what is possible.
+        # If no set is expected to meet the targets, simulate the most effective one.
         likely = sorted(candidates, key=lambda it: it[1])[:1]
     likely.sort(key=lambda it: (it[0], it[1]))
     return [remedies for _, _, remedies in likely[:MOST_SETS]]

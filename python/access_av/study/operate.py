@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from access_av.device.platform import PowerMode
     from access_av.study.targets import Targets
 
-    # Name, scenario, number of runs and seed of drives.
+    # Simulation function: name, scenario, number of runs, seed.
     Simulate = Callable[[str, _core.Scenario, int, int], Driven]
 
 # Operations that are simulated in every power mode with two seeds: the one that screening
 # recommends, the vehicle's own, and their rivals.
 MOST_FINALISTS = 3
-# Blocks of runs that each of the two seeds gets until both recommend the same point.
+# Maximum number of blocks of runs per seed until both seeds recommend the same point.
 MOST_BLOCKS = 2
 # Offset of the seed of each further block of runs.
 SEED_STEP = 1000
@@ -50,10 +50,10 @@ class Rival:
     point
         The rival.
     delta_m
-        Its error minus that of the recommended point, in pairs of drives, and the ends of the
-        95 % interval; percentile of the target of the whole trip.
+        Paired difference of the error to that of the recommended point, and the ends of its 95 %
+        interval; percentile of the target of the whole trip.
     delta_j
-        Its energy of a trip minus that of the recommended point, at the central values.
+        Energy of a trip minus that of the recommended point, at the central values.
     day_share
         The difference in energy as a share of the fleet's energy of a day at the recommended
         point, idle computers included; ``None`` without a figure of idle power.
@@ -120,7 +120,7 @@ class Recommendation:
 
 @dataclass(frozen=True)
 class _Finalist:
-    """Drives of an operation in a group of power modes, by block."""
+    """Runs of an operation in a group of power modes, by block."""
 
     operation: Operation
     modes: list[PowerMode]
@@ -152,15 +152,15 @@ def operate(
     plant, targets
         The plant and its targets.
     nominal
-        Drives of the nominal plant.
+        Runs of the nominal plant.
     runs
         Runs of each operation, power mode and block.
     seed
-        Seed of the drives.
+        Seed of the runs.
     simulate
-        Drives a scenario.
+        Simulates a scenario.
     plan
-        Called with the number of drives that are still to be simulated.
+        Called with the number of remaining runs.
     """
     scenario = plant.scenario()
     screened = _screened(scenario, targets, nominal, runs, seed, simulate, plan)
@@ -209,7 +209,7 @@ def _screened(
     simulate: Simulate,
     plan: Callable[[int], None],
 ) -> list[Point]:
-    """Every operation, driven in the vehicle's own power mode, with its energy in all modes."""
+    """Simulates every operation in the vehicle's power mode; returns the energies in all modes."""
     found = []
     every = operations(scenario)
     for number, it in enumerate(every):
@@ -223,7 +223,7 @@ def _screened(
 
 
 def _finalists(screened: list[Point]) -> list[Operation]:
-    """Candidates: the screening's choice, the vehicle's own operation, and possible rivals."""
+    """Returns the finalists: choice of the screening, the vehicle's operation, possible rivals."""
     chosen = recommended(screened)
     if chosen is None:
         return []
@@ -234,7 +234,8 @@ def _finalists(screened: list[Point]) -> list[Operation]:
     others = [it for it in cheapest.values() if it.operation.name != best.operation.name]
     possible = [it for it in others if it.judgement is not Judgement.MISSED]
     if best.judgement.holds:
-        # Cheaper ones might meet the targets; if this one does not, the next ones are needed.
+        # Operations with less energy may meet the targets; those with more are needed if this one
+        # does not.
         rivals = [it for it in possible if it.energy_j <= best.energy_j][::-1]
         rivals += [it for it in possible if it.energy_j > best.energy_j]
     else:
@@ -248,7 +249,7 @@ def _finalists(screened: list[Point]) -> list[Operation]:
 def _rivals(
     plant: _core.Plant, targets: Targets, pooled: list[Point], best: Point, named: tuple[str, ...]
 ) -> list[Rival]:
-    """Every finalist in its mode of least energy, the other modes, and what the seeds recommend."""
+    """Returns finalists in their best mode, other modes, and choices of single seeds."""
     percent = targets.each[0].percent
     best_wh = _day_wh(plant, best)
     seen = {best.name}
@@ -267,6 +268,6 @@ def _rivals(
 
 
 def _day_wh(plant: _core.Plant, it: Point) -> float | None:
-    """Energy of the fleet's day with idle computers; ``None`` without a figure of idle power."""
+    """Returns the energy of the fleet's day; ``None`` without a figure of idle power."""
     day = economy.day(plant, it)
     return None if day.idle_wh is None else day.idle_wh.central + day.trips_wh.central

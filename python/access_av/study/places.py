@@ -1,4 +1,4 @@
-"""The error by place: metre by metre along the road, the worst places, and why they are."""
+"""Error by position along the road, and the worst positions with their causes."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
     from access_av.study.trips import Driven
 
-# A percentile is of the errors so far before and behind a place: of one metre there are too few.
+# Half-width (m) of the section whose errors determine the percentile at a position.
 WINDOW_M = 5.0
 # Minimum distance between reported worst positions, in metres.
 APART_M = 40.0
 MOST_PLACES = 3
 # Distance from the start within which the given start dominates the position (m).
 STARTING_M = 20.0
-# Distance over which the odometer carries errors on (m), and ratio that is reported.
+# Distance over which the odometer retains errors (m), and minimum reported ratio.
 CARRIED_M = 60.0
 MORE_THAN_USUAL = 1.25
 # Below this SNR noise is a large part of an angle's error.
@@ -36,16 +36,16 @@ WEAK_SNR_DB = 5.0
 
 @dataclass(frozen=True)
 class WorstPlace:
-    """A place where the error is largest, and what is particular about it.
+    """A position with a large error, and its cause.
 
     Attributes
     ----------
     along_m, x_m, y_m
-        Where.
+        Position along the road, and its coordinates.
     error_m
-        The target's percentile there.
+        Error at the target's percentile.
     why
-        In words.
+        Cause as text.
     """
 
     along_m: float
@@ -56,22 +56,22 @@ class WorstPlace:
 
 
 def by_place(driven: Driven, percent: float, error_m: float) -> pl.DataFrame:
-    """Error, bound, geometry and signal at every metre of the road.
+    """Returns error, bound, geometry and signal at every metre of the road.
 
     Parameters
     ----------
     driven
-        Drives along it.
+        Runs along the road.
     percent, error_m
         The target.
 
     Returns
     -------
     polars.DataFrame
-        One row a metre; columns ``places`` of :mod:`access_av.columns`. The dilution along the
-        road is ``1 / sqrt(Σ (n·t)² / r²)`` over the visible radio heads, r being their distance,
-        n the normal of their line of sight and t the road's direction: by how many metres an error
-        of one degree in every angle shows along the road. Across it the map helps.
+        One row per metre; columns ``places`` of :mod:`access_av.columns`. The dilution along the
+        road is ``1 / sqrt(Σ (n·t)² / r²)`` over the visible radio heads, with their distance r, the
+        normal n of their line of sight and the direction t of the road. It is the error along the
+        road per unit of angle error. The map limits the error across the road.
     """
     route = along_route(driven.scenario)
     time_s, along_m, x_m, y_m = (
@@ -119,7 +119,7 @@ def by_place(driven: Driven, percent: float, error_m: float) -> pl.DataFrame:
 
 
 def _rising(along_m: NDArray[Any], values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Distances that rise, and what is there: a vehicle that stands is at one place for long."""
+    """Returns increasing distances and their values, without repetitions at stops."""
     moved = np.concatenate([[True], np.diff(along_m) > 1e-6])
     return along_m[moved], values[moved]
 
@@ -130,7 +130,7 @@ def _dilution(
     heads = np.array([head["position_m"][:2] for head in radio_heads(scenario)])
     dx, dy = heads[:, 0, None] - x_m, heads[:, 1, None] - y_m
     heading = np.arctan2(np.gradient(y_m), np.gradient(x_m)) if len(x_m) > 1 else np.zeros(1)
-    # The normal of the line of sight against the road's direction.
+    # Component of the line-of-sight normal along the road.
     across = (np.cos(heading) * dy - np.sin(heading) * dx) / (dx**2 + dy**2)
     known = (np.where(visible, across, 0.0) ** 2).sum(axis=0)
     with np.errstate(divide="ignore"):
@@ -138,13 +138,13 @@ def _dilution(
 
 
 def radio_heads(scenario: _core.Scenario) -> list[Mapping[str, Any]]:
-    """The radio heads of a scenario's site, as they are set."""
+    """Returns the radio heads of a scenario's site."""
     heads: list[Mapping[str, Any]] = json.loads(scenario.site.to_json())["radio_heads"]
     return heads
 
 
 def worst_places(places: pl.DataFrame, plant: _core.Plant) -> list[WorstPlace]:
-    """The positions with the largest errors, at least :data:`APART_M` apart."""
+    """Returns the positions with the largest errors, at least :data:`APART_M` apart."""
     written = json.loads(plant.to_json())
     left = places.sort("target_error_m", descending=True, maintain_order=True)
     found: list[WorstPlace] = []
@@ -165,7 +165,7 @@ def worst_places(places: pl.DataFrame, plant: _core.Plant) -> list[WorstPlace]:
 
 
 def _why(row: Mapping[str, Any], places: pl.DataFrame, plant: Mapping[str, Any]) -> str:
-    """The most important particularity of a position."""
+    """Returns the cause of a large error at a position as text."""
     along_m = row["along_m"]
     if along_m < places["along_m"][0] + STARTING_M:
         return "the vehicle has just started, and its position is mostly the configured start"
@@ -206,7 +206,7 @@ def _is_poor(row: Mapping[str, Any], usual_m: float) -> bool:
 def _carried_over(
     row: Mapping[str, Any], places: pl.DataFrame, plant: Mapping[str, Any]
 ) -> str | None:
-    """The explanation of an error that arose earlier; ``None`` where it arose here."""
+    """Returns the explanation of an error from an earlier section; ``None`` if it arose here."""
     usual_m = _usual(places)
     if _is_poor(row, usual_m):
         return None
@@ -229,7 +229,7 @@ def _carried_over(
 
 
 def hiding(row: Mapping[str, Any], plant: Mapping[str, Any]) -> str:
-    """The named walls between a position and radio heads, in parentheses; empty without any."""
+    """Returns the named walls between a position and radio heads, in parentheses."""
     found = []
     for number, head in enumerate(plant["site"]["radio_heads"], start=1):
         ends = (row["x_m"], row["y_m"]), tuple(head["position_m"][:2])
@@ -248,7 +248,7 @@ def hiding(row: Mapping[str, Any], plant: Mapping[str, Any]) -> str:
 
 
 def _cross(one: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> bool:
-    """Whether two line segments cross."""
+    """Returns whether two line segments cross."""
 
     def side(ends: Sequence[Sequence[float]], point: Sequence[float]) -> float:
         (ax, ay), (bx, by) = ends
@@ -259,7 +259,7 @@ def _cross(one: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> 
 
 
 def _carried(places: pl.DataFrame, along_m: float) -> float:
-    """Root mean square of the dilution on the stretch before a position."""
+    """Returns the root mean square of the dilution on the section before a position."""
     before = pl.col("along_m").is_between(along_m - CARRIED_M, along_m)
     square = (pl.col("along_road_error_per_degree_m").filter(before) ** 2).mean().sqrt()
     found = places.select(square).item()
@@ -267,13 +267,13 @@ def _carried(places: pl.DataFrame, along_m: float) -> float:
 
 
 def _usual(places: pl.DataFrame) -> float:
-    """The median of that over the road."""
+    """Returns the median of :func:`_carried` over the road."""
     every = range(0, places.height, 10)
     return float(np.median([_carried(places, places["along_m"][place]) for place in every]))
 
 
 def radio_head_sides(scenario: _core.Scenario) -> pl.DataFrame:
-    """Side and distance of each radio head from the road, at the nearest point of the trip.
+    """Returns side and distance of each radio head from the road, at the nearest point of the trip.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Operating points: estimator, wake-up and power mode, and the front of energy and error."""
+"""Operating points (estimator, wake-up, power mode), and their Pareto front of energy and error."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Operation:
     name
         Name in tables; ``unchanged`` for the vehicle's own.
     method, wake_up
-        In words.
+        Descriptions of estimator and wake-up.
     settings
         Keys of the scenario that differ from the vehicle's own, and their values.
     """
@@ -54,13 +54,13 @@ class Point:
     Attributes
     ----------
     driven
-        Its drives; in this mode if ``simulated``, else in the vehicle's own mode.
+        Runs in this mode if ``simulated``, otherwise in the vehicle's mode.
     operation
         Estimator and wake-up.
     mode, mode_name
         The power mode.
     simulated
-        Whether the drives are of this mode.
+        Whether the runs use this mode.
     energy
         Energy of a trip by ``low``, ``value`` and ``high``.
     idle_w
@@ -101,7 +101,7 @@ class Point:
 
 
 def operations(scenario: _core.Scenario) -> list[Operation]:
-    """Operations that a study simulates; the vehicle's own comes first."""
+    """Returns the operations that a study simulates; that of the vehicle is the first."""
     vehicle = json.loads(scenario.resolved().vehicle.to_json())
     method, own = vehicle["estimator"]["method"], in_words(vehicle["wake_up"])
     found = [Operation("unchanged", method, own, {})]
@@ -123,7 +123,7 @@ def operations(scenario: _core.Scenario) -> list[Operation]:
 
 
 def in_words(wake_up: Mapping[str, Any]) -> str:
-    """A wake-up policy in words."""
+    """Returns the description of a wake-up policy."""
     if wake_up["policy"] == "fixed":
         interval_ms = wake_up.get("interval_ms")
         return "as often as possible" if interval_ms is None else f"every {interval_ms:g} ms"
@@ -137,10 +137,10 @@ def in_words(wake_up: Mapping[str, Any]) -> str:
 
 
 def mode_groups(scenario: _core.Scenario) -> list[list[PowerMode]]:
-    """Power modes of the vehicle's platform, together where the vehicle drives identically.
+    """Returns the power modes of the vehicle's platform, in groups with identical runs.
 
-    A mode changes a drive by the wake-up times that the vehicle leaves to the platform, and by the
-    energy of a wake-up relative to an estimate. Modes without a figure for the method are left
+    A mode affects the runs by default wake-up times, and by the energy of a wake-up relative to an
+    estimate. Modes without a figure for the method are left
     out, and modes in which an estimate takes longer than the period of the SSBs.
     """
     platform = Platform.load(platform_name(scenario))
@@ -161,7 +161,7 @@ def mode_groups(scenario: _core.Scenario) -> list[list[PowerMode]]:
 
 
 def own_mode(scenario: _core.Scenario) -> int:
-    """The power mode of a scenario's vehicle."""
+    """Returns the power mode of a scenario's vehicle."""
     return int(json.loads(scenario.vehicle.to_json())["platform"]["mode"])
 
 
@@ -173,7 +173,7 @@ def point(
     *,
     simulated: bool,
 ) -> Point:
-    """Drives of an operation in a power mode, with their energy there."""
+    """Returns the operating point of an operation in a power mode, with its energy."""
     in_mode = driven.scenario.with_overrides({MODE_KEY: mode.number})
     platform = Platform.load(platform_name(in_mode))
     energy = driven.in_scenario(in_mode).energy(platform)
@@ -193,7 +193,7 @@ def point(
 
 
 def idle_w(platform: Platform, number: int) -> dict[str, float] | None:
-    """Power of an idle board in a mode in watts, low to high; ``None`` without a figure."""
+    """Returns the idle power of a board in watts, low to high; ``None`` if unknown."""
     written = json.loads(platform.core.to_json())
     [mode] = [mode for mode in written["modes"] if mode["mode"] == number]
     figure = mode.get("idle_power_w") or written.get("idle", {}).get("power_w")
@@ -205,7 +205,7 @@ def idle_w(platform: Platform, number: int) -> dict[str, float] | None:
 
 
 def front(found: Sequence[Point]) -> list[int]:
-    """Indices of the points that no other exceeds in both energy and error, by energy."""
+    """Returns the indices of the Pareto front of energy and error, by energy."""
     if not found:
         return []
     energy_j = np.array([point.energy_j for point in found])
@@ -214,10 +214,10 @@ def front(found: Sequence[Point]) -> list[int]:
 
 
 def recommended(found: Sequence[Point]) -> int | None:
-    """Index of the point of the front with the least energy that meets all targets.
+    """Returns the index of the front's point with the least energy that meets all targets.
 
-    Points that meet them with 95 % confidence come before those that probably meet them. Where
-    none does: the most accurate point of the front.
+    Points that meet the targets with 95 % confidence are preferred to those that probably meet
+    them. If no point does, it is the most accurate one of the front.
     """
     on_front = front(found)
     if not on_front:

@@ -14,26 +14,26 @@ if TYPE_CHECKING:
 
     from access_av import _core
 
-# Returns the ratio of each error after the remedy to that before.
-SURVEYED_STD_M = 0.02  # a total station or RTK-GNSS, in each of x and y
+# Standard deviations after the remedies.
+SURVEYED_STD_M = 0.02  # m, in x and y: total station or RTK-GNSS
 CALIBRATED_MOUNTING_STD_RAD = 0.002
 CALIBRATED_PHASE_STD_RAD = 0.01
-REMEMBERED_SCALE_STD = 0.0005  # change by tyres and load from one day to the next
+REMEMBERED_SCALE_STD = 0.0005  # daily change caused by tyres and load
 SHORTEST_PERIOD_MS = 5.0  # TS 38.331, ssb-periodicityServingCell
 
 
 @dataclass(frozen=True)
 class Remedy:
-    """One change by itself.
+    """One change of the plant.
 
     Attributes
     ----------
     name
         Name in tables.
     what
-        In words, with its numbers.
+        Description with numbers.
     settings
-        The keys of the scenario that it changes, and their values.
+        Changed keys of the scenario, and their values.
     price
         Key of the plant's price of one unit.
     units
@@ -47,19 +47,19 @@ class Remedy:
     units: int
 
     def applied(self, scenario: _core.Scenario) -> _core.Scenario:
-        """A scenario with this change."""
+        """Returns a scenario with this change."""
         return scenario.with_overrides(dict(self.settings))
 
 
 def remedies(scenario: _core.Scenario, vehicles: int) -> list[Remedy]:
-    """Every remedy that changes something in a scenario, from settings to what has to be bought.
+    """Returns the remedies that change a scenario, ordered from settings to purchases.
 
     Parameters
     ----------
     scenario
         A trip of the plant.
     vehicles
-        How many vehicles there are.
+        Number of vehicles.
     """
     site, vehicle = (json.loads(part.to_json()) for part in (scenario.site, scenario.vehicle))
     found = [

@@ -1,4 +1,4 @@
-"""Results of a study: drives, verdicts, figures and tables."""
+"""Results of a study: runs, verdicts, figures and tables."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ class Study(Result):
     Attributes
     ----------
     plant, seed
-        The plant, and the seed of the drives.
+        The plant, and the seed of the runs.
     targets
         The targets; that of the whole trip is the first one.
     nominal, poor_los
-        Drives with the nominal channel, and with poor line of sight.
+        Runs with the nominal channel, and with poor line of sight.
     places, worst
         The error along the road, and the positions with the largest errors.
     heads
         Side and distance of each radio head from the road.
     measured
-        Measures that reduce the error; ``None`` where the drives meet all targets.
+        Measures that reduce the error; ``None`` if the runs meet all targets.
     recommendation
         Operating points, and the recommended one.
     prices, day, ways
@@ -52,7 +52,7 @@ class Study(Result):
     unverified
         Values that are equal to the template's or the default.
     example_run
-        The first drive with the nominal channel, step by step.
+        Steps of the first run with the nominal channel.
     origin
         Version and commit that computed it. Not compared.
     """
@@ -76,7 +76,7 @@ class Study(Result):
 
     @property
     def scenario(self) -> _core.Scenario:
-        """Scenario of the drives with the nominal channel."""
+        """Scenario of the runs with the nominal channel."""
         return self.nominal.scenario
 
     def __repr__(self) -> str:
@@ -104,7 +104,7 @@ class Study(Result):
 
     @property
     def front(self) -> list[int]:
-        """Indices of the points that no other finalist exceeds in energy and error."""
+        """Indices of the Pareto front of the finalists."""
         return self.recommendation.front
 
     @property
@@ -121,20 +121,20 @@ class Study(Result):
     def alert_limit_m(self) -> float:
         """Alert limit of the vehicle in metres; twice the target's error unless set."""
         limit_m = self.nominal.scenario.vehicle.alert_limit_m
-        if limit_m is None:  # such plants are not studied
+        if limit_m is None:  # a study requires an integrity monitor
             raise RuntimeError("the vehicle has no integrity monitor")
         return limit_m
 
     def results(self, driven: Driven) -> list[TargetResult]:
-        """Drives under each target."""
+        """Returns the result of runs for each target."""
         return self.targets.results(driven)
 
     def judged(self, driven: Driven) -> Judgement:
-        """Whether drives meet all targets."""
+        """Returns the judgement of runs for all targets."""
         return self.targets.judgement(driven)
 
     def in_words(self, driven: Driven) -> str:
-        """Lost drives first, then the target's percentile with its interval, in words."""
+        """Returns lost runs and the target's percentile with its interval as text."""
         found = driven.percentile(self.percent)
         lost = f"LOST in {driven.lost_runs} of {driven.runs} drives, " if driven.lost_runs else ""
         return f"{lost}within {found.value:.2f} m ({found.interval} m, {driven.runs} drives)"
@@ -160,8 +160,8 @@ class Study(Result):
 
     @property
     def trajectory(self) -> pl.DataFrame:
-        """Truth and estimate of the drive that is played, step by step."""
-        if self.example_run.trajectories is None:  # they were asked for
+        """Truth and estimate of the example run, by step."""
+        if self.example_run.trajectories is None:  # keep_trajectories is set
             raise RuntimeError("the simulation kept no trajectories")
         return self.example_run.trajectories
 

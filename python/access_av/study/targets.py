@@ -44,20 +44,20 @@ class StretchTarget:
 
     @property
     def words(self) -> str:
-        """The required accuracy in words."""
+        """Required accuracy as text."""
         return f"{self.error_m:g} m {self.percent:g} %"
 
 
 @dataclass(frozen=True)
 class TargetResult:
-    """Drives under one target.
+    """Result of runs for one target.
 
     Attributes
     ----------
     target
         The target.
     error
-        The target's percentile of the horizontal error on its stretch.
+        Error at the target's percentile on its section of the road.
     share
         Share of the time within the target's error, and the ends of its 95 % interval.
     """
@@ -68,7 +68,7 @@ class TargetResult:
 
     @property
     def judgement(self) -> Judgement:
-        """Whether the drives meet the target."""
+        """Judgement: whether the runs meet the target."""
         return Judgement.of(self.share, self.target.percent)
 
 
@@ -81,7 +81,7 @@ class Targets:
     each
         The targets.
     time_s, along_m
-        Nominal distance along the road over the time of the trip.
+        Nominal distance along the road as a function of time.
     """
 
     each: list[StretchTarget]
@@ -90,7 +90,7 @@ class Targets:
 
     @classmethod
     def of(cls, plant: _core.Plant) -> Targets:
-        """The targets of a plant."""
+        """Returns the targets of a plant."""
         route = along_route(plant.scenario())
         time_s, along_m = (route[name].to_numpy() for name in ("time_s", "along_m"))
         error_m, percent = plant.target
@@ -101,7 +101,7 @@ class Targets:
         return cls(found, time_s, along_m)
 
     def results(self, driven: Driven) -> list[TargetResult]:
-        """Drives under each target; an epoch belongs to a stretch by its nominal position."""
+        """Returns the result of each target; the nominal position assigns an epoch to a section."""
         at_m = np.interp(driven.time_s, self.time_s, self.along_m)
         found = []
         for target in self.each:
@@ -114,12 +114,12 @@ class Targets:
         return found
 
     def judgement(self, driven: Driven) -> Judgement:
-        """Whether drives meet all targets."""
+        """Returns the judgement of runs for all targets."""
         return Judgement.of_all(it.judgement for it in self.results(driven))
 
 
 def table(found: dict[str, list[TargetResult]]) -> pl.DataFrame:
-    """One row per variant and target: columns ``study_targets`` of :mod:`access_av.columns`."""
+    """Returns one row per variant and target: columns ``study_targets``."""
     return pl.DataFrame(
         [
             {

@@ -1,4 +1,4 @@
-"""Drives of one variant of a plant, and what two variants differ by, drive by drive."""
+"""Runs of one variant of a plant, and paired differences between variants."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ if TYPE_CHECKING:
 
     from access_av import _core
 
-# Errors are kept this often: a vehicle moves less than its own width meanwhile.
+# Interval of the stored errors (s): a vehicle moves less than its width in this time.
 KEPT_EVERY_S = 0.1
 EXTENTS = ("low", "value", "high")
 
 
 @dataclass(frozen=True)
 class Energy:
-    """Energy of a trip in joules, on the mean over the drives, at one end of the figures' ranges.
+    """Mean energy of a trip in joules, at one end of the ranges of the figures.
 
     Attributes
     ----------
     estimates_j, listening_j
-        Angle estimates, and the receiver while it listens.
+        Energy of angle estimates, and of the receiver while it is on.
     idle_j
-        The board that would idle, where the platform counts it; else 0.
+        Idle energy of the board if the platform counts it, otherwise 0.
     """
 
     estimates_j: float
@@ -46,26 +46,26 @@ class Energy:
 
     @property
     def total_j(self) -> float:
-        """All three."""
+        """Sum of the three energies."""
         return self.estimates_j + self.listening_j + self.idle_j
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Driven(ErrorSamples):
-    """Many drives of one scenario.
+    """Runs of one scenario.
 
     Attributes
     ----------
     scenario
         Simulated scenario.
     levels_m
-        Protection levels, shape (runs, epochs); NaN where the position may not be relied on.
+        Protection levels, shape (runs, epochs); NaN unless the state is ``ok``.
     time_s
         Times of the epochs.
     aoa_estimates, bursts_received
-        Angle estimates, and SSB received bursts, of each run.
+        Numbers of angle estimates and of received bursts of each run.
     integrity
-        Counts of states and of errors beyond the protection level; ``None`` without a monitor.
+        Counts of states and of errors above the protection level; ``None`` without a monitor.
     seeds
         Seed of each run.
     """
@@ -110,14 +110,14 @@ class Driven(ErrorSamples):
 
     @property
     def energy_j(self) -> float | None:
-        """Energy of a trip, on the mean; ``None`` where the platform has no figure."""
+        """Mean energy of a trip; ``None`` if the platform has no figure."""
         if self.has_own_estimator:
             return self.own_energy_j
         energy = self.energy()
         return None if energy is None else energy["value"].total_j
 
     def first(self, runs: int) -> Driven:
-        """Returns the trips of the first `runs` drives, for paired comparisons."""
+        """Returns the first `runs` runs, for paired comparisons."""
         return replace(
             self,
             errors_m=self.errors_m[:runs],
@@ -129,16 +129,16 @@ class Driven(ErrorSamples):
         )
 
     def in_scenario(self, scenario: _core.Scenario) -> Driven:
-        """These drives under another scenario that drives identically."""
+        """Returns these runs with another scenario that has identical runs."""
         return replace(self, scenario=scenario)
 
     def named(self, name: str) -> Driven:
-        """These drives under another name."""
+        """Returns these runs with another name."""
         return replace(self, name=name)
 
     @classmethod
     def joined(cls, parts: Sequence[Driven]) -> Driven:
-        """The drives of several seeds of one scenario together."""
+        """Joins the runs of several seeds of one scenario."""
         of_parts = [it.integrity for it in parts if it.integrity is not None]
         return replace(
             parts[0],
@@ -151,7 +151,7 @@ class Driven(ErrorSamples):
         )
 
     def between(self, first: int, last: int) -> ErrorSamples:
-        """Errors of the epochs from ``first`` to before ``last``: a part of each drive."""
+        """Returns the errors of the epochs from ``first`` to before ``last``."""
         share = (last - first) / self.errors_m.shape[1]
         return ErrorSamples(
             name=self.name,
@@ -181,7 +181,7 @@ class Driven(ErrorSamples):
         return found
 
     def table(self) -> pl.DataFrame:
-        """One row per drive and epoch: columns ``study_errors`` of :mod:`access_av.columns`."""
+        """Returns one row per run and epoch: columns ``study_errors``."""
         runs, epochs = self.errors_m.shape
         return pl.DataFrame(
             {
@@ -194,7 +194,7 @@ class Driven(ErrorSamples):
         ).with_columns(pl.col("protection_level_m").fill_nan(None))
 
     def drives(self) -> pl.DataFrame:
-        """One row per drive: columns ``study_drives`` of :mod:`access_av.columns`."""
+        """Returns one row per run: columns ``study_drives`` of :mod:`access_av.columns`."""
         counts = {} if self.integrity is None else self.integrity.by_run
 
         def column(name: str, minus: str = "") -> pl.Series:
@@ -224,8 +224,8 @@ class Driven(ErrorSamples):
 def share_within(driven: ErrorSamples, error_m: float) -> tuple[float, float, float]:
     """Share of the time within an error, and the ends of its 95 % interval.
 
-    The wider, at each end, of the bootstrap over whole drives, and of Clopper and Pearson's for
-    the number of independent positions.
+    Each end is the wider one of the bootstrap over whole runs and of Clopper and Pearson's interval
+    for the number of independent positions.
     """
     shares = (driven.errors_m <= error_m).mean(axis=1)
     share = float(shares.mean())
@@ -263,7 +263,7 @@ def drive(
     progress: Callable[[int, int], None] | None = None,
     plug_ins: Mapping[str, Any] | None = None,
 ) -> Driven:
-    """Drive a scenario: the same seed gives each variant the same world, run by run."""
+    """Simulates a scenario; an equal seed gives every variant equal environments."""
     period_s = json.loads(scenario.site.to_json())["ssb"]["period_ms"] * 1e-3
     every = max(1, round(KEPT_EVERY_S / period_s))
     found = simulate(
@@ -275,7 +275,7 @@ def drive(
         progress=progress,
         **(plug_ins or {}),
     )
-    if found.errors_m is None or found.levels_m is None:  # they were asked for
+    if found.errors_m is None or found.levels_m is None:  # errors_every is set
         raise RuntimeError("the simulation kept no errors")
     errors_m = np.hypot(found.errors_m[:, :, 0], found.errors_m[:, :, 1]).astype(np.float64)
     errors_m[np.isnan(errors_m)] = np.inf
@@ -297,10 +297,10 @@ def drive(
 
 
 def _mean(values: pl.Series) -> float | None:
-    """Mean of values that are all known."""
+    """Returns the mean of values; all must be known."""
     return None if values.null_count() else float(values.to_numpy().mean())
 
 
 def platform_name(scenario: _core.Scenario) -> str:
-    """Name of the platform that a scenario's vehicle computes on."""
+    """Returns the name of the platform of a scenario's vehicle."""
     return str(json.loads(scenario.vehicle.to_json())["platform"]["name"])

@@ -38,12 +38,12 @@ class Unverified:
     key
         Key in the plant's file.
     what
-        The value in words.
+        Description of the value.
     otherwise
-        A plausible alternative in words; empty without an effect on the error.
+        Description of a plausible alternative; empty without an effect on the error.
     effect
-        Bound of the error (90th percentile along the road) with the alternative over that with the
-        value; ``None`` where the key has no effect on it.
+        Ratio of the error bounds (90th percentile along the road) with the alternative and with the
+        value; ``None`` if the key has no effect.
     """
 
     key: str
@@ -53,11 +53,10 @@ class Unverified:
 
 
 def unverified(plant: _core.Plant) -> list[Unverified]:
-    """Values that are equal to the template's or the default, the most influential first.
+    """Returns the values equal to the template's or the default, by influence.
 
-    The effect is that on the posterior Cramér–Rao bound, each value changed alone. Whether a value
-    was written to the file or left out does not matter: a plant that was loaded from a path and the
-    same plant as an object have the same values.
+    The effect is the change of the posterior Cramér–Rao bound when one value is changed. A value
+    that is omitted in the file is equal to a written default.
     """
     mine, template = json.loads(plant.to_json()), _template()
     scenario = plant.scenario()
@@ -91,7 +90,7 @@ def _at(held: Any, key: str) -> Any:
 
 
 def _is_shared(mine: Mapping[str, Any], template: Mapping[str, Any], key: str) -> bool:
-    """Whether a plant has the template's value; of radio heads, whether one of them has it."""
+    """Returns whether a plant (or one of its radio heads) has the template's value."""
     place, _, name = key.rpartition(".")
     if place == "site.radio_heads":
         values = {head[name] for head in template["site"]["radio_heads"]}
@@ -110,7 +109,7 @@ def _p90_m(scenario: _core.Scenario) -> float:
 def _candidates(
     site: Mapping[str, Any], vehicle: Mapping[str, Any]
 ) -> list[tuple[str, str, str, dict[str, Any]]]:
-    """Values with an effect on the error: key, value in words, alternative, and its settings."""
+    """Returns the values with an effect on the error: key, description, alternative, settings."""
     heads, odometer, array = site["radio_heads"], vehicle["odometer"], vehicle["array"]
     found = [
         (

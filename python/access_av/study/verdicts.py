@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 class Judgement(Enum):
-    """Whether drives meet the target; the value stands in `study.json`."""
+    """Whether runs meet the target; `study.json` contains the value."""
 
     MET = "met"
     PROBABLY_MET = "probably_met"
@@ -19,7 +19,7 @@ class Judgement(Enum):
 
     @classmethod
     def of(cls, share: tuple[float, float, float], percent: float) -> Judgement:
-        """Judgement by a share of the time, the ends of its 95 % interval, and the target's share.
+        """Returns the judgement of a share of the time with the ends of its 95 % interval.
 
         Examples
         --------
@@ -36,7 +36,7 @@ class Judgement(Enum):
 
     @classmethod
     def of_all(cls, each: Iterable[Judgement]) -> Judgement:
-        """Judgement of several targets together: that of the least fulfilled one.
+        """Returns the judgement of several targets: the worst one.
 
         Examples
         --------
@@ -69,7 +69,7 @@ class Judgement(Enum):
 
 
 class Effect(Enum):
-    """Effect of a remedy on the error; the value stands in `study.json`."""
+    """Effect of a remedy on the error; `study.json` contains the value."""
 
     HELPS = "helps"
     UNCERTAIN = "uncertain"
@@ -93,7 +93,7 @@ class Effect(Enum):
 
     @classmethod
     def of(cls, delta_m: tuple[float, float, float]) -> Effect:
-        """Effect by a difference to the baseline and the ends of its 95 % interval.
+        """Returns the effect by a difference to the baseline with its 95 % interval.
 
         Examples
         --------
@@ -107,7 +107,7 @@ class Effect(Enum):
 
 
 class NotOk(Enum):
-    """Reason why a state is not ``ok``; the value stands in `study.json`."""
+    """Reason for a state other than ``ok``; `study.json` contains the value."""
 
     LEVEL = "level"
     SUSPECTED = "suspected"
@@ -126,7 +126,7 @@ class NotOk(Enum):
 
 
 class Agreement(Enum):
-    """Whether two seeds recommend one operating point; the value stands in `study.json`."""
+    """Whether two seeds recommend one operating point; `study.json` contains the value."""
 
     AGREED = "agreed"
     EQUIVALENT = "equivalent"
