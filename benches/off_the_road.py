@@ -59,14 +59,14 @@ CASES = [
         for drive, road in [("road", False), ("differential", False), ("road", True)]
     ),
     *(
-        Case("stays", f"stays {name}{', on its road' * road}", world, road)
+        Case("correlated", f"correlated over {name}{', on its road' * road}", world, road)
         for name, world in [
             ("1 s", {"stays_s": 1.0}), ("1 m", {"stays_m": 1.0}), ("10 m", {"stays_m": 10.0}),
         ]
         for road in (False, True)
     ),
     *(
-        Case("scratch", f"from scratch, {drive}", {}, False, drive, start_unknown=True)
+        Case("unknown-start", f"unknown start, {drive}", {}, False, drive, start_unknown=True)
         for drive in ("road", "differential")
     ),
     *(
@@ -166,7 +166,7 @@ def locate(case: Case, seed: int, settings: list[str]) -> dict[str, float]:
     wrong_ok = ok & (error > ALERT_LIMIT_M)
     dark = error > level  # exceeds the protection level, in any state
     time_s = poses["time_s"].to_numpy()
-    settles = RECOVERY_S if case.group in ("start", "scratch") else 0.1
+    settles = RECOVERY_S if case.group in ("start", "unknown-start") else 0.1
     settled, settled_of_truth = time_s >= settles, drive.time_s >= settles
     return {
         "square": float(np.mean(error[settled] ** 2)),

@@ -88,8 +88,9 @@ fn condition<const N: usize>(
     errors
 }
 
-/// Shares of reliable estimates from which on the RMS, and the errors beyond three standard deviations, of a condition
-/// are judged alone. With fewer the SNR is near the threshold, and reliable are those whose noise was underestimated.
+/// Minimum shares of reliable estimates of a condition for a separate test of its RMS, and of its
+/// errors beyond three standard deviations. With smaller shares, the SNR is near the threshold, and
+/// the reliable estimates are those with underestimated noise.
 const RMS_SHARE: f64 = 0.2;
 const BEYOND_SHARE: f64 = 0.85;
 

@@ -1,4 +1,4 @@
-//! A model that holds is doubted as rarely as is said, one that does not hold is named.
+//! False-alarm rate of the model test, and its detection of wrong models.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -10,8 +10,8 @@ use aoa::{
 
 use crate::common::{METHODS, Random};
 
-/// Shares of p-values below some probabilities are these, but for four standard deviations of chance
-/// and what the approximated distributions are off by.
+/// Checks the shares of p-values below given probabilities, with a tolerance of four standard
+/// deviations plus the error of the approximated distributions.
 fn check(name: &str, trials: u32, mut fit: impl FnMut() -> GoodnessOfFit) {
     let mut below = [0_u32; 3];
     let probabilities = [0.5, 0.1, 0.01];
@@ -29,7 +29,7 @@ fn check(name: &str, trials: u32, mut fit: impl FnMut() -> GoodnessOfFit) {
             share < 1.25 * probability + chance,
             "{name}: {share} of {probability}"
         );
-        // With few snapshots the approximation doubts too rarely.
+        // With few snapshots, the approximation has a lower false-alarm rate.
         assert!(
             share > 0.3 * probability - chance,
             "{name}: {share} of {probability}"
@@ -76,7 +76,7 @@ fn p_values_of_pilots_are_uniform() {
             2000,
             || {
                 let a = array.steering_vector(random.uniform(-2.8, 2.8));
-                // Each block has a channel phase of its own, as a carrier offset makes it.
+                // Each block has its own channel phase, as with a carrier offset.
                 let blocks: Vec<[Complex64; 4]> = (0..blocks)
                     .map(|_| {
                         let gain = Complex64::from_polar(6.0, random.uniform(-PI, PI));
@@ -184,7 +184,8 @@ fn reflections_and_further_sources_are_named() {
             f64::from(named) >= 0.9 * trials as f64,
             "{echo_db} dB: {named}"
         );
-        // The standard deviation is of the size of the error: 0.67 and 1.64 were it Gaussian.
+        // The standard deviation has the size of the error: the quantiles would be 0.67 and 1.64
+        // for a Gaussian error.
         assert!(
             (0.4..1.2).contains(&median) && most < 4.0,
             "{median} {most}"
@@ -229,8 +230,8 @@ fn the_reason_is_the_cause() {
         Verdict::Unresolved(Reason::TooFewSnapshots)
     );
     assert_eq!(most_frequent(10.0, 20), Verdict::Resolved);
-    // Samples without any noise fit, and so does a single snapshot, of which nothing is left to test. It leaves too
-    // few degrees of freedom for the noise.
+    // Samples without noise fit, and so does a single snapshot, which has no degrees of freedom for
+    // a test and too few for the noise variance.
     let exact = [array.steering_vector(0.7)];
     for count in [1, 20] {
         let covariance = Covariance::from_snapshots(&exact.repeat(count)).unwrap();

@@ -29,7 +29,7 @@ struct Shared {
 /// A file, FIFO or device that is appended to.
 ///
 /// Bytes are kept in a buffer until [`flush`](Write::flush). After a failed write, [`repair`](Self::repair)
-/// removes what was written since the last successful flush, so that the file ends with a complete record.
+/// removes the bytes after the last successful flush, so that the file ends with a complete record.
 ///
 /// A file may have an end, such as a footer. Each flush writes it, and the next write replaces it: the file is valid
 /// at any time, also after `kill -9`.

@@ -29,18 +29,19 @@ use crate::numeric::phasors::fill_phasors;
 
 /// Samples of a frame at the base rate: 3.75 kHz per bin at 30 kHz subcarrier spacing.
 const FRAME: usize = 2048;
-/// Maximum number of frames: more hardly change a median.
+/// Maximum number of frames: further frames hardly change the median.
 const MOST_FRAMES: usize = 16;
-/// Minimum number of samples in which lines are looked for, in frames: those of about one SSB.
+/// Minimum number of samples for the detection of lines, in frames: about one SSB.
 const SHORTEST_FRAMES: f64 = 0.5;
 /// Minimum ratio of a line's power per bin to that of its surroundings, 16 dB. White noise exceeds it in one
 /// of 1e8 bins of a single frame, SSBs stay below 13 dB. A weaker line adds less than 12 dB to the noise of
 /// one resource element, which is 2 % of the noise of all pilots.
 const PROMINENCE: f32 = 40.0;
-/// Minimum power of a line relative to the strongest frame, −100 dB: less may be rounding.
+/// Minimum power of a line relative to the strongest frame, −100 dB: weaker lines may be rounding
+/// errors.
 const ROUNDING: f32 = 1e-10;
 /// Minimum power of a line within the main lobe of a known one, relative to the known one, −40 dB:
-/// what is left of a subtracted line is below −50 dB, and is visible in a band without noise.
+/// the residual of a subtracted line is below −50 dB, and is visible in a band without noise.
 const RESIDUAL: f32 = 1e-4;
 /// Half of the taper's main lobe, in bins of a full frame.
 const LOBE: usize = 4;
@@ -52,7 +53,7 @@ const MOST_TONES: usize = 16;
 const STRETCH: usize = 4096;
 /// Minimum number of samples that amplitudes are fitted to.
 const SHORTEST_FIT: usize = 256;
-/// Corrections of a frequency; each leaves a tenth of the error or less.
+/// Number of corrections of a frequency; each one reduces the error at least tenfold.
 const CORRECTIONS: usize = 3;
 
 /// A line in the spectrum of received samples.
@@ -64,8 +65,8 @@ pub struct Tone {
     pub power_dbfs: f64,
 }
 
-/// Lines in the spectrum of a recording's whole band, the strongest first; empty for less than a
-/// millisecond's samples.
+/// Returns the lines in the whole band of a recording, the strongest first; empty for a recording
+/// below one millisecond.
 pub fn tones<S: AsRef<[Complex32]>>(antennas: &[S], sample_rate_hz: f64) -> Vec<Tone> {
     // The resolution of a receiver of 15 kHz subcarriers, or finer.
     let frames = (sample_rate_hz / 3.84e6).ceil().clamp(1.0, 64.0) as usize;
@@ -100,7 +101,7 @@ pub(crate) struct ToneCanceller {
     lines: Vec<Line>,
 }
 
-/// The samples that are examined: frames of equal length.
+/// Examined samples: frames of equal length.
 #[derive(Clone, Copy)]
 struct Frames {
     first: usize,
@@ -133,7 +134,7 @@ impl Frames {
 }
 
 impl ToneCanceller {
-    /// For samples at the base rate.
+    /// Creates a canceller for samples at the base rate.
     pub(crate) fn new(antennas: usize) -> Self {
         Self::with_frame(FRAME, antennas)
     }
@@ -154,7 +155,7 @@ impl ToneCanceller {
         }
     }
 
-    /// Whether there are lines to subtract.
+    /// Whether any line has to be subtracted.
     pub(crate) fn is_needed(&self) -> bool {
         !self.lines.is_empty()
     }
@@ -164,7 +165,7 @@ impl ToneCanceller {
         self.lines.clear();
     }
 
-    /// The lines found last, the strongest first.
+    /// Returns the lines of the last detection, the strongest first.
     pub(crate) fn tones(&self, sample_rate_hz: f64) -> impl Iterator<Item = Tone> + '_ {
         self.lines.iter().map(move |line| Tone {
             frequency_hz: line.frequency * sample_rate_hz,
@@ -172,8 +173,8 @@ impl ToneCanceller {
         })
     }
 
-    /// Looks for lines in the samples from number `first` on; less than half a frame of them
-    /// leaves the lines as they are.
+    /// Detects lines in the samples from index `first`; with less than half a frame, the known
+    /// lines are unchanged.
     pub(crate) fn detect<S: AsRef<[Complex32]>>(&mut self, antennas: &[S], first: usize) {
         let end = antennas.iter().map(|it| it.as_ref().len()).min();
         let Some(frames) = Frames::new(first, end.unwrap_or(0), self.frame.len()) else {
@@ -208,7 +209,7 @@ impl ToneCanceller {
         self.lines.sort_by(|a, b| b.power.total_cmp(&a.power));
     }
 
-    /// Subtracts the lines from the samples from number `first` on.
+    /// Subtracts the lines from the samples from index `first`.
     pub(crate) fn subtract(&mut self, antennas: &mut [Vec<Complex32>], first: usize) {
         let end = antennas.iter().map(Vec::len).min().unwrap_or(0);
         if self.lines.is_empty() || end < first + SHORTEST_FIT {
@@ -226,8 +227,8 @@ impl ToneCanceller {
         }
     }
 
-    /// Fits the lines' amplitudes, all but those of line `without`, to the samples of a range, and
-    /// subtracts them on request; returns the power of each line.
+    /// Fits the amplitudes of all lines except line `without` to a range of samples, and subtracts
+    /// them on request. Returns the power of each line.
     fn fit(
         &mut self,
         antennas: &mut [Vec<Complex32>],
@@ -281,7 +282,7 @@ impl ToneCanceller {
         powers
     }
 
-    /// Brings a frame of every antenna to `work`, without the lines, except line `kept`.
+    /// Copies a frame of every antenna to `work`, without the lines other than line `kept`.
     fn load<S: AsRef<[Complex32]>>(
         &mut self,
         antennas: &[S],
@@ -307,7 +308,8 @@ impl ToneCanceller {
         self.work = work;
     }
 
-    /// Median over the frames of every bin's power, the lines known so far subtracted.
+    /// Measures the median power of every bin over the frames, after subtraction of the known
+    /// lines.
     fn measure<S: AsRef<[Complex32]>>(&mut self, antennas: &[S], frames: Frames) {
         for number in 0..frames.count {
             self.load(antennas, frames, number, None);
@@ -335,7 +337,7 @@ impl ToneCanceller {
         }
     }
 
-    /// The strongest bin that stands out of its surroundings.
+    /// Returns the strongest bin whose power exceeds that of its surroundings by [`PROMINENCE`].
     fn most_prominent(&self, length: usize) -> Option<usize> {
         let bins = self.median.len();
         let lobe = (LOBE * bins).div_ceil(length);
@@ -372,7 +374,7 @@ impl ToneCanceller {
             .max_by(|a, b| self.median[*a].total_cmp(&self.median[*b]))
     }
 
-    /// Whether a bin within half a main lobe of a known line contains what is left of that line.
+    /// Whether a bin within half a main lobe of a known line contains the residual of that line.
     fn is_residual(&self, bin: usize, lobe: usize) -> bool {
         let bins = self.median.len() as f64;
         self.lines.iter().any(|line| {
@@ -450,8 +452,8 @@ impl ToneCanceller {
     }
 }
 
-/// Inner products of the lines, `Σ exp(j2π (f_j − f_i) n)` over `length` samples; unused rows are those of
-/// lines without likeness to others.
+/// Inner products of the lines, `Σ exp(j2π (f_j − f_i) n)` over `length` samples; unused rows
+/// belong to lines that are orthogonal to all others.
 fn gram(frequencies: &[f64], length: usize) -> Matrix<MOST_TONES> {
     let mut gram = [[Complex64::ZERO; MOST_TONES]; MOST_TONES];
     for (i, row) in gram.iter_mut().enumerate() {
@@ -474,7 +476,8 @@ fn gram(frequencies: &[f64], length: usize) -> Matrix<MOST_TONES> {
     gram
 }
 
-/// `Σ x conj(phasor)`, summed in parts: single precision would lose a line's digits.
+/// Returns `Σ x conj(phasor)` as a sum of partial sums, which reduces rounding errors of single
+/// precision.
 fn correlate(phasors: &[Complex32], samples: &[Complex32]) -> Complex64 {
     const PART: usize = 64;
     let parts = phasors.chunks(PART).zip(samples.chunks(PART));

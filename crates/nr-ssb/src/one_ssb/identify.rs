@@ -1,5 +1,5 @@
-//! Which cell and which SSB: N_ID^(1) from the SSS and ī_SSB from the PBCH DM-RS, once the channel
-//! is known from the PSS.
+//! Identification of cell and SSB: N_ID^(1) from the SSS and ī_SSB from the PBCH DM-RS, with the
+//! channel estimated from the PSS.
 //!
 //! Antennas are combined with the channel's conjugate (maximum ratio); each statistic is
 //! `|Σ w(k) d*(k)|² / Σ|w(k)|²`, in noise exponentially distributed with mean one.
@@ -17,11 +17,11 @@ use crate::standard::sequence::dmrs::{DMRS_LEN, dmrs};
 use crate::standard::sequence::pss::{SYNC_LEN, pss};
 use crate::standard::sequence::sss::sss;
 
-/// Most likely hypothesis and how it stands out.
+/// Most likely hypothesis with its statistic.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Best<T> {
     pub(crate) hypothesis: T,
-    /// Its statistic; for DM-RS the sum over its three symbols.
+    /// Statistic; for DM-RS the sum over the three symbols.
     pub(crate) statistic: f32,
     /// Phase of the match, a unit phasor.
     pub(crate) phase: Complex32,
@@ -35,7 +35,7 @@ impl SssTable {
         Self(Pci::all().map(sss).collect())
     }
 
-    /// The PCI whose SSS fits best, among those with this N_ID^(2).
+    /// Returns the PCI with the largest SSS statistic, among those with this N_ID^(2).
     pub(crate) fn identify(
         &self,
         n_id_2: u8,
@@ -76,7 +76,8 @@ impl SssTable {
 /// DM-RS elements of the symbols 1, 2 and 3.
 const DMRS_OF_SYMBOL: [std::ops::Range<usize>; 3] = [0..60, 60..84, 84..144];
 
-/// The ī_SSB, 0 to 7, whose DM-RS fits best. The phase between symbols is not used.
+/// Returns the ī_SSB, 0 to 7, with the largest DM-RS statistic. The phase between symbols is not
+/// used.
 pub(crate) fn dmrs_hypothesis(
     pci: Pci,
     grids: &[ReceivedGrid],
@@ -127,11 +128,11 @@ pub(crate) fn dmrs_hypothesis(
     best
 }
 
-/// How the PSS stands out, whatever the noise's correlation over the antennas: `127 cᴴ R⁻¹ c` with
+/// Returns the PSS statistic for noise with any correlation over the antennas: `127 cᴴ R⁻¹ c` with
 /// `c` the despread antennas and `R` the sample covariance of their 127 elements. In noise 127 times
-/// a beta distribution, whose tail is thinner than that of a sum of as many unit exponentials as
-/// there are antennas. (The statistic of the search, a plain sum over the antennas, takes
-/// interference from one direction for several independent witnesses.)
+/// a beta distribution, whose tail is thinner than that of a sum of unit exponentials, one per
+/// antenna. (The statistic of the search is a plain sum over the antennas. It treats interference
+/// from one direction as independent at each antenna.)
 pub(crate) fn pss_statistic(n_id_2: u8, grids: &[ReceivedGrid]) -> f32 {
     let chips = pss(n_id_2);
     let rows = grids

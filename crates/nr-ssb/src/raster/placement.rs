@@ -33,9 +33,9 @@ const COARSE_AT_BEST: f64 = 0.01;
 /// Penalty of a point off the synchronization raster, of a point off the global frequency raster,
 /// and of a frequency that is not a multiple of 5 kHz, in squared standard deviations.
 const RASTER_PREFERENCE: f64 = 16.0;
-/// Transmitters off the rasters are usually configured to multiples of this frequency, ...
+/// Transmitters off the rasters usually have multiples of this frequency.
 const SET_BY_HAND_HZ: f64 = 5e3;
-/// ... or, less often, of this one.
+/// Finest multiples of transmitters off the rasters, in Hz; less frequent.
 const FINEST_HZ: f64 = 1e3;
 
 /// Returns the prior penalty of a frequency in squared standard deviations: zero for a frequency of

@@ -280,7 +280,7 @@ impl<const A: usize> WindowReceiver<A> {
                     if none_came && off.abs() > OFF_PERIOD {
                         self.unreported_gap += (-off).rem_euclid(period);
                     }
-                    none_came = false; // the others tell of the same
+                    none_came = false; // the other beams have equal information
                 }
                 Some(_) => {}
                 None => self.beams.push(Beam::new(&self.config.search, &found)?),

@@ -1,4 +1,4 @@
-//! A receiver that runs for years allocates nothing once its buffers have grown.
+//! A receiver does not allocate memory after its buffers have grown.
 
 use crate::air;
 use nr_ssb::search::{SearchConfig, Searcher};
@@ -7,7 +7,7 @@ use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci, Su
 
 use crate::counting::allocations;
 
-/// 20 ms with one SSB on four antennas, and the settings to find it.
+/// Returns 20 ms with one SSB at four antennas, and the settings of its search.
 fn scene(snr_db: f64) -> (SearchConfig, Vec<Vec<nr_ssb::Complex32>>) {
     let mut rng = air::rng(1);
     let cell = air::Cell::random(&mut rng, SubcarrierSpacing::Khz15, 4);
@@ -61,7 +61,7 @@ fn warm_tracking_allocates_nothing() {
     let mut tracker = Tracker::<4>::new(&config, &cell).unwrap();
     let antennas = std::array::from_fn(|antenna| slices[antenna]);
     let start = cell.sample_start;
-    // Found where expected, without and with the PBCH; near by; and not at all.
+    // SSB at the expected time, without and with the PBCH; near the expected time; and missing.
     let silent = vec![vec![nr_ssb::Complex32::ZERO; 76_800]; 4];
     let nothing = std::array::from_fn(|antenna| silent[antenna].as_slice());
     let mut visit = || {

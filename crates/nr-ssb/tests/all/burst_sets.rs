@@ -1,4 +1,4 @@
-//! How many SSBs a cell has, and which of them one is: Lmax 4, 8 and 64.
+//! Burst set size and SSB index: Lmax 4, 8 and 64.
 
 use crate::air::{Cell, add_noise, raised, rng, silence, slices};
 use nr_ssb::raster::scan_raster;
@@ -73,7 +73,7 @@ fn a_scan_above_24_ghz_searches_120_and_240_khz() {
     let mut antennas = silence(1, (5e-3 * 30.72e6) as usize);
     cell.add_to(&mut antennas);
     add_noise(&mut antennas, 10.0, &mut rng(3));
-    // The recording's centre lies 10 MHz below the SSB.
+    // The centre of the recording is 10 MHz below the SSB.
     let wide = raised(&antennas[0], 2, 10e6 / 61.44e6);
     let finds = scan_raster(&[&wide], 61.44e6, cell.ssb_freq_hz - 10e6).unwrap();
     let [find] = finds.as_slice() else {
@@ -87,7 +87,7 @@ fn a_scan_above_24_ghz_searches_120_and_240_khz() {
     );
 }
 
-/// Without a frequency the first four SSBs of a frame look the same of 4 and of 8.
+/// Without a known frequency, the first four SSBs of a frame are identical for Lmax 4 and 8.
 #[test]
 fn an_unknown_burst_set_size_is_determined_by_the_first_decoded_ssb() {
     let mut cell = Cell::random(&mut rng(9), SubcarrierSpacing::Khz30, ANTENNAS);
@@ -95,7 +95,7 @@ fn an_unknown_burst_set_size_is_determined_by_the_first_decoded_ssb() {
     let [ssb] = found(&cell, None, 10.0).try_into().unwrap();
     assert_eq!((ssb.lmax, ssb.ssb_index), (None, 1));
     assert!(ssb.payload.is_some());
-    // The bands of 30 kHz at 3.7 GHz have 8; so has the unpaired n38, but n66 has 4.
+    // Bands at 30 kHz and 3.7 GHz have Lmax 8, the unpaired band n38 as well, but n66 has 4.
     for (ssb_freq_hz, lmax) in [
         (3.7008e9, Lmax::L8),
         (2.595e9, Lmax::L8),
@@ -105,7 +105,7 @@ fn an_unknown_burst_set_size_is_determined_by_the_first_decoded_ssb() {
         let [ssb] = found(&cell, Some(ssb_freq_hz), 10.0).try_into().unwrap();
         assert_eq!((ssb.lmax, ssb.ssb_index), (Some(lmax), 1));
     }
-    // The sixth of the cell's SSBs is one of eight, and the first then too.
+    // The sixth SSB exists only for Lmax 8, which then also applies to the first one.
     cell.ssb_indices = vec![1, 5];
     let ssbs = found(&cell, None, 10.0);
     let told: Vec<_> = ssbs.iter().map(|ssb| (ssb.ssb_index, ssb.lmax)).collect();

@@ -45,12 +45,12 @@ impl Drifting {
         sent * (1.0 + 1e-6 * self.ppm)
     }
 
-    /// Returns the samples around it, and the index of the first sample.
+    /// Returns the samples around the beam of period `number`, and the index of the first sample.
     fn window(&mut self, number: f64) -> (Vec<Vec<Complex32>>, f64) {
         let start = self.start(number);
         let window_start = (start - MARGIN).floor();
         let delay = start - window_start - MARGIN;
-        // The stretch of the half frame around the beam, a fraction of a sample late.
+        // Part of the half frame around the beam, delayed by a fraction of a sample.
         let first = (self.cell.ssb_start(BEAM) - self.cell.delay - MARGIN).round() as usize;
         let late = air::delayed(&self.sent[first..first + WINDOW], delay);
         let step = std::f64::consts::TAU * self.cell.cfo_hz / self.cell.spacing.base_rate_hz();
@@ -116,9 +116,9 @@ impl Tally {
         }
     }
 
-    /// The SNR of one SSB at 0 dB is known to 0.3 dB (noise by 125 second differences per antenna,
-    /// as good as 64 independent ones; power by 398 pilots), skewed upwards: 3 in 1000 are off by
-    /// more than 1 dB.
+    /// The standard deviation of the SNR of one SSB at 0 dB is 0.3 dB: noise from 125 second
+    /// differences per antenna (64 degrees of freedom), power from 398 pilots. The distribution is
+    /// skewed: 3 of 1000 errors exceed 1 dB.
     fn must_hold(&self) {
         println!("{self:?}");
         assert!(
@@ -167,7 +167,7 @@ fn sleep_is_bridged_by_what_was_learned() {
                     let mut air = Drifting::new(spacing, ppm, 0.02, snr_db, seed);
                     let mut tracker = air.tracker();
                     let mut number = 0.0;
-                    // Awake for half a second, then asleep, and that again.
+                    // Three cycles: half a second of reception, then sleep.
                     for _ in 0..3 {
                         for _ in 0..25 {
                             number += 1.0;
@@ -214,7 +214,7 @@ fn an_ssb_off_its_place_is_named_rightly_or_not_at_all() {
         }
     }
     println!("{named:?}");
-    // Six samples to either side, and none given away where it is near.
+    // The search range is six samples to either side.
     assert!(
         named[6..=18].iter().all(|count| *count == trials as u32),
         "{named:?}"

@@ -1,11 +1,12 @@
-//! How often SSBs are found and decoded in noise, and how often noise is taken for one.
+//! Detection and decoding rates of SSBs in noise, and false-alarm rate.
 
 use crate::air;
 use crate::noise_only;
 use nr_ssb::SubcarrierSpacing;
 use nr_ssb::search::{SearchConfig, Searcher};
 
-/// Share of trials whose one SSB in 20 ms is found in the right place, and decoded.
+/// Returns the shares of trials in which the SSB in 20 ms is detected at the correct time, and
+/// decoded.
 fn rates(antennas: usize, snr_db: f64, trials: u64) -> (f64, f64) {
     let spacing = SubcarrierSpacing::Khz15;
     let mut searcher = Searcher::new(SearchConfig::new(spacing, antennas)).unwrap();
@@ -32,7 +33,8 @@ fn rates(antennas: usize, snr_db: f64, trials: u64) -> (f64, f64) {
     (found as f64 / trials as f64, decoded as f64 / trials as f64)
 }
 
-/// Fewest hits of `TRIALS` at which a probability of 0.95 is not refuted at three sigma.
+/// Number of trials, and minimum number of detections that is consistent with a probability of 0.95
+/// at three sigma.
 const TRIALS: u64 = 80;
 const FEWEST: f64 = 0.95 - 3.0 * 0.0244;
 
@@ -60,9 +62,9 @@ fn one_ssb_in_20_ms_is_decoded_by_one_antenna_at_minus_3_db() {
     assert!(decoded >= FEWEST, "{decoded}");
 }
 
-/// At 1e-3 a search, 400 searches make a cell with a probability of 0.33. `false_cells` of the
-/// examples makes enough of them to refute 1e-3; here a rate tenfold too high would show with a
-/// probability of 0.98.
+/// With a false-alarm probability of 1e-3 per search, 400 searches detect a false cell with a
+/// probability of 0.33. A tenfold rate is detected here with a probability of 0.98. The example
+/// `false_cells` simulates enough searches to test 1e-3.
 #[test]
 fn noise_makes_no_cell() {
     let mut all = noise_only::Tally::default();
@@ -71,13 +73,13 @@ fn noise_makes_no_cell() {
     }
     println!("{all:?}");
     assert_eq!(all.false_cells, 0);
-    // Else nothing was examined at all.
+    // Ensure that candidates were examined.
     assert!(all.pss_candidates > 0 && all.pbch_tried > 0);
 }
 
 #[test]
 fn the_upper_limit_is_that_of_clopper_and_pearson() {
-    // No event: 1 − 0.05^(1/n). One in ten: so few have the probability (1 − p)^9 (1 + 9p).
+    // No event: 1 − 0.05^(1/n). At most one event in ten has the probability (1 − p)^9 (1 + 9p).
     assert!((noise_only::upper_limit(0, 1000) - (1.0 - 0.05_f64.powf(1e-3))).abs() < 1e-12);
     let p: f64 = noise_only::upper_limit(1, 10);
     assert!(((1.0 - p).powi(9) * (1.0 + 9.0 * p) - 0.05).abs() < 1e-9);
@@ -94,7 +96,7 @@ fn bursts_in_silence_or_next_to_none_are_found() {
         for antenna in &mut samples {
             antenna[1_000..1_000 + half_frame.len()].copy_from_slice(&half_frame);
         }
-        // As a program made it, and with less noise than any receiver has.
+        // Noise-free samples, and less noise than in any receiver.
         if let Some(snr_db) = [None, Some(90.0), Some(60.0), Some(45.0)][trial as usize / 2 % 4] {
             air::add_noise(&mut samples, snr_db, &mut rng);
         }

@@ -1,4 +1,4 @@
-//! How exact the search's estimates are, and what it says to bad input.
+//! Accuracy of the search's estimates, and errors for invalid input.
 
 use crate::air;
 use std::f64::consts::TAU;
@@ -59,7 +59,7 @@ proptest! {
         let mut samples = air::silence(2, 26_000);
         cell.add_to(&mut samples);
         air::add_noise(&mut samples, 15.0, &mut rng);
-        // Up to a multiple of the rate and off the centre, as a recording would be.
+        // A recording has a multiple of the base rate, and the SSB is not at its centre.
         let room_hz = 0.5 * spacing.base_rate_hz() * (rate - 1) as f64;
         let offset_hz = offset * 2.0 * room_hz;
         let input_hz = spacing.base_rate_hz() * rate as f64;
@@ -90,7 +90,7 @@ proptest! {
     }
 }
 
-/// Rates of common receivers, and what they are of the base rate.
+/// Sample rates of common receivers, and their ratio to the base rate.
 #[test]
 fn rates_that_are_no_multiple_are_converted() {
     use SubcarrierSpacing::{Khz15, Khz30};
@@ -113,7 +113,7 @@ fn rates_that_are_no_multiple_are_converted() {
         air::add_noise(&mut samples, 15.0, &mut rng);
         let recorded = air::resampled(&samples[0], up, down);
         let mut front_end = FrontEnd::new(rate_hz, 0.0, spacing.hz(), 1).unwrap();
-        // In blocks as they come: nothing is lost or doubled between them.
+        // Blocks of a stream: no sample is lost or repeated between them.
         let mut base = vec![Vec::new()];
         for block in recorded.chunks(10_007) {
             front_end.push(&[block], &mut base).unwrap();

@@ -1,6 +1,6 @@
-//! Conformity to the standard, wherever the crate is tested: vectors that `golden/make.py` wrote
-//! from the standard's text, and that agree with those of three other encoders.
-//! `golden/mutate.py`, run by hand, shows that each table and sequence, broken, is caught here.
+//! Conformity to the standard by vectors that `golden/make.py` generates from the standard's text.
+//! They agree with those of three other encoders. `golden/mutate.py` modifies each table and
+//! sequence, and checks that these tests fail; it is run manually.
 
 use nr_ssb::burst::ssb_grid;
 use nr_ssb::crc::crc24c;
@@ -17,7 +17,7 @@ use nr_ssb::{
     BchPayload, Case, Complex32, Lmax, Mib, Numerology, Pci, SubcarrierSpacing, band, polar,
 };
 
-/// The lines that begin with `name`, in fields.
+/// Returns the fields of the lines that begin with `name`.
 fn lines(name: &str) -> impl Iterator<Item = Vec<&'static str>> {
     let all = include_str!("golden/golden.txt").lines();
     let fields = all.map(|line| line.split_whitespace().collect::<Vec<_>>());
@@ -132,7 +132,7 @@ fn every_stage_of_the_pbch_and_back() {
         let sent = bits(line[12], 864);
         let symbols = pbch::encode(&payload, pci, lmax);
         assert_eq!(qpsk_bits(&symbols), sent);
-        // Into the grid, in order, with the DM-RS of this SSB.
+        // Map to the grid, in order, with the DM-RS of this SSB.
         let grid = ssb_grid(pci, lmax, &payload).unwrap();
         let at = |index: &usize| grid.elements()[*index];
         assert!(pbch_indices(pci).iter().map(at).eq(symbols));
@@ -183,8 +183,9 @@ fn cases_and_raster() {
     }
 }
 
-/// No entry of a table is wrong by much: the outermost SSBs of a band lie inside it, at its edges.
-/// (Where spectrum is shared, n46 and n96, the first channel of 20 MHz begins further inside.)
+/// The outermost SSBs of a band are inside the band and near its edges, which excludes large errors
+/// of the table. (In the shared spectrum n46 and n96, the first 20 MHz channel begins farther
+/// inside.)
 #[test]
 fn raster_entries_reach_from_edge_to_edge_of_their_bands() {
     for band in band::all() {

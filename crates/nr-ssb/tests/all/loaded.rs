@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 const SPACING: SubcarrierSpacing = SubcarrierSpacing::Khz30;
 const SAMPLES: usize = 153_600;
 
-/// OFDM that fills the band without a pause: QPSK on 240 subcarriers at unit power of an element.
+/// Returns continuous OFDM in the whole band: QPSK on 240 subcarriers with unit power per element.
 fn loaded(rng: &mut ChaCha8Rng) -> Vec<Complex32> {
     let mut ofdm = Ofdm::new(Numerology::new(SPACING, 256).unwrap());
     let mut samples = vec![Complex32::ZERO; SAMPLES.next_multiple_of(274)];
@@ -33,7 +33,7 @@ fn a_loaded_neighbour_offers_few_candidates_and_hides_no_weak_cell() {
         cell.lmax = Lmax::L8;
         let mut samples = air::silence(4, SAMPLES);
         cell.add_to(&mut samples);
-        // As strong as the cell, from elsewhere.
+        // A neighbour with the power of the cell, from another direction.
         let neighbour = loaded(&mut rng);
         for antenna in &mut samples {
             let gain = Complex32::cis(6.2 * rng.random::<f32>());
@@ -59,7 +59,7 @@ fn a_loaded_neighbour_offers_few_candidates_and_hides_no_weak_cell() {
     assert!(most <= 10, "{most}");
 }
 
-/// A transmitter under test may send a PBCH that no receiver can read; that there is a cell is seen.
+/// A transmitter under test may send an undecodable PBCH; the cell is detected nevertheless.
 #[test]
 fn a_strong_cell_whose_message_fails_is_reported_without_it() {
     let mut rng = air::rng(31);
@@ -68,7 +68,7 @@ fn a_strong_cell_whose_message_fails_is_reported_without_it() {
     cell.ssb_indices = vec![2];
     let mut samples = air::silence(2, 38_400);
     cell.add_to(&mut samples);
-    // The two symbols that are PBCH from edge to edge hold something else.
+    // Replace the two symbols that contain PBCH on all subcarriers.
     let other = loaded(&mut rng);
     let start = cell.ssb_start(2) as usize;
     for antenna in &mut samples {

@@ -1,4 +1,4 @@
-//! The SSB chain, as whoever uses the crate meets it.
+//! Tests of the SSB processing through the public interface.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,

@@ -82,7 +82,7 @@ fn errors_in_noise_reach_the_bound_and_their_standard_deviations() {
             .iter()
             .all(|it| it.rate.value.abs() < 6.0 * it.rate.sigma)
     );
-    // The phase difference of every 20 ms counts at 15 dB, that of 1 and 5 s never.
+    // At 15 dB, the phase difference is used after every sleep of 20 ms, and never after 1 or 5 s.
     assert!(from_phase.len() * 4 > heard.len());
     assert!(from_phase.iter().all(|it| it.sleep_s < 1.0));
 }
@@ -118,7 +118,7 @@ fn a_first_path_is_found_in_multipath_or_reported_as_uncertain() {
             let it = summary(&errors(&found, of));
             assert!(it.nees < 1.5, "K {k_db} dB, {name}: {it:?}");
         }
-        // The centroid of the paths is late by 1/(K + 1) of the mean delay of the echoes.
+        // The delay of the centroid of the paths is 1/(K + 1) of the mean delay of the echoes.
         let late = mean_delay_s / (1.0 + 10f64.powf(0.1 * k_db));
         let bias = found.iter().map(|it| it.delay.value).sum::<f64>() / found.len() as f64;
         assert!(bias.abs() < 0.6 * late, "K {k_db} dB: {bias} of {late}");

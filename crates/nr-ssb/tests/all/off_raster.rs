@@ -1,4 +1,4 @@
-//! SSBs off the synchronization raster, and recordings that do not state their centre.
+//! SSBs off the synchronization raster, and recordings without a centre frequency.
 
 use crate::air;
 use crate::recordings;
@@ -64,8 +64,9 @@ fn an_ssb_between_the_raster_points_is_found() {
             assert_eq!(ssb.payload.unwrap().sfn(), cell.sfn);
             let found_hz = find.point.ssb_freq_hz - centre_hz.unwrap_or(0.0);
             assert!((found_hz - offset_hz).abs() < 1.0, "{found_hz}");
-            // At 0 dB the PSS-SSS phase has σ = 0.09 rad over two symbols, 0.7 % of a subcarrier;
-            // the halves of the PSS, all that is left without the centre, 4 %.
+            // At 0 dB, the phase between PSS and SSS has σ = 0.09 rad over two symbols, 0.7 % of a
+            // subcarrier. Without the centre frequency, only the halves of the PSS are usable, with
+            // 4 %.
             let tolerance = if centre_hz.is_some() { 0.035 } else { 0.2 };
             let error_hz = ssb.cfo_hz - cell.cfo_hz;
             assert!(error_hz.abs() < tolerance * spacing.hz(), "{error_hz}");
@@ -73,8 +74,8 @@ fn an_ssb_between_the_raster_points_is_found() {
     }
 }
 
-/// A recording's centre may be any frequency. 50 dB: the noise moves the frequency offset by less
-/// than 1 Hz, so that what remains is the method's.
+/// The centre of a recording may be any frequency. At 50 dB, noise changes the frequency offset by
+/// less than 1 Hz, so that the error is that of the method.
 #[test]
 fn a_centre_between_all_rasters_gives_the_right_frequency_and_offset() {
     use SubcarrierSpacing::{Khz15, Khz30};
@@ -149,8 +150,8 @@ fn an_oscillator_of_20_ppm_hides_no_cell() {
     }
 }
 
-/// PSS and SSS, shifted in frequency, look like another cell's; on the raster such a shadow may be
-/// found before the cell itself.
+/// Frequency-shifted PSS and SSS resemble those of another cell. On the raster, such a ghost may be
+/// detected before the cell.
 #[test]
 fn a_cell_off_the_raster_does_not_mask_cells_on_it() {
     for seed in 1020..1040 {
@@ -162,7 +163,8 @@ fn a_cell_off_the_raster_does_not_mask_cells_on_it() {
     }
 }
 
-/// A strong cell on the raster hides none off it, 20 dB weaker, whatever their spacings.
+/// A strong cell on the raster does not prevent the detection of a cell off the raster that is 20
+/// dB weaker, for any subcarrier spacings.
 #[test]
 fn a_weak_cell_off_the_raster_is_found_next_to_a_strong_one_on_it() {
     use SubcarrierSpacing::{Khz15, Khz30};
@@ -213,7 +215,7 @@ fn off_the_raster_a_cell_may_be_nearly_as_weak() {
             cell.lmax = nr_ssb::Lmax::L8;
             cell.ssb_indices = vec![1];
             cell.delay = 200.0 + rng.random_range(0.0..1000.0);
-            // Within two parts in a million, as a base station and a receiver are.
+            // Oscillators of base station and receiver within 2 ppm.
             cell.cfo_hz = rng.random_range(-7e3..7e3);
             for (place, found) in [3_600.96e6, 3_600.675e6].into_iter().zip(&mut found) {
                 cell.ssb_freq_hz = place;
@@ -253,7 +255,8 @@ fn recordings_that_hide_their_centre_give_the_same_cells() {
     for recording in recordings::annotated() {
         let name = &recording.name;
         let first = &recording.annotations[0];
-        // 2 ms around the first SSB: what a scan takes grows with the recording.
+        // Use 2 ms around the first SSB, because the duration of a scan increases with the
+        // recording.
         let start = first["core:sample_start"].as_u64().unwrap() as usize;
         let margin = (1e-3 * recording.rate_hz) as usize;
         let antennas = recording.antennas();
@@ -288,7 +291,7 @@ fn recordings_that_hide_their_centre_give_the_same_cells() {
             truth["mib_bits_24"].as_str().unwrap(),
             "{name}"
         );
-        // With the centre, the place is known to the hertz.
+        // With a known centre, the frequency is accurate to 1 Hz.
         let finds =
             scan_off_raster(&part, recording.rate_hz, Some(recording.centre_hz), &[]).unwrap();
         let found_hz = finds[0].point.ssb_freq_hz;

@@ -26,7 +26,7 @@ fn few_block_errors_at_minus_8_db() {
     assert!((errors as f64) < most, "{errors} errors in {blocks}");
 }
 
-/// Where a list of 8 fails, one of 32 finds most of the rest, and invents nothing.
+/// A list of 32 decodes most PBCHs that a list of 8 does not, without false messages.
 #[test]
 fn the_retry_finds_most_of_what_a_list_of_8_misses() {
     let blocks = 4000;
@@ -36,9 +36,9 @@ fn the_retry_finds_most_of_what_a_list_of_8_misses() {
     assert!(2 * retried < alone, "{retried} of {alone}");
 }
 
-/// Independent implementations, which use neither the early checks nor joint decisions: successive
-/// cancellation 0.25 at −8 dB and 0.85 at −10 dB, a list of 8 0.00 (of some hundred) and 0.40. This
-/// one has no more, but for four standard deviations of 2000 trials, and 0.01 for their 0.00.
+/// Block error rates of independent implementations without early checks and joint decisions:
+/// successive cancellation 0.25 at −8 dB and 0.85 at −10 dB; list of 8: 0.00 (of some hundred) and
+/// 0.40. The tolerance is four standard deviations of 2000 trials, and 0.01 in place of 0.00.
 #[test]
 fn no_more_block_errors_than_other_implementations() {
     for (list_size, snr_db, expected) in [
@@ -55,7 +55,7 @@ fn no_more_block_errors_than_other_implementations() {
     }
 }
 
-/// A period 5 dB below what a list of 8 needs decodes together with three more.
+/// Four periods, each 5 dB below the limit of a list of 8, decode together.
 #[test]
 fn combining_four_periods_gains_about_6_db() {
     let (snr_db, trials, lmax) = (-13.0, 200, Lmax::L4);
@@ -64,7 +64,7 @@ fn combining_four_periods_gains_about_6_db() {
     let (mut alone, mut together) = (0, 0);
     for trial in 0..trials {
         let pci = Pci::new(rng.random_range(0..1008)).unwrap();
-        // Every place of the first period, across 80 ms and 160 ms and the SFN's own end.
+        // Every position of the first period, across 80 ms and 160 ms and the wrap of the SFN.
         let first = random_payload(&mut rng, lmax)
             .with_sfn((1010 + trial) % 1024)
             .unwrap();
@@ -85,11 +85,12 @@ fn combining_four_periods_gains_about_6_db() {
     }
     println!("at {snr_db} dB of {trials}: {alone} alone, {together} of four together");
     assert!(alone <= trials as usize / 10, "{alone} alone");
-    // 5 of 8 places keep all four on one side of a change of the SFN's high bits, 2 of 8 keep three.
+    // In 5 of 8 positions, all four periods have equal high bits of the SFN; in 2 of 8, three
+    // periods have.
     assert!(together >= trials as usize * 3 / 4, "{together} together");
 }
 
-/// Without noise every spacing and every place decodes.
+/// Without noise, every spacing of the periods and every position decodes.
 #[test]
 fn periods_of_any_spacing_combine() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);

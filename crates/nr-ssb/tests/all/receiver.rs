@@ -1,4 +1,4 @@
-//! The receiver as a whole: a stream of samples in blocks of any length, SSBs out.
+//! The complete receiver: input samples in blocks of any length, output SSBs.
 
 use crate::air::{Cell, add_noise, raised, rng, silence, slices};
 use nr_ssb::receiver::{
@@ -32,7 +32,7 @@ fn cell_and_samples() -> (Cell, Vec<Vec<Complex32>>) {
         burst.add_to(&mut base);
     }
     add_noise(&mut base, 10.0, &mut rng(5));
-    // The SSB lies 2 MHz above the recording's centre.
+    // The SSB is 2 MHz above the centre of the recording.
     let samples = base.iter().map(|it| raised(it, 2, 2e6 / RATE_HZ)).collect();
     (cell, samples)
 }
@@ -76,7 +76,8 @@ fn every_ssb_of_a_stream_is_received_once_with_its_channel() {
             (3, 3, 3)
         );
         for antenna in 0..3 {
-            // One path: between antennas the same on every subcarrier, with the power that the SNR says.
+            // With one path, the ratio of two antennas is equal on every subcarrier, and the power
+            // agrees with the SNR.
             let expected = cell.gains[antenna] / cell.gains[0];
             for (h, first) in channel[antenna].iter().zip(&channel[0]) {
                 assert!((h / first - expected).norm() < 0.25);
@@ -188,7 +189,7 @@ fn unreported_gaps_are_inferred_from_the_beams() {
         ..ReceiverConfig::new(cell.ssb_freq_hz, SPACING, 3)
     };
     let mut receiver = StreamReceiver::<3>::new(config, RATE_HZ, 3.6e9 - 2e6).unwrap();
-    // 7 ms are cut out within the third period; then all of it again, for the search to come round.
+    // Remove 7 ms in the third period, then repeat all periods so that the search restarts.
     let cut = (0.05 * RATE_HZ) as usize..(0.057 * RATE_HZ) as usize;
     let mut unreported_gap = Vec::new();
     let mut push = |range: std::ops::Range<usize>| {

@@ -1,4 +1,4 @@
-//! Streams: SSBs across block borders, several cells on one point, periods combined.
+//! Streams: SSBs across block boundaries, several cells at one raster point, combined periods.
 
 use crate::air;
 use nr_ssb::SubcarrierSpacing;
@@ -45,12 +45,13 @@ fn every_ssb_of_a_stream_is_found_once_wherever_the_blocks_end() {
     }
 }
 
-/// Three cells of a synchronised network send at the same time; the weakest lies 15 dB below.
+/// Three cells of a synchronised network transmit simultaneously; the weakest one is 15 dB below
+/// the strongest.
 #[test]
 fn all_cells_of_one_raster_point_are_found() {
     let mut samples = air::silence(4, FRAME);
     let mut cells = [cell(10, 4), cell(11, 4), cell(12, 4)];
-    // Two of them have the same PSS.
+    // Two cells have the same PSS.
     for (cell, (pci, level)) in cells.iter_mut().zip([(300, 1.0), (601, 0.4), (903, 0.18)]) {
         cell.pci = pci;
         cell.lmax = nr_ssb::Lmax::L8;
@@ -90,7 +91,7 @@ fn four_periods_decode_where_one_does_not() {
         let mut decoded = [0, 0];
         for seed in 0..10 {
             let mut cell = cell(20 + seed, 1);
-            // No change of the SFN's high bits within the four periods.
+            // The high bits of the SFN do not change within the four periods.
             cell.sfn = 16 * (cell.sfn / 16) + 1;
             let (first_sfn, first_start) = (cell.sfn, cell.delay);
             let mut samples = air::silence(1, FRAME * usize::from(4 * period_frames));

@@ -1,4 +1,5 @@
-//! DC offset and tones: found, removed and reported; SSBs and channels are then as without them.
+//! DC offset and tones are detected, removed and reported; SSBs and channels equal those without
+//! tones.
 
 use std::f64::consts::TAU;
 
@@ -15,7 +16,7 @@ const SPACING: SubcarrierSpacing = SubcarrierSpacing::Khz30;
 
 /// Powers of a tone relative to the SSB's.
 const ABOVE_SSB_DB: [f64; 5] = [-10.0, 0.0, 10.0, 15.0, 20.0];
-/// 240 subcarriers of power one over the 256 samples of an unnormalised transform, squared.
+/// Power of an SSB: 240 subcarriers of unit power, divided by the squared length of the transform.
 const SSB_POWER: f64 = 240.0 / 65536.0;
 
 /// Adds a tone `above_ssb_db` above an SSB of unit resource elements, with a gain of its own per antenna.
@@ -47,7 +48,7 @@ fn is_found(searcher: &mut Searcher, cell: &Cell, samples: &[Vec<Complex32>]) ->
         .any(|ssb| ssb.pci.get() == cell.pci && (ssb.sample_start - start).abs() < 1.0)
 }
 
-/// DC in every second scene, a tone anywhere in the others.
+/// Returns the frequency: DC in every second scene, otherwise random.
 fn cycles(seed: u64, rng: &mut ChaCha8Rng) -> f64 {
     if seed.is_multiple_of(2) {
         0.0
@@ -73,7 +74,7 @@ fn a_search_finds_what_it_finds_without_tones_and_reports_them() {
                     found,
                     "{seed}: {above_ssb_db} dB"
                 );
-                // A tone 19 dB below the noise does no harm and need not be found.
+                // A tone 19 dB below the noise has no effect and need not be detected.
                 if snr_db + above_ssb_db < -10.0 {
                     continue;
                 }
@@ -90,7 +91,7 @@ fn a_search_finds_what_it_finds_without_tones_and_reports_them() {
     }
 }
 
-/// Squared error of the phase between two antennas, by all pilots.
+/// Returns the squared error of the phase between two antennas, from all pilots.
 fn squared_error(cell: &Cell, gains: [Complex64; 2]) -> f64 {
     let sent = cell.gains[1] * cell.gains[0].conj();
     let sent = Complex64::new(f64::from(sent.re), f64::from(sent.im));
@@ -201,7 +202,7 @@ fn a_stream_of_a_wide_band_is_tracked_through_tones() {
         let (cell, samples) = three_periods(11, -300.0, 0.0);
         let cycles = offset_hz / rate_hz;
         let mut wide: Vec<_> = samples.iter().map(|it| raised(it, 2, cycles)).collect();
-        // Noise in all of the band, of the density of that in the SSB's band or less.
+        // Noise in the whole band with at most the density in the SSB's band.
         let mut rng = rng(12);
         add_noise(&mut wide, 10.0, &mut rng);
         for hz in tones_hz {
@@ -243,7 +244,7 @@ fn a_scan_finds_cells_in_a_band_that_is_empty_in_part() {
         cell.add_to(&mut samples);
         add_noise(&mut samples, 20.0, &mut rng);
         let mut samples = vec![raised(&samples[0], 2, offset_hz / rate_hz)];
-        // Every second one with tones in the empty part and next to the SSB.
+        // Every second recording has tones in the empty part and next to the SSB.
         let tones_hz: &[f64] = if seed % 2 == 0 { &[] } else { &[-5.6e6, 0.0] };
         for hz in tones_hz {
             add_tone(&mut samples, hz / rate_hz, 15.0, &mut rng);
@@ -296,12 +297,13 @@ fn a_scan_of_the_band_finds_cells_through_tones() {
 
 #[test]
 fn windows_of_strong_ssbs_have_no_tones() {
-    // From little more than one SSB to a quarter of a half frame, without noise and with little.
+    // Lengths from one SSB to a quarter of a half frame, without noise and with weak noise.
     let mut searcher = Searcher::new(SearchConfig::new(SPACING, 1)).unwrap();
     for (before, after) in [(16, 16), (100, 1000), (400, 3000), (400, 9000)] {
         for seed in 0..60 {
             let snr_db = if seed % 2 == 0 { 300.0 } else { 20.0 };
-            // A whole number of samples of delay: interpolation would leave a line at half the sample rate.
+            // The delay is an integer number of samples, because interpolation would cause a line
+            // at half the sample rate.
             let mut rng = rng(1000 + seed);
             let mut cell = Cell::random(&mut rng, SPACING, 1);
             cell.delay = cell.delay.round();

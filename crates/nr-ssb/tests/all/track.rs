@@ -45,7 +45,7 @@ fn beams_timing_frequency_and_gains_are_followed() {
         let (mut cell, config, samples) = scene(seed, 10.0);
         let mut tracker = Tracker::<4>::new(&config, &first(&config, &samples)).unwrap();
         for period in 1..6 {
-            // Two ppm of clock error, and an oscillator on its way.
+            // A clock error of 2 ppm and a drifting oscillator.
             cell.delay += 0.3;
             cell.cfo_hz += 20.0;
             let samples = received(&cell, 10.0, 100 * seed + period);
@@ -89,7 +89,8 @@ fn beams_timing_frequency_and_gains_are_followed() {
     }
 }
 
-/// The mean over many SSBs of |block|² is that of the pilots at the SNR plus the noise claimed.
+/// The mean of |block|² over many SSBs is the pilot energy at the SNR plus the reported noise
+/// variance.
 #[test]
 fn noise_variance_and_blocks_keep_the_scale_of_a_resource_element() {
     let (cell, config, samples) = scene(50, 0.0);

@@ -148,7 +148,7 @@ fn grids() {
             .enumerate()
         {
             let grid = ssb_grid(cell.pci, cell.lmax, &cell.payload).unwrap();
-            // The file's axes are k, l: l fastest.
+            // The axes of the file are k, l; l varies fastest.
             let got: Vec<_> = (0..960)
                 .map(|n| grid.elements()[n / 4 + 240 * (n % 4)])
                 .collect();

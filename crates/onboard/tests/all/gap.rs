@@ -63,7 +63,7 @@ fn the_gap_is_reported_and_increases_the_covariance_until_the_lane_is_followed_a
         let along_m = 60.0 + 0.08 * f64::from(number);
         let [larger, smaller] = tracker.pose(0.02 * f64::from(number)).principal_variances();
         if verdict == OdometryVerdict::Accepted {
-            // Across the road it is as sure as the lane is kept, or surer.
+            // Across the road, the standard deviation is at most that of the lane keeping.
             assert!(smaller < (1.0 + 1e-9) * lane_m2, "{along_m} {smaller}");
         } else {
             let Gap { from_m, to_m } = gap;
@@ -83,7 +83,7 @@ fn the_gap_is_reported_and_increases_the_covariance_until_the_lane_is_followed_a
     let (early_m, late_m) = (gap.from_m - first_m, last_m - gap.to_m);
     assert!(early_m > 0.0 && early_m < margin_m(30.0), "{early_m}");
     assert!(late_m > 0.0 && late_m < margin_m(111.0), "{late_m}");
-    // Eighty metres of a path that bends as it likes.
+    // Standard deviation after 80 m of an unknown path.
     assert!(before > 1.0, "{before}");
 }
 

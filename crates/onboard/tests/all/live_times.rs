@@ -30,7 +30,7 @@ struct Drive {
     odometry_clock_s: f64,
     angle_clock_s: f64,
     distance_offset_m: f64,
-    /// Whether the state was `ok` with an error beyond the protection level.
+    /// Whether the error exceeded the protection level in state `ok`.
     misled: bool,
 }
 
@@ -142,7 +142,7 @@ impl Drive {
             .reason
     }
 
-    /// The pose is right, `ok`, and never was wrong and `ok`.
+    /// Asserts that the pose is correct and `ok`, and that no wrong pose was `ok`.
     fn assert_fine(&self) {
         let (state, error_m, level_m) = self.status();
         assert_eq!(state, State::Ok, "{}", self.reason());
@@ -162,7 +162,7 @@ fn a_given_start_is_ok_once_angles_have_confirmed_it() {
     // Confirmed at once; the level of a start that is known to 0.5 m falls below the alert limit with more angles.
     assert!(drive.drive(4.0).is_empty());
     drive.assert_fine();
-    // A wrong start never is.
+    // A wrong start is never confirmed.
     let mut drive = Drive::new();
     let elsewhere = Pose {
         x_m: 25.0,
@@ -224,12 +224,12 @@ fn a_step_of_the_odometry_clock_resumes_the_pose() {
         );
         let step = drive.live.take_odometry_step().unwrap();
         assert!((step.step_s - step_s).abs() < 1e-6, "{step:?}");
-        // At the old pose, with the new time, and first to be confirmed.
+        // The previous pose is resumed with the new time, and has to be confirmed.
         let (_, error_m, level_m) = drive.status();
         assert!(error_m < 1.0, "{step_s}: {error_m} {level_m}");
         assert!(drive.drive(3.0).is_empty());
         drive.assert_fine();
-        // Back again.
+        // The clock steps back.
         drive.odometry_clock_s = 0.0;
         drive.drive(4.0);
         drive.assert_fine();

@@ -1,4 +1,4 @@
-//! Random drives of any kind: no number is lost, no variance negative, no position leaps.
+//! Random drives: finite numbers, positive variances, and no position jumps.
 
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -15,7 +15,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-/// As many as take seconds; 2,000 take minutes.
+/// Number of drives, which takes seconds; 2,000 take minutes.
 const DRIVES: u64 = 200;
 
 fn drive(seed: u64) {

@@ -1,4 +1,4 @@
-//! The receiver over seconds: clocks that differ, sleep, beams that vanish and return.
+//! The receiver over seconds: different clocks, sleep, lost and returning beams.
 
 use crate::air;
 use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
@@ -111,7 +111,7 @@ fn a_beam_that_vanishes_and_returns_is_received_again() {
     for number in 0..50 {
         assert_eq!(air.heard(&mut receiver, number), all, "burst {number}");
     }
-    // Gone for three seconds.
+    // Beams are missing for three seconds.
     air.send(others.clone());
     let before = receiver.searches();
     for number in 50..200 {
@@ -123,7 +123,7 @@ fn a_beam_that_vanishes_and_returns_is_received_again() {
         receiver.searches() - before
     );
     assert_eq!(receiver.tracked(), 7);
-    // Back within the second that passes between two searches.
+    // Beams are received again within the second between two searches.
     air.send(all.clone());
     let back = (200..252).find(|number| air.heard(&mut receiver, *number) == all);
     println!("received again in burst {back:?}");
@@ -142,8 +142,7 @@ fn while_all_beams_that_are_known_come_none_is_searched_for() {
         assert_eq!(air.heard(&mut receiver, number), all, "burst {number}");
     }
     assert_eq!(receiver.searches(), 1);
-    // One beam is absent for longer than it is kept, and detected again as by a receiver without
-    // beams.
+    // One beam is missing until it is removed, and detected again as by a receiver without beams.
     air.send((1..8).collect());
     for number in 150..280 {
         air.heard(&mut receiver, number);
@@ -188,7 +187,8 @@ fn any_oscillator_is_found_from_cold_and_sleep_is_bridged() {
             for number in first + 1..first + 6 {
                 assert_eq!(air.heard(&mut receiver, number), all);
             }
-            // Awake for one burst in a second and in ten; what is searched then is not needed.
+            // Reception of one burst per second, and of one burst in ten seconds, without
+            // additional searches.
             for asleep in [50, 500, 1000] {
                 let heard = air.heard(&mut receiver, first + 6 + asleep);
                 assert_eq!(heard, all, "{spacing:?} {ppm} ppm, {asleep}");

@@ -164,7 +164,7 @@ fn no_search_runs_after_a_restart() {
             drive.step(0.0, 0.8);
             lost_s += STEP_S * f64::from(u8::from(drive.localizer.is_lost()));
         }
-        drive.truth.heading_rad += 0.7; // nothing tells of the push
+        drive.truth.heading_rad += 0.7; // no sensor measures this rotation
         lost_s
     };
     let (before_s, after_s) = (lost_s(10.0), lost_s(30.0));

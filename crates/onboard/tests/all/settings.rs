@@ -58,13 +58,13 @@ fn a_file_extends_another_and_overrides_its_keys() {
     let carrier = Vehicle::from_library("carrier", &Shipped).unwrap();
     let mine = vehicle("extends = 'carrier'\nname = 'mine'\nodometer.scale = 1.01").unwrap();
     assert_eq!((mine.name.as_str(), mine.odometer.scale), ("mine", 1.01));
-    // A table's other keys are those of the file it is like.
+    // The other keys of a table are those of the extended file.
     assert_eq!(mine.odometer.scale_std, carrier.odometer.scale_std);
     let mut again = mine.clone();
     again.name.clone_from(&carrier.name);
     again.odometer.scale = 1.0;
     assert_eq!(again, carrier);
-    // The written file does not depend on others.
+    // The written file does not depend on other files.
     assert!(!mine.to_toml().contains("extends ="));
     assert_eq!(vehicle(&mine.to_toml()).unwrap(), mine);
     // A list is replaced as a whole.
@@ -97,7 +97,7 @@ fn chains_of_extends_are_resolved_and_loops_rejected() {
     assert!(key == "extends" && message.contains("the name of a file"));
     let message = vehicle("extends = 'carier'").unwrap_err().to_string();
     assert!(message.contains("did you mean `carrier`?"), "{message}");
-    // A site is not like a vehicle.
+    // A site file cannot extend a vehicle file.
     let message = site("extends = 'carrier'").unwrap_err().to_string();
     assert!(message.contains("no site `carrier`"), "{message}");
 }
@@ -110,7 +110,7 @@ fn a_changed_tag_removes_the_keys_of_the_previous_variant() {
         panic!("{:?}", fixed.wake_up)
     };
     assert_eq!(settings.interval_ms, Some(40.0));
-    // The keys remain with the same kind.
+    // The keys remain if the kind is equal.
     let tight =
         vehicle("extends = 'tugger'\nwake_up = { policy = 'uncertainty', target_error_m = 0.1 }");
     let Some(WakeUpSettings::Uncertainty(settings)) = tight.unwrap().wake_up else {
@@ -120,7 +120,7 @@ fn a_changed_tag_removes_the_keys_of_the_previous_variant() {
         (settings.target_error_m, settings.min_variance_reduction_m2),
         (0.1, 1.5e-4)
     );
-    // And so does a table that names no kind.
+    // The keys also remain if the table contains no kind.
     let told = "extends = 'paper'\nwake_up.snr_set_point = { kind = 'absolute', snr_db = 5.0 }";
     assert!(matches!(
         vehicle(told).unwrap().wake_up,
@@ -197,9 +197,9 @@ fn a_site_need_not_have_a_road() {
     assert_eq!(hall.build_road().unwrap(), None);
     let file = "road.file = 'road.csv'";
     let with_road = site(&format!("{roaming}\n{file}")).unwrap();
-    // Points on disk become points in the file: it stands by itself.
+    // Points of another file are copied, so that the written file is complete.
     let road = with_road.build_road().unwrap().unwrap();
-    // Smooth through the points: longer than with an arc of 5 m, shorter than the polyline.
+    // The smooth road is longer than one with an arc of 5 m, and shorter than the polyline.
     let length_m = road.length_m();
     let with_arc_m = 130.0 - 20.0 + 5.0 * std::f64::consts::PI;
     assert!((with_arc_m - 0.01..130.0).contains(&length_m), "{length_m}");
@@ -314,7 +314,7 @@ fn a_vehicle_receives_only_the_radio_heads_on_its_list() {
         let (_, key, _) = refusal(check_together(&trip, &with(list), check));
         assert_eq!(key, format!("vehicle.receiver.pci_allow_list{expected}"));
     }
-    // One of two leaves several places open.
+    // With one of two radio heads, several positions are possible.
     let mut lost = with("[2]");
     lost.start.known = false;
     let (_, key, message) = refusal(check_together(&trip, &lost, check));
@@ -334,7 +334,8 @@ fn defaults_are_a_vehicle_that_drives() {
     assert_eq!(plain.wake_up_policy(), by_error);
     let trusting = vehicle("name = 'plain'\nintegrity.enabled = false").unwrap();
     assert!(trusting.integrity_monitor().is_none());
-    // Dead reckoning knows no error of its own: nothing to monitor, nothing to wake up by.
+    // Dead reckoning has no covariance, as integrity monitoring and uncertainty-driven wake-up
+    // require.
     let text = "name = 'plain'\nlocalizer.kind = 'dead-reckoning'";
     for off in ["", "\nintegrity.enabled = false"] {
         let reckons = vehicle(&format!("{text}{off}")).unwrap();

@@ -16,7 +16,7 @@ use rand_distr::StandardNormal;
 const SIGMA_RAD: f64 = 0.06;
 const OUTLIERS: f64 = 0.03;
 
-/// Odometry every so often (s); angles with every fourth sample.
+/// Interval of the odometry (s); angles with every fourth sample.
 const STEP_S: f64 = 0.05;
 
 /// Duration of a drive (s), and speed (m/s).

@@ -1,4 +1,4 @@
-//! The tracker on input that no drive should bring.
+//! The tracker with implausible inputs.
 
 use std::sync::Arc;
 
@@ -100,7 +100,7 @@ fn an_unverified_angle_is_weighted_by_its_likelihood() {
     let sure = angle(0.12, 0.0, 0.01);
     let after = |off_rad: f64, resolved: bool| {
         let (mut tracker, head) = tracker();
-        // Where the tracker sees the head, and a little off.
+        // The predicted angle plus a small deviation.
         let residual_rad = tracker.innovation(&head, &sure).unwrap().residual;
         let measured = AngleMeasurement {
             phase_rad: off_rad - residual_rad,
@@ -117,14 +117,14 @@ fn an_unverified_angle_is_weighted_by_its_likelihood() {
             .distance_m(before.pose.point());
         (moved_m, tracker.pose(0.12).principal_variances()[0])
     };
-    // Close to where it is expected it is most likely right ...
+    // An angle close to the prediction is most probably correct ...
     let ((sure_m, sure_m2), (unsure_m, unsure_m2)) = (after(0.1, true), after(0.1, false));
     assert!(
         unsure_m < sure_m && unsure_m > 0.8 * sure_m,
         "{unsure_m} {sure_m}"
     );
     assert!(unsure_m2 > sure_m2);
-    // ... and far off, if within the gate, it says nothing.
+    // ... and an angle far from it, but within the gate, contains no information.
     let ((sure_m, _), (unsure_m, _)) = (after(0.33, true), after(0.33, false));
     assert!(sure_m > 0.0);
     assert_eq!(unsure_m, 0.0);
@@ -174,9 +174,10 @@ fn beyond_the_end_of_the_map_it_drives_on_and_comes_back() {
             before = across(&tracker, time_s);
         }
     }
-    // Beyond the end from three deviations of the place (0.9 m of scale, 0.5 m of start) on.
+    // The vehicle is beyond the end by more than three standard deviations of the position (0.9 m
+    // of scale, 0.5 m of start).
     assert!(beyond > 2 * 50 * 13 && beyond < 2 * 50 * 15, "{beyond}");
-    // Sixty metres without a lane, and the lane is kept again.
+    // After sixty metres without a lane, the lateral variance is again that of the lane.
     let lane_m2 = across(&tracker, 2.0 * turn_s)[1];
     assert!(
         before[1] > 2.0 * lane_m2 && lane_m2 < 0.1_f64.powi(2),
@@ -199,7 +200,7 @@ fn a_gap_loses_time_and_a_jump_loses_certainty() {
         jump.odometry(&sample(2.1, 5000.0)),
         OdometryVerdict::DistanceJump { .. }
     ));
-    // The counter is worthless, the speed is not: 2 s at 4 m/s.
+    // The counter is invalid, the speed is valid: 2 s at 4 m/s.
     assert!((jump.pose(2.1).pose.x_m - 8.4).abs() < 0.05);
     let variance = |tracker: &Ekf| tracker.pose(2.1).principal_variances()[0];
     assert!(variance(&jump) > variance(&gap) + 1.0);

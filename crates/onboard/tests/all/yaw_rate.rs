@@ -53,7 +53,7 @@ fn in_a_bend_it_corrects_the_odometer() {
             yaw_rate_radps: Some(wrap_angle(turn_rad) / PERIOD_S),
         });
         along_m += 0.1;
-        // From the middle of the bend on it reads a tenth too much for 5 m.
+        // From the middle of the bend, the odometer measures 10 % too much for 5 m.
         let reads_more = (50.0..55.0).contains(&along_m);
         read_m += if reads_more { 0.11 } else { 0.1 };
     }
@@ -72,7 +72,7 @@ fn in_a_bend_it_corrects_the_odometer() {
 fn the_turn_while_samples_are_lost_is_not_known() {
     for map in [true, false] {
         let mut tracker = tracker(map, 0.05);
-        // It swings by 0.05 rad within 4 s; every fifth sample is lost.
+        // The heading oscillates by 0.05 rad with a period of 4 s; every fifth sample is lost.
         let heading_rad = |time_s: f64| 0.05 * (TAU * time_s / 4.0).sin();
         let mut worst_sigmas = 0.0_f64;
         for number in 0..350_u32 {

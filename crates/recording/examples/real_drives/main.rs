@@ -384,8 +384,8 @@ fn main() {
         } else {
             MRCLAM
         };
-        if wants("told") {
-            report("told", &drive, &drive.locate(told, drive.start, true));
+        if wants("configured") {
+            report("configured", &drive, &drive.locate(told, drive.start, true));
         }
         if wants("defaults") {
             report(

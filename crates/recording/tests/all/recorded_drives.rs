@@ -1,5 +1,5 @@
-//! Odometry, angles and trajectories: what is written is read again; bad items are reported one by
-//! one and the rest is kept.
+//! Odometry, angles and trajectories are read as they were written; each invalid item is reported
+//! and omitted.
 
 use crate::common;
 use std::fs::{self, File};
@@ -103,7 +103,7 @@ fn bad_odometry_rows_are_reported_one_by_one_and_the_rest_is_kept() {
     ));
 }
 
-/// As spreadsheets, other languages and careful people write it.
+/// Notations of spreadsheets, other locales and manual editing.
 #[test]
 fn odometry_csv_of_any_kind_is_read() {
     let file = common::scratch("odometry-kinds").join("odo.csv");
@@ -252,7 +252,7 @@ fn is_truncated(log: &OdometryLog) -> bool {
         .any(|it| matches!(it.issue, OdometryIssue::Truncated(_)))
 }
 
-/// A damaged length of a name is a damaged file, not so much memory.
+/// A damaged length of a name is reported, without an allocation of that size.
 #[test]
 fn mcap_names_longer_than_their_record_are_refused() {
     let file = common::scratch("odometry-mcap-damaged").join("odo.mcap");
@@ -497,7 +497,7 @@ fn tum_has_eight_fields_and_comes_back() {
         let error = read_tum(&file).unwrap_err();
         assert!(matches!(error, RecordingError::Value { ref key, .. } if key == "line 2"));
     }
-    // A truth is compared by its positions: its orientation need not be known, nor have many digits.
+    // Only the positions of a truth are used: its orientation may be unknown or rounded.
     fs::write(&file, "1 2 3 0 0 0 0 0\n2 2 3 0 0 0 0.04 1.00\n").unwrap();
     let read = read_tum(&file).unwrap();
     assert!(read[0].pose.heading_rad.is_nan());

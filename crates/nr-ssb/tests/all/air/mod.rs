@@ -1,4 +1,4 @@
-//! Signals on the air for the receiver's tests: SSBs with delay, frequency offset, antennas, noise.
+//! Received signals for tests: SSBs with delay, frequency offset, antenna gains and noise.
 #![allow(dead_code, reason = "each test uses its part")]
 
 pub mod receivers;
@@ -14,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rustfft::FftPlanner;
 
-/// One cell as it arrives.
+/// Received signal of one cell.
 #[derive(Debug, Clone)]
 pub struct Cell {
     pub pci: u16,
@@ -25,7 +25,7 @@ pub struct Cell {
     pub half_frame: bool,
     pub mib: Mib,
     pub ssb_freq_hz: f64,
-    /// Where the half frame begins in the recording, samples.
+    /// Start of the half frame in the recording, in samples.
     pub delay: f64,
     pub cfo_hz: f64,
     /// Complex gain of each antenna.
@@ -75,7 +75,7 @@ impl Cell {
         }
     }
 
-    /// The half frame at its own beginning, before delay and offset.
+    /// Returns the samples of the half frame without delay and frequency offset.
     pub fn half_frame_samples(&self) -> Vec<Complex32> {
         let burst = Burst {
             pci: Pci::new(self.pci).unwrap(),
@@ -93,7 +93,7 @@ impl Cell {
         burst.iq(&mut ofdm).unwrap()
     }
 
-    /// First sample of an SSB with its cyclic prefix, in the recording.
+    /// Returns the first sample of an SSB including its cyclic prefix, in the recording.
     pub fn ssb_start(&self, ssb_index: u8) -> f64 {
         let numerology = Numerology::new(self.spacing, 256).unwrap();
         let symbol = self.case().start_symbol(ssb_index).unwrap();
@@ -118,7 +118,7 @@ impl Cell {
     }
 }
 
-/// Delays by a fraction of a sample, circularly.
+/// Applies a circular delay, which may be a fraction of a sample.
 pub fn delayed(samples: &[Complex32], fraction: f64) -> Vec<Complex32> {
     let n = samples.len();
     let mut planner = FftPlanner::new();

@@ -19,14 +19,14 @@ pub fn data_dir() -> PathBuf {
 pub struct Vectors(PathBuf);
 
 impl Vectors {
-    /// The file.
+    /// Opens a file by its name.
     pub fn open(name: &str) -> Self {
         let path = data_dir().join("vectors").join(name);
         assert!(path.is_file(), "no reference vectors at {}", path.display());
         Self(path)
     }
 
-    /// The bytes of one array: an `.npz` is a zip archive of `.npy` files.
+    /// Returns the bytes of one array: an `.npz` file is a zip archive of `.npy` files.
     fn npy(&self, key: &str) -> Vec<u8> {
         let mut archive = zip::ZipArchive::new(File::open(&self.0).unwrap()).unwrap();
         let mut bytes = Vec::new();
@@ -94,7 +94,7 @@ pub fn cells(vectors: &Vectors) -> Vec<Cell> {
         .collect()
 }
 
-/// Up to 32 bits, the first becoming the most significant.
+/// Packs up to 32 bits; the first one becomes the most significant.
 pub fn pack(bits: &[u8]) -> u32 {
     bits.iter()
         .fold(0, |packed, &bit| packed << 1 | u32::from(bit))

@@ -1,4 +1,4 @@
-//! Counts what a test's thread asks of the allocator.
+//! Counts the allocations of a test's thread.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -7,16 +7,16 @@ thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
 }
 
-/// The system's allocator, counting what this thread asks of it.
+/// System allocator that counts the allocations of this thread.
 struct Counting;
 
-// SAFETY: every call goes unchanged to the system's allocator; counting touches no memory of it,
-// and a thread-local that is initialised by a constant and not dropped allocates nothing itself.
+// SAFETY: every call is forwarded unchanged to the system allocator. The counter is a thread-local
+// with a constant initial value and without a destructor, so that it does not allocate.
 #[allow(unsafe_code, reason = "an allocator is unsafe by its trait")]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the caller's promises are those that the system's allocator asks for.
+        // SAFETY: the caller fulfils the requirements of the system allocator.
         unsafe { System.alloc(layout) }
     }
 

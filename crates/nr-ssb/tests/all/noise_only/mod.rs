@@ -1,4 +1,4 @@
-//! Searches of nothing but noise, and what they find.
+//! Searches of noise, and their false alarms.
 #![allow(dead_code, reason = "each program uses its part")]
 
 use nr_ssb::SubcarrierSpacing;

@@ -1,4 +1,4 @@
-//! PBCHs in white noise with an ideally known channel, and how many of them do not decode.
+//! Block error rate of PBCHs in white noise with a known channel.
 #![allow(dead_code, reason = "each test uses its part")]
 
 use nr_ssb::pbch::{self, Decoder};
@@ -30,7 +30,8 @@ pub fn random_payload(rng: &mut impl Rng, lmax: Lmax) -> BchPayload {
     }
 }
 
-/// Block errors in `trials` PBCHs; a wrong payload with a right CRC must not occur.
+/// Returns the number of block errors in `trials` PBCHs; a wrong payload with a correct CRC must
+/// not occur.
 pub fn block_errors(decoder: &mut Decoder, snr_db: f32, trials: usize, seed: u64) -> usize {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let lmax = Lmax::L8;

@@ -1,4 +1,4 @@
-//! Reading of the recordings that the tests use: cf32_le SigMF, channels interleaved.
+//! Reader of the recordings in the tests: SigMF cf32_le with interleaved channels.
 
 use std::path::{Path, PathBuf};
 

@@ -29,7 +29,7 @@ impl Ekf {
         let off_map = self.off_map();
         let (was_off, is_off) = (self.off_map.is_some(), off_map.is_some());
         if was_off && !is_off && !self.is_in_lane() {
-            return; // a lane that it is certainly not in tells nothing of where it is
+            return; // no information: the vehicle is certainly not in this lane
         }
         self.off_map = off_map;
         if is_off && !was_off {

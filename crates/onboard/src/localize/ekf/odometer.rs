@@ -24,7 +24,7 @@ impl SpeedJumps {
         self.speed_jump = 0.0;
         let fastest_mps = from_mps.abs().max(to_mps.abs());
         if fastest_mps == 0.0 {
-            return; // standing tells nothing of the reading's noise
+            return; // standstill contains no information on the noise
         }
         let step_mps = (to_mps - from_mps).abs();
         let unusual_mps = UNUSUAL * self.mean_square.sqrt();

@@ -165,7 +165,7 @@ impl Ekf {
         }
         let share = std::mem::take(&mut self.unread_m) / read_m;
         if share == 0.0 || !share.is_finite() {
-            return Reading::exact(read_m); // no speed is told, or no time
+            return Reading::exact(read_m); // no speed, or no time
         }
         let [least, most] = DRIVEN_BY_READ;
         let driven_m = read_m * share.abs().clamp(least, most).copysign(share);
