@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parent.parent
 
-# Parallel workers are given the size of no terminal, which consoles would keep to.
+# Remove the terminal size of parallel workers, which consoles would use.
 for size in ("COLUMNS", "LINES"):
     os.environ.pop(size, None)
 
@@ -20,7 +20,7 @@ for size in ("COLUMNS", "LINES"):
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
-# Files of tests that drive, attack or start programs for longer than a person waits after a change.
+# Files of slow tests, which `make check` skips: long simulations, attacks and started programs.
 SLOW = {
     *("test_attack", "test_interrupt", "test_robustness", "test_readme", "test_site"),
     *("test_bags", "test_locate", "test_locate_mistakes", "test_real_drives", "test_survey"),
@@ -53,7 +53,7 @@ class Finished(NamedTuple):
 def access_av(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> Callable[..., Finished]:
-    """Run the command line in this process; its latest results are the test's own."""
+    """Runs the command line in this process, with a separate results directory for each test."""
     from access_av.cli.main import main
 
     monkeypatch.setattr("access_av.tables.results_directory.RESULTS", tmp_path / "results")
@@ -71,7 +71,7 @@ def access_av(
 
 @pytest.fixture(scope="session")
 def quick_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Results of a small evaluation, in a directory that stands for ``results/``."""
+    """Results of a small evaluation, in a temporary ``results/`` directory."""
     from access_av.report.paper import results as paper_results
 
     results = tmp_path_factory.mktemp("results")
@@ -84,7 +84,7 @@ def quick_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def data() -> Path:
-    """Directory of the reference recordings; skips where there is none."""
+    """Directory of the reference recordings; skips the test if it does not exist."""
     place = Path(os.environ.get("ACCESS_AV_DATA", ROOT.parent / "shared" / "data"))
     if not place.is_dir():
         pytest.skip(f"no reference data: neither {place} nor ACCESS_AV_DATA")

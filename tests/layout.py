@@ -56,7 +56,7 @@ DRAWN = (
     " === document.querySelectorAll('.chart').length"
 )
 HEIGHT_PX = 3000
-# Windows, and what a PDF has: a sheet of A4 between margins of a centimetre, at 96 px an inch.
+# Width of a printed page: A4 with margins of a centimetre, at 96 px per inch.
 PAPER_PX = 718
 VIEWS = [*((width, look) for width in (1300, 800, 400) for look in ("light", "dark"))]
 VIEWS.append((PAPER_PX, "print"))
@@ -90,7 +90,7 @@ def measure(browser: Browser, width: int, look: str) -> dict[str, Any]:
     """Returns the layout faults of a page at a window width, light, dark or printed."""
     browser.resize(width, HEIGHT_PX, look="dark" if look == "dark" else "light")
     browser.evaluate("window.isBefore = true")
-    browser.call("Page.reload")  # a page is laid out for the window in which it is opened
+    browser.call("Page.reload")  # the layout is computed when the page is opened
     browser.wait_for(f"!window.isBefore && {DRAWN}", seconds=60.0)
     browser.resize(width, HEIGHT_PX, look=look)
     browser.evaluate("new Promise((done) => setTimeout(done, 1000))")

@@ -53,7 +53,7 @@ def apart_m(a: Points, b: Points) -> float:
 
 def _from(points: Points, line: Points) -> float:
     line = np.asarray(line, dtype=float)
-    # Points between the corners too, so that a chord cannot leave a curve unseen.
+    # Add points between the corners, so that the deviation of chords is measured.
     dense = np.concatenate([np.linspace(p, q, 20) for p, q in itertools.pairwise(points)])
     start, along = line[:-1], np.diff(line, axis=0)
     square = np.maximum((along**2).sum(axis=1), 1e-18)
@@ -89,7 +89,7 @@ def course(road: dict[str, Any]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawing in the making.
+    """A drawing under construction.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class Drawing:
 
     @property
     def model(self) -> Any:
-        """Its model space."""
+        """Model space of the drawing."""
         return self.document.modelspace()
 
     def world(self, points: Points) -> list[tuple[float, ...]]:
@@ -208,7 +208,8 @@ def elliptic_arc(drawing: Drawing) -> Points:
 
 
 def spline_fit_polyline(drawing: Drawing) -> Points:
-    """A polyline of R12 that was made a spline: control frame and curve are both vertices."""
+    """A polyline of R12 that was converted to a spline: control frame and curve are both
+    vertices."""
     frame, curve = 16, 8
     made = drawing.model.add_polyline2d([], dxfattribs=drawing.attributes("ROAD", flags=4))
     points = spline()[::100]

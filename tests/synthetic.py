@@ -1,4 +1,4 @@
-"""Synthetic evaluation of smooth curves, for tests of the steps after the simulation."""
+"""Synthetic evaluation with smooth error curves, for tests of the evaluation without simulation."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def platform() -> SimpleNamespace:
 
 
 def drives(worst_y_m: float, aoa_estimates: float, *, spread: float = 0.0) -> Drives:
-    """Drives whose error grows to its worst at the end; variants scatter about the first."""
+    """Runs whose error increases until the end; variants scatter around the first one."""
     factors = 1.0 + spread * np.concatenate([[0.0], np.linspace(-2.0, 2.0, 20)])
     curve = worst_y_m * (TIME_S[::5] / TIME_S[-1]) ** 1.5
     return Drives(
@@ -110,7 +110,8 @@ def evaluation(
 
 
 def study(*, controller_gain: float = 0.0) -> Study:
-    """A study of two interpretations whose controllers gain so much of the RMS error."""
+    """Returns a study of two interpretations whose controllers reduce the RMS error by given
+    amounts."""
     shown = evaluation(spread=0.01)
     other = replace(shown, interpretation=load("every-ssb"))
     constant = drives(0.2 * (1.0 + controller_gain), 430, spread=0.02)

@@ -1,4 +1,4 @@
-"""A short attack with fixed seeds; ``make attack`` takes a new seed each time, and more."""
+"""Short attack with fixed seeds; ``make attack`` uses a new seed and more mutations."""
 
 from __future__ import annotations
 

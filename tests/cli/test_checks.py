@@ -79,7 +79,7 @@ SAME_INDEX = {"site.radio_heads[1].ssb_index": 0, "site.radio_heads[2].ssb_index
 
 # Setting, key in the message, and correction in the message.
 NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
-    # As people have written it.
+    # Notations that users have written.
     "turn in degrees": (
         {"site.road.segments[1].turn_rad": 60.0}, "segments[1].turn_rad", "1.0472"),
     "heads in latitude and longitude": (
@@ -178,7 +178,7 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
          **{f"site.radio_heads[{n}].ssb_index": n for n in range(3)}},
         "spacing_wavelengths", "are 0.50"),
     "shadowing in percent": ({"channel.shadowing_std_db": 30.0}, "shadowing_std_db", "3 to 8"),
-    # Motion and what measures it.
+    # Motion, odometer and gyroscope.
     "stop in milliseconds": (
         {"motion.stops": [{"at_m": 100.0, "dwell_s": 8000.0}]}, "dwell_s", "8000 ms are 8"),
     "speed in m/min": ({"vehicle.top_speed_kmh": 180.0}, "top_speed_kmh", "10.8"),
@@ -252,7 +252,7 @@ def test_decimal_commas_are_named(line: str) -> None:
         Site.from_toml(f'name = "mine"\n[[radio_heads]]\n{place}{line}\n')
 
 
-# Plants unlike those that are shipped: site, vehicle, motion.
+# Plants that differ from the shipped ones: site, vehicle, motion.
 MASTS = "\n".join(
     f"[[radio_heads]]\nposition_m = [{30.0 + 230.0 * (n % 5)}, {60.0 + 480.0 * (n // 5)}, 40.0]\n"
     f"pci = {n}\nssb_index = {n % 8}\neirp_dbm = 33.0"
@@ -412,7 +412,7 @@ def test_check_warns_and_goes_on(tmp_path: Path, access_av: Callable[..., Finish
 def test_a_run_prints_warnings_first(
     tmp_path: Path, access_av: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In what is printed, in the manifest and in the report."""
+    """Checks the terminal output, the manifest and the report."""
     monkeypatch.setattr("access_av.report.page.bundle", lambda: "")
     deep = PLANT.replace("25.0, 8.0]", "25.0, -8.0]").replace("324.0", "4.0")
     (tmp_path / "deep.toml").write_text(deep.replace("250.0 }", "30.0 }"))
@@ -548,6 +548,6 @@ def test_dead_reckoning_with_two_radio_heads_is_reported_by_simulate() -> None:
     two = Scenario.load("paper-real-odometry-2").with_overrides(dead_reckoning)
     with pytest.warns(ImplausibleSettingsWarning, match=r"supports one radio head.*has 2"):
         simulate(two, runs=1)
-    # One radio head is what it supports: warnings are errors in these tests.
+    # The localizer supports one radio head; warnings are errors in these tests.
     one = json.loads(two.site.to_json())["radio_heads"][:1]
     simulate(two.with_overrides({"site.radio_heads": one}), runs=1)

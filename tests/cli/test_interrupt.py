@@ -1,4 +1,4 @@
-"""Ctrl-C at a random time: within a second, exit code 130, nothing half written."""
+"""Ctrl-C at a random time ends within a second with exit code 130 and without partial files."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ LONG: dict[str, list[str]] = {
 LATEST_S = 2.0
 # A process that ends this soon (s) had finished when the signal was sent.
 LATE_S = 0.1
-# The interpreter starts before the program does; what Ctrl-C does then is Python's own.
+# Time (s) of the interpreter's start, during which Python handles Ctrl-C.
 PYTHON_S = 0.15
 
 
@@ -113,8 +113,8 @@ def test_ctrl_c_ends_it_within_a_second(command: str, place: Path) -> None:
         sent_s = time.monotonic()
         _, said = process.communicate(timeout=20.0)
         took_s = time.monotonic() - sent_s
-        # Before and after the program itself it is the interpreter that the signal ends: 130 too;
-        # or it comes too late to end anything.
+        # Before and after the program, the signal ends the interpreter (also 130), or it arrives
+        # after the end.
         ended = process.returncode in (130, -signal.SIGINT) or took_s < LATE_S * (1.0 + busy_s())
         assert finished or ended, (after_s, process.returncode, said)
         assert finished or took_s < 1.0 + busy_s(), (after_s, took_s)
@@ -125,11 +125,11 @@ def test_ctrl_c_ends_it_within_a_second(command: str, place: Path) -> None:
         assert written.stat().st_size > 0
 
 
-# `ACCESS_AV_INTERRUPTIONS=20` is the whole of it.
+# `ACCESS_AV_INTERRUPTIONS=20` is the complete test.
 TIMES = int(os.environ.get("ACCESS_AV_INTERRUPTIONS", "1"))
 
 
 def busy_s() -> float:
-    """How long a machine that does much else takes to give the processor back."""
+    """Returns the time (s) after which a loaded computer schedules this process again."""
     waiting = os.getloadavg()[0] / (os.cpu_count() or 1)
     return waiting if waiting > 1.0 else 0.0

@@ -118,12 +118,12 @@ def test_covariances_are_positive(seed: int) -> None:
     xx, yy, xy = (found.trajectories[f"covariance_{it}_m2"] for it in ("xx", "yy", "xy"))
     assert xx.min() >= 0.0  # type: ignore[operator]
     assert yy.min() >= 0.0  # type: ignore[operator]
-    # In units of what two roundings of the product leave.
+    # In units of the rounding error of two products.
     assert ((xx * yy - xy * xy) / (xx * yy)).min() >= -1e-12  # type: ignore[operator]
 
 
 def test_a_heading_that_is_given_exactly_has_a_positive_variance() -> None:
-    # In a bend, heading and position are correlated: rounding made the variance negative.
+    # In a bend, heading and position are correlated, and rounding made the variance negative.
     scenario = access_av.Scenario.load("yard").with_overrides(
         {
             "site.road": {"segments": [{"length_m": 90.0, "turn_rad": 1.5}]},
@@ -233,7 +233,7 @@ from access_av import aoa, simulate
 batch = np.exp(1j * np.arange(4 * 20 * 256)).reshape(256, 4, 20)
 alone = aoa.music(batch)
 assert np.array_equal(aoa.music(batch, threads=1000).angle_rad, alone.angle_rad)
-simulate("paper", runs=1, threads=1)  # libraries have their threads from here on
+simulate("paper", runs=1, threads=1)  # libraries have started their threads
 before = most = len(os.listdir("/proc/self/task"))
 drives = threading.Thread(target=lambda: simulate("paper", threads=1000))
 drives.start()
@@ -247,7 +247,7 @@ def test_threads_that_no_core_is_for() -> None:
     done = subprocess.run(
         [sys.executable, "-c", THREADS], capture_output=True, text=True, check=True
     )
-    # Workers, one a core, the thread that asked for them, and a few of libraries; not a thousand.
+    # One worker per core, the calling thread, and a few threads of libraries.
     assert 2 <= int(done.stdout) <= (os.cpu_count() or 1) + 16
 
 
@@ -300,7 +300,7 @@ def test_what_would_never_end(access_av: Cli, tmp_path: Path) -> None:
     refused(access_av("site", "check", one), "extends")
     one.write_text("a = " + "[" * 100_000)
     refused(access_av("site", "check", one))
-    # A key with a dot in it, in a table that is read as a whole for its tag.
+    # A dotted key in a tagged table, which is read as a whole.
     one.write_text('name = "x"\n[wake_up]\npolicy = "fixed"\n".." = 1\n')
     refused(access_av("vehicle", "check", one), "wake_up")
 
@@ -447,7 +447,7 @@ def test_two_runs_in_one_folder(access_av: Cli, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) in ([], [tmp_path / "results"])
 
 
-# Written: a table, a recording, samples of more than this.
+# Size of the simulated disk; table, recording and samples are larger.
 FULL_BYTES = 20_000
 
 

@@ -1,4 +1,4 @@
-"""Designs: spaces, campaigns that are stopped and go on, fronts, and what to change."""
+"""Designs: spaces, interrupted campaigns, Pareto fronts, and suggested changes of limits."""
 
 from __future__ import annotations
 
@@ -283,7 +283,7 @@ def test_an_executor_that_cannot_be_used_is_named(tmp_path: Path, text: str, mes
         pass
 
 
-# A cluster of one's own, of which one process dies once three parts are there.
+# A local cluster in which one process ends after three parts.
 DYING = """
 import json, subprocess, sys, threading, time
 from pathlib import Path
@@ -345,7 +345,7 @@ def test_of_a_cluster_any_process_may_die(
     assert contents(parts) == whole
 
 
-# Fronts. Designs whose energy and error are known, with noise that all of them share.
+# Pareto fronts of designs with known energy and error, and common noise.
 
 
 def known(energy_j: float, rms_m: float, noise: np.ndarray, own: np.ndarray, label: str) -> Driven:
@@ -426,7 +426,7 @@ def test_an_unreachable_limit_reports_the_reachable_value() -> None:
 def test_a_design_is_judged_in_the_worst_of_its_worlds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One design is better in one world and much worse in the other."""
+    """One design is better in one environment and much worse in the other."""
 
     def pretended(text: str, _seed: int, _first: int, runs: int) -> dict[str, np.ndarray]:
         scenario = json.loads(Scenario.from_toml(text).to_json())
@@ -486,7 +486,7 @@ def test_rounds_of_halving() -> None:
 
 
 def by_halving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, halving: bool) -> Found:
-    """Simulates 120 designs: the error falls and the estimates grow with ``bound``; and a cost."""
+    """Simulates 120 designs whose error decreases, and whose estimates increase, with ``bound``."""
 
     def pretended(text: str, seed: int, first_run: int, runs: int) -> dict[str, np.ndarray]:
         wake_up = Scenario.from_toml(text)
@@ -606,7 +606,7 @@ def test_command_on_any_scenario(tmp_path: Path, run: Callable[..., Finished]) -
     done = run(tmp_path, "designs", *asked)
     assert done.code == 0, done.err
     assert 1 <= len(json.loads(done.out)["front"]) <= 4
-    # A mode that changes no drive is not driven again: two parts for four designs.
+    # A power mode without influence on the runs is not simulated again: two parts for four designs.
     assert len(list((tmp_path / "results/parts").glob("*.npz"))) == 2
     assert (tmp_path / "o/report.html").stat().st_size > 10_000
     some = run(tmp_path, "choose", "o", "--max-rms-m", "100", "--json")

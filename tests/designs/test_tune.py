@@ -44,7 +44,7 @@ def test_least_energy_that_keeps_the_error(campaign: Campaign) -> None:
     every = Constraints(max_rms_m=1.0)
     found = tune(campaign, scenario, every, designs=6, runs=3)
     assert found.after.rms_m <= 1.0
-    # An odometer drifts slowly: few angles are enough.
+    # The odometer drifts slowly, so that few angles are sufficient.
     assert found.after.aoa_estimates.mean() < 0.2 * found.before.aoa_estimates.mean()
     mean_j, low_j, high_j = found.less[0]
     assert 0.0 < low_j <= mean_j <= high_j
@@ -64,7 +64,7 @@ def test_least_error_that_keeps_the_energy_and_drives_are_kept(campaign: Campaig
 
 
 def pretended(text: str, _seed: int, _first: int, runs: int) -> dict[str, np.ndarray]:
-    """Errors that grow with the interval between estimates, the same in every run."""
+    """Errors that increase with the interval between estimates, equal in every run."""
     settings = json.loads(Scenario.from_toml(text).vehicle.to_json())["wake_up"]
     rms_m = np.full(runs, 0.01 * settings["interval_ms"] ** 0.5)
     count = np.full(runs, 80_000.0 / settings["interval_ms"])
@@ -77,7 +77,8 @@ def pretended(text: str, _seed: int, _first: int, runs: int) -> dict[str, np.nda
 
 
 def test_an_optimal_design_is_kept(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
-    """From a set point that is as late as the error allows, any other takes more energy."""
+    """The given set point has the largest interval within the error limit; any other needs more
+    energy."""
     monkeypatch.setattr("access_av.designs.driven.simulated", pretended)
     scenario = short({"policy": "fixed", "interval_ms": 400.0})
     for bound in (Constraints(max_rms_m=0.2), Constraints(max_error_m=0.397, percentile=99.0)):

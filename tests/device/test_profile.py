@@ -1,4 +1,4 @@
-"""`access-av profile`: sysfs trees with a known energy put in, and sensors that go wrong."""
+"""`access-av profile`: simulated sysfs trees with a known energy, and faulty sensors."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ RAILS = {"VDD_GPU_SOC": 3.0, "VDD_CPU_CV": 2.0, "VIN_SYS_5V0": 4.0}
 
 
 def write(file: Path, text: object) -> None:
-    """Put a value in place whole, as the kernel shows it."""
+    """Writes a value atomically, as the kernel provides it."""
     file.parent.mkdir(parents=True, exist_ok=True)
     partial = file.with_name(f".{file.name}")
     partial.write_text(f"{text}\n")
@@ -151,13 +151,13 @@ def test_no_sensor_is_none(tmp_path: Path) -> None:
 
 
 class Bench:
-    """A tree whose power is known, looked at by a clock of its own."""
+    """Simulated sensors with a known power and a simulated clock."""
 
     def __init__(self, root: Path, feed: Callable[[float, float], None]) -> None:
         self.root, self.feed, self.now_s = root, feed, 0.0
 
     def window(self, seconds: float, power_w: Callable[[float], float]) -> tuple[Window, float]:
-        """A window of a power over time, and the energy that was really put in."""
+        """Returns the window of a power over time, and the true energy."""
         found = counters.find(self.root)
         assert found is not None
         recording = Recording(found, clock=lambda: self.now_s, start_s=self.now_s)
@@ -207,7 +207,7 @@ def thor(root: Path) -> Bench:
 
 
 class FedRapl:
-    """Counters in steps of 61 µJ that start again every 100 J."""
+    """Counters in steps of 61 µJ that wrap around at 100 J."""
 
     def __init__(self, root: Path) -> None:
         self.powercap = rapl(root, {"intel-rapl:0": "package-0"}, 100_000_000)
@@ -219,7 +219,7 @@ class FedRapl:
         self.joules += power_w * seconds
         counted_uj = int(self.joules / 2**-14) * 2**-14 * 1e6 % 100_000_000
         with (self.powercap / "intel-rapl:1/energy_uj").open("r+") as file:
-            file.write(f"{counted_uj:012.0f}\n")  # always as long: never met empty
+            file.write(f"{counted_uj:012.0f}\n")  # constant length: never empty
 
 
 def wrapping_rapl(root: Path) -> Bench:
@@ -269,7 +269,7 @@ def test_the_energy_interval_covers_noise_between_samples() -> None:
     assert held >= 198  # 99.9 % each
 
 
-# Sensors that go wrong.
+# Faulty sensors.
 
 
 def test_too_short_a_window_is_refused(tmp_path: Path) -> None:
@@ -349,7 +349,7 @@ esac
 
 @pytest.fixture
 def jetson(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A Jetson with three power modes, in mode 1, whose counter follows what is done on it."""
+    """A simulated Jetson with three power modes, in mode 1, whose counter follows the load."""
     root = tmp_path / "jetson"
     write(root / "etc/nvpmodel.conf", NVPMODEL)
     write(root / "sys/devices/system/cpu/cpufreq/policy0/cpuinfo_max_freq", 2201600)

@@ -1,4 +1,4 @@
-"""From samples to a log of angles, and from that to where the vehicle was."""
+"""From samples to a log of angles, and from the log to the trajectory."""
 
 from __future__ import annotations
 
@@ -92,7 +92,8 @@ def test_a_log_of_angles_locates_as_its_samples_do(
 
 
 def test_the_deviation_holds_all_of_the_error(drive: Path, log: Path) -> None:
-    """Noise alone is far less than the error; with the scatter the squares are one in the mean."""
+    """The noise alone is far below the error; with the scatter, the mean normalized square is
+    one."""
     truth = json.loads((drive / "iq.sigmf-meta").read_text())
     rate_hz = truth["global"]["core:sample_rate"]
     spacing = truth["annotations"][0]["aoa:truth"]["element_spacing_wavelengths"]
@@ -119,12 +120,13 @@ def test_the_deviation_holds_all_of_the_error(drive: Path, log: Path) -> None:
     by_noise = float(((error / both["phase_noise_sigma_rad"]) ** 2).mean())  # type: ignore[arg-type]
     by_all = float(((error / both["phase_sigma_rad"]) ** 2).mean())  # type: ignore[arg-type]
     assert by_noise > 4.0
-    # Looks are independent every half a wavelength: some hundred here, of squares of variance 2.
+    # Angles are independent every half wavelength: about a hundred here, with squares of variance
+    # 2.
     assert abs(by_all - 1.0) < 4.0 * (2.0 / INDEPENDENT) ** 0.5
 
 
 def test_the_truth_of_a_synthetic_recording_is_shown(drive: Path) -> None:
-    """It is where the radio head is seen from the pose that is annotated."""
+    """The annotated angle is that of the radio head from the annotated pose."""
     site = json.loads(Site.load(str(drive / "site.toml")).to_json())
     heads_m = {head["pci"]: head["position_m"] for head in site["radio_heads"]}
     annotations = json.loads((drive / "iq.sigmf-meta").read_text())["annotations"]
@@ -137,7 +139,7 @@ def test_the_truth_of_a_synthetic_recording_is_shown(drive: Path) -> None:
         assert burst.truth_deg == pytest.approx(math.degrees(math.asin(math.cos(from_axis_rad))))
         if pci == STRONGER:
             errors_deg.append(burst.azimuth_from_broadside_deg - burst.truth_deg)
-    # Both cells send at once, and one direction is looked for: that of the stronger.
+    # Both cells transmit simultaneously; the estimated direction is that of the stronger one.
     assert np.median(np.abs(errors_deg)) < math.degrees(0.1)
 
 

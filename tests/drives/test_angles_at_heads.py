@@ -48,7 +48,7 @@ def seen_by_heads(seed: int = 1, duration_s: float = 90.0) -> RobotSeenByHeads:
                 rows.append((time_s, pci, angle, SIGMA_RAD, 1))
     names = ["time_s", "pci", "angle_rad", "angle_sigma_rad", "at_head"]
     drive.angles = pl.DataFrame(rows, schema=names, orient="row")
-    # Mounting and phase of the vehicle's array must not matter: it measures nothing.
+    # Mounting and phase of the vehicle's array have no influence, because it measures no angle.
     return RobotSeenByHeads(
         drive.odometry, drive.angles, drive.truth, drive.start, mounting_rad=0.7, sheet=drive.sheet
     )
@@ -74,10 +74,11 @@ def test_a_drive_is_located_by_angles_measured_at_the_radio_heads(tmp_path: Path
         assert found.angles["accepted"].mean() > 0.97
         errors.append(drive.rms_error_m(found))
         ratios.append(nees(found, drive.truth) / 2)
-    # 12 angles a second of 0.05 rad at 6 m are 0.3 m / sqrt(12) in a second in which the odometry
-    # is exact to some centimetres; the share of the variance that is correlated doubles it at most.
+    # 12 angles per second with 0.05 rad at 6 m give 0.3 m / sqrt(12) in a second, in which the
+    # odometry is exact to some centimetres. The correlated share of the variance at most doubles
+    # it.
     assert max(errors) < 0.2
-    # Cautious by the correlated share that is assumed and not there; never too certain.
+    # The assumed correlation, which does not exist here, makes the covariance conservative.
     assert 0.3 < np.mean(ratios) < 1.5
 
 

@@ -54,7 +54,7 @@ def odometry(driven: Robot, *, yaw: bool = False, heading: bool = False) -> list
 def imu(
     driven: Robot, *, late_s: float = 0.0, turned: float = 1.0, **how: Any
 ) -> list[bag.Message]:
-    """A gyroscope that is read at times of its own; between odometry samples the rate stays."""
+    """A gyroscope with its own sample times; the rate is constant between odometry samples."""
     time_s = driven.odometry["time_s"].to_numpy()
     rate = driven.odometry["yaw_rate_radps"].to_numpy()
     ticks_s = EPOCH_S + np.arange(0.0013, DURATION_S, 1.0 / IMU_HZ)
@@ -105,7 +105,7 @@ def test_the_source_of_the_yaw_rate_is_reported(driven: Robot, tmp_path: Path) -
         assert source(drive) == said
         assert drive.poses.height == round(DURATION_S * RATE_HZ)
         assert drive.is_reliable
-        # The differences of the headings have none of the gyroscope's noise.
+        # Heading differences do not contain the noise of the gyroscope.
         assert driven.rms_error_m(drive) < as_told_m + 0.02, said
     silent = locate(driven, tmp_path, bag.write(tmp_path / "silent", odometry(driven)))
     assert not any("taken from" in it for it in silent.remarks)
@@ -148,7 +148,7 @@ def test_of_several_imus_one_is_chosen(access_av: Cli, driven: Robot, tmp_path: 
     code, said = located("front", told, "--imu-topic", "/imu/front")
     assert code == 0
     assert "taken from angular_velocity.z of /imu/front" in said
-    # The wrong way round is what the drive's own diagnosis names.
+    # The diagnosis of the drive reports a reversed yaw rate.
     assert located("back", told, "--imu-topic", "/imu/back")[0] == 3
     code, said = located("left", told, "--imu-topic", "/imu/left")
     assert code == 2
@@ -187,7 +187,7 @@ def test_several_files_are_read_in_order_of_time(driven: Robot, tmp_path: Path) 
     assert gap.poses.height == whole.poses.height - 300
     assert any("s after the one before" in it for it in gap.remarks)
     damaged = folder / names[0]
-    # A recorder that was killed leaves a file without an end: what is there is read.
+    # A killed recorder leaves a file without an end; its complete messages are read.
     content = damaged.read_bytes()
     damaged.write_bytes(content[: len(content) // 2])
     cut = locate(driven, tmp_path, folder)

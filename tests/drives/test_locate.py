@@ -46,7 +46,7 @@ def arguments(drive: Path, out: Path) -> list[object]:
 
 
 def locate(drive: Path, **given: Any) -> drives.Drive:
-    """A synthesized drive, with other files in place of its own."""
+    """Locates a synthesized drive with replaced files."""
     return drives.locate(
         given.pop("site", drive / "site.toml"),
         given.pop("odometry", drive / "odometry.csv"),
@@ -130,7 +130,7 @@ for found in (tum, mcap):
 def test_mcap_odometry_and_bad_items_are_taken_in(
     access_av: Cli, drive: Path, tmp_path: Path
 ) -> None:
-    # Our own poses as odometry, by way of MCAP.
+    # Use the located poses in MCAP as odometry.
     access_av(*arguments(drive, tmp_path))
     located = locate(drive, odometry=tmp_path / "drive.mcap")
     assert located.poses.height == 601
@@ -226,7 +226,7 @@ def test_without_an_initial_pose_the_vehicle_is_found(
     assert 0 < known.height < poses.height
     trajectory = (tmp_path / "out" / "trajectory.tum").read_text().splitlines()
     assert len(trajectory) == known.height
-    # It is found once its standard deviation is below 0.4 m; it only gets better.
+    # The vehicle is found when the standard deviation is below 0.4 m, which then decreases.
     errors = drives.error_m(poses, drive / "truth.tum")
     assert errors.height == known.height
     assert errors["error_m"].max() < 4 * 0.4  # type: ignore[operator]
@@ -416,7 +416,7 @@ def test_a_drive_is_located_by_variants_side_by_side(access_av: Cli, tmp_path: P
     first, worse, same = compared.iter_rows(named=True)
     poses = pl.read_parquet(tmp_path / "out" / "poses.parquet")
     errors_m = drives.error_m(poses, logged / "truth.tum")["error_m"]
-    errors_m = errors_m.head(4 * (errors_m.len() // 4)).sort()  # in four stretches of one length
+    errors_m = errors_m.head(4 * (errors_m.len() // 4)).sort()  # in four sections of equal length
     assert first["percentile_m"] == errors_m[math.ceil(0.9 * errors_m.len()) - 1]
     assert first["delta_m"] is None
     # A scale error of 3 % is ten standard deviations of the odometer; the file is the same.

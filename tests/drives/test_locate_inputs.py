@@ -1,4 +1,4 @@
-"""Times, counters and truths as users have them: located, or rejected with the cause."""
+"""Times, counters and truths of users: located, or rejected with the cause."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_a_wheel_that_jumps_turns_nothing(tmp_path: Path, wheel: str) -> None:
 
 
 def test_coarse_counters_are_used_as_they_are(tmp_path: Path) -> None:
-    """Ticks of 0.2 m, of which most samples have none."""
+    """Ticks of 0.2 m: most samples contain no tick."""
     whole = robot(45.0)
     whole.odometry = whole.odometry.with_columns((DISTANCE / 0.2).round() * 0.2).drop("speed_mps")
     assert not any("jumps" in it for it in whole.locate(tmp_path).remarks)
@@ -127,7 +127,7 @@ def test_coarse_counters_are_used_as_they_are(tmp_path: Path) -> None:
 def test_an_odometer_that_counts_upwards_in_reverse_is_named(
     tmp_path: Path, columns: list[str]
 ) -> None:
-    """The robot stands before and after it reverses, as it must to change its direction."""
+    """The robot stops before and after it reverses."""
 
     def speed_mps(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
         stands = (abs(time_s - 20.0) < 1.0) | (abs(time_s - 35.0) < 1.0)
@@ -322,7 +322,7 @@ def test_a_truth_of_a_part_of_the_drive_is_reported(access_av: Cli, tmp_path: Pa
 
 
 def test_a_drive_that_is_unavailable_is_not_relied_on(tmp_path: Path) -> None:
-    """Radio heads that contradict each other are an exit code, whatever the diagnosis says."""
+    """Contradictory radio heads cause an exit code, independent of the diagnosis."""
     whole = robot(40.0)
     rng = pl.Series([math.tau * ((k * 0.618) % 1.0) for k in range(whole.angles.height)])
     whole.angles = whole.angles.with_columns(phase_rad=rng - math.pi)

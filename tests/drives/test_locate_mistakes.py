@@ -1,4 +1,4 @@
-"""Mistakes that people make with the files of a drive: each is refused, or named."""
+"""Mistakes in the files of a drive: each is rejected or reported."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ DISTANCE, SPEED, TIME = pl.col("distance_m"), pl.col("speed_mps"), pl.col("time_
 ANGLE = (PHASE / math.pi).clip(-1.0, 1.0).arccos()
 OTHERS = pl.when(pl.int_range(pl.len()) % 2 == 0)
 
-# Kind, what is done to the files, and what has to be said of it: as a suspicion, whatever else ...
+# Kind of mistake, change of the files, and the expected report: as a suspicion ...
 SUSPECTED = {
     "sign of the phase": (angles(phase_rad=-PHASE), "order of the array's antennas is reversed"),
     "array mirrored": (mounted(-math.pi), "order of the array's antennas is reversed"),
@@ -88,7 +88,7 @@ SUSPECTED = {
     "x and y exchanged": (heads(lambda x, y: (y, x)), "x and y are exchanged"),
 }  # fmt: skip
 
-# ... as a remark on a drive that is located all the same ...
+# ... as a remark on a located drive ...
 REMARKED = {
     "distance in millimetres": (odometry(distance_m=1e3 * DISTANCE), "check the units"),
     "speed in km/h": (odometry(speed_mps=3.6 * SPEED), "check the units"),
@@ -181,7 +181,8 @@ def test_a_correct_drive_has_no_suspicions(tmp_path: Path, seed: int) -> None:
 @pytest.mark.parametrize("kind", SUSPECTED)
 def test_the_likely_mistake_is_named(tmp_path: Path, kind: str) -> None:
     spoil, says = SUSPECTED[kind]
-    # Kilometres a second take a long search; yaw rates that are refused cannot lead astray at once.
+    # Speeds of kilometres per second cause a long search. Rejected yaw rates have no immediate
+    # effect.
     spoilt = robot({"millimetres": 25.0, "yaw rate in degrees": 90.0}.get(kind, 60.0))
     spoil(spoilt)
     drive = spoilt.locate(tmp_path)
@@ -192,7 +193,7 @@ def test_the_likely_mistake_is_named(tmp_path: Path, kind: str) -> None:
 
 
 def test_wheels_in_millimetres_are_not_relied_on(tmp_path: Path) -> None:
-    """With so much of an odometer every angle fits."""
+    """With such distances, the filter can fit every angle."""
     whole = robot(30.0)
     whole.sheet = whole.sheet.replace("odometer = {", "odometer = { track_width_m = 0.26,")
     turned = 0.13 * (YAW * 0.05).cum_sum()
@@ -221,7 +222,7 @@ def test_a_wrong_heading_is_named_and_overcome(tmp_path: Path, by_rad: float, sa
 @pytest.mark.parametrize("kind", REMARKED)
 def test_it_is_remarked_on(tmp_path: Path, kind: str) -> None:
     spoil, says = REMARKED[kind]
-    # Where no angle fits, the search is long.
+    # If no angle fits, the search is long.
     spoilt = robot({"all of the angle in degrees": 45.0}.get(kind, 90.0))
     spoil(spoilt)
     drive = spoilt.locate(tmp_path)
@@ -267,7 +268,7 @@ def test_one_radio_head_elsewhere_is_named(tmp_path: Path) -> None:
 
 def test_never_found_is_no_success(access_av: Cli, tmp_path: Path) -> None:
     whole = robot(3.0)
-    whole.angles = whole.angles.filter(pci=11)  # of one radio head alone no place is known
+    whole.angles = whole.angles.filter(pci=11)  # one radio head does not determine a position
     arguments = whole.write(tmp_path)
     arguments[arguments.index("--start") + 1] = "unknown"
     done = access_av(*arguments, "--json")

@@ -1,4 +1,5 @@
-"""Odometry messages as drivers fill them: the vehicle's motion is found, or the field is named."""
+"""Odometry messages of different drivers: the motion is determined, or the invalid field is
+reported."""
 
 from __future__ import annotations
 
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
 
 DURATION_S = 50.0  # reverses from 40 s on
 EPOCH_S = 1.7e9
-# Difference between the errors (m, RMS) of one drive by two odometries that are both right: one
-# fifth of the error itself, which is below 0.1 m.
+# Maximum difference (m) between the RMS errors of one drive with two correct odometries: a fifth of
+# the error, which is below 0.1 m.
 SAME_M = 0.02
 
 
@@ -69,7 +70,7 @@ def fields(driven: Robot) -> list[Fields]:
 
 @pytest.fixture(scope="module")
 def as_csv_m(driven: Robot, tmp_path_factory: pytest.TempPathFactory) -> float:
-    """Error (m, RMS) by the odometry as CSV."""
+    """RMS error (m) with the odometry as CSV."""
     return driven.rms_error_m(driven.locate(tmp_path_factory.mktemp("csv")))
 
 
@@ -248,7 +249,7 @@ def test_the_time_of_the_recorder_stands_in_for_a_stamp_that_was_not_set(
 def test_motion_to_the_side_is_named_where_it_does_harm(
     driven: Robot, fields: list[Fields], tmp_path: Path
 ) -> None:
-    """A vehicle that slides by 6 m is not where its odometer says."""
+    """A vehicle that slides by 6 m differs from the position of its odometer."""
     sliding = [replace(it, side_mps=0.4 if k > 600 else 0.0) for k, it in enumerate(fields)]
     drive = locate(driven, tmp_path, sliding)
     assert any("twist.twist.linear.y is not 0" in it for it in drive.remarks)

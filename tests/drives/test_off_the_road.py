@@ -1,4 +1,5 @@
-"""Another's hall (``benches/off_the_road.py``): its textbook filter, and two clocks."""
+"""Drives through a hall (``benches/off_the_road.py``): comparison with a textbook filter, and time
+offsets."""
 
 from __future__ import annotations
 
@@ -25,7 +26,7 @@ def test_the_textbook_filter_is_consistent() -> None:
         poses, covariances = hall_drive.textbook(drive)
         error = (poses - drive.truth)[1:, :2]
         nees.append(np.einsum("ki,kij,kj->k", error, np.linalg.inv(covariances[1:]), error).mean())
-    # Errors of a drive hang together: as good as twenty independent drives of one error each.
+    # Errors of a drive are correlated; twenty drives count as twenty independent errors.
     assert 0.6 < np.mean(nees) / 2 < 1.5
 
 

@@ -1,4 +1,4 @@
-"""The bench of real drives, on a small drive in the files of the MRCLAM data sets."""
+"""The benchmark of real drives with a small synthetic drive in the MRCLAM format."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def converted(bench: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     def write(name: str, *columns: Any) -> None:
         np.savetxt(dataset / name, np.column_stack(columns), fmt="%.6f", header="a comment")
 
-    # A command is valid until the next one: the value at the end of a step is from its start.
+    # A command is valid until the next one, so that the value of a step is that of its start.
     speed, yaw = (told.odometry[name].to_numpy() for name in ("speed_mps", "yaw_rate_radps"))
     write("Robot1_Odometry.dat", times[:-1], speed[1:], yaw[1:])
     x, y, heading = (told.truth[name].to_numpy() for name in ("x_m", "y_m", "heading_rad"))
@@ -77,7 +77,7 @@ def test_what_is_converted_is_the_drive(bench: Any, converted: Path) -> None:
     assert np.abs(drive["bearings"][:, 2]).max() < VIEW_RAD + 0.1
     assert drive["start"]["x_m"] == pytest.approx(told.start[0], abs=1e-3)
     driven = told.odometry["distance_m"].to_numpy()
-    # But for a step at each end.
+    # One step at each end is excepted.
     assert drive["odometry"]["distance_m"][-1] == pytest.approx(driven[-1], abs=2 * 0.5 / RATE_HZ)
     assert drive["truth"][0, 0] == pytest.approx(0.0, abs=1e-4)
 

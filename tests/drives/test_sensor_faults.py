@@ -52,7 +52,7 @@ def test_a_fault_that_lasts_is_a_remark_and_a_diagnosis(drive: Path, tmp_path: P
     assert begun, found.remarks
     assert float(begun[0].split()[3]) == pytest.approx(STOPS_S, abs=2.0)
     (diagnosis,) = found.diagnoses
-    # When it is since, what it is, and what to do.
+    # The diagnosis contains start time, fault and remedy.
     assert any(f"since {second}." in diagnosis for second in (26, 27)), diagnosis
     assert "the odometry is frozen" in diagnosis
     assert "check the odometer" in diagnosis

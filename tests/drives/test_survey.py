@@ -74,7 +74,7 @@ def test_a_head_and_an_array_that_are_elsewhere_are_found(logged: Path) -> None:
     error = np.array([it.found for it in found.parameters]) - truth
     assert error @ np.linalg.solve(found.covariance, error) < CHI2_10
     assert by_key["radio_heads[0].position_m[0]"].std < 0.6
-    # The dock is 300 m away: the drives say nothing of it, and it stays where it was.
+    # The dock is 300 m away: the drives do not determine its position, which is unchanged.
     assert not by_key["radio_heads[2].position_m[0]"].is_learnt
     heads = json.loads(found.site.to_json())["radio_heads"]
     assert heads[2]["position_m"] == [310.0, 85.0, 7.0]

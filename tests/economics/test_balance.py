@@ -1,4 +1,4 @@
-"""Cost, energy and carbon of a user's own figures."""
+"""Cost, energy and carbon for given figures."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from conftest import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
-# Each crate and what it may use of the others: arrows run one way.
+# Each crate, and the crates that it may use.
 CRATES = {
     "aoa-array": set(),
     "nr-ssb": set(),
@@ -61,13 +61,13 @@ def modules(crate: Path) -> dict[str, Path]:
 
 
 def product_code(file: Path) -> str:
-    """A file without its comments and its tests."""
+    """Returns a source file without comments and tests."""
     text = re.sub(r"//[^\n]*", "", file.read_text(encoding="utf-8"))
     return text.split("#[cfg(test)]")[0]
 
 
 def used_paths(tree: str, prefix: str = "") -> list[str]:
-    """The paths of a use tree: `a::{b, c::d}` as `a::b`, `a::c::d`."""
+    """Returns the paths of a use tree: `a::{b, c::d}` as `a::b`, `a::c::d`."""
     head, brace, rest = tree.partition("{")
     if not brace:
         return [prefix + tree.split(" as ")[0].strip()]
@@ -86,7 +86,8 @@ def used_paths(tree: str, prefix: str = "") -> list[str]:
 
 
 def imports(module: str, text: str, known: dict[str, Path]) -> set[str]:
-    """Modules of the crate that a module takes names from; its own children's re-exports aside."""
+    """Returns the modules of the crate that a module imports from, without re-exports of its
+    children."""
     found = set()
     for public, tree in re.findall(r"^\s*(pub(?:\([^)]*\))? )?use ([^;]+);", text, re.M):
         for path in used_paths(" ".join(tree.split())):
@@ -100,7 +101,7 @@ def imports(module: str, text: str, known: dict[str, Path]) -> set[str]:
                     steps = steps[1:]
                 steps = here + steps
             elif public and "::".join([*here, steps[0]]) in known:
-                continue  # a face: it hands on what its children define
+                continue  # a re-export of the children
             else:
                 continue
             while steps and "::".join(steps) not in known:

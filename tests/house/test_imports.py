@@ -1,4 +1,4 @@
-"""Which module may import which, and what `import access_av` reaches and costs."""
+"""Permitted imports between modules; modules and duration of `import access_av`."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ CORE = "access_av._core"
 TOP = {"access_av", "access_av.cli.main", "access_av.cli.paper_tables", "access_av.__main__"}
 TOP |= {"access_av.cli.paper", "access_av.cli.codesign"}
 PAPERS = ("access_av.paper", "access_av.report.paper")
-# Named after the command or the thing that is shown; elsewhere a file's name means one thing.
+# Folders whose files have the name of a command or a report; elsewhere file names are unique.
 NAMED_AFTER_ANOTHER = {"cli", "report"}
 
 
 def imported_by(module: str) -> set[str]:
-    """Modules of the project that a module imports anywhere in it, also only for its types."""
+    """Returns the modules of the project that a module imports, including imports for types
+    only."""
     found = set()
     for node in ast.walk(ast.parse(FILES[module].read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -57,7 +58,7 @@ def test_what_is_general_does_not_import_the_paper() -> None:
 
 
 def folder(module: str) -> str:
-    """The folder that a module lies in, or is."""
+    """Returns the folder of a module or package."""
     return module if FILES[module].name == "__init__.py" else module.rpartition(".")[0]
 
 

@@ -71,7 +71,7 @@ def test_every_claim_of_the_paper_has_a_finding_or_a_reason() -> None:
         assert (name in testable) != ("why" in entry), name
 
 
-# Figures that sections VI and VII of the paper state, and the claim that each is of.
+# Figures in sections VI and VII of the paper, and their claims.
 FIGURES = {
     "x1": "four antennas with 20 snapshots",
     "x2": "clocks and base wake-up times of eight modes",
@@ -167,7 +167,8 @@ def test_what_cannot_be_judged_is_named_and_the_others_are_judged() -> None:
         assert found[name].verdict == NOT_JUDGED
         assert found[name].obtained is None
         assert said in found[name].note
-    # In addition to these two the settings, of which a synthetic evaluation has none.
+    # The claims about settings are not judged either, because a synthetic evaluation has no
+    # settings.
     unjudged = {name for name, claim in found.items() if claim.verdict == NOT_JUDGED}
     assert {name for name in unjudged if not name.startswith("x")} == {
         "a1_adaptive_worst_m",

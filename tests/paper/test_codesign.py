@@ -1,4 +1,5 @@
-"""Platforms, energy models, and the proposed method against the paper's adaptive point."""
+"""Platforms, energy models, and comparison of the proposed method with the paper's adaptive
+point."""
 
 from __future__ import annotations
 
@@ -40,7 +41,7 @@ def test_wall_power_is_that_of_the_public_measurements(data: Path) -> None:
 
 
 def test_each_measured_mode_is_foretold_by_the_others() -> None:
-    """The form of the model is fitted without a mode and then says that mode's power."""
+    """The model is fitted without a mode and predicts the power of this mode."""
     modes = json.loads(Platform.load(ENGINE).core.to_json())["modes"]
     points = np.array(
         [

@@ -89,7 +89,7 @@ def test_each_fit_parameter_has_the_described_effect(demands: dict[int, ModeDema
         ratio = none[3][method] / none[3]["music"]
         times_s = demands[3].base_wake_up_s
         assert ratio == pytest.approx(times_s[method] / times_s["music"]), "the same power"
-    # Without a power of its own a mode has that of a busy core by its clock.
+    # A mode without its own power has that of a busy core at its clock.
     assert none[1]["music"] == pytest.approx(none[3]["music"]), "the same clock"
     ratio = fit_energy(demands, ("ratio",))
     for method in METHODS:

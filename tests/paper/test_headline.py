@@ -1,4 +1,4 @@
-"""The first sentence of the evaluation follows from its verdicts, and they from the energy fit."""
+"""The headline of the evaluation agrees with its verdicts, and these with the energy fit."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def test_only_gates_wait_for_a_better_ssb() -> None:
 
 
 def test_a_controller_of_no_gain_makes_no_difference(driver: Driver) -> None:
-    """Algorithm 1 with gains of zero is the constant t_base; the report has to say so."""
+    """Algorithm 1 with gains of zero is the constant t_base, which the report must state."""
     gate = interpretations.load("gate")
     idle = interpretations.Interpretation(
         "gate",
@@ -164,7 +164,7 @@ def test_t_max_follows_from_the_position_uncertainty_unless_it_is_stated() -> No
 def test_algorithm_1_of_no_gain_is_the_fixed_interval(
     base_ms: float, serving: str, driver: Driver
 ) -> None:
-    """One clock: both execute at the same SSBs, whatever the base wake-up time."""
+    """Both use the same SSBs for every base wake-up time."""
     scenario = interpretations.load("every-ssb").scenario.with_overrides(
         {f"vehicle.wake_up.{name}": 0.0 for name in ("kp", "ki", "kd")}
         | {"vehicle.wake_up.base_ms": base_ms, "vehicle.wake_up.ssb_selection": serving}
@@ -176,6 +176,6 @@ def test_algorithm_1_of_no_gain_is_the_fixed_interval(
     rounds = np.ceil if serving == "first-after" else np.floor
     gap_s = float(rounds(base_ms / period_ms)) * period_ms / 1e3
     assert one.longest_gap_s == pytest.approx(gap_s)
-    # Algorithm 1 has no wake-up time before its second SSB: one estimate more, at the beginning.
+    # Algorithm 1 has no wake-up time before its second SSB, which gives one additional estimate.
     assert abs(float(one.aoa_estimates[0] - other.aoa_estimates[0])) <= 1.0
     assert float(one.rms_error_m[0]) == pytest.approx(float(other.rms_error_m[0]), rel=0.3)

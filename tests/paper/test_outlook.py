@@ -1,4 +1,4 @@
-"""The examples behind docs/outlook.md: what they compare, and what is known of it beforehand."""
+"""The examples of docs/outlook.md, compared with known results."""
 
 from __future__ import annotations
 

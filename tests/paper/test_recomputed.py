@@ -253,7 +253,7 @@ FOUND: dict[str, Callable[[Interpretation], Any]] = {
 
 
 def margin(entry: dict[str, Any], value: Any) -> NDArray[np.float64]:
-    """How far a value is on the right side of its rule, relative to the stated value."""
+    """Returns the margin of a value under its rule, relative to the stated value."""
     rule, stated = entry["rule"], entry["stated"]
     if rule in ("at_most", "above", "about"):
         pairs = (
@@ -428,7 +428,7 @@ def test_operating_points_and_resamples_follow_from_the_runs(
         for axis in "xy":
             worst_m = interpretation.series(*case)[f"mean_abs_error_{axis}_m"].max()
             assert point[f"worst_error_{axis}_m"] == pytest.approx(worst_m)
-            # A mean over runs exceeds no run's maximum.
+            # A mean over runs does not exceed the maximum of the runs.
             assert worst_m <= runs[f"max_error_{axis}_m"].max() * (1.0 + 1e-5)
         if point["mode"] is None:
             assert runs["energy_j"].null_count() == runs.height
@@ -628,7 +628,7 @@ def test_cost_and_carbon_of_the_page(tables: Tables) -> None:
         for name in ("cost", "carbon")
     )
     units, fleet = 4, STATED["day"]["fleet"]
-    # Energy saved in mode 0: fixed MUSIC less adaptive MUSIC, trip after trip.
+    # Energy saved in mode 0: fixed minus adaptive MUSIC, for continuous trips.
     gate = Interpretation(tables, "gate")
     trip_j = float((gate.energy_j("Q", "music", 0) - gate.energy_j("R", "music", 0))[0])
     words = plain(tables.page)

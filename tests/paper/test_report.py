@@ -30,7 +30,7 @@ def page() -> str:
 
 
 def test_loads_nothing(page: str) -> None:
-    """No element that fetches; links that remain are names of schemas and of namespaces."""
+    """No element loads a resource; the remaining URLs are names of schemas and namespaces."""
     markup = re.sub(r"(<script>).*?(</script>)", r"\1\2", page, flags=re.DOTALL)
     assert not re.search(r"<(link|img|iframe|script)[^>]*\b(src|href)=", markup)
     assert not re.search(r"@import|url\(|https?:", markup)

@@ -1,4 +1,5 @@
-"""The simulator and Algorithm 1 against a second implementation, written from the paper alone."""
+"""Comparison of simulator and Algorithm 1 with a second implementation, written from the paper
+alone."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 RUNS, T_BASE_MS = 100, 80.0
-# Six comparisons, each within an interval that one in 500 misses by chance.
+# Standard deviations of the intervals of six comparisons; a correct value is outside with a
+# probability of 1/500.
 SURE = 3.1
 
 
@@ -99,5 +101,5 @@ def test_both_execute_and_err_alike(
     differs_m = abs(float(ours.rms_error_m[0] - theirs_m[0]))
     std_m = np.hypot(np.std(ours.rms_error_m[1:]), np.std(theirs_m[1:]))
     assert differs_m < SURE * std_m, (ours.rms_error_m[0], theirs_m[0])
-    # The interval of 100 runs is not so wide that anything is within it.
+    # The interval of 100 runs is short enough for a meaningful test.
     assert std_m < 0.3 * theirs_m[0]

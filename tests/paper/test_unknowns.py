@@ -1,4 +1,4 @@
-"""Sampling what the paper leaves open: parts on disk, and indices of functions that are known."""
+"""Sampling of unspecified parameters: parts on disk, and Sobol indices of known functions."""
 
 from __future__ import annotations
 

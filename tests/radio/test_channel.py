@@ -1,4 +1,4 @@
-"""Channels of TR 38.901 and of ray tracers, as Python and the command line have them."""
+"""Channels of TR 38.901 and of ray tracers, in Python and on the command line."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_a_drive_under_every_model_and_with_blockage() -> None:
 
 
 def line_of_sight(site: Site, places_m: np.ndarray) -> pl.DataFrame:
-    """The straight path from every head of a site to every place."""
+    """Returns the line of sight from every radio head of a site to every position."""
     settings = json.loads(site.to_json())
     heads = settings["radio_heads"]
     towards_m = np.array([head["position_m"] for head in heads])[None] - places_m[:, None]
@@ -91,7 +91,7 @@ def test_a_traced_line_of_sight_is_that_of_the_geometry(tmp_path: Path) -> None:
         traced = hall.with_overrides(
             {**drawn, "channel.paths": str(tmp_path / "los.npz"), "fidelity": fidelity}
         )
-        # Without multipath nothing is left between them but half a step of plane wave.
+        # Without multipath, they differ by the plane-wave approximation over half a step only.
         free = untraced.with_overrides(
             {**drawn, "fidelity": fidelity, "truth.site.rician_k_db": 60.0}
         )
@@ -133,7 +133,7 @@ def test_the_bound_has_the_paths_k(tmp_path: Path) -> None:
     clear = hall.with_overrides({"channel.paths": str(tmp_path / "los.npz")})
     traced_m, clear_m = (bound(it, map_step_m=1.0).route["bound_m"].max() for it in (hall, clear))
     assert clear_m < 0.8 * traced_m
-    # Beyond the lane nothing is traced, and so nothing is known.
+    # Positions beyond the lane are not traced, so that the bound is unknown.
     assert bound(hall, map_step_m=4.0).site.filter(pl.col("y_m") > 20.0)["bound_m"].is_null().all()
 
 

@@ -45,7 +45,7 @@ MASTS = pl.DataFrame(
 
 
 def p90_m(names: list[str]) -> float:
-    """The bound with these masts, by the long way."""
+    """Returns the bound with these masts, computed directly."""
     heads = json.loads(SHORT.site.to_json())["radio_heads"]
     chosen = MASTS.filter(pl.col("name").is_in(names))
     new = [
@@ -151,7 +151,7 @@ def test_service_levels_need_time_as_well_as_accuracy() -> None:
     assert service_levels.reached_in_words(service_levels.of_runs(good, 0.02)) == "no level"
     hours = service_levels.of_runs(np.full((20, 1000), 0.01), 20.0)
     assert all(verdict.reached for verdict in hours)
-    # One drive of twenty is lost: no interval over drives lets 99 % stand.
+    # One of twenty runs is lost, so that no interval over runs permits 99 %.
     lost = np.full((20, 1000), 0.01)
     lost[3] = np.nan
     reached = [
@@ -161,7 +161,7 @@ def test_service_levels_need_time_as_well_as_accuracy() -> None:
     found = simulate(SHORT, runs=2, keep_trajectories=True).service_levels
     assert found is not None
     assert found[0].share == 1.0
-    # Half a minute is too short for level 2, and nothing says that it is not reached.
+    # Half a minute is too short for level 2: neither reached nor missed.
     assert [found[0].outcome, found[1].outcome] == ["too few runs"] * 2
 
 
@@ -259,8 +259,8 @@ def test_the_level_grows_as_less_risk_is_asked(tmp_path: Path) -> None:
     levels = [float(case.trajectories["protection_level_m"].median()) for case in cases]
     assert levels == sorted(levels)
     assert levels[2] > 1.3 * levels[0]
-    # Quantiles of a Gaussian grow as the root of the logarithm, here to 1.45 times; slip, that is
-    # negligible compared with the larger risk, not compared with the smaller one.
+    # Quantiles of a Gaussian increase with the root of the logarithm, here by a factor of 1.45.
+    # Slip is negligible relative to the larger risk, but not relative to the smaller one.
     assert levels[2] < 3.0 * levels[0]
 
 

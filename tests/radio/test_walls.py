@@ -1,4 +1,4 @@
-"""A wall hides a radio head: from the channel, the wake-up and the bound alike."""
+"""A wall hides a radio head in the channel, in the wake-up policy and in the bound."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ GATE_PCI = 21
 
 
 def trip(**more: Any) -> Scenario:
-    """The first 150 m or so of the plant with bends."""
+    """The first 150 m of the plant `bends`."""
     scenario = Plant.load("bends").scenario()
     every_ssb = {"policy": "fixed", "interval_ms": 20.0}
     return scenario.with_overrides({"motion.stops": [], "vehicle.wake_up": every_ssb, **more})
@@ -32,8 +32,8 @@ GATE_M = (60.0, 25.0)
 
 
 def hidden(x_m: Any, head_m: Sequence[float] = GATE_M) -> Any:
-    """Whether the wall is between a place on the straight (y = 0) and a radio head."""
-    crossing_m = x_m + 10.0 / head_m[1] * (head_m[0] - x_m)  # where the line is at y = 10
+    """Returns whether the wall is between a position on the straight (y = 0) and a radio head."""
+    crossing_m = x_m + 10.0 / head_m[1] * (head_m[0] - x_m)  # x of the line at y = 10
     return np.abs(crossing_m - 60.0) <= 20.0
 
 
@@ -51,7 +51,7 @@ def test_no_angle_is_taken_through_a_wall(walled: Scenario) -> None:
     taken = taken.join_asof(places, on="time_s", strategy="nearest")
     straight = taken.filter(pl.col("true_x_m") < 190.0)["true_x_m"].to_numpy()
     assert len(straight) > 100
-    # It knows its place to a metre or so, and its array is not where it counts its place.
+    # The position error is up to a metre, and the array is not at the odometer's reference point.
     assert not hidden(straight[(straight > 30.0) & (straight < 90.0)]).any()
 
 
@@ -68,7 +68,7 @@ def test_the_channel_loses_the_direct_wave_behind_it() -> None:
         levels[name] = found.aoa_estimates.filter(pci=GATE_PCI).select("time_s", "snr_db")
     both = levels["open"].join(levels["behind"], on="time_s", suffix="_behind")
     lost_db = (both["snr_db"] - both["snr_db_behind"]).to_numpy()
-    # Concrete at 3.5 GHz: 19 dB of a wave that is all of what comes; elsewhere nothing.
+    # Concrete at 3.5 GHz: 19 dB loss of a wave without scatter; no loss elsewhere.
     assert lost_db.max() == pytest.approx(19.0, abs=0.5)
     assert (np.abs(lost_db) < 1e-9).mean() > 0.4
 

@@ -38,7 +38,7 @@ def test_route_is_the_scenarios(four_heads: ErrorBound) -> None:
     assert abs(route["along_m"][-1] - 300.0) < 1e-6
     parts_m = np.hypot(route["along_std_m"], route["across_std_m"])
     assert np.allclose(parts_m, route["bound_m"], rtol=1e-12)
-    assert route["bound_m"][0] < 2e-6  # the start is known, to the micrometre that no σ goes below
+    assert route["bound_m"][0] < 2e-6  # the start is known to a micrometre, the minimum σ
     assert (route["bound_m"][1:] > 0.0).all()
 
 
@@ -69,7 +69,7 @@ def test_snr_is_the_link_budgets() -> None:
     core = _core.Bound(
         Scenario.load("paper").with_overrides({"site.radio_heads[0].eirp_dbm": -17.0})
     )
-    # Worked by hand in the core's own test: 8.083 dB at 100 m.
+    # The unit test of the core contains the calculation: 8.083 dB at 100 m.
     snr_db = core.snr_db(np.array([205.0]), np.array([0.0]))
     assert snr_db.shape == (1, 1)
     assert abs(snr_db[0, 0] - 8.083) < 2e-3

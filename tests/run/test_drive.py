@@ -46,7 +46,8 @@ def test_a_monitored_tracker_reports_protection_levels(guarded: Simulation) -> N
     assert integrity.epochs == table.height
     assert abs(sum(integrity.state_shares.values()) - 1.0) < 1e-12
     assert integrity.median_level_over_error > 1.0
-    # Two runs are correlated epochs: the stated 1e-3 is of many. Here, not grossly violated.
+    # The specified risk of 1e-3 holds for many runs; two runs with correlated epochs permit a
+    # coarse test only.
     assert integrity.exceedances < 0.05 * integrity.epochs
 
 
@@ -69,7 +70,7 @@ def test_page_has_every_chart_and_loads_nothing(guarded: Simulation) -> None:
     markup = re.sub(r"(<script>).*?(</script>)", r"\1\2", page, flags=re.DOTALL)
     assert not re.search(r"<(link|img|iframe|script)[^>]*\b(src|href)=", markup)
     assert not re.search(r"@import|url\(|https?:", markup)
-    # Bars between two times stand on zero and on each other.
+    # The bars are stacked from zero.
     assert specs["aoa_estimates"]["encoding"]["x"]["bin"] == "binned"
     counted = specs["stanford"]["datasets"].values()
     assert guarded.trajectories is not None
@@ -82,7 +83,7 @@ def test_integrity_is_there_without_trajectories(guarded: Simulation) -> None:
     assert again.trajectories is None
     assert again.integrity is not None
     assert again.integrity == guarded.integrity
-    # The table counts equal steps; its median is exact, the other a histogram's.
+    # The table uses equal steps; its median is exact, the other one is that of a histogram.
     assert guarded.trajectories is not None
     counted = Integrity.of(guarded.trajectories)
     assert counted is not None

@@ -61,7 +61,7 @@ def test_compare_takes_plug_ins(access_av: Callable[..., Finished], folder: Path
     assert rows["variant"].unique(maintain_order=True).to_list() == ["unchanged", *texts]
     changed = rows.filter(pl.col("variant") != "unchanged")
     assert (changed["delta_m"] != 0.0).all()
-    # The energy of an estimate is what the plug-in states.
+    # The energy of an estimate is that of the plug-in.
     found = simulated(folder, estimator=plug_in_files.load("estimator", "mine.py:Mine"))
     energy_j = rows.filter(variant=texts[0])["energy_j"][0]
     assert energy_j == pytest.approx(float(found["energy_j"].to_numpy().mean()))
@@ -93,7 +93,7 @@ def test_designs_take_plug_ins(access_av: Callable[..., Finished], folder: Path)
     ).row(0, named=True)
     assert row["aoa_estimates"] == both["aoa_estimates"].to_numpy().mean()
     assert row["energy_j"] == pytest.approx(float(both["energy_j"].to_numpy().mean()))
-    # Another content of the file is another design: nothing is taken from the parts.
+    # Changed content of the file is another design: no stored part is used.
     (folder / "mine.py").write_text(MINE.replace("% 10", "% 5"))
     done = access_av("designs", *arguments[:-1], "again")
     assert done.code == 0, done.err

@@ -1,4 +1,4 @@
-"""A user's own estimator, policy and localizer: the documented ones, and those that misbehave."""
+"""User-defined estimators, policies and localizers: the documented ones, and invalid ones."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ def test_documented_examples_run(capsys: pytest.CaptureFixture[str]) -> None:
         exec(block, names)
     printed = capsys.readouterr().out
     errors_m = [float(number) for number in re.findall(r"([\d.]+) m", printed)]
-    # As good as what is built in, up to what a plain filter in the plane loses without the map.
+    # The accuracy is that of the built-in localizer, except for the loss of a plain filter without
+    # a map.
     assert len(errors_m) == 4, printed
     assert max(errors_m) < 0.6, printed
 
@@ -55,7 +56,7 @@ def test_without_sigma_the_bound_is_used_and_reported_once() -> None:
         table["phase_sigma_rad"].median()
         for table in (result.aoa_estimates, built_in.aoa_estimates)
     ]
-    # The bound at the sensed SNR is what maximum likelihood states, fading aside.
+    # Maximum likelihood reports the bound at the measured SNR, apart from fading.
     assert 0.8 < sigmas[0] / sigmas[1] < 1.25  # type: ignore[operator]
 
 
@@ -91,7 +92,7 @@ def test_estimates_that_cannot_be_are_refused(returned: Any, named: str) -> None
 
 
 class Stating:
-    """An estimator that may say what an estimate takes."""
+    """An estimator with optional energy or time of an estimate."""
 
     def __init__(self, **stated: Any) -> None:
         vars(self).update(stated)
@@ -389,7 +390,7 @@ def test_poses_that_cannot_be_are_refused(pose: Any, named: str) -> None:
 
 def test_late_angles_are_processed_by_copies_of_a_localizer() -> None:
     class Filter(Standing):
-        """Remembers in which order things came."""
+        """Records the order of its inputs."""
 
         def __init__(self, *arguments: Any) -> None:
             super().__init__(*arguments)
@@ -431,6 +432,6 @@ def test_what_is_learned_stays_above_its_ceiling() -> None:
     snr_db, learned, likely, ceiling = next(learn.compare(network, random, 400))
     assert snr_db == -25.0
     assert learned[0] < untrained
-    # Less than the least there is, only by chance: five standard errors of the same draws.
+    # The error may be below the lower bound by chance only: five standard errors.
     for cost, error in (learned, likely):
         assert cost > ceiling[0] - 5.0 * error

@@ -66,10 +66,10 @@ def test_a_result_is_saved_and_loaded_unchanged(name: str, tmp_path: Path) -> No
     loaded = type(found).load(file)
     assert loaded == found
     assert type(loaded) is type(found)
-    # Equal content gives equal bytes, also of what was loaded.
+    # Equal content gives equal bytes, also after loading.
     for each in (again, loaded):
         other = tmp_path / "other.zip"
-        if name == "evaluation":  # the computing time is no content
+        if name == "evaluation":  # the computing time is not compared
             each = replace(each, duration_s=found.duration_s)
         each.save(other)
         assert other.read_bytes() == file.read_bytes()

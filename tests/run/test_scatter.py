@@ -1,4 +1,4 @@
-"""The angle that the tracker uses of a channel with much scatter, against its bound."""
+"""Angles of the tracker in a channel with strong scatter, compared with the bound."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_used_angles_are_near_the_bound(k_db: float, most: float) -> None:
     azimuth_rad = np.arctan2(away_m[:, 1], away_m[:, 0]) - looks["true_heading_rad"].to_numpy()
     error_rad = looks["phase_rad"].to_numpy() - np.pi * np.cos(azimuth_rad)
     error_rad = (error_rad + np.pi) % (2.0 * np.pi) - np.pi
-    # Scatter and noise: 1/(2KA) with A = N (N² - 1) / 12 of four antennas, and what is stated.
+    # Scatter and noise: 1/(2KA) with A = N (N² - 1) / 12 for four antennas, and the reported noise.
     bound_rad = np.sqrt(0.1 * 10.0 ** (-0.1 * k_db) + looks["phase_sigma_rad"].to_numpy() ** 2)
     used = looks["accepted"].to_numpy()
     ratio = float(np.sqrt(((error_rad / bound_rad)[used] ** 2).mean()))

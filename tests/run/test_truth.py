@@ -22,7 +22,7 @@ EXACT = {
 
 
 def anees(name: str, runs: int, changes: Mapping[str, object] = MappingProxyType({})) -> float:
-    # All runs are kept, 3 GB of them. Without a monitor: it would take over from who is wrong.
+    # All runs are kept (3 GB). Without integrity monitoring, which would replace a wrong filter.
     usual = {"allow_large": True, "vehicle.integrity.enabled": False}
     scenario = Scenario.load(name).with_overrides(usual | dict(changes))
     consistency = simulate(scenario, runs=runs, seed=5, keep_trajectories=True).consistency
@@ -32,7 +32,7 @@ def anees(name: str, runs: int, changes: Mapping[str, object] = MappingProxyType
 
 
 def test_the_localizer_is_consistent_with_errors_of_the_specified_deviations() -> None:
-    # 60 runs: the interval of 500, 0.90 to 0.96, and half as wide again three times over.
+    # The interval of 500 runs is 0.90 to 0.96; that of 60 runs is about three times as wide.
     assert 0.8 < anees("yard", 60) < 1.15
 
 

@@ -1,4 +1,4 @@
-"""`access_av.aoa`: what the user calls."""
+"""Public functions of `access_av.aoa`."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_rmse_is_near_the_bound(method: Callable[..., Any], snr_db: float) -> No
     rmse = np.sqrt(np.mean((found.angle_rad - angles) ** 2))
     bound = np.sqrt(np.mean(aoa.crb_rad(angles, snr_db) ** 2))
     assert rmse / bound <= (1.14 if method is aoa.esprit else 1.08)
-    # The stated standard deviation is the true one.
+    # The reported standard deviation is correct.
     assert 0.9 < np.mean(((found.angle_rad - angles) / found.sigma_rad) ** 2) < 1.2
     assert np.median(found.snr_db) == pytest.approx(snr_db, abs=0.5)
     assert found.resolved.mean() > 0.99
@@ -297,7 +297,7 @@ def test_subarrays_of_sixteen_antennas(subarray: int) -> None:
     noise = 0.05 * (rng.normal(size=(16, 50, 2)) @ [1, 1j])
     samples = steering @ np.stack([waveform, -0.8 * waveform]) + noise
     found = aoa.root_music(samples, sources=2, subarray=subarray)
-    # All sixteen leave nothing to average over.
+    # With all sixteen antennas, there is no average over subarrays.
     assert found.resolved.all() == (subarray < 16)
     if subarray < 16:
         assert (abs(found.angle_rad - angles) < 4 * found.sigma_rad).all()
@@ -422,7 +422,7 @@ def test_what_is_no_plane_wave_is_named() -> None:
     waveform = 10 * (rng.normal(size=(count, 1, 20, 2)) @ [1, 1j]) / np.sqrt(2)
     direct, echo = (np.exp(1j * phase * np.arange(4))[:, None] for phase in (0.4, -1.3))
     clean = aoa.maximum_likelihood(direct * waveform + noise)
-    # One in a hundred, but for chance.
+    # False-alarm rate of 1 %, within statistical limits.
     assert clean.reliable.mean() == pytest.approx(0.99, abs=0.02)
     assert clean.p_value.mean() == pytest.approx(0.5, abs=0.1)
     named = aoa.maximum_likelihood((direct + 0.5j * echo) * waveform + noise)

@@ -64,7 +64,7 @@ def test_a_fitted_manifold_removes_the_bias_of_coupling(unknown: bool) -> None:
     )
     truth = rng.uniform(-np.pi, np.pi, 300)
     others = snapshots(truth, 25.0, 5).T[:, :, None].copy()
-    # An unknown orientation leaves a rotation of all.
+    # With unknown orientations, a common rotation remains.
     ideal, fitted = (
         wrapped(aoa.direction(others, manifold, elevations_rad=(0.0, 0.0)).azimuth_rad - truth)
         for manifold in (PLACES, fit.manifold)
@@ -173,7 +173,7 @@ def real_phases(file: Path) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
 
 
 # 90 % of the errors on the opposite half are below 13 degrees: two of its 24 pairs of position and
-# beacon have strong reflections. Even a fit of all positions leaves them 5 to 12 degrees off.
+# beacon have strong reflections. Their errors are 5 to 12 degrees even in a fit of all positions.
 @pytest.mark.parametrize(("first", "percentile_deg"), [(0, 6.0), (1, 13.5)])
 def test_a_manifold_of_half_of_the_positions_is_good_at_the_others(
     data: Path, first: int, percentile_deg: float

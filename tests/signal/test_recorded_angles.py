@@ -60,7 +60,7 @@ def test_calibrates_and_turns_the_right_way(tmp_path: Path) -> None:
     bursts = estimate_bursts(write(tmp_path / "array", azimuths_deg))
     assert [burst.sample_start for burst in bursts] == [BURST * (2 * k + 1) for k in range(5)]
     for burst, azimuth_deg in zip(bursts, azimuths_deg, strict=True):
-        # The reference's own noise comes on top of the burst's.
+        # The noise of the reference adds to that of the burst.
         assert abs(burst.azimuth_from_broadside_deg - azimuth_deg) < 6 * burst.sigma_deg
 
 

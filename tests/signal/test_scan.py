@@ -80,7 +80,7 @@ def test_a_kept_searcher_finds_what_a_new_search_does() -> None:
     # Samples of another memory order or type are converted.
     assert values(kept.search(np.asfortranarray(samples))) == expected
     assert values(kept.search(samples.astype(np.complex128))) == expected
-    # Searched where it lies, and left as it was.
+    # The samples are searched without a copy, and are not changed.
     before = samples.copy()
     before.flags.writeable = False
     assert values(kept.search(before)) == expected
@@ -116,7 +116,8 @@ def test_a_searcher_rejects_invalid_input_with_a_reason() -> None:
 
 
 def test_a_channel_estimate_carries_its_covariance() -> None:
-    """Angles of the whitened channel are as wrong as they say, in 60 draws within 3 deviations."""
+    """Errors of the angles from the whitened channel agree with their standard deviations: 60 draws
+    within 3 σ."""
     rng = np.random.default_rng(5)
     burst = nr.build_burst(42, ssb_indices=[1], sfn=6, ssb_freq_hz=SSB_HZ)
     noise_std = np.sqrt(0.5 * np.mean(np.abs(burst[np.abs(burst) > 0]) ** 2))
@@ -226,7 +227,7 @@ def test_an_empty_scan_reports_the_searched_range_and_a_hint(
 
 @pytest.mark.parametrize("scenario", ["yard", "paper-real-odometry-4"])
 def test_synthesized_drives_are_scanned_without_parameters(scenario: str, tmp_path: Path) -> None:
-    # At 3500.0 MHz: on no raster at all.
+    # 3500.0 MHz is not on any raster.
     drive = synthesize(scenario, tmp_path, duration_s=0.1)
     site = json.loads(Scenario.load(scenario).site.to_json())
     cells = nr.scan_as_recorded(nr.Recording.open(drive.recording)).cells
@@ -277,7 +278,7 @@ def test_angles_of_received_cells_agree_with_their_standard_deviations() -> None
     z = [(cell.phase_rad - 0.9) / cell.phase_sigma_rad for cell in cells]
     # Four standard deviations of a mean of squares.
     assert np.mean(np.square(z)) == pytest.approx(1, abs=4 * np.sqrt(2 / 60))
-    # More than four of sixty at one in a hundred have a probability of 4e-4.
+    # More than four of sixty false alarms at a rate of 1 % have a probability of 4e-4.
     assert sum(cell.doubt != "" for cell in cells) <= 4
     again = aoa.maximum_likelihood_pilots(cells[0].blocks, noise_variance=1.0)
     assert again.phase_rad == pytest.approx(cells[0].phase_rad)

@@ -1,4 +1,4 @@
-"""IQ recordings as users have them: retuned, in other units, types and containers."""
+"""IQ recordings of users: retuned, in other units, data types and containers."""
 
 from __future__ import annotations
 

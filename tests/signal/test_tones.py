@@ -17,7 +17,7 @@ RATE_HZ = 7.68e6
 
 
 def received(above_ssb_db: float, tone_hz: float) -> NDArray[np.complex128]:
-    """Two antennas, one SSB of power one in 5 ms, 20 dB below it noise, and a tone."""
+    """Two antennas with one SSB of unit power in 5 ms, noise 20 dB below it, and a tone."""
     rng = np.random.default_rng(2)
     burst = nr.build_burst(42, ssb_indices=[1], sfn=7, ssb_freq_hz=CARRIER["ssb_freq_hz"])
     burst = burst / np.sqrt(np.mean(np.abs(burst[np.abs(burst) > 0]) ** 2))

@@ -1,4 +1,4 @@
-"""Statistics against values worked out by hand, tables of quantiles and synthetic drives."""
+"""Statistics compared with manual calculations, tables of quantiles and synthetic runs."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_nees_band_is_that_of_chi_squared() -> None:
 def drives(
     rng: np.random.Generator, runs: int, steps: int, *, stretch: float = 1.0
 ) -> pl.DataFrame:
-    """Errors drawn from an ellipse that is turned and changes; ``stretch`` times too large."""
+    """Errors drawn from a rotated, changing error ellipse, scaled by ``stretch``."""
     tables = []
     for run in range(runs):
         turn = rng.uniform(0, np.pi, steps)
@@ -293,14 +293,14 @@ def test_stanford_regions() -> None:
 def test_alarms_by_hand() -> None:
     steps = (
         (0.1, 0.8, "ok"),
-        (0.1, 0.8, "degraded"),  # an alarm without need
+        (0.1, 0.8, "degraded"),  # an early alarm
         (0.5, 0.4, "ok"),
-        (2.0, 9.0, "ok"),  # beyond the alert limit, silent for 0 s ...
+        (2.0, 9.0, "ok"),  # above the alert limit, without an alarm for 0 s ...
         (2.0, 9.0, "ok"),  # ... 1 s ...
         (2.0, 9.0, "degraded"),
         (2.0, 9.0, "ok"),  # ... and again 3 s after it began
         (0.5, 9.0, "ok"),
-        (2.0, 9.0, "degraded"),  # an alarm in time
+        (2.0, 9.0, "degraded"),  # a timely alarm
     )
     found = Alarms.of(guarded(*steps), alert_limit_m=1.5)
     assert found is not None
@@ -323,7 +323,7 @@ def test_peaks_over_a_threshold_find_known_tails(shape: float) -> None:
     grown = (lambda x: np.expm1(shape * x) / shape) if shape else (lambda x: x)
     level = float(grown(-np.log(truth)))
     found = [exceedance(sample, level) for sample in grown(exponential)]
-    # One sample knows it within a factor of about ten (500 peaks: ξ ± 0.05 over ln 1e5).
+    # One sample determines the rate within a factor of about ten (500 peaks: ξ ± 0.05 over ln 1e5).
     assert 0.2 < np.median(found) / truth < 5.0
     assert max(found) < 1000.0 * truth
 
@@ -383,7 +383,7 @@ def test_percentiles_are_those_of_all_and_their_intervals_of_whole_runs() -> Non
 
 
 def test_intervals_of_percentiles_hold_what_they_are_of() -> None:
-    """With forty runs; that of the 99th percentile is known to be short where runs differ."""
+    """With forty runs; the interval of the 99th percentile is too short if the runs differ."""
     rng = np.random.default_rng(11)
     many = np.abs(rng.standard_normal((4000, 60))) * rng.lognormal(0.0, 0.5, (4000, 1))
     true = dict(zip((50.0, 90.0), np.quantile(many, (0.5, 0.9)), strict=True))

@@ -1,4 +1,4 @@
-"""Sets of measures, and operating points next to each other, on made drives."""
+"""Sets of measures, and comparison of operating points, with synthetic runs."""
 
 from __future__ import annotations
 
@@ -58,13 +58,13 @@ def prices(each: dict[str, float]) -> Prices:
 @pytest.mark.parametrize(
     ("ratios", "costs", "cheapest"),
     [
-        # A single measure that suffices and is dearer than two that suffice together.
+        # A sufficient single measure is more expensive than a sufficient pair.
         ({"a": 0.2, "b": 0.5, "c": 0.5}, {"a": 900.0, "b": 10.0, "c": 20.0}, "b + c"),
-        # The single one is the cheapest.
+        # The single measure is the cheapest.
         ({"a": 0.2, "b": 0.5, "c": 0.5}, {"a": 9.0, "b": 10.0, "c": 20.0}, "a"),
         # All three are needed, and none of the pairs is simulated before.
         ({"a": 0.6, "b": 0.6, "c": 0.7}, {"a": 9.0, "b": 10.0, "c": 20.0}, "a + b + c"),
-        # Nothing suffices: the most effective set shows what is possible.
+        # No set is sufficient: the most effective one is simulated.
         ({"a": 0.9, "b": 0.9, "c": 0.9}, {"a": 9.0, "b": 10.0, "c": 20.0}, None),
     ],
 )
@@ -108,7 +108,7 @@ def test_the_cheapest_set_that_meets_the_target_is_found(
             Agreement.UNDECIDED,
             "every 200 ms",
         ),
-        # None is accurate enough, and all have the same error: the seeds recommend by chance.
+        # No operation is accurate enough, and all have equal errors: the recommendation is random.
         ({200: [0.2] * 4, 500: [0.2] * 4, 1000: [0.2] * 4}, Agreement.EQUIVALENT, None),
     ],
 )
@@ -122,7 +122,7 @@ def test_seeds_agree_or_the_difference_is_judged(
         interval_ms = next((it for it in levels if name.startswith(f"every {it} ms")), None)
         level_m = 0.2 if interval_ms is None else levels[interval_ms][seed // 1000]
         count = 150 if interval_ms is None else bursts[interval_ms]
-        # Drives of different operations do not resemble each other.
+        # The runs of different operations are independent.
         found = made(real, name, scenario, level_m, seed + count)
         return replace(
             found, bursts_received=np.full(RUNS, count), aoa_estimates=np.full(RUNS, 3 * count)

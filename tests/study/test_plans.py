@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-# A centimetre, which the issue requires of every import.
+# Required accuracy of every import: one centimetre.
 SAME_M = 0.01
-# Every entity of a road with units and extrusions that go round, so that each unit and each
-# extrusion meets several entities.
+# Every kind of road entity; units and extrusions are assigned in turn, so that each one is tested
+# with several entities.
 DRAWINGS = [
     pytest.param(road, *plans.UNITS[index % len(plans.UNITS)], down, id=f"{road.__name__}-{down}")
     for index, (road, down) in enumerate(itertools.product(plans.ROADS, (False, True)))
@@ -56,7 +56,7 @@ def test_drawings_give_the_same_plant_or_name_what_they_leave_out(
     plans.add_heads_and_wall(drawing)
     file = tmp_path / "plant.dxf"
     drawing.document.saveas(file)
-    # The scale by hand: what $INSUNITS says is only proposed.
+    # The scale is given, because the unit of $INSUNITS has to be confirmed.
     scale = ("--metres-per-unit", repr(unit_m))
     options = [f"--{it}={file}" for it in ("road", "heads-file", "walls")]
     site, done = new(access_av, tmp_path, *options, *scale)
@@ -77,7 +77,7 @@ def test_drawings_give_the_same_plant_or_name_what_they_leave_out(
     assert float(said[1]) == pytest.approx(length_m, abs=0.05)
 
 
-# A place in the area of use of each system.
+# A position in the area of use of each system.
 MUNICH, NEW_YORK, SAO_PAULO = (48.137, 11.575), (40.70, -74.01), (-23.55, -46.63)
 SYDNEY, AUCKLAND, BERN, LONDON = (-33.87, 151.2), (-36.85, 174.76), (46.95, 7.44), (51.5, -0.12)
 MAPS = [

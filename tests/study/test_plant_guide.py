@@ -1,4 +1,4 @@
-"""The guide for plants: its commands and its Python run as they are written."""
+"""The commands and the Python code of docs/plant.md can be executed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pytest
 
 GUIDE = (ROOT / "docs" / "plant.md").read_text(encoding="utf-8")
-# A few trips of a short road stand for a minute of driving.
+# A few trips of a short road replace a minute of simulation.
 FEW = ("--runs", "2")
 SHORT = (
     ("length_m = 200.0", "length_m = 20.0"),

@@ -1,4 +1,4 @@
-"""Roads and radio heads from the files that plants have, and back."""
+"""Import and export of roads and radio heads."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def course(site: dict[str, Any]) -> NDArray[np.float64]:
 
 
 def apart_m(points: NDArray[np.float64], line: NDArray[np.float64]) -> float:
-    """How far from a line the farthest of some points is."""
+    """Returns the maximum distance of points from a line."""
     start, along = line[:-1], np.diff(line, axis=0)
     square = np.maximum((along**2).sum(axis=1), 1e-12)
     farthest = 0.0
@@ -342,7 +342,7 @@ def test_a_picture_lies_under_a_site_where_two_points_and_a_length_say(
     site = Site.load("site.toml")
     placed = underlay(site)
     assert placed is not None
-    # The lower left corner is the map's zero, y goes upward.
+    # The lower left corner is the origin of the map; y points upwards.
     assert (placed.left_m, placed.right_m) == (0.0, 600.0)
     assert (placed.low_m, placed.high_m) == (0.0, 400.0)
     assert base64.b64decode(placed.url.removeprefix("data:image/png;base64,")) == picture(300, 200)

@@ -1,4 +1,4 @@
-"""A plant's question: every figure of its answer, recomputed from its tables."""
+"""Every figure of a study, computed again from its tables."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-# A short way, so that everything is driven in seconds.
+# A short road, so that all simulations take seconds.
 PLANT = """
 name = "short"
 target = "0.2 m 90 %"
@@ -157,7 +157,7 @@ def said(results: Path) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def page(results: Path) -> str:
-    """The page's text, without its code, its tags and what they escape."""
+    """Returns the text of the page, without scripts and tags."""
     text = (results / "report.html").read_text("utf-8")
     text = re.sub(r"<script>.*?</script>|<style>.*?</style>", "", text, flags=re.S)
     return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text)).split())
@@ -323,7 +323,7 @@ def test_places_are_those_of_the_road(results: Path, said: dict[str, Any], page:
     assert "These figures every 3 m" in page
     for name in ("target_error_m", "median_error_m", "bound_m"):
         assert f"{places[name][9]:.3f} m" in page
-    # Levels and reliability, again from the errors' table.
+    # Protection levels and reliability, computed again from the table of errors.
     route = along_route(Plant.from_toml(PLANT).scenario())
     rows = pl.read_parquet(results / "errors.parquet").filter(variant="unchanged")
     along_m = np.interp(rows["time_s"], route["time_s"], route["along_m"])
@@ -331,7 +331,7 @@ def test_places_are_those_of_the_road(results: Path, said: dict[str, Any], page:
     at = places.row(10, named=True)
     assert at["reliable_share"] == pytest.approx(1.0 - near.null_count() / len(near), abs=1e-4)
     assert at["level_m"] == pytest.approx(near.quantile(0.5, "lower"), abs=1e-3)
-    # Straight ahead to the first bend: the way and its points agree.
+    # On the straight before the first bend, distance and coordinates agree.
     straight = places.filter(pl.col("along_m") < 29.0)
     assert np.allclose(straight["x_m"], straight["along_m"], atol=1e-3)
     # One degree of both angles on a straight, by hand.
@@ -463,7 +463,7 @@ def test_the_page_is_small_loads_nothing_and_shows_names_as_they_are(results: Pa
     assert not re.search(r"""(src|href)=["']?(https?:)?//""", shown)
     assert "<b>bold</b> mast" not in shown
     assert "<i>somebody" not in shown
-    assert "Algorithm 1" not in shown  # nothing of the paper's trip
+    assert "Algorithm 1" not in shown  # no text about the paper's trip
 
 
 def test_the_same_seed_gives_the_same_study_of_a_plant_and_of_its_file(tmp_path: Path) -> None:
@@ -549,7 +549,7 @@ def test_reliability_is_counted_from_the_drives(
         found = errors(results, variant)
         lost_s = (found > 5.0).mean(axis=1) * mine["duration_s"][0]
         assert figures["lost_runs"] == int((lost_s > 5.0).sum()) == mine["is_lost"].sum()
-        # Levels are there at ok only.
+        # Protection levels exist in state ok only.
         levels = pl.read_parquet(results / "errors.parquet").filter(variant=variant)
         ok_share = 1.0 - levels["protection_level_m"].null_count() / levels.height
         assert ok_share == pytest.approx(figures["ok_share"], abs=0.02)
@@ -701,7 +701,7 @@ def test_values_in_another_unit_are_doubted(settings: dict[str, Any], words: str
 def test_a_radio_head_behind_a_hall_is_doubted_on_the_other_side_of_the_road(
     ends_m: tuple[float, float], is_doubtful: bool
 ) -> None:
-    """The gate of `bends`, 25 m to the left of 200 m of straight road, behind a long wall."""
+    """Radio head `gate` of `bends`, 25 m to the left of a straight of 200 m, behind a long wall."""
     walls = [{"name": "hall", "points_m": [[at_m, 10.0] for at_m in ends_m]}]
     told = Plant.load("bends").with_overrides({"site.walls": walls}).warnings()
     assert any("[60.0, -25.0, 8]" in str(it) for it in told) is is_doubtful
@@ -744,7 +744,7 @@ def test_nothing_unguarded_is_studied() -> None:
 
 @pytest.mark.parametrize("name", Plant.names())
 def test_each_shipped_plant_gets_a_recommended_point_of_the_pareto_front(name: str) -> None:
-    """On the last stretch of its road; `benches/shipped_plants.py` drives all of it."""
+    """Uses the last section of the road; `benches/shipped_plants.py` simulates the whole road."""
     plant = Plant.load(name)
     road_m = along_route(plant.scenario())["along_m"].max()
     assert isinstance(road_m, float)
@@ -860,7 +860,7 @@ def test_verdicts_are_enums_with_words_of_their_own(
 
 
 def test_paired_intervals_hold_the_difference_as_often_as_they_say() -> None:
-    """Drives that differ from each other much more than the variants do."""
+    """The runs differ more than the variants."""
     rng = np.random.default_rng(5)
     held = 0
     trials = 100
@@ -869,9 +869,10 @@ def test_paired_intervals_hold_the_difference_as_often_as_they_say() -> None:
         first = scale * np.abs(rng.standard_normal((20, 60)))
         second = 0.8 * scale * np.abs(rng.standard_normal((20, 60)))
         _, low, high = paired_difference(second, first, 50.0)
-        # Median of a mixture: both scale alike, so that the difference is a fifth of the first's.
+        # The median of a mixture scales by the same factor, so that the difference is a fifth of
+        # the first median.
         held += low <= -0.2 * MEDIAN <= high
-    # 95 % of 100, less three standard deviations of the count, and 5 % for so few drives.
+    # 95 of 100, minus three standard deviations of the count, minus 5 for the small number of runs.
     assert held >= 83
 
 

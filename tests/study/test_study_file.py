@@ -1,4 +1,4 @@
-"""A study is saved and loaded as other results are."""
+"""A study can be saved and loaded like other results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every table has the columns that `access_av.columns` says, and nulls only where it says."""
+"""Every table has the columns of `access_av.columns`, and null values only under its conditions."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ pytestmark = pytest.mark.skipif(
 
 
 def poses(command: list[str | Path], drive: Path, folder: Path, sources: str) -> bytes:
-    """The trajectory that a node writes, played back as fast as it can."""
+    """Returns the trajectory that a node writes in fast playback."""
     settings, tum = folder / "node.toml", folder / "node.tum"
     odometry = f'odometry.file = "{drive}/odometry.csv"\n'
     text = f'name = "played"\npace = "fast"\n{odometry}{sources}output.tum = "{tum}"\n'

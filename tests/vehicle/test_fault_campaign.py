@@ -13,9 +13,9 @@ from attack.node.node import PROGRAM, has_small_disk
 if TYPE_CHECKING:
     from pathlib import Path
 
-# Seed of the short campaign: its runs are the same each time.
+# Seed of the short campaign, so that its runs are reproducible.
 SEED = 1
-# Nodes at once: a run waits most of the time.
+# Number of simultaneous nodes; a run waits most of the time.
 AT_ONCE = 12
 # Further runs of a fault that violated a bound; none may violate it again.
 REPEATED = 2
@@ -27,7 +27,8 @@ pytestmark = pytest.mark.skipif(
 
 def test_every_fault_is_reported_and_recovered_from_within_its_bounds(tmp_path: Path) -> None:
     small_disk = has_small_disk()
-    # Recordings take longer to make than all runs together: they belong to the full campaign.
+    # Faults of recordings are part of the full campaign only, because synthesis takes longer than
+    # all runs.
     chosen = [
         replace(it, repetitions=1)
         for it in FAULTS
@@ -44,5 +45,5 @@ def test_every_fault_is_reported_and_recovered_from_within_its_bounds(tmp_path: 
     too_busy = [it.fault for it in verdicts if it.was_busy]
     wrong = {it.fault: it.violations for it in verdicts if it.violations and not it.was_busy}
     assert not wrong
-    # A busy computer may spoil single runs, not the campaign.
+    # Single runs may be invalid on a loaded computer.
     assert len(too_busy) <= len(chosen) // 4, too_busy

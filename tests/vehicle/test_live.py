@@ -1,4 +1,4 @@
-"""The pipeline fed as things come in, and the ROS 2 node made of it."""
+"""The pipeline with data in order of arrival, and the ROS 2 node."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ def test_time_stamps_are_validated_against_arrivals_and_predecessors(drive: Path
 
 
 class Anything(SimpleNamespace):
-    """A message whose fields come to be as they are asked for."""
+    """A message that creates its fields at first access."""
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -188,7 +188,7 @@ class Anything(SimpleNamespace):
 
 
 def ros(monkeypatch: pytest.MonkeyPatch, now_s: list[float]) -> SimpleNamespace:
-    """An `rclpy` of whose node the callbacks can be called."""
+    """A substitute for `rclpy` whose callbacks can be called."""
     seen = SimpleNamespace(callbacks={}, published={}, warned=[], timer=None)
 
     def publisher(_kind: object, topic: str, _depth: int) -> SimpleNamespace:

@@ -1,4 +1,4 @@
-"""`access-av-node`, with peers that others wrote: ZeroMQ, MQTT, MCAP, Prometheus, a browser."""
+"""`access-av-node` with independent peers: ZeroMQ, MQTT, MCAP, Prometheus, a browser."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_a_recording_played_back_gives_the_poses_of_locate(drive: Path, tmp_path
 
 
 def played(folder: Path, messages: list[dict[str, Any]], more: str) -> None:
-    """Drives a node by messages as fast as it can."""
+    """Sends messages to a node as fast as possible."""
     drive = folder / "drive.jsonl"
     drive.write_text("".join(json.dumps(it) + "\n" for it in messages), encoding="utf-8")
     settings = folder / "node.toml"
@@ -108,7 +108,7 @@ def test_each_file_of_a_day_is_whole_and_together_they_hold_all(
     tmp_path: Path, rotation: str
 ) -> None:
     start = {"type": "set-pose", "x_m": -100.0, "y_m": 0.0, "heading_rad": 0.0}
-    # A wheel speed that never repeats is the worst that a file that is compressed can get.
+    # A wheel speed that never repeats is the worst case for compression.
     wheels = [
         {"type": "odometry", "time_s": 0.02 * k, "speed_mps": 1.0 + 0.1 * float(np.sin(k * k))}
         for k in range(10_001)
@@ -192,12 +192,12 @@ def test_a_recording_in_real_time_is_not_read_where_nothing_is_wanted(tmp_path: 
     assert node.returncode == 0, said
     records = lines(tmp_path / "node.jsonl")
     received = sorted({round(it["time_s"]) for it in records if it["type"] == "verdict"})
-    # Found at the start, and after three seconds' sleep each in the one window there is.
+    # SSBs are found at the start, and in the only window after three seconds of sleep.
     assert received[0] == 0
     assert received[-2:] == [received[-1] - 3, received[-1]]
     later = [it for it in records if it["type"] == "verdict" and it["time_s"] > 1.0]
     assert all(it["accepted"] for it in later), later
-    # Each radio head by the search at the start, and then where it is expected.
+    # Each radio head is found by the search at the start, then at its expected time.
     assert state["found_by_search"] == 4
     # A source that is switched off is not silent.
     silent = [it for it in records if "nothing has come" in it.get("text", "")]
@@ -286,7 +286,7 @@ def test_every_radio_head_is_received_through_sockets(live: Live) -> None:
     assert [head["pci"] for head in heads] == [11, 12, 13, 14]
     assert all(head["accepted"] >= 3 for head in heads), heads
     assert live.state["dropped"] == {"blocks": 0, "messages": 0, "records": 0}
-    # The samples between the bursts were not looked at.
+    # The samples between the bursts were not processed.
     assert live.state["duty"] < 0.5
     poses = [it for it in live.records if it["type"] == "pose" and it["by"] == "odometry"]
     assert len(poses) == round(DURATION_S / 0.02) + 1

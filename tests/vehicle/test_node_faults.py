@@ -32,7 +32,7 @@ pytestmark = pytest.mark.skipif(
 
 
 class Driven:
-    """A node with odometry in real time and a known pose that no integrity monitor watches."""
+    """A node with odometry in real time, a known pose and no integrity monitor."""
 
     def __init__(self, folder: Path, broker: Broker) -> None:
         self.json = folder / "node.jsonl"
@@ -69,7 +69,7 @@ class Driven:
         self.thread.start()
 
     def drive(self) -> None:
-        """Sends odometry at 50 Hz on a circle, and the pose as soon as the node takes it."""
+        """Sends odometry at 50 Hz on a circle, and the pose as soon as the node accepts it."""
         with socket.socket(type=socket.SOCK_DGRAM) as sender:
             number = 0
             while not self.ended.wait(0.02):

@@ -62,7 +62,7 @@ class Faulty(Transmitter):
                     sample["yaw_rate_radps"] = 0.0
 
     def run(self, *, speed: float = 1.0) -> None:
-        """Send the drive once in real time, without the absent samples."""
+        """Sends the drive once in real time, without the absent samples."""
         assert speed == 1.0
         if not all(self._asked(rep) for rep in self.sockets):
             return
@@ -85,7 +85,8 @@ class Faulty(Transmitter):
 
 
 def run(drive: Path, folder: Path, transmitter: Faulty, changes: dict[str, str]) -> Any:
-    """Run the node until the drive ends. Returns its records, timed from the start of the drive."""
+    """Runs the node until the drive ends. Returns its records with times from the start of the
+    drive."""
     settings = folder / "node.toml"
     text = node_toml(transmitter, "127.0.0.1:0")
     for old, new in changes.items():
@@ -115,9 +116,9 @@ def run(drive: Path, folder: Path, transmitter: Faulty, changes: dict[str, str])
 def test_reception_resumes_after_samples_were_absent(
     drive: Path, tmp_path: Path, clock: str, sleep: bool
 ) -> None:
-    # Not a whole number of periods, so that every SSB comes off its period.
+    # The gap is not a multiple of the period, so that every SSB deviates from its period.
     transmitter = Faulty(Drive(drive), absent_s=(3.0, 6.0073), is_unix=clock == "arrival")
-    # The wake-up policy wants bursts at all times: the test is about their reception.
+    # The wake-up policy requests every burst, because the test is about reception.
     drive = Path(shutil.copytree(drive, tmp_path / "drive"))
     wake_up_every(drive, 0.1)
     changes = {"name =": f"sleep = {str(sleep).lower()}\nname ="}

@@ -52,7 +52,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Run:
-    """A node that a drive is sent to in real time; its poses against the truth."""
+    """Sends a drive to a node in real time, and compares its poses with the truth."""
 
     def __init__(self, drive: Path, folder: Path) -> None:
         self.drive, self.folder = drive, folder
@@ -66,7 +66,7 @@ class Run:
         self.messages = [(time_s, json.loads("{" + rest)) for time_s, rest in messages_of(drive)]
         self.truth = np.loadtxt(drive / "truth.tum")
         self.records: list[tuple[float, Message]] = []
-        # Time stamp of the odometry minus time of the drive, each that was sent.
+        # Differences between odometry time stamp and drive time that were sent.
         self.offsets_s = {0.0}
         self.began_s = 0.0
         self.peer: socket.socket | None = None
@@ -89,7 +89,7 @@ class Run:
                 time.sleep(0.05)
 
     def read(self, node: subprocess.Popen[str]) -> None:
-        """Reads what the node says, with the time of the drive."""
+        """Reads the output of the node, with the time of the drive."""
         assert node.stdout is not None
         with node.stdout:
             for line in node.stdout:
@@ -113,7 +113,7 @@ class Run:
                 self.peer.sendall(json.dumps(message).encode() + b"\n")
 
     def pause(self, until_s: float) -> None:
-        """Drives on without a message."""
+        """Continues the drive without messages."""
         self.messages = [it for it in self.messages if it[0] > until_s]
         time.sleep(max(0.0, self.began_s + until_s - time.monotonic()))
 
@@ -147,7 +147,8 @@ class Run:
         return found
 
     def assert_truthful(self, since_s: float = 0.0) -> None:
-        """No `ok` pose is beyond its level; 0.3 m are driven within a late arrival."""
+        """No error of an `ok` pose exceeds its level, except 0.3 m that are driven during a late
+        arrival."""
         wrong = [
             (error_m, it["protection_level_m"])
             for error_m, it in self.poses(since_s)
@@ -156,7 +157,7 @@ class Run:
         assert not wrong, wrong[:3]
 
     def assert_recovered(self, *states: str) -> None:
-        """The last pose has one of these states (default: `ok`) and is right."""
+        """The last pose has one of these states (default: `ok`) and is correct."""
         self.assert_truthful()
         error_m, last = self.poses(0.0)[-1]
         assert last["state"] in (states or ("ok",)), (last["state"], last["reason"])
@@ -242,7 +243,7 @@ def test_a_clock_that_steps_back_by_five_seconds_resumes_the_pose(run: Run) -> N
     run.end()
     stepped = [it for it in run.events("odometry") if "the clock has stepped by -5.0" in it]
     assert len(stepped) == 1, run.events("odometry")
-    # The pose goes on where it was, by the new clock.
+    # The pose is resumed with the new clock.
     first = next(it for it in run.poses(6.1) if it[1]["time_s"] < 5.0)
     assert first[0] < 1.0, first
     run.assert_recovered()

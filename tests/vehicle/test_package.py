@@ -109,7 +109,7 @@ def test_unit_is_of_the_required_kind(root: Path) -> None:
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze")
 def test_unit_is_accepted_by_systemd(root: Path, tmp_path: Path) -> None:
-    # Without an installation the program is elsewhere; everything else is verified as installed.
+    # The program has another path without installation; all other items are verified as installed.
     unit = (root / SERVICE).read_text(encoding="utf-8")
     program = root / "usr/bin/access-av-node"
     verified = tmp_path / "access-av-node.service"

@@ -28,7 +28,7 @@ INTERVAL_S = 0.5
 
 
 def can_soapy(settings: Path, options: list[str]) -> bool:
-    """Whether the node was built with the feature `soapy`."""
+    """Returns whether the node was built with the feature `soapy`."""
     told = subprocess.run([NODE, *options, "--dry-run", settings], capture_output=True, text=True)
     return "without the feature" not in told.stderr
 
@@ -63,11 +63,12 @@ def test_a_radio_is_on_for_the_bursts_alone(tmp_path: Path) -> None:
     assert node.returncode == 0, said
     records = [json.loads(line) for line in (tmp_path / "node.jsonl").read_text().splitlines()]
 
-    # Each radio head was found by the search at the start, and then where the radio's clock says.
+    # Each radio head was found by the search at the start, then at its expected time by the radio's
+    # clock.
     assert state["found_by_search"] == 4
     assert all(head["accepted"] >= 8 for head in state["heads"]), state["heads"]
     assert state["dropped"] == {"blocks": 0, "messages": 0, "records": 0}
-    # After the search: on in time before each burst, off after it.
+    # After the search, the radio is on before each burst and off after it.
     sleeping = [it for it in radio.on() if it[0] > 2.0]
     on_s = sum(ended - began for began, ended in sleeping)
     assert len(sleeping) >= (DURATION_S - 2.0) / INTERVAL_S - 2
