@@ -22,7 +22,7 @@ help: ## List these commands
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
 demo: .venv/installed ## Install into .venv, evaluate the paper, write results/latest/report.html
-	$(BIN)/access-av evaluate
+	$(BIN)/access-av paper evaluate
 
 NODE := target/debug/access-av-node
 live: .venv/installed-live $(NODE) ## Send a simulated drive to the node in real time, and open its page (Ctrl-C ends it)
@@ -98,12 +98,12 @@ lint: .venv/installed-test ## Check formats, lints and types of both languages
 	$(BIN)/stubtest access_av._core
 
 docs: .venv/installed-docs ## Build the documentation site target/docs/site/index.html; warnings are errors
-	$(BIN)/access-av columns --markdown > docs/columns.md
+	$(BIN)/access-av file columns --markdown > docs/columns.md
 	$(BIN)/python docs/site/build.py
 
 CHROMIUM ?= chromium
 figures: .venv/installed ## Evaluate the paper with five seeds (10 minutes) and make the figures of README and docs/paper.md
-	$(BIN)/access-av evaluate --seeds 5 --sensitivity --out results/paper
+	$(BIN)/access-av paper evaluate --seeds 5 --sensitivity --out results/paper
 	for name in ablation front sobol; do cp results/paper/$$name.svg docs/paper-$$name.svg; done
 	$(MAKE) --no-print-directory picture REPORT=results/paper/report.html
 

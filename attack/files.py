@@ -182,7 +182,7 @@ def _locate(case: Case, random: Random, *changed: str) -> list[str]:
     angles = "angles.parquet" if "angles.parquet" in changed else "angles.csv"
     options = random.choice(([], [], ["--smooth"], ["--start", "unknown"], ["--start", "0,0,0"]))
     return case.access_av(
-        "locate", "--recording", angles, "--odometry", odometry,
+        "record", "locate", "--recording", angles, "--odometry", odometry,
         "--site", "site.toml", "--vehicle", "vehicle.toml", "--truth", "truth.tum", "--out", "out",
         *options,
     )  # fmt: skip
@@ -218,13 +218,21 @@ def recording(random: Random, case: Case) -> list[str]:
     command = random.choice(("scan", "aoa", "aoa", "locate", "angles"))
     settings_of = ("--site", "site.toml", "--vehicle", "vehicle.toml", "--out", "out")
     if command == "angles":
-        return case.access_av("angles", "iq.sigmf-meta", *settings_of)
+        return case.access_av("record", "angles", "iq.sigmf-meta", *settings_of)
     if command == "locate":
         return case.access_av(
-            "locate", "--recording", "iq.sigmf-meta", "--odometry", "odometry.csv", *settings_of
+            "record",
+            "locate",
+            "--recording",
+            "iq.sigmf-meta",
+            "--odometry",
+            "odometry.csv",
+            *settings_of,
         )
     quick = ["--ssb-freq-hz", "3.5e9", "--scs-khz", "15"] if command == "scan" else []
-    return case.access_av(command, "iq.sigmf-meta", *quick, *random.choice(([], ["--json"])))
+    return case.access_av(
+        "record", command, "iq.sigmf-meta", *quick, *random.choice(([], ["--json"]))
+    )
 
 
 def road_file(random: Random, case: Case) -> list[str]:
@@ -241,4 +249,4 @@ def road_file(random: Random, case: Case) -> list[str]:
     case.write(name, held)
     site = deepcopy(settings("site", "yard"))
     site["road"] = {"file": name}
-    return case.access_av("site", "check", case.write("site.toml", site))
+    return case.access_av("file", "check", "--kind", "site", case.write("site.toml", site))

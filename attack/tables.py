@@ -53,8 +53,8 @@ def results(random: Random, case: Case) -> list[str]:
     """A folder of results, and a command that reads it."""
     name, command = random.choice(
         (
-            ("operating_points", ("explore", "--results", ".", "--max-energy-j", "1000")),
-            ("designs", ("choose", ".", "--max-energy-j", "1000")),
+            ("operating_points", ("paper", "explore", "--results", ".", "--max-energy-j", "1000")),
+            ("designs", ("design", "select", ".", "--max-energy-j", "1000")),
         )
     )
     table = held(name)
@@ -77,8 +77,11 @@ def given(random: Random, case: Case) -> list[str]:
     case.write("site.toml", recorded()["site.toml"])
     name, command = random.choice(
         (
-            ("masts.csv", ("plan", "short.toml", "--masts")),
-            ("paths.csv", ("import-paths", "--carrier-mhz", "3500", "--site", "site.toml")),
+            ("masts.csv", ("design", "plan", "short.toml", "--masts")),
+            (
+                "paths.csv",
+                ("design", "import-paths", "--carrier-mhz", "3500", "--site", "site.toml"),
+            ),
         )
     )
     text = {"masts.csv": MASTS, "paths.csv": PATHS}[name]
@@ -91,7 +94,7 @@ def figures(random: Random, case: Case) -> list[str]:
     """The figures of a fleet, or a design space."""
     if random.random() < 0.6:
         fleet = mutate.table(random, shipped("economics", "balance.toml"))
-        return case.access_av("balance", case.write("fleet.toml", fleet))
+        return case.access_av("design", "balance", case.write("fleet.toml", fleet))
     case.write("short.toml", SHORT)
     space = case.write("space.toml", mutate.table(random, SPACE))
-    return case.access_av("designs", "short.toml", "--space", space, "--runs", "1")
+    return case.access_av("design", "sweep", "short.toml", "--space", space, "--runs", "1")

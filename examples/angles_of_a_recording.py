@@ -3,7 +3,7 @@
 The Python form of `crates/recording/examples/angles_of_a_recording.rs`. Only the recording is
 needed::
 
-    access-av synth yard --duration-s 2 --out drive
+    access-av record synth yard --duration-s 2 --out drive
     python examples/angles_of_a_recording.py drive/iq.sigmf-meta
 """
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 
@@ -47,6 +47,20 @@ class Finished(NamedTuple):
     code: int
     out: str
     err: str
+
+
+def commands() -> list[str]:
+    """Returns all commands of the command line, such as ``paper evaluate``."""
+    import typer.main
+
+    from access_av.cli.main import app
+
+    top: Any = typer.main.get_command(app)
+    found = list[str]()
+    for name, command in top.commands.items():
+        inner = getattr(command, "commands", None)
+        found += [name] if inner is None else [f"{name} {it}" for it in inner]
+    return found
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ NODE = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-node
 
 
 def command(drive: Path, settings: Path, *options: str) -> list[str]:
-    """Returns the node's command for a drive that `access-av synth` wrote."""
+    """Returns the node's command for a drive that `access-av record synth` wrote."""
     nominal = ["--site", str(drive / "site.toml"), "--vehicle", str(drive / "vehicle.toml")]
     return [str(NODE), *nominal, *options, str(settings)]
 

@@ -69,7 +69,8 @@ class Robot:
         )
         (place / "truth.tum").write_text("# time x y z qx qy qz qw\n" + "".join(lines))
         return [
-            "locate", "--recording", place / "angles.csv", "--odometry", place / "odometry.csv",
+            "record", "locate", "--recording", place / "angles.csv",
+            "--odometry", place / "odometry.csv",
             "--site", place / "site.toml", "--vehicle", place / "vehicle.toml",
             "--start", ",".join(map(str, self.start)), "--out", place / "out",
         ]  # fmt: skip

@@ -1,7 +1,7 @@
 """Sample faults: a recorded drive whose samples are changed, played back or sent in real time.
 
-The samples come from `access-av synth`; the changes are made here. The line of sight is strong
-(K = 20 dB, no shadowing), so that the fault-free state is always `ok`.
+The samples come from `access-av record synth`; the changes are made here. The line of sight is
+strong (K = 20 dB, no shadowing), so that the fault-free state is always `ok`.
 """
 
 from __future__ import annotations

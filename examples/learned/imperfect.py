@@ -9,7 +9,7 @@ antennas give B a(ω), where B is a matrix. A drive along a known road gives sna
 angle. They are used to estimate
 
 - two numbers, the direction of the axis and one phase from antenna to antenna, as
-  `access-av survey` does;
+  `access-av record survey` does;
 - the whole matrix B, by alternating least squares over B and the complex amplitude of each
   snapshot;
 - a network of two layers.

@@ -14,7 +14,7 @@ SOURCE = Path(__file__).with_name("replay_radio.cpp")
 
 
 class Radio:
-    """Plays a drive of `access-av synth --continuous` to the program that opens it by SoapySDR."""
+    """Plays a drive of `access-av record synth --continuous` to a program that uses SoapySDR."""
 
     def __init__(self, recording: Path, scratch: Path) -> None:
         module = scratch / "libreplay.so"

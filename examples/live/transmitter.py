@@ -7,7 +7,7 @@ JSON to every connected client. Both run in real time from the first request for
 
     python examples/live/transmitter.py DRIVE [--port 2000] [--odometry-port 2100] [--once]
 
-DRIVE is a folder that `access-av synth` wrote. Antenna k is at port + k.
+DRIVE is a folder that `access-av record synth` wrote. Antenna k is at port + k.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ ANSWER = 3840
 
 
 def odometry_of(folder: Path) -> list[dict[str, float]]:
-    """Returns the odometry of a drive that `access-av synth` wrote."""
+    """Returns the odometry of a drive that `access-av record synth` wrote."""
     with (folder / "odometry.csv").open(encoding="utf-8") as file:
         rows = csv.DictReader(file)
         return [{key: float(row[key]) for key in row if row[key]} for row in rows]
 
 
 class Drive:
-    """Samples and odometry of a drive that `access-av synth` wrote."""
+    """Samples and odometry of a drive that `access-av record synth` wrote."""
 
     def __init__(self, folder: Path) -> None:
         metadata = json.loads((folder / "iq.sigmf-meta").read_text(encoding="utf-8"))

@@ -398,13 +398,15 @@ def test_sites_of_recorded_drives_and_of_a_street_are_fine(data: Path) -> None:
 def test_check_warns_and_goes_on(tmp_path: Path, access_av: Callable[..., Finished]) -> None:
     (tmp_path / "fine.toml").write_text(PLANT)
     (tmp_path / "deep.toml").write_text(PLANT.replace("25.0, 8.0]", "25.0, -8.0]"))
-    done = access_av("site", "check", tmp_path / "fine.toml", tmp_path / "deep.toml")
+    done = access_av(
+        "file", "check", "--kind", "site", tmp_path / "fine.toml", tmp_path / "deep.toml"
+    )
     assert done.code == 0
     assert "fine.toml: valid" in done.out
     assert "deep.toml: valid, 1 warning" in done.out
     assert "specify metres above the ground, positive upwards: 8" in done.err
     (tmp_path / "cart.toml").write_text(VEHICLE + 'platform = { name = "jetson" }\n')
-    done = access_av("vehicle", "check", tmp_path / "cart.toml")
+    done = access_av("file", "check", "--kind", "vehicle", tmp_path / "cart.toml")
     assert done.code == 2
     assert "`platform.name`" in done.err
 
@@ -435,20 +437,30 @@ def test_a_run_prints_warnings_first(
 SITE_AND_VEHICLE = ("--site", "yard", "--vehicle", "tugger")
 COMMANDS = (
     ("run", "yard"),
-    ("bound", "yard"),
-    ("plan", "yard"),
-    ("integrity", "yard"),
-    ("tune", "yard"),
-    ("designs", "yard", "--space", "space.toml"),
-    ("synth", "yard", "--out", "drive"),
-    ("locate", "--recording", "a.csv", "--odometry", "o.csv", *SITE_AND_VEHICLE),
-    ("survey", "drive", *SITE_AND_VEHICLE),
-    ("angles", "iq.sigmf-meta", *SITE_AND_VEHICLE),
-    ("import-paths", "t.csv", "--site", "yard", "--carrier-mhz", "3500", "--out", "p.npz"),
+    ("design", "bound", "yard"),
+    ("design", "plan", "yard"),
+    ("design", "integrity", "yard"),
+    ("design", "tune", "yard"),
+    ("design", "sweep", "yard", "--space", "space.toml"),
+    ("record", "synth", "yard", "--out", "drive"),
+    ("record", "locate", "--recording", "a.csv", "--odometry", "o.csv", *SITE_AND_VEHICLE),
+    ("record", "survey", "drive", *SITE_AND_VEHICLE),
+    ("record", "angles", "iq.sigmf-meta", *SITE_AND_VEHICLE),
+    (
+        "design",
+        "import-paths",
+        "t.csv",
+        "--site",
+        "yard",
+        "--carrier-mhz",
+        "3500",
+        "--out",
+        "p.npz",
+    ),
 )
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command[0])
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: "-".join(command[:2]))
 def test_every_command_prints_warnings_first(
     command: tuple[str, ...], access_av: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -504,7 +516,7 @@ def test_dead_reckoning_with_two_radio_heads_is_reported_by_varied_commands(
         "[vehicle.platform]\nmode = [0, 1]\n"
     )
     space = ("--space", tmp_path / "space.toml", "--runs", "1")
-    done = access_av("designs", tmp_path / "short.toml", *space, "--out", tmp_path / "d")
+    done = access_av("design", "sweep", tmp_path / "short.toml", *space, "--out", tmp_path / "d")
     assert done.code == 0, done.err
     assert " ".join(done.err.split()).count(said) == 1
 

@@ -11,6 +11,7 @@ import pytest
 
 from access_av.cli import terminal
 from access_av.paper.statements import stated_claims
+from conftest import commands
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,45 +24,32 @@ if TYPE_CHECKING:
 TRAJECTORY_COLUMNS = {
     "run", "time_s", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "error_x_m", "error_y_m",
 }  # fmt: skip
-COMMANDS = [
-    "evaluate", "interpretations", "search", "run", "explore", "bound", "aoa", "scan", "synth",
-    "locate",
-    "fit", "columns", "scenario", "platform",
-]  # fmt: skip
+# Maximum numbers of names after `access-av`, and of commands in all.
+MOST_NAMES, MOST_COMMANDS = 8, 42
 
 
-def test_help_lists_every_command(access_av: Cli) -> None:
-    done = access_av("--help")
-    assert done.code == 0
-    for command in COMMANDS:
-        assert command in done.out
+def test_commands_are_few_and_in_groups_by_task(access_av: Cli) -> None:
+    assert len({command.split()[0] for command in commands()}) <= MOST_NAMES
+    assert len(commands()) <= MOST_COMMANDS
+    for group in ("", "paper", "design", "record", "file"):
+        done = access_av(*group.split(), "--help")
+        assert done.code == 0
+        inner = {it.removeprefix(group).split()[0] for it in commands() if it.startswith(group)}
+        for name in inner:
+            assert f"│ {name} " in done.out
+        assert "─ Commands ─" not in done.out, "each command belongs to a panel"
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        "evaluate",
-        "interpretations",
-        "search",
-        "run",
-        "explore",
-        "bound",
-        "aoa",
-        "scan",
-        "synth",
-        "locate",
-        "fit",
-    ],
-)
+@pytest.mark.parametrize("command", commands())
 def test_help_of_each_command_has_an_example(access_av: Cli, command: str) -> None:
-    done = access_av(command, "--help", columns=60)
+    done = access_av(*command.split(), "--help", columns=60)
     assert done.code == 0
-    assert f"access-av {command}" in done.out
-    assert "Example:" in done.out
+    assert f"access-av {command} " in " ".join(done.out.split())
+    assert "Example" in done.out
     assert max(map(len, done.out.splitlines())) <= 60
 
 
-@pytest.mark.parametrize("command", ["locate", "platform power"])
+@pytest.mark.parametrize("command", ["record locate", "design power"])
 def test_help_breaks_a_line_only_where_the_next_word_has_no_room(
     access_av: Cli, command: str
 ) -> None:
@@ -85,7 +73,7 @@ def test_run_writes_the_files_that_its_help_lists(access_av: Cli, tmp_path: Path
     assert set(aoa_estimates.columns) >= {"run", "time_s"}
     manifest = json.loads((tmp_path / "r/manifest.json").read_text())
     assert manifest["seed"] == 3
-    assert access_av("scenario", "check", tmp_path / "r/scenario.toml").code == 0
+    assert access_av("file", "check", "--kind", "scenario", tmp_path / "r/scenario.toml").code == 0
     # The platform's default value is written out.
     assert "base_ms = 80.0" in (tmp_path / "r/scenario.toml").read_text()
     assert not (tmp_path / "results").exists()
@@ -133,14 +121,14 @@ def test_explore_answers_from_the_last_evaluation(
 ) -> None:
     (tmp_path / "results").symlink_to(quick_study)
     monkeypatch.chdir(tmp_path)
-    done = access_av("explore", "--max-energy-j", "1000", "--json")
+    done = access_av("paper", "explore", "--max-energy-j", "1000", "--json")
     assert len(json.loads(done.out)) == 8
-    assert access_av("explore", "--max-energy-j", "1000", "--fixed", columns=60).code == 0
-    asked = ("explore", "--max-error-m", "9", "--percentile", "90", "--json")
+    assert access_av("paper", "explore", "--max-energy-j", "1000", "--fixed", columns=60).code == 0
+    asked = ("paper", "explore", "--max-error-m", "9", "--percentile", "90", "--json")
     found = json.loads(access_av(*asked).out)
     assert all(each["p90_error_low_m"] <= each["p90_error_m"] for each in found)
-    assert access_av("explore", "--max-error-m", "1", "--percentile", "12").code == 2
-    none = access_av("explore", "--max-energy-j", "1")
+    assert access_av("paper", "explore", "--max-error-m", "1", "--percentile", "12").code == 2
+    none = access_av("paper", "explore", "--max-energy-j", "1")
     assert none.code == 3
     assert "No operating point has energy ≤ 1 J" in none.out
 
@@ -148,7 +136,7 @@ def test_explore_answers_from_the_last_evaluation(
 def test_output_of_evaluate_fits_one_screen(access_av: Cli, tmp_path: Path) -> None:
     """Verdict, three figures and the path of the report; the report contains everything else."""
     arguments = ("--interpretation", "gate", "--runs", "1", "--out", str(tmp_path / "e"))
-    done = access_av("evaluate", *arguments, columns=60)
+    done = access_av("paper", "evaluate", *arguments, columns=60)
     assert done.code == 0, done.err
     lines = done.out.splitlines()
     assert len(lines) <= 24
@@ -168,16 +156,53 @@ def test_output_of_evaluate_fits_one_screen(access_av: Cli, tmp_path: Path) -> N
         assert private not in words
 
 
-def test_shipped_files_are_listed_shown_and_fine(access_av: Cli, tmp_path: Path) -> None:
-    for what in ("site", "vehicle", "scenario", "platform"):
-        names = access_av(what, "list").out.split()
-        assert names
-        for name in names:
-            shown = access_av(what, "show", name)
-            file = tmp_path / f"{name}.toml"
-            file.write_text(shown.out)
-            assert access_av(what, "check", str(file), name).code == 0
-        assert json.loads(access_av(what, "schema").out)["$schema"]
+KINDS = ("site", "vehicle", "scenario", "platform", "plant")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_shipped_files_are_listed_shown_and_fine(access_av: Cli, tmp_path: Path, kind: str) -> None:
+    names = access_av("file", "list", kind).out.split()
+    assert names
+    for name in names:
+        shown = access_av("file", "show", "--kind", kind, name)
+        file = tmp_path / f"{name}.toml"
+        file.write_text(shown.out)
+        assert access_av("file", "check", "--kind", kind, str(file), name).code == 0
+        # The keys of a complete file determine its kind.
+        assert access_av("file", "check", str(file)).out.startswith(f"{file}: valid")
+        assert access_av("file", "show", str(file)).out == shown.out
+    assert json.loads(access_av("file", "schema", kind).out)["$schema"]
+
+
+def test_kinds_of_files(access_av: Cli, tmp_path: Path) -> None:
+    listed = access_av("file", "list").out.splitlines()
+    assert {line.split(":")[0] for line in listed} == {*KINDS}
+    assert "radio_heads" in access_av("file", "show", "trip-1", "--kind", "site").out
+    assert "wake_up" in access_av("file", "show", "tugger").out  # the name of a vehicle only
+    file = tmp_path / "mine.toml"
+    for text, named in (
+        ('extends = "yard"\nname = "mine"\n', ["could be a", "--kind site", "--kind scenario"]),
+        ('name = "mine"\n[page]\n', ["node file", "access-av-node"]),
+        ("a = " + "[" * 100_000, ["mine.toml"]),
+    ):
+        file.write_text(text)
+        done = access_av("file", "check", file, columns=400)
+        assert done.code == 2
+        for part in named:
+            assert part in done.err, done.err
+    for name, part in (("nowhere", "no such file"), ("yard", "--kind plant or --kind site")):
+        done = access_av("file", "show", name, columns=400)
+        assert done.code == 2
+        assert part in done.err, done.err
+
+
+def test_options_of_sites_are_rejected_for_files_without_a_site(
+    access_av: Cli, tmp_path: Path
+) -> None:
+    done = access_av("file", "new", "vehicle", tmp_path / "v.toml", "--heads-file", "heads.csv")
+    assert done.code == 2
+    assert "--heads-file: only for plant and site files, not for vehicle" in done.err
+    assert not list(tmp_path.glob("*.toml"))
 
 
 SCENARIO = (
@@ -221,7 +246,7 @@ def test_bad_scenarios_end_with_2_and_name_file_and_key(
 ) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(text)
-    for arguments in (("run", file), ("scenario", "check", file)):
+    for arguments in (("run", file), ("file", "check", file)):
         done = access_av(*map(str, arguments))
         assert done.code == 2
         for part in ("mine.toml", *named):
@@ -237,18 +262,18 @@ def test_bad_scenarios_end_with_2_and_name_file_and_key(
         (["run", "paper", "--set", "nonsense"], ["KEY=VALUE"]),
         (["run", "paper", "--runs", "0"], ["--runs"]),
         (["run", "paper", "--seed", "-1"], ["--seed"]),
-        (["evaluate", "--platform", "jetson"], ["jetson", "jetson-agx-xavier"]),
-        (["evaluate", "--scenario", "nowhere.toml"], ["nowhere.toml"]),
-        (["explore", "--max-energy-j", "nan"], ["--max-energy-j"]),
-        (["explore", "--max-energy-j", "inf"], ["finite"]),
-        (["explore", "--max-rms-m", "-1"], ["--max-rms-m"]),
-        (["explore", "--results", "."], ["operating_points.parquet"]),
-        (["bound", "papier"], ["papier", "paper"]),
-        (["bound", "yard", "--map-step-m", "0"], ["--map-step-m", "above 0"]),
-        (["bound", "yard", "--map-step-m", "nan"], ["--map-step-m", "above 0"]),
-        (["bound", "yard", "--map-step-m", "0.01"], ["--map-step-m", "at most"]),
-        (["bound", "paper", "--out", "pyproject.toml"], ["--out takes a directory"]),
-        (["aoa", "nowhere"], ["nowhere", ".sigmf-meta"]),
+        (["paper", "evaluate", "--platform", "jetson"], ["jetson", "jetson-agx-xavier"]),
+        (["paper", "evaluate", "--scenario", "nowhere.toml"], ["nowhere.toml"]),
+        (["paper", "explore", "--max-energy-j", "nan"], ["--max-energy-j"]),
+        (["paper", "explore", "--max-energy-j", "inf"], ["finite"]),
+        (["paper", "explore", "--max-rms-m", "-1"], ["--max-rms-m"]),
+        (["paper", "explore", "--results", "."], ["operating_points.parquet"]),
+        (["design", "bound", "papier"], ["papier", "paper"]),
+        (["design", "bound", "yard", "--map-step-m", "0"], ["--map-step-m", "above 0"]),
+        (["design", "bound", "yard", "--map-step-m", "nan"], ["--map-step-m", "above 0"]),
+        (["design", "bound", "yard", "--map-step-m", "0.01"], ["--map-step-m", "at most"]),
+        (["design", "bound", "paper", "--out", "pyproject.toml"], ["--out takes a directory"]),
+        (["record", "aoa", "nowhere"], ["nowhere", ".sigmf-meta"]),
         (["frobnicate"], ["frobnicate"]),
     ],
     ids=" ".join,

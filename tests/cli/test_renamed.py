@@ -12,6 +12,7 @@ from access_av.errors import InputError
 from access_av.tables import renamed, validation
 from access_av.tables.columns.glossary import GLOSSARY
 from access_av.tables.columns.tables import TABLES
+from conftest import commands
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,18 +20,19 @@ if TYPE_CHECKING:
 
     from conftest import Finished
 
+KINDS = ("plant", "site", "vehicle", "scenario", "platform", "--kind")
 # A command that has the option under its new name, unless the table names the command.
 COMMANDS = {
     "--vary": ["run", "yard"],
     "--compare": ["run", "yard"],
-    "--reading": ["evaluate"],
-    "--unknowns": ["evaluate"],
+    "--reading": ["paper", "evaluate"],
+    "--unknowns": ["paper", "evaluate"],
     "--always-mend": ["study", "bends"],
-    "--german": ["export", "trip-2", "road.csv"],
-    "--mismatch": ["integrity", "yard"],
-    "--hypotheses": ["integrity", "yard"],
-    "integrity --heads": ["integrity", "yard"],
-    "new --heads": ["new", "plant", "mine.toml"],
+    "--german": ["file", "export", "trip-2", "road.csv"],
+    "--mismatch": ["design", "integrity", "yard"],
+    "--hypotheses": ["design", "integrity", "yard"],
+    "integrity --heads": ["design", "integrity", "yard"],
+    "new --heads": ["file", "new", "plant", "mine.toml"],
 }
 
 
@@ -42,15 +44,34 @@ def test_old_options(access_av: Callable[..., Finished], old: str, new: str) -> 
     text = " ".join(done.err.replace("│", " ").split())
     assert f"renamed in version 0.2.0: write {new}" in text, done.err
     option = new.split()[0]
-    assert option in access_av(*command[: 2 if command[0] == "new" else 1], "--help").out
+    assert (
+        option
+        in access_av(*command[: 1 + (command[0] in ("paper", "design", "file"))], "--help").out
+    )
 
 
 @pytest.mark.parametrize(("old", "new"), renamed.names("commands").items())
 def test_old_commands(access_av: Callable[..., Finished], old: str, new: str) -> None:
-    done = access_av(old)
+    done = access_av(*old.split(), columns=200)
     assert done.code == 2
-    assert f"write {new}" in " ".join(done.err.split()), done.err
-    assert access_av(new, "--help").code == 0
+    assert f"'{old}'. It was renamed in version 0.2.0: write {new}" in " ".join(done.err.split())
+    arguments = [word for word in new.split() if word not in KINDS]
+    assert access_av(*arguments, "--help").code == 0
+    assert not {*commands()} & {old}
+
+
+def test_command_lines_of_earlier_results_are_translated() -> None:
+    for old, new in {
+        "designs paper --space space.toml": "design sweep paper --space space.toml",
+        "integrity yard --hypotheses --heads 4": (
+            "design integrity yard --fault-scale 1,3,10 --num-heads 4"
+        ),
+        "run yard --vary site.rician_k_db=1,2": "run yard --sweep site.rician_k_db=1,2",
+        "evaluate --reading=gate": "paper evaluate --interpretation=gate",
+        "design sweep paper": "design sweep paper",
+        "study bends": "study bends",
+    }.items():
+        assert renamed.current(old.split()) == new.split()
 
 
 def test_the_old_word_for_an_unknown_start(
@@ -58,7 +79,7 @@ def test_the_old_word_for_an_unknown_start(
 ) -> None:
     for name in ("odometry.csv", "angles.csv"):
         (tmp_path / name).write_text("time_s\n")
-    arguments = ["locate", "--odometry", "odometry.csv", "--recording", "angles.csv"]
+    arguments = ["record", "locate", "--odometry", "odometry.csv", "--recording", "angles.csv"]
     done = access_av(*arguments, "--site", "yard", "--vehicle", "carrier", "--start", "scratch")
     assert done.code == 2
     assert "write --start unknown" in " ".join(done.err.split()), done.err
@@ -76,7 +97,7 @@ def test_old_keys() -> None:
 
 
 def test_new_keys_exist(access_av: Callable[..., Finished]) -> None:
-    schema = access_av("scenario", "schema").out
+    schema = access_av("file", "schema", "scenario").out
     for new in renamed.names("keys").values():
         assert f'"{new.split(".")[-1]}"' in schema, new
 

@@ -28,16 +28,16 @@ COMMANDS = {
         *("run", "short.toml", "--runs", "2", "--set", "site.radio_heads[0].eirp_dbm=5"),
         *("--sweep", "site.rician_k_db=0,20", "--against", "short.toml"),
     ),
-    "synth": ("synth", "short.toml"),
-    "angles": ("angles", "drive/iq.sigmf-meta", *DRIVE),
-    "locate": ("locate", *RECORDED, *DRIVE, "--truth", "drive/truth.tum", "--smooth"),
-    "survey": ("survey", "log1", "log2", *DRIVE),
-    "bound": ("bound", "short.toml", "--map-step-m", "60"),
-    "plan": ("plan", "short.toml"),
-    "designs": ("designs", "short.toml", "--space", "space.toml", "--runs", "2"),
-    "tune": ("tune", "short.toml", "--runs", "2", "--designs", "2", "--max-error-m", "3"),
-    "integrity": ("integrity", "short.toml", "--runs", "2", "--fault", "none"),
-    "evaluate": ("evaluate", "--interpretation", "gate", "--runs", "1"),
+    "synth": ("record", "synth", "short.toml"),
+    "angles": ("record", "angles", "drive/iq.sigmf-meta", *DRIVE),
+    "locate": ("record", "locate", *RECORDED, *DRIVE, "--truth", "drive/truth.tum", "--smooth"),
+    "survey": ("record", "survey", "log1", "log2", *DRIVE),
+    "bound": ("design", "bound", "short.toml", "--map-step-m", "60"),
+    "plan": ("design", "plan", "short.toml"),
+    "designs": ("design", "sweep", "short.toml", "--space", "space.toml", "--runs", "2"),
+    "tune": ("design", "tune", "short.toml", "--runs", "2", "--designs", "2", "--max-error-m", "3"),
+    "integrity": ("design", "integrity", "short.toml", "--runs", "2", "--fault", "none"),
+    "evaluate": ("paper", "evaluate", "--interpretation", "gate", "--runs", "1"),
     "study": ("study", "plant.toml", "--runs", "2"),
 }
 
@@ -65,7 +65,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("log2", ("--angles", "--run", "1")),
     )
     for name, options in drives:
-        done = access_av(where, "synth", "short.toml", *options, "--out", name)
+        done = access_av(where, "record", "synth", "short.toml", *options, "--out", name)
         assert done.returncode == 0, done.stderr
     return where
 
@@ -82,6 +82,18 @@ def test_the_results_of_every_command_are_repeated(name: str, folder: Path) -> N
     files = [it for it in (folder / f"of-{name}").rglob("*") if it.is_file()]
     assert record["files"] == sum("parts" not in it.parts for it in files) > 1
     assert record["written_by"] == record["repeated_by"]
+
+
+def test_a_command_line_of_an_earlier_version_is_repeated(folder: Path, tmp_path: Path) -> None:
+    done = access_av(folder, "design", "bound", "short.toml", "--out", str(tmp_path / "old"))
+    assert done.returncode == 0, done.stderr
+    file = tmp_path / "old/manifest.json"
+    manifest = json.loads(file.read_text())
+    program, *words = manifest["command"]
+    assert words[:2] == ["design", "bound"]
+    file.write_text(json.dumps({**manifest, "command": [program, *words[1:]]}))
+    repeated = access_av(folder, "rerun", str(tmp_path / "old"))
+    assert repeated.returncode == 0, repeated.stdout + repeated.stderr
 
 
 def test_every_command_with_results_is_tried() -> None:

@@ -154,7 +154,8 @@ def test_tables_hold_no_nan(name: str) -> None:
 @pytest.mark.parametrize("start_s", ["-1e9", "1e9", "nan", "inf"])
 def test_start_times_that_cannot_be(access_av: Cli, drive: Path, start_s: str) -> None:
     done = access_av(
-        "locate", "--recording", drive / "iq.sigmf-meta", "--odometry", drive / "odometry.csv",
+        "record", "locate", "--recording", drive / "iq.sigmf-meta",
+        "--odometry", drive / "odometry.csv",
         "--site", drive / "site.toml", "--vehicle", drive / "vehicle.toml",
         "--start-time-s", start_s,
     )  # fmt: skip
@@ -203,8 +204,8 @@ def test_drives_too_large(key: str, value: Any) -> None:
 def test_what_is_too_large_can_be_meant(access_av: Cli, tmp_path: Path) -> None:
     file = tmp_path / "long.toml"
     file.write_text('extends = "paper"\nmotion.stops = [{ at_m = 100.0, dwell_s = 8e4 }]\n')
-    refused(access_av("scenario", "check", file), "22", "allow_large", "stops")
-    assert access_av("scenario", "check", "--allow-large", file).code == 0
+    refused(access_av("file", "check", "--kind", "scenario", file), "22", "allow_large", "stops")
+    assert access_av("file", "check", "--kind", "scenario", "--allow-large", file).code == 0
 
 
 @pytest.mark.parametrize(
@@ -251,13 +252,13 @@ def test_threads_that_no_core_is_for() -> None:
     assert 2 <= int(done.stdout) <= (os.cpu_count() or 1) + 16
 
 
-@pytest.mark.parametrize("words", [["fit", "x" * 2000], ["x" * 2000], ["--" + "x" * 2000]])
+@pytest.mark.parametrize("words", [["paper", "fit", "x" * 2000], ["x" * 2000], ["--" + "x" * 2000]])
 def test_usage_errors_are_brief(access_av: Cli, words: list[str]) -> None:
     done = access_av(*words)
     assert done.code == 2
     assert "xxx" in done.err
     assert done.err.count("x") < 500
-    assert "\x1b" not in access_av("fit", "\x1b[2J").err
+    assert "\x1b" not in access_av("paper", "fit", "\x1b[2J").err
 
 
 def test_too_many_radio_heads(access_av: Cli, tmp_path: Path) -> None:
@@ -266,21 +267,23 @@ def test_too_many_radio_heads(access_av: Cli, tmp_path: Path) -> None:
     file = tmp_path / "site.toml"
     file.write_text('name = "many"\n' + "".join(heads))
     began_s = time.monotonic()
-    refused(access_av("site", "check", file), "radio_heads", "1000")
+    refused(access_av("file", "check", "--kind", "site", file), "radio_heads", "1000")
     assert time.monotonic() - began_s < 10.0
 
 
 def test_files_without_end(access_av: Cli, drive: Path, tmp_path: Path) -> None:
-    refused(access_av("scenario", "check", "/dev/zero"), "/dev/zero", "regular file")
+    refused(
+        access_av("file", "check", "--kind", "scenario", "/dev/zero"), "/dev/zero", "regular file"
+    )
     pipe = tmp_path / "pipe.csv"
     os.mkfifo(pipe)
-    refused(access_av("site", "check", pipe), "regular file")
+    refused(access_av("file", "check", "--kind", "site", pipe), "regular file")
     zeros = tmp_path / "zeros.toml"
     zeros.write_bytes(bytes(1 << 20))
-    refused(access_av("site", "check", zeros), "zeros.toml")
+    refused(access_av("file", "check", "--kind", "site", zeros), "zeros.toml")
     with zeros.open("r+b") as file:
         file.truncate(1 << 40)
-    refused(access_av("site", "check", zeros), "zeros.toml")
+    refused(access_av("file", "check", "--kind", "site", zeros), "zeros.toml")
     for option in ("--odometry", "--recording", "--truth"):
         words = {
             "--recording": drive / "iq.sigmf-meta",
@@ -290,19 +293,19 @@ def test_files_without_end(access_av: Cli, drive: Path, tmp_path: Path) -> None:
             option: pipe,
         }
         flat = [word for pair in words.items() for word in pair]
-        refused(access_av("locate", *flat, "--out", tmp_path / "out"), "regular file")
+        refused(access_av("record", "locate", *flat, "--out", tmp_path / "out"), "regular file")
 
 
 def test_what_would_never_end(access_av: Cli, tmp_path: Path) -> None:
     one, other = tmp_path / "one.toml", tmp_path / "other.toml"
     one.write_text(f'extends = "{other}"\n')
     other.write_text(f'extends = "{one}"\n')
-    refused(access_av("site", "check", one), "extends")
+    refused(access_av("file", "check", "--kind", "site", one), "extends")
     one.write_text("a = " + "[" * 100_000)
-    refused(access_av("site", "check", one))
+    refused(access_av("file", "check", "--kind", "site", one))
     # A dotted key in a tagged table, which is read as a whole.
     one.write_text('name = "x"\n[wake_up]\npolicy = "fixed"\n".." = 1\n')
-    refused(access_av("vehicle", "check", one), "wake_up")
+    refused(access_av("file", "check", "--kind", "vehicle", one), "wake_up")
 
 
 TUM = b"0.0 0 0 0 0 0 0 1\n0.3 0.1 0 0 0 0 0 1\n"
@@ -328,7 +331,8 @@ def test_truths_that_are_none(
     file = tmp_path / "truth.tum"
     file.write_bytes(truth)
     done = access_av(
-        "locate", "--recording", drive / "iq.sigmf-meta", "--odometry", drive / "odometry.csv",
+        "record", "locate", "--recording", drive / "iq.sigmf-meta",
+        "--odometry", drive / "odometry.csv",
         "--site", drive / "site.toml", "--vehicle", drive / "vehicle.toml", "--truth", file,
         "--out", tmp_path / "out",
     )  # fmt: skip
@@ -354,11 +358,11 @@ def test_aoa_truth(access_av: Cli, drive: Path, tmp_path: Path, key: str, value:
     metadata["annotations"][3][key] = value
     (tmp_path / "iq.sigmf-meta").write_text(json.dumps(metadata))
     (tmp_path / "iq.sigmf-data").symlink_to(drive / "iq.sigmf-data")
-    refused(access_av("aoa", tmp_path / "iq"))
+    refused(access_av("record", "aoa", tmp_path / "iq"))
 
 
 def test_a_map_of_one_square(access_av: Cli, tmp_path: Path) -> None:
-    done = access_av("bound", "yard", "--map-step-m", "1e300", "--out", tmp_path / "out")
+    done = access_av("design", "bound", "yard", "--map-step-m", "1e300", "--out", tmp_path / "out")
     assert done.code in (0, 2)
     assert "Traceback" not in done.err
 
@@ -366,16 +370,16 @@ def test_a_map_of_one_square(access_av: Cli, tmp_path: Path) -> None:
 def test_a_foreign_table(access_av: Cli, tmp_path: Path) -> None:
     file = tmp_path / "operating_points.parquet"
     pl.DataFrame({"mode": ["a"], "energy_j": ["b"]}).write_parquet(file)
-    refused(access_av("explore", "--results", tmp_path), "operating_points.parquet")
+    refused(access_av("paper", "explore", "--results", tmp_path), "operating_points.parquet")
     file.write_bytes(b"PAR1 and no more")
-    refused(access_av("explore", "--results", tmp_path), "operating_points.parquet")
+    refused(access_av("paper", "explore", "--results", tmp_path), "operating_points.parquet")
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-8"])
 def test_terminals_of_any_encoding(encoding: str) -> None:
     done = shell("columns", "trajectories", PYTHONIOENCODING=encoding)  # m², …
     assert done.returncode == 0, done.stderr
-    name = shell("scenario", "check", "größe-日本", PYTHONIOENCODING=encoding)
+    name = shell("file", "check", "größe-日本", PYTHONIOENCODING=encoding)
     assert name.returncode == 2, name.stderr
     assert b"Traceback" not in name.stderr
 
@@ -391,7 +395,18 @@ def shell(*words: object, **environment: str) -> subprocess.CompletedProcess[byt
 def test_a_folder_whose_name_is_no_text(tmp_path: Path) -> None:
     folder = os.fsencode(tmp_path) + b"/\xff\xfe"
     done = subprocess.run(
-        [sys.executable, "-m", "access_av", "bound", "yard", "--map-step-m", "50", "--out", folder],
+        [
+            sys.executable,
+            "-m",
+            "access_av",
+            "design",
+            "bound",
+            "yard",
+            "--map-step-m",
+            "50",
+            "--out",
+            folder,
+        ],
         capture_output=True,
     )
     assert done.returncode in (0, 2), done.stderr
@@ -407,7 +422,7 @@ def test_names_that_are_no_names(name: str) -> None:
 def test_no_escape_sequence_reaches_the_terminal(access_av: Cli, tmp_path: Path) -> None:
     file = tmp_path / "x.toml"
     file.write_text('name = "x"\n"\\u001b[2J" = 1\n[red]\n')
-    done = access_av("site", "check", file)
+    done = access_av("file", "check", "--kind", "site", file)
     refused(done, "\\x1b[2J")
     assert "\x1b" not in done.err
 
@@ -417,7 +432,7 @@ def test_names_that_are_html(access_av: Cli, tmp_path: Path) -> None:
     scenario = access_av_scenario({"site.radio_heads[0].name": name})
     file = tmp_path / "x.toml"
     file.write_text(scenario.to_toml())
-    assert access_av("bound", file, "--out", tmp_path / "out").code == 0
+    assert access_av("design", "bound", file, "--out", tmp_path / "out").code == 0
     page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
     assert name not in page
 
@@ -440,7 +455,12 @@ def test_two_runs_in_one_folder(access_av: Cli, tmp_path: Path) -> None:
     folder = os.open(tmp_path, os.O_RDONLY)
     fcntl.flock(folder, fcntl.LOCK_EX)
     try:
-        for words in (("run", "paper"), ("bound", "yard"), ("evaluate",), ("synth", "paper")):
+        for words in (
+            ("run", "paper"),
+            ("design", "bound", "yard"),
+            ("paper", "evaluate"),
+            ("record", "synth", "paper"),
+        ):
             refused(access_av(*words, "--out", tmp_path), "another run is writing here")
     finally:
         os.close(folder)
@@ -455,8 +475,8 @@ FULL_BYTES = 20_000
     "words",
     [
         ("run", "paper-real-odometry-2", "--set", "motion.start_at_m=250"),
-        ("synth", "paper-real-odometry-2", "--duration-s", "1"),
-        ("bound", "yard"),
+        ("record", "synth", "paper-real-odometry-2", "--duration-s", "1"),
+        ("design", "bound", "yard"),
     ],
     ids=lambda words: words[0],
 )
@@ -480,14 +500,16 @@ def test_a_full_disk(tmp_path: Path, words: tuple[str, ...]) -> None:
 def test_a_folder_that_may_not_be_written(access_av: Cli, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     refused(access_av("run", "paper", "--out", tmp_path / "file/out"), "file")
-    refused(access_av("bound", "yard", "--out", "/proc/none"), "/proc/none")
-    refused(access_av("fit", "--runs", "1", "--out", tmp_path / "none/x.toml"), "none/x.toml")
+    refused(access_av("design", "bound", "yard", "--out", "/proc/none"), "/proc/none")
+    refused(
+        access_av("paper", "fit", "--runs", "1", "--out", tmp_path / "none/x.toml"), "none/x.toml"
+    )
 
 
 def test_standard_output_that_takes_nothing() -> None:
     with open("/dev/full", "w") as full:  # noqa: PTH123
         done = subprocess.run(
-            [sys.executable, "-m", "access_av", "scenario", "show", "paper"],
+            [sys.executable, "-m", "access_av", "file", "show", "--kind", "scenario", "paper"],
             stdout=full,
             stderr=subprocess.PIPE,
             text=True,

@@ -603,15 +603,15 @@ def run(
 def test_command_on_any_scenario(tmp_path: Path, run: Callable[..., Finished]) -> None:
     (tmp_path / "space.toml").write_text(SPACE)
     asked = ("yard", "--space", "space.toml", "--runs", "2", "--json", "--out", "o")
-    done = run(tmp_path, "designs", *asked)
+    done = run(tmp_path, "design", "sweep", *asked)
     assert done.code == 0, done.err
     assert 1 <= len(json.loads(done.out)["front"]) <= 4
     # A power mode without influence on the runs is not simulated again: two parts for four designs.
     assert len(list((tmp_path / "results/parts").glob("*.npz"))) == 2
     assert (tmp_path / "o/report.html").stat().st_size > 10_000
-    some = run(tmp_path, "choose", "o", "--max-rms-m", "100", "--json")
+    some = run(tmp_path, "design", "select", "o", "--max-rms-m", "100", "--json")
     assert len(json.loads(some.out)["kept"]) == 4
-    none = run(tmp_path, "choose", "o", "--max-rms-m", "0.0001", "--json")
+    none = run(tmp_path, "design", "select", "o", "--max-rms-m", "0.0001", "--json")
     assert "m instead of 0.0001 m" in json.loads(none.out)["advice"][0]
     assert (some.code, none.code) == (0, 3)
     told = json.loads((tmp_path / "o/manifest.json").read_text())
@@ -624,8 +624,8 @@ def test_command_on_any_scenario(tmp_path: Path, run: Callable[..., Finished]) -
     assert (tmp_path / "o/again/designs.parquet").read_bytes() == before
     assert len(list((tmp_path / "o/results/parts").glob("*.npz"))) == 2
     for bad, message in (
-        (("designs", *asked, "--shard", "5/2"), "write --executor FILE.py:NAME"),
-        (("choose", "nowhere"), "no designs here"),
+        (("design", "sweep", *asked, "--shard", "5/2"), "write --executor FILE.py:NAME"),
+        (("design", "select", "nowhere"), "no designs here"),
     ):
         done = run(tmp_path, *bad)
         assert (done.code, message in done.err) == (2, True)

@@ -108,7 +108,7 @@ def test_a_constraint_that_is_missed_ends_with_exit_code_3(
         'extends = "paper-real-odometry-2"\n'
         'vehicle = { extends = "tugger", wake_up = { policy = "fixed", interval_ms = 400.0 } }\n'
     )
-    asked = ("tune", tmp_path / "short.toml", "--designs", "4", "--runs", "2")
+    asked = ("design", "tune", tmp_path / "short.toml", "--designs", "4", "--runs", "2")
     missed = access_av(*asked, "--max-error-m", "0.001", "--percentile", "90")
     assert missed.code == 3, missed.err
     assert "90th percentile of the error" in missed.out
@@ -147,7 +147,7 @@ def test_bad_questions(campaign: Campaign, access_av: Callable[..., Finished]) -
     empty = short({"policy": "gated", "snr_set_point": absolute, "trigger": due})
     with pytest.raises(InputError, match="nothing to tune"):
         tune(campaign, empty, Constraints(max_rms_m=1.0))
-    done = access_av("tune", "yard", "--max-rms-m", "-1")
+    done = access_av("design", "tune", "yard", "--max-rms-m", "-1")
     assert done.code == 2
 
 
@@ -156,7 +156,8 @@ def test_command(access_av: Callable[..., Finished], tmp_path: Path) -> None:
         'extends = "paper-real-odometry-2"\n[motion]\nstart_at_m = 290.0\n'
     )
     done = access_av(
-        "tune", tmp_path / "short.toml", "--max-rms-m", "1", "--designs", "2", "--runs", "2",
+        "design", "tune", tmp_path / "short.toml", "--max-rms-m", "1",
+        "--designs", "2", "--runs", "2",
         "--out", tmp_path / "out", "--json",
     )  # fmt: skip
     assert done.code == 0, done.err

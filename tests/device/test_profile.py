@@ -1,4 +1,4 @@
-"""`access-av profile`: simulated sysfs trees with a known energy, and faulty sensors."""
+"""`access-av design profile`: simulated sysfs trees with a known energy, and faulty sensors."""
 
 from __future__ import annotations
 
@@ -450,7 +450,7 @@ def test_command_on_a_machine_without_sensor(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
     done = access_av(
-        "profile", "--sysfs-root", str(tmp_path), "--window-s", "0.05", "--json",
+        "design", "profile", "--sysfs-root", str(tmp_path), "--window-s", "0.05", "--json",
         "--out", str(tmp_path / "board.toml"),
     )  # fmt: skip
     assert done.code == 0, done.err
@@ -468,9 +468,9 @@ def test_command_on_a_machine_without_sensor(
 def test_bad_input_ends_with_one_message(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
-    done = access_av("profile", "--sysfs-root", tmp_path / "none")
+    done = access_av("design", "profile", "--sysfs-root", tmp_path / "none")
     assert (done.code, "no such directory" in done.err) == (2, True)
-    done = access_av("profile", "--sysfs-root", tmp_path, "--mode", "9")
+    done = access_av("design", "profile", "--sysfs-root", tmp_path, "--mode", "9")
     assert (done.code, "this machine has 0" in done.err) == (2, True)
 
 

@@ -55,7 +55,16 @@ def test_a_log_of_angles_locates_as_its_samples_do(
     site, vehicle = drive / "site.toml", drive / "vehicle.toml"
     out = tmp_path / "angles"
     done = access_av(
-        "angles", drive / "iq.sigmf-meta", "--site", site, "--vehicle", vehicle, "--out", out
+        "record",
+        "record",
+        "angles",
+        drive / "iq.sigmf-meta",
+        "--site",
+        site,
+        "--vehicle",
+        vehicle,
+        "--out",
+        out,
     )
     assert done.code == 0, done.err
     text = (out / "angles.csv").read_text()
@@ -189,7 +198,7 @@ def test_damaged_parquet_is_refused(access_av: Cli, drive: Path, log: Path, tmp_
         file = tmp_path / f"{number}.parquet"
         file.write_bytes(content)
         done = access_av(
-            "locate", "--recording", file, "--odometry", drive / "odometry.csv",
+            "record", "locate", "--recording", file, "--odometry", drive / "odometry.csv",
             "--site", drive / "site.toml", "--vehicle", drive / "vehicle.toml",
             "--out", tmp_path / "out",
         )  # fmt: skip
@@ -201,7 +210,7 @@ def test_samples_without_angles_are_refused(access_av: Cli, drive: Path, tmp_pat
     site = (drive / "site.toml").read_text()
     other = tmp_path / "site.toml"
     other.write_text(site.replace("pci = 1\n", "pci = 501\n").replace("pci = 2\n", "pci = 502\n"))
-    given = ["angles", drive / "iq.sigmf-meta", "--vehicle", drive / "vehicle.toml"]
+    given = ["record", "angles", drive / "iq.sigmf-meta", "--vehicle", drive / "vehicle.toml"]
     done = access_av(*given, "--site", other, "--out", tmp_path / "out")
     assert done.code == 2
     assert "no SSB of a radio head of the site" in " ".join(done.err.split())

@@ -40,7 +40,8 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def arguments(drive: Path, out: Path) -> list[object]:
     return [
-        "locate", "--recording", drive / "iq.sigmf-meta", "--odometry", drive / "odometry.csv",
+        "record", "locate", "--recording", drive / "iq.sigmf-meta",
+        "--odometry", drive / "odometry.csv",
         "--site", drive / "site.toml", "--out", out, "--vehicle", drive / "vehicle.toml",
     ]  # fmt: skip
 
@@ -200,8 +201,10 @@ def test_a_drive_that_cannot_be_located_has_a_reason(
 
 
 def test_synth_refuses_what_it_cannot_send(access_av: Cli, tmp_path: Path) -> None:
-    assert access_av("synth", "paper", "--out", tmp_path, "--datatype", "cf64_le").code == 2
-    done = access_av("synth", "no-such", "--out", tmp_path)
+    assert (
+        access_av("record", "synth", "paper", "--out", tmp_path, "--datatype", "cf64_le").code == 2
+    )
+    done = access_av("record", "synth", "no-such", "--out", tmp_path)
     assert done.code == 2
     assert "no-such" in done.err
 
@@ -376,12 +379,12 @@ def test_the_files_of_the_docs_can_be_used(access_av: Cli, tmp_path: Path) -> No
     assert len(ways) == 3
     for shape in (road, *(width + way for way in ways)):
         (tmp_path / "site.toml").write_text(hall + shape)
-        assert access_av("site", "check", tmp_path / "site.toml").code == 0
+        assert access_av("file", "check", "--kind", "site", tmp_path / "site.toml").code == 0
     told = robot(60.0)
     told.sheet = re.sub(r"^array = .*\n", "", vehicle, flags=re.MULTILINE)
     done = access_av(*told.write(tmp_path), "--truth", tmp_path / "truth.tum")
     assert done.code == 0, done.err
-    shown = access_av("locate", "--help", columns=200).out
+    shown = access_av("record", "locate", "--help", columns=200).out
     for row in re.findall(r"^\| (?:odometry|the same|angles).*$", page, re.MULTILINE):
         for column in re.findall(r"`(\w+_(?:s|m|mps|rad|radps|db)|pci|ssb_index)`", row):
             assert column in shown or column == "rician_k_db", column
@@ -393,7 +396,8 @@ def test_a_drive_is_located_by_variants_side_by_side(access_av: Cli, tmp_path: P
     other = tmp_path / "other.toml"
     other.write_text((logged / "vehicle.toml").read_text("utf-8"), "utf-8")
     command = [
-        "locate", "--recording", logged / "angles.csv", "--odometry", logged / "odometry.csv",
+        "record", "locate", "--recording", logged / "angles.csv",
+        "--odometry", logged / "odometry.csv",
         "--site", logged / "site.toml", "--vehicle", logged / "vehicle.toml",
         "--sweep", "vehicle.odometer.scale=1.03", "--against", other, "--percentile", "90",
         "--out", tmp_path / "out",

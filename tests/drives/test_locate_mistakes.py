@@ -297,4 +297,4 @@ def test_exit_codes(access_av: Cli, tmp_path: Path) -> None:
     whole.write(tmp_path)
     assert access_av(*arguments[:-1], tmp_path / "refused").code == 2
     for code in ("0", "2", "3"):
-        assert f"{code}: " in access_av("locate", "--help", columns=200).out
+        assert f"{code}: " in access_av("record", "locate", "--help", columns=200).out

@@ -90,7 +90,7 @@ def test_what_it_writes_locates_better(
     out = tmp_path / "out"
     one, vehicle, plan = logged / "0", logged / "0/vehicle.toml", logged / "0/site.toml"
     done = access_av(
-        "survey", one, logged / "1", "--site", plan, "--vehicle", vehicle, "--out", out
+        "record", "survey", one, logged / "1", "--site", plan, "--vehicle", vehicle, "--out", out
     )
     assert done.code == 0, done.err
     rows = pl.read_parquet(out / "survey.parquet")
@@ -137,7 +137,15 @@ def test_the_command_reports_parameters_that_were_not_estimated_or_do_not_fit(
     for name in ("odometry.csv", "angles.csv", "vehicle.toml"):
         lines = (logged / "0" / name).read_text().splitlines(keepends=True)
         (short / name).write_text("".join(lines if name == "vehicle.toml" else lines[:80]))
-    arguments = ("survey", short, "--vehicle", short / "vehicle.toml", "--out", tmp_path / "out")
+    arguments = (
+        "record",
+        "survey",
+        short,
+        "--vehicle",
+        short / "vehicle.toml",
+        "--out",
+        tmp_path / "out",
+    )
     done = access_av(*arguments, "--site", "yard")
     assert done.code == 0, done.err
     rows = [line.split() for line in done.out.splitlines() if line.startswith(" radio_heads")]

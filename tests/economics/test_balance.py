@@ -137,8 +137,8 @@ def test_the_example_is_a_file_of_ones_own(
     mine = tmp_path / "mine.toml"
     mine.write_text(text())
     assert balance(read(mine)) == balance(read(None))
-    done = access_av("balance", mine)
+    done = access_av("design", "balance", mine)
     assert (done.code, "Payback: 0 years" in done.out) == (0, True)
     mine.write_text("fleet = [")
-    done = access_av("balance", mine)
+    done = access_av("design", "balance", mine)
     assert (done.code, str(mine) in done.err.replace("\n", "")) == (2, True)

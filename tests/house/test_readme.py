@@ -43,7 +43,11 @@ def test_python_example(tmp_path: Path) -> None:
 
 def test_command_line_examples(tmp_path: Path, quick_study: Path) -> None:
     examples = commands(COMMAND_LINE)
-    assert [command[0] for command in examples] == ["run", "explore", "bound"]
+    assert [command[:2] for command in examples] == [
+        ["run", "paper"],
+        ["paper", "explore"],
+        ["design", "bound"],
+    ]
     shutil.copytree(quick_study, tmp_path / "results", symlinks=True)
     for command in examples:
         done = subprocess.run(

@@ -105,7 +105,7 @@ def test_ours_is_better_in_error_and_energy_in_every_mode() -> None:
 
 
 def test_json_of_a_single_run_has_no_interval(access_av: Callable[..., Finished]) -> None:
-    done = access_av("codesign", "--runs", "1", "--json")
+    done = access_av("paper", "codesign", "--runs", "1", "--json")
     records = json.loads(done.out)
     assert [each["mode"] for each in records] == list(range(8))
     assert {each["is_better"] for each in records} == {False}
@@ -115,7 +115,7 @@ def test_json_of_a_single_run_has_no_interval(access_av: Callable[..., Finished]
 
 
 def test_power_command(access_av: Callable[..., Finished]) -> None:
-    done = access_av("platform", "power", ENGINE)
+    done = access_av("design", "power", ENGINE)
     rows = [line for line in done.out.splitlines() if line.rstrip().endswith(tuple("0123456789"))]
     off = [float(line.split()[-1]) for line in rows]
     assert len(off) == 5

@@ -96,10 +96,10 @@ def test_behind_the_gate_algorithm_1_is_idle(driver: Driver) -> None:
 def test_claims_are_not_judged_on_another_trip(
     name: str, access_av: Callable[..., Finished]
 ) -> None:
-    done = access_av("evaluate", "--scenario", name)
+    done = access_av("paper", "evaluate", "--scenario", name)
     assert done.code == 2
     assert f"access-av run {name}" in done.err
-    assert f"access-av bound {name}" in done.err
+    assert f"access-av design bound {name}" in done.err
 
 
 def test_an_unknown_reading_is_named() -> None:
@@ -116,6 +116,7 @@ def test_a_reading_that_contradicts_itself_is_named_and_the_others_are_judged(
         '[vehicle.wake_up]\npolicy = "pid"\nt_max_ms = 110.0\n'
     )
     done = access_av(
+        "paper",
         "evaluate",
         "--interpretation",
         file,
@@ -132,7 +133,9 @@ def test_a_reading_that_contradicts_itself_is_named_and_the_others_are_judged(
     assert "wake_up.t_max_ms" in told
     claims = json.loads((tmp_path / "e/claims.json").read_text())
     assert {claim["interpretation"] for claim in claims} == {"gate"}
-    alone = access_av("evaluate", "--interpretation", file, "--runs", "1", "--out", tmp_path / "f")
+    alone = access_av(
+        "paper", "evaluate", "--interpretation", file, "--runs", "1", "--out", tmp_path / "f"
+    )
     assert alone.code == 2
     assert "wake_up.t_max_ms" in alone.err
 

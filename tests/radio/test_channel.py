@@ -159,7 +159,7 @@ def test_bad_tables_are_refused(tmp_path: Path, access_av: Callable[..., Finishe
     def refused(table: pl.DataFrame, carrier_mhz: float = 3750.0) -> str:
         table.write_parquet(tmp_path / "paths.parquet")
         done = access_av(
-            "import-paths", tmp_path / "paths.parquet", "--site", HALL / "site.toml",
+            "design", "import-paths", tmp_path / "paths.parquet", "--site", HALL / "site.toml",
             "--carrier-mhz", carrier_mhz, "--out", tmp_path / "paths.npz",
         )  # fmt: skip
         assert done.code == 2
@@ -190,7 +190,7 @@ def test_bad_tables_are_refused(tmp_path: Path, access_av: Callable[..., Finishe
     assert ray_paths.import_paths(named, site, tmp_path / "text.npz", carrier_mhz=3750.0)
     (tmp_path / "paths.csv").write_text("nothing")
     done = access_av(
-        "import-paths", tmp_path / "paths.csv", "--site", HALL / "site.toml",
+        "design", "import-paths", tmp_path / "paths.csv", "--site", HALL / "site.toml",
         "--carrier-mhz", "3750", "--out", tmp_path / "paths.npz",
     )  # fmt: skip
     assert done.code == 2

@@ -112,7 +112,15 @@ def test_the_command_plans_and_refuses(tmp_path: Path, access_av: Callable[..., 
     MASTS.write_csv(masts)
     (tmp_path / "short.toml").write_text(SHORT.to_toml())
     done = access_av(
-        "plan", tmp_path / "short.toml", "--masts", masts, "--out", tmp_path / "plan", "--json"
+        "design",
+        "design",
+        "plan",
+        tmp_path / "short.toml",
+        "--masts",
+        masts,
+        "--out",
+        tmp_path / "plan",
+        "--json",
     )
     assert done.code == 0, done.err
     record = json.loads(done.out)
@@ -129,7 +137,7 @@ def test_the_command_plans_and_refuses(tmp_path: Path, access_av: Callable[..., 
         ("name,x_m,y_m,z_m\na,-100,0,0\n", "on the road"),
     ):
         masts.write_text(text)
-        done = access_av("plan", tmp_path / "short.toml", "--masts", masts)
+        done = access_av("design", "plan", tmp_path / "short.toml", "--masts", masts)
         assert done.code == 2
         assert message in done.err, done.err
     with pytest.raises(InputError, match="there are 4 masts"):
@@ -170,7 +178,7 @@ def test_an_interrupted_integrity_campaign_is_continued(
 ) -> None:
     (tmp_path / "short.toml").write_text(SHORT.to_toml())
     arguments = (
-        "integrity", tmp_path / "short.toml", "--runs", "2", "--fault", "none",
+        "design", "integrity", tmp_path / "short.toml", "--runs", "2", "--fault", "none",
         "--fault", "array 1 degree off", "--num-heads", "2", "--num-heads", "4",
         "--out", tmp_path / "out", "--json",
     )  # fmt: skip
@@ -201,7 +209,7 @@ def test_cases_of_an_integrity_campaign_stand_side_by_side(
 ) -> None:
     (tmp_path / "short.toml").write_text(SHORT.to_toml())
     done = access_av(
-        "integrity", tmp_path / "short.toml", "--runs", "2", "--fault", "none",
+        "design", "integrity", tmp_path / "short.toml", "--runs", "2", "--fault", "none",
         "--fault", "array 1 degree off", "--sweep", "vehicle.integrity.risk_per_hour=1e-3",
         "--percentile", "90", "--out", tmp_path / "out", "--json",
     )  # fmt: skip

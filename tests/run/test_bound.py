@@ -102,7 +102,9 @@ def test_page_loads_nothing_and_names_the_heads(four_heads: ErrorBound) -> None:
 def test_the_command_writes_the_files_that_its_help_lists(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
-    done = access_av("bound", "yard", "--map-step-m", "25", "--out", tmp_path / "b", columns=80)
+    done = access_av(
+        "design", "bound", "yard", "--map-step-m", "25", "--out", tmp_path / "b", columns=80
+    )
     assert done.code == 0, done.err
     assert "lower bound of the RMS error" in done.out
     assert "dock" in done.out
@@ -115,10 +117,10 @@ def test_the_command_writes_the_files_that_its_help_lists(
     assert names == {
         "bound.parquet", "map.parquet", "report.html", "scenario.toml", "manifest.json",
     }  # fmt: skip
-    narrow = access_av("bound", "yard", "--out", tmp_path / "b", columns=60).out
+    narrow = access_av("design", "bound", "yard", "--out", tmp_path / "b", columns=60).out
     assert re.search(r"^ 6 +0\.3 +99\.9% .* not reached", narrow, re.MULTILINE)
     route = pl.read_parquet(tmp_path / "b/bound.parquet")
-    told = json.loads(access_av("bound", "yard", "--json", "--out", tmp_path / "b").out)
+    told = json.loads(access_av("design", "bound", "yard", "--json", "--out", tmp_path / "b").out)
     assert told["next_level"]["cheapest"] == "8 antennas"
     assert told["median_m"] == route["bound_m"].median()
     assert told["median_m"] < told["p90_m"] < told["max_m"]

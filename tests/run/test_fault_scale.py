@@ -39,6 +39,6 @@ def test_the_fault_grows_with_its_scale() -> None:
 def test_invalid_scales_are_rejected(
     access_av: Callable[..., Finished], text: str, message: str
 ) -> None:
-    done = access_av("integrity", "yard", "--fault-scale", text)
+    done = access_av("design", "integrity", "yard", "--fault-scale", text)
     assert done.code == 2
     assert message in " ".join(done.err.split()), done.err

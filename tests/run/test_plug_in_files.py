@@ -81,7 +81,7 @@ def test_designs_take_plug_ins(access_av: Callable[..., Finished], folder: Path)
         'estimator = ["", "mine.py:Mine"]\npolicy = ["", "mine.py:EveryTenth"]\n'
     )
     arguments = ("short.toml", "--space", "space.toml", "--runs", "2", "--out", "out")
-    done = access_av("designs", *arguments)
+    done = access_av("design", "sweep", *arguments)
     assert done.code == 0, done.err
     rows = pl.read_parquet(folder / "out/designs.parquet")
     assert rows.height == 4
@@ -95,7 +95,7 @@ def test_designs_take_plug_ins(access_av: Callable[..., Finished], folder: Path)
     assert row["energy_j"] == pytest.approx(float(both["energy_j"].to_numpy().mean()))
     # Changed content of the file is another design: no stored part is used.
     (folder / "mine.py").write_text(MINE.replace("% 10", "% 5"))
-    done = access_av("designs", *arguments[:-1], "again")
+    done = access_av("design", "sweep", *arguments[:-1], "again")
     assert done.code == 0, done.err
     more = pl.read_parquet(folder / "again/designs.parquet")
     assert (more["aoa_estimates"] > rows["aoa_estimates"]).sum() == 2
@@ -122,7 +122,7 @@ def test_what_is_no_plug_in_is_named(
     (folder / "space.toml").write_text(f'estimator = ["{text}"]\n')
     for arguments in (
         ("run", "short.toml", "--against", f"estimator={text}"),
-        ("designs", "short.toml", "--space", "space.toml", "--runs", "1"),
+        ("design", "sweep", "short.toml", "--space", "space.toml", "--runs", "1"),
     ):
         done = access_av(*arguments, columns=200)
         assert done.code == 2

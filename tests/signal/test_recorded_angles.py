@@ -74,10 +74,10 @@ def test_real_recordings(data: Path, array: int, bound_deg: float) -> None:
 
 
 def test_json_has_the_promised_keys(access_av: Callable[..., Finished], tmp_path: Path) -> None:
-    done = access_av("aoa", str(write(tmp_path / "array", [20.0])), "--json")
+    done = access_av("record", "aoa", str(write(tmp_path / "array", [20.0])), "--json")
     (burst,) = json.loads(done.out)
     assert set(burst) >= {"sample_start", "azimuth_from_broadside_deg", "sigma_deg", "truth_deg"}
-    assert access_av("aoa", str(tmp_path / "array"), columns=60).code == 0
+    assert access_av("record", "aoa", str(tmp_path / "array"), columns=60).code == 0
 
 
 def test_missing_parts_are_reported(tmp_path: Path) -> None:
@@ -96,7 +96,7 @@ def test_truncated_data_ends_with_2(access_av: Callable[..., Finished], tmp_path
     path = write(tmp_path / "array", [20.0])
     file = path.with_name("array.sigmf-data")
     file.write_bytes(file.read_bytes()[:-5])
-    done = access_av("aoa", str(path))
+    done = access_av("record", "aoa", str(path))
     assert done.code == 2
     assert "array" in done.err
     assert "Traceback" not in done.err

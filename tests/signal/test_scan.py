@@ -35,7 +35,7 @@ def test_raw_files_of_each_antenna_are_scanned(access_av: Cli, tmp_path: Path) -
     for file, samples in zip(files, array_burst(ssb_indices=[2], sfn=99), strict=True):
         samples.tofile(file)
     options = ["--sample-rate-hz", RATE_HZ, "--centre-hz", SSB_HZ, "--ssb-freq-hz", SSB_HZ]
-    done = access_av("scan", *files, *options, "--json")
+    done = access_av("record", "scan", *files, *options, "--json")
     assert done.code == 0, done.err
     [cell] = json.loads(done.out)
     assert (cell["pci"], cell["ssb_index"], cell["sfn"]) == (7, 2, 99)
@@ -43,7 +43,7 @@ def test_raw_files_of_each_antenna_are_scanned(access_av: Cli, tmp_path: Path) -
     assert len(cell["mib_bits"]) == 24
     assert abs(cell["angle_deg"] - 50) < 5 * cell["sigma_deg"]
     assert cell["azimuth_deg"] == pytest.approx(90 - cell["angle_deg"], abs=1e-3)
-    assert access_av("scan", *files, *options).out.count("99") >= 1
+    assert access_av("record", "scan", *files, *options).out.count("99") >= 1
 
 
 def test_sixteen_antennas_have_an_angle() -> None:
@@ -209,8 +209,8 @@ def test_noise_holds_no_cell(access_av: Cli, tmp_path: Path) -> None:
     noise = np.random.default_rng(1).normal(size=(40_000, 2)) @ [1, 1j]
     noise.astype(np.complex64).tofile(file)
     options = ["--sample-rate-hz", RATE_HZ, "--centre-hz", SSB_HZ]
-    assert json.loads(access_av("scan", file, *options, "--json").out) == []
-    assert "no SSB found" in access_av("scan", file, *options).out
+    assert json.loads(access_av("record", "scan", file, *options, "--json").out) == []
+    assert "no SSB found" in access_av("record", "scan", file, *options).out
 
 
 def test_an_empty_scan_reports_the_searched_range_and_a_hint(
@@ -220,7 +220,7 @@ def test_an_empty_scan_reports_the_searched_range_and_a_hint(
     noise = np.random.default_rng(2).normal(size=(40_000, 2)) @ [1, 1j]
     noise.astype(np.complex64).tofile(file)
     options = ["--sample-rate-hz", RATE_HZ, "--centre-hz", SSB_HZ]
-    told = " ".join(access_av("scan", file, *options).out.split())
+    told = " ".join(access_av("record", "scan", file, *options).out.split())
     for words in ("raster", "any frequency from", "the first 5 ms of 1 channel", "--cfo-ppm"):
         assert words in told
 
@@ -241,7 +241,7 @@ def test_real_recordings_are_scanned_without_parameters(access_av: Cli, data: Pa
         file = data / "captures" / f"{name}.sigmf-meta"
         [annotation] = json.loads(file.read_text())["annotations"]
         truth = annotation["nr:ssb"]
-        cells = json.loads(access_av("scan", file, "--json").out)
+        cells = json.loads(access_av("record", "scan", file, "--json").out)
         cell = max(cells, key=lambda cell: cell["snr_db"])
         for key in ("pci", "ssb_index", "half_frame", "sfn", "ssb_freq_hz"):
             assert cell[key] == truth[key], (name, key)
@@ -252,7 +252,7 @@ def test_real_recordings_are_scanned_without_parameters(access_av: Cli, data: Pa
 
 def test_annotated_calibration_and_spacing_are_used(access_av: Cli, data: Path) -> None:
     file = data / "captures" / "semireal4_singtel-n1_day1_array1.sigmf-meta"
-    cells = json.loads(access_av("scan", file, "--json").out)
+    cells = json.loads(access_av("record", "scan", file, "--json").out)
     errors_deg = []
     for annotation in json.loads(file.read_text())["annotations"]:
         start = annotation["core:sample_start"]

@@ -114,7 +114,9 @@ def test_a_drive_has_one_centre_frequency(access_av: Cli, tmp_path: Path) -> Non
     site, vehicle = tmp_path / "site.toml", tmp_path / "vehicle.toml"
     site.write_text('name = "hall"\n[[radio_heads]]\npci = 3\nposition_m = [5.0, 0.0, 3.0]\n')
     vehicle.write_text('name = "robot"\n[array]\nelements = 1\n')
-    done = access_av("angles", file, "--site", site, "--vehicle", vehicle, "--out", tmp_path / "o")
+    done = access_av(
+        "record", "angles", file, "--site", site, "--vehicle", vehicle, "--out", tmp_path / "o"
+    )
     assert done.code == 2
     if "elements" not in done.err:
         assert "captures[1].core:frequency" in done.err
@@ -135,7 +137,7 @@ def test_frequencies_in_other_units_are_rejected(
         Recording.open(file)
     good = write(tmp_path / "good", burst(1), [(0, SSB_HZ)])
     if value > 0:
-        done = access_av("scan", good, "--centre-hz", value)
+        done = access_av("record", "scan", good, "--centre-hz", value)
         assert done.code == 2
         assert says in " ".join(done.err.split())
     raw = tmp_path / "unit.sigmf-data"
@@ -148,12 +150,12 @@ def test_exchanged_i_and_q_are_found_and_reported(access_av: Cli, tmp_path: Path
     exchanged = (right.imag + 1j * right.real).astype(np.complex64)
     for name, samples in {"exchanged": exchanged, "conjugate": right.conj()}.items():
         file = write(tmp_path / name, samples, [(0, SSB_HZ + 0.18e6)])
-        done = access_av("scan", file, "--json")
+        done = access_av("record", "scan", file, "--json")
         [cell] = json.loads(done.out)
         assert (cell["pci"], cell["ssb_freq_hz"]) == (5, SSB_HZ)
         assert "I and Q are exchanged" in " ".join(done.err.split())
     file = write(tmp_path / "right", right, [(0, SSB_HZ + 0.18e6)])
-    assert "exchanged" not in access_av("scan", file, "--json").err
+    assert "exchanged" not in access_av("record", "scan", file, "--json").err
 
 
 def as_integers(samples: np.ndarray, full_scale: float) -> np.ndarray:
@@ -274,7 +276,7 @@ def test_archives_are_read_in_place(access_av: Cli, tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"must hold a \.sigmf-meta file"):
         Recording.open(archive(tmp_path, []))
     file.write_bytes(b"no tar file" * 100)
-    done = access_av("scan", file)
+    done = access_av("record", "scan", file)
     assert done.code == 2
     assert "SigMF archive (tar)" in " ".join(done.err.split())
 

@@ -33,9 +33,9 @@ DRAWINGS = [
 
 
 def new(access_av: Callable[..., Any], tmp_path: Path, *options: Any) -> tuple[dict[str, Any], Any]:
-    """The site that `access-av new site` writes, and what it prints."""
+    """The site that `access-av file new site` writes, and what it prints."""
     file = tmp_path / "site.toml"
-    done = access_av("new", "site", file, "--force", *options, columns=500)
+    done = access_av("file", "new", "site", file, "--force", *options, columns=500)
     assert done.code == 0, done.err
     return tomllib.loads(file.read_text("utf-8")), done
 
@@ -207,7 +207,7 @@ def test_an_export_far_from_its_zero_is_rejected(
         ("11.575,48.137", "Horn of Africa"),
         ("89,10", "no [longitude, latitude]"),
     ):
-        done = access_av("export", "yard", file, "--origin", origin, columns=500)
+        done = access_av("file", "export", "yard", file, "--origin", origin, columns=500)
         assert done.code == 2
         assert said in done.err
         assert not file.exists()
@@ -395,7 +395,7 @@ def test_nothing_of_the_example_remains_in_an_imported_plant(
     source, file = tmp_path / "plant.geojson", tmp_path / "new.toml"
     plans.write_map(source, plans.CORNERS, None, MUNICH, kind="features")
     options = [f"--{it.replace('heads', 'heads-file')}={source}" for it in parts]
-    done = access_av("new", kind, file, *options, "--origin", "48.137,11.575", columns=500)
+    done = access_av("file", "new", kind, file, *options, "--origin", "48.137,11.575", columns=500)
     assert done.code == 0, done.err
     text = file.read_text("utf-8")
     held = tomllib.loads(text)
@@ -413,7 +413,7 @@ def test_nothing_of_the_example_remains_in_an_imported_plant(
     if "heads" not in parts:
         assert "radio_heads]] (examples" in done.out or "radio_heads]]," in done.out
     complete = "heads" in parts and ("road" in parts or kind == "site")
-    checked = access_av(kind, "check", file)
+    checked = access_av("file", "check", file)
     assert checked.code == (0 if complete else 2), checked.err
 
 

@@ -75,9 +75,9 @@ def test_a_road_is_the_same_after_it_was_written_and_read(
     written, again = tmp_path / file, tmp_path / "again.toml"
     origin = ("--origin", "48.1,11.5") if file.startswith("degrees") else ()
     decimal_comma = ("--decimal-comma",) if file.startswith("german") else ()
-    assert access_av("export", site, written, *origin, *decimal_comma).code == 0
+    assert access_av("file", "export", site, written, *origin, *decimal_comma).code == 0
     heads = written.with_name(f"{written.stem}-heads.csv") if file.endswith("csv") else written
-    new = access_av("new", "site", again, "--road", written, "--heads-file", heads, *origin)
+    new = access_av("file", "new", "site", again, "--road", written, "--heads-file", heads, *origin)
     assert new.code == 0, new.err
     read_again = json.loads(Site.load(str(again)).to_json())
     assert apart_m(course(read_again), reference) < SAME_M
@@ -134,14 +134,16 @@ def test_a_drawing_gives_the_same_road(
     files = ("--road", drawn, "--heads-file", drawn)
     # From the start to the end of the first straight: 200 m.
     scale = ("--two-points", "0,0,200000,0", "--length-m", "200")
-    done = access_av("new", "site", site, *files, *layers, *scale)
+    done = access_av("file", "new", "site", site, *files, *layers, *scale)
     assert done.code == 0, done.err
     read_again = json.loads(Site.load(str(site)).to_json())
     assert apart_m(course(read_again), reference) < SAME_M
     assert apart_m(reference, course(read_again)) < SAME_M
     assert read_again["radio_heads"][1]["position_m"] == pytest.approx([240.0, 100.0, 8.0])
     assert "walls" not in read_again
-    walled = access_av("new", "site", site, *files, "--walls", drawn, *layers, *scale, "--force")
+    walled = access_av(
+        "file", "new", "site", site, *files, "--walls", drawn, *layers, *scale, "--force"
+    )
     assert walled.code == 0, walled.err
     straight, bent = (
         np.array(it["points_m"]) for it in json.loads(Site.load(str(site)).to_json())["walls"]
@@ -151,7 +153,7 @@ def test_a_drawing_gives_the_same_road(
     middle = 0.5 * (bent[1:] + bent[:-1])
     assert np.hypot(*(middle - [90.0, 20.0]).T).min() > 10.0 - 0.05
     missing = access_av(
-        "new", "site", site, "--walls", drawn, "--walls-layer", "X", *scale, "--force"
+        "file", "new", "site", site, "--walls", drawn, "--walls-layer", "X", *scale, "--force"
     )
     assert missing.code == 2
     assert "'X' holds no lines" in missing.err
@@ -178,7 +180,9 @@ def test_a_drawing_whose_scale_or_layer_is_not_sure_is_refused(
 ) -> None:
     drawn = tmp_path / "plant.dxf"
     drawing(drawn, units)
-    done = access_av("new", "site", tmp_path / "site.toml", "--road", drawn, *options, columns=500)
+    done = access_av(
+        "file", "new", "site", tmp_path / "site.toml", "--road", drawn, *options, columns=500
+    )
     assert done.code == 2
     assert said in done.err
     assert not (tmp_path / "site.toml").exists()
@@ -221,7 +225,9 @@ def test_files_that_are_no_plant_are_named(
         its = tmp_path / "heads.geojson"
         its.write_text(json.dumps(heads), "utf-8")
         more = ("--heads-file", its)
-    done = access_av("new", "plant", tmp_path / "new.toml", "--road", file, *more, columns=500)
+    done = access_av(
+        "file", "new", "plant", tmp_path / "new.toml", "--road", file, *more, columns=500
+    )
     assert done.code == 2
     assert said in done.err
     assert str(tmp_path) in done.err
@@ -232,7 +238,7 @@ def test_names_with_markup_stay_names(access_av: Callable[..., Any], tmp_path: P
     heads = tmp_path / "heads.geojson"
     heads.write_text(geojson.text(Drawn(heads=[Head(name, 60.0, 25.0, 8.0, 5)]), None), "utf-8")
     file = tmp_path / "new.toml"
-    assert access_av("new", "site", file, "--heads-file", heads).code == 0
+    assert access_av("file", "new", "site", file, "--heads-file", heads).code == 0
     assert json.loads(Site.load(str(file)).to_json())["radio_heads"][0]["name"] == name
 
 
@@ -241,15 +247,15 @@ def test_new_files_are_not_written_over_others(
 ) -> None:
     file = tmp_path / "mine.toml"
     for kind in ("plant", "site", "vehicle", "scenario"):
-        assert access_av("new", kind, file, "--force").code == 0
-        checked_again = access_av(kind, "check", file)
+        assert access_av("file", "new", kind, file, "--force").code == 0
+        checked_again = access_av("file", "check", file)
         assert checked_again.code == 0
         assert "valid" in checked_again.out, checked_again.out
-        assert "already" in access_av("new", kind, file).err
-    said = access_av("new", "node", file, "--force", columns=500).out
+        assert "already" in access_av("file", "new", kind, file).err
+    said = access_av("file", "new", "node", file, "--force", columns=500).out
     assert f"access-av-node --site yard --vehicle tugger {file} --dry-run" in said
     assert tomllib.loads(file.read_text("utf-8"))["name"] == "mine"
-    assert "folder" in access_av("new", "plant", tmp_path).err
+    assert "folder" in access_av("file", "new", "plant", tmp_path).err
 
 
 def test_a_scale_is_that_of_two_points() -> None:
@@ -277,9 +283,14 @@ def test_walls_are_the_same_after_they_were_written_and_read(
     )
     file, again = tmp_path / "site.geojson", tmp_path / "again.toml"
     (tmp_path / "site.toml").write_text(walled.to_toml(), "utf-8")
-    assert access_av("export", tmp_path / "site.toml", file, *origin).code == 0
+    assert access_av("file", "export", tmp_path / "site.toml", file, *origin).code == 0
     done = access_av(
-        "new", "site", again, *(f"--{it}={file}" for it in ("road", "heads-file", "walls")), *origin
+        "file",
+        "new",
+        "site",
+        again,
+        *(f"--{it}={file}" for it in ("road", "heads-file", "walls")),
+        *origin,
     )
     assert done.code == 0, done.err
     walls = json.loads(Site.load(str(again)).to_json())["walls"]
@@ -288,7 +299,7 @@ def test_walls_are_the_same_after_they_were_written_and_read(
     only_a_road = tmp_path / "road.geojson"
     only_a_road.write_text(json.dumps(ROAD), "utf-8")
     beside = ("--road", only_a_road, "--walls", only_a_road)
-    done = access_av("new", "site", again, *beside, "--force")
+    done = access_av("file", "new", "site", again, *beside, "--force")
     assert done.code == 2
     assert "a wall" in done.err
 
@@ -332,7 +343,7 @@ def test_a_picture_lies_under_a_site_where_two_points_and_a_length_say(
     monkeypatch.chdir(tmp_path)
     shown = f"drawings/{name.replace('/', '')}"
     of_picture = ("--underlay", shown, "--underlay-points", "50,100,250,100")
-    done = access_av("new", "site", "site.toml", *of_picture, "--underlay-length-m", "400")
+    done = access_av("file", "new", "site", "site.toml", *of_picture, "--underlay-length-m", "400")
     assert done.code == 0, done.err
     assert tomllib.loads((tmp_path / "site.toml").read_text("utf-8"))["underlay"] == {
         "file": shown,
@@ -398,7 +409,7 @@ def test_pictures_that_cannot_be_used_are_named(
     (tmp_path / "cut.jpg").write_bytes(JPEG[:26])
     (tmp_path / "large.png").write_bytes(picture(30, 20) + bytes(400_000))
     (tmp_path / "plan.svg").write_text("<svg onload='alert(1)'/>", "utf-8")
-    done = access_av("new", "site", "site.toml", *given)
+    done = access_av("file", "new", "site", "site.toml", *given)
     assert done.code == 2
     assert said in done.err
     assert not (tmp_path / "site.toml").exists()

@@ -129,14 +129,29 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     logged = folder / "logged"
     drives.log_angles(scenario, logged)
     located = [
-        *("locate", "--recording", logged / "angles.csv", "--odometry", logged / "odometry.csv"),
+        *(
+            "record",
+            "locate",
+            "--recording",
+            logged / "angles.csv",
+            "--odometry",
+            logged / "odometry.csv",
+        ),
         *("--site", logged / "site.toml", "--vehicle", logged / "vehicle.toml"),
         *("--truth", logged / "truth.tum"),
     ]
     commands = {
         "run": ["run", folder / "short.toml", "--runs", "2"],
-        "bound": ["bound", folder / "short.toml"],
-        "integrity": ["integrity", folder / "short.toml", "--runs", "1", "--fault", "none"],
+        "bound": ["design", "bound", folder / "short.toml"],
+        "integrity": [
+            "design",
+            "integrity",
+            folder / "short.toml",
+            "--runs",
+            "1",
+            "--fault",
+            "none",
+        ],
         "locate": located,
     }
     for name, command in commands.items():

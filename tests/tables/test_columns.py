@@ -152,7 +152,7 @@ def test_evaluation(quick_study: Path) -> None:
 
 
 def test_chosen(access_av: Callable[..., Finished]) -> None:
-    done = access_av("chosen", "--runs", "1", "--json")
+    done = access_av("paper", "assumptions", "--runs", "1", "--json")
     assert done.code == 0, done.err
     found = json.loads(done.out)
     check("assumptions", found)
@@ -173,12 +173,15 @@ def test_unknowns() -> None:
 
 def test_cells_and_bursts(access_av: Callable[..., Finished], data: Path) -> None:
     captures = data / "captures"
-    one = access_av("scan", captures / "oai-n78.sigmf-meta", "--unconfirmed", "--json")
+    one = access_av("record", "scan", captures / "oai-n78.sigmf-meta", "--unconfirmed", "--json")
     array = captures / "semireal4_singtel-n1_day1_array1.sigmf-meta"
-    several = access_av("scan", array, "--unconfirmed", "--json")
+    several = access_av("record", "scan", array, "--unconfirmed", "--json")
     for done in (one, several):
         check("cells", json.loads(done.out))
-    check("bursts", json.loads(access_av("aoa", captures / "aoa4_day1_array1", "--json").out))
+    check(
+        "bursts",
+        json.loads(access_av("record", "aoa", captures / "aoa4_day1_array1", "--json").out),
+    )
 
 
 def test_cells_without_a_recording() -> None:
@@ -190,18 +193,18 @@ def test_cells_without_a_recording() -> None:
 
 
 def test_command(access_av: Callable[..., Finished]) -> None:
-    done = access_av("columns", "aoa_estimates", columns=100)
+    done = access_av("file", "columns", "aoa_estimates", columns=100)
     assert done.code == 0
     for name in columns.TABLES["aoa_estimates"].columns:
         assert re.search(rf"^ {name} ", done.out, flags=re.MULTILINE)
     assert "no angle could be estimated" in done.out
-    told = json.loads(access_av("columns", "--json").out)
+    told = json.loads(access_av("file", "columns", "--json").out)
     assert told.keys() == columns.TABLES.keys()
     assert told["snr"]["columns"][0] == {
         "name": "time_s", "unit": "s", "null": "never",
         "meaning": "Time from the start of the drive, or by the recording's clock",
     }  # fmt: skip
-    assert access_av("columns", columns=60).code == 0
-    wrong = access_av("columns", "executiones")
+    assert access_av("file", "columns", columns=60).code == 0
+    wrong = access_av("file", "columns", "executiones")
     assert wrong.code == 2
     assert "aoa_estimates" in wrong.err

@@ -1,4 +1,4 @@
-//! Playback of files in order of time, which gives the poses of `access-av locate` bit by bit.
+//! Playback of files in order of time, which gives the poses of `access-av record locate` bit by bit.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,7 +17,7 @@ use crate::source::{Blocks, Files};
 use crate::statistics::SourceHealth;
 
 /// Duration of the samples that are processed together, in seconds, equal to that of `access-av
-/// locate`.
+/// record locate`.
 const BLOCK_S: f64 = 0.02;
 /// Duration of samples that are read beyond the last required burst, in seconds: a burst and the
 /// receiver's filter.

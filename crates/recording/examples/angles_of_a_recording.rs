@@ -1,7 +1,7 @@
 //! From a recording to angles of arrival with the library only: samples, SSBs, electrical angles.
 //!
 //! ```sh
-//! access-av synth yard --duration-s 2 --out drive
+//! access-av record synth yard --duration-s 2 --out drive
 //! cargo run --release -p recording --example angles_of_a_recording -- \
 //!     drive/iq.sigmf-meta drive/site.toml drive/vehicle.toml
 //! ```

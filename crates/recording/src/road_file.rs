@@ -175,7 +175,7 @@ fn system(json: &Value) -> Result<System, Defect> {
         let message = format!(
             "{what} is not read here; allowed are longitude and latitude (no `crs`), grids such as \
              UTM, and urn:ogc:def:crs:OGC::Engineering for metres of the plant's own frame; \
-             `access-av new site NAME.toml --road FILE` converts any other system"
+             `access-av file new site NAME.toml --road FILE` converts any other system"
         );
         ("crs".to_owned(), message)
     };
@@ -327,10 +327,10 @@ mod tests {
         );
         assert_eq!(from_geojson(&metres).unwrap()[2], [8.001, 60.001]);
         for (name, said) in [
-            ("urn:ogc:def:crs:EPSG::3857", "access-av new site"),
-            ("EPSG:900913", "access-av new site"),
-            ("EPSG:4978", "access-av new site"),
-            ("unknown", "access-av new site"),
+            ("urn:ogc:def:crs:EPSG::3857", "access-av file new site"),
+            ("EPSG:900913", "access-av file new site"),
+            ("EPSG:4978", "access-av file new site"),
+            ("unknown", "access-av file new site"),
         ] {
             let other = metres.replace("EPSG:25832", name);
             let (key, message) = from_geojson(&other).unwrap_err();

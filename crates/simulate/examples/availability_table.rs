@@ -3,7 +3,7 @@
 //! [key=value …]`.
 //!
 //! Channels are `nominal`, `K=5` or a model of TR 38.901; faults are those of `access-av
-//! integrity`. `beyond` is the fraction of the `ok` steps whose error exceeds the protection level.
+//! design integrity`. `beyond` is the fraction of the `ok` steps whose error exceeds the protection level.
 //! `silent` is the longest time in state `ok` with an error that exceeds the alert limit.
 #![allow(clippy::print_stdout, reason = "prints a table")]
 

@@ -25,7 +25,9 @@ UNITS = {
 
 
 @app.command(
-    epilog="Example: [bold]access-av balance --example > mine.toml; access-av balance mine.toml[/]",
+    rich_help_panel="Integrity and cost",
+    epilog="Example: [bold]access-av design balance --example > mine.toml; "
+    "access-av design balance mine.toml[/]",
 )
 def balance(
     figures: Annotated[

@@ -13,7 +13,8 @@ app = typer.Typer()
 
 
 @app.command(
-    epilog="Example: [bold]access-av bound yard --map-step-m 10 --out results/yard-bound[/]",
+    rich_help_panel="Radio heads",
+    epilog="Example: [bold]access-av design bound yard --map-step-m 10 --out results/yard-bound[/]",
 )
 def bound(
     scenario: ScenarioArgument,
@@ -57,5 +58,5 @@ def bound(
     show_bound(summary, found.verdicts)
     if missed is not None:
         console.print(missed.in_words())
-        console.print(f"Further radio heads: access-av plan {scenario}", soft_wrap=True)
+        console.print(f"Further radio heads: access-av design plan {scenario}", soft_wrap=True)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

@@ -14,7 +14,8 @@ app = typer.Typer()
 
 
 @app.command(
-    epilog="Example: [bold]access-av codesign --runs 20[/]",
+    rich_help_panel="Energy",
+    epilog="Example: [bold]access-av paper codesign --runs 20[/]",
 )
 def codesign(
     interpretation: Annotated[

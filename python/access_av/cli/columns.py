@@ -15,7 +15,10 @@ from access_av.tables.columns.tables import TABLES
 app = typer.Typer()
 
 
-@app.command(epilog="Example: [bold]access-av columns trajectories[/]")
+@app.command(
+    rich_help_panel="Results",
+    epilog="Example: [bold]access-av file columns trajectories[/]",
+)
 def columns(
     name: Annotated[
         str | None, typer.Argument(metavar="TABLE", help="Name of a table.", show_default="all")

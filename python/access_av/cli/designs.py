@@ -46,7 +46,9 @@ def _bound(text: str) -> Any:
 
 
 @app.command(
-    epilog="Example: [bold]access-av designs paper --space space.toml --halving[/]",
+    "sweep",
+    rich_help_panel="Operating points",
+    epilog="Example: [bold]access-av design sweep paper --space space.toml --halving[/]",
 )
 def designs(
     scenario: ScenarioArgument,
@@ -77,8 +79,8 @@ def designs(
 
     All designs use the same runs. The table [world] of the space contains environments that cannot
     be chosen, such as the Rician K; each design is rated in its worst one. results/parts keeps the
-    runs, so that a repeated command continues. Writes designs.parquet (input of access-av choose),
-    worlds.parquet, report.html, scenario.toml and space.toml.
+    runs, so that a repeated command continues. Writes designs.parquet (input of access-av design
+    select), worlds.parquet, report.html, scenario.toml and space.toml.
     """
     from access_av.designs.driven import in_worlds
     from access_av.designs.search import search
@@ -122,7 +124,7 @@ def designs(
     how += [] if optuna is None else ["--optuna", optuna]
     directory.write_manifest(
         repeat=(
-            *("designs", "scenario.toml", "--space", "space.toml", *how),
+            *("design", "sweep", "scenario.toml", "--space", "space.toml", *how),
             *("--runs", runs, "--seed", seed),
         ),
         scenario=chosen.name,
@@ -149,15 +151,19 @@ def designs(
         )
     console.print(f"{found.drives} runs. Report: {directory.path / 'report.html'}", soft_wrap=True)
     console.print(
-        f"Next: access-av choose {directory.path} --max-error-m 0.3 --percentile 99", soft_wrap=True
+        f"Next: access-av design select {directory.path} --max-error-m 0.3 --percentile 99",
+        soft_wrap=True,
     )
 
 
 @app.command(
-    epilog="Example: [bold]access-av choose results/mine --max-energy-j 1 --max-error-m 0.3[/]",
+    "select",
+    rich_help_panel="Operating points",
+    epilog="Example: [bold]access-av design select results/mine --max-energy-j 1 "
+    "--max-error-m 0.3[/]",
 )
 def choose(
-    results: Annotated[Path, typer.Argument(help="Results folder of access-av designs.")],
+    results: Annotated[Path, typer.Argument(help="Results folder of access-av design sweep.")],
     max_error_m: MaxError = None,
     percentile: PercentileOption = None,
     max_rms_m: MaxRms = None,
@@ -231,7 +237,7 @@ def _show(rows: pl.DataFrame, title: str, percent: float = 99.0) -> None:
     if rows["energy_j"].null_count() == rows.height and rows.height:
         console.print(
             "Energy is unknown, because the platform has no value for this method. Set "
-            "vehicle.platform to another one (access-av platform list)."
+            "vehicle.platform to another one (access-av file list platform)."
         )
 
 

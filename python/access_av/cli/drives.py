@@ -41,7 +41,9 @@ UNRELIABLE = 3
 
 
 @app.command(
-    epilog="Example: [bold]access-av synth paper-real-odometry-2 --out drive --duration-s 20[/]",
+    rich_help_panel="Drives",
+    epilog="Example: [bold]access-av record synth paper-real-odometry-2 --out drive "
+    "--duration-s 20[/]",
 )
 def synth(
     scenario: ScenarioArgument,
@@ -98,7 +100,8 @@ def synth(
 
 
 @app.command(
-    epilog="Example: [bold]access-av locate --recording drive/iq.sigmf-meta "
+    rich_help_panel="Drives",
+    epilog="Example: [bold]access-av record locate --recording drive/iq.sigmf-meta "
     "--odometry drive/odometry.csv --site drive/site.toml --vehicle drive/vehicle.toml "
     "--truth drive/truth.tum[/]",
 )

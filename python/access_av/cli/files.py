@@ -1,134 +1,152 @@
-"""Commands that show, check and describe site, vehicle, scenario and platform files."""
+"""Commands that list, show, check and describe settings files."""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Annotated, Any
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
 from access_av._core import Plant, Platform, Scenario, SettingsError, Site, Vehicle
 from access_av.cli.options import AllowLarge, announce, read_scenario
-from access_av.cli.terminal import console, show_error, table
+from access_av.cli.terminal import console, show_error
+from access_av.errors import InputError
+from access_av.tables import toml
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+app = typer.Typer()
 
 
+class Kind(str, Enum):
+    """Kind of a settings file that this package reads."""
+
+    PLANT = "plant"
+    SITE = "site"
+    VEHICLE = "vehicle"
+    SCENARIO = "scenario"
+    PLATFORM = "platform"
+
+
+CLASSES: dict[Kind, Any] = {
+    Kind.PLANT: Plant,
+    Kind.SITE: Site,
+    Kind.VEHICLE: Vehicle,
+    Kind.SCENARIO: Scenario,
+    Kind.PLATFORM: Platform,
+}
+# Keys that only files of access-av-node have at the top.
+NODE_KEYS = {"samples", "messages", "inputs", "output", "page"}
+
+KindArgument = Annotated[Kind, typer.Argument(help="Kind of file.")]
+KindOption = Annotated[
+    Kind | None, typer.Option(help="Kind of file.", show_default="recognized from the keys")
+]
 Names = Annotated[list[str], typer.Argument(help="Shipped names, or paths.")]
+PANEL = "Settings files"
 
 
-def _check(names: list[str], load: Callable[[str], Any]) -> None:
-    """Prints the result of the check of each file; exit code 2 if one is invalid."""
+def kind_of(name: str) -> Kind:
+    """Returns the kind of a file by its top-level keys, or of a shipped file by its name.
+
+    Raises
+    ------
+    InputError
+        Unknown name, unreadable file, or several kinds are possible.
+    """
+    path = Path(name)
+    kinds = _kinds_of_file(path) if path.exists() else _kinds_of_name(name)
+    if len(kinds) == 1:
+        return kinds[0]
+    if not kinds:
+        raise InputError(f"{name}: no such file, and no shipped file has this name")
+    raise InputError(
+        f"{name}: could be a {' or a '.join(kinds)} file: add --kind {' or --kind '.join(kinds)}"
+    )
+
+
+def _kinds_of_name(name: str) -> list[Kind]:
+    return [kind for kind, of in CLASSES.items() if name in of.names()]
+
+
+def _kinds_of_file(path: Path) -> list[Kind]:
+    """Returns the kinds whose schemas have the most keys of the file, and lack the fewest."""
+    keys = toml.read(path).keys()
+    if keys & NODE_KEYS:
+        raise InputError(
+            f"{path}: this is a node file; check it with access-av-node {path} --dry-run, "
+            "and --site and --vehicle if they are not installed"
+        )
+    scores = dict[Kind, tuple[int, int]]()
+    for kind, of in CLASSES.items():
+        schema = json.loads(of.schema_json())
+        missing = 0 if "extends" in keys else len({*schema["required"]} - keys)
+        scores[kind] = (len(keys & schema["properties"].keys()), -missing)
+    best = max(scores.values())
+    return [kind for kind, score in scores.items() if score == best]
+
+
+@app.command("list", rich_help_panel=PANEL, epilog="Example: [bold]access-av file list site[/]")
+def list_names(
+    kind: Annotated[
+        Kind | None, typer.Argument(help="Kind of file.", show_default="all kinds")
+    ] = None,
+) -> None:
+    """List the names of the shipped files."""
+    for each in Kind if kind is None else [kind]:
+        names = CLASSES[each].names()
+        text = "\n".join(names) if kind else f"{each.value}: {', '.join(names)}"
+        console.print(text, soft_wrap=True)
+
+
+@app.command(
+    rich_help_panel=PANEL,
+    epilog="Example: [bold]access-av file show --kind site yard > mine.toml[/]",
+)
+def show(
+    name: Annotated[str, typer.Argument(help="Shipped name, or path.")],
+    kind: KindOption = None,
+) -> None:
+    """Print a settings file with all default values."""
+    print(CLASSES[kind or kind_of(name)].load(name).to_toml(), end="")
+
+
+@app.command(rich_help_panel=PANEL, epilog="Example: [bold]access-av file check mine.toml[/]")
+def check(names: Names, kind: KindOption = None, allow_large: AllowLarge = False) -> None:
+    """Check settings files: exit code 2 for invalid ones, warnings for implausible values."""
     wrong = 0
     for name in names:
         try:
-            read = load(name)
-            warnings = read.warnings()
-            verdict = (
-                f"valid, {len(warnings)} warning{'s' * (len(warnings) > 1)}"
-                if warnings
-                else "valid"
-            )
-            size = _size(read) if isinstance(read, Scenario) else ""
-            console.print(f"{name}: {verdict}{size}", soft_wrap=True)
-            announce(name, warnings)
-        except SettingsError as error:
+            _check(name, kind or kind_of(name), allow_large)
+        except (SettingsError, InputError) as error:
             show_error(error)
             wrong += 1
     if wrong:
         raise typer.Exit(2)
 
 
-def _size(scenario: Scenario) -> str:
-    """Returns the duration and size of a run."""
-    size = scenario.size
-    return (
-        f"; a run of {size['duration_s']:.0f} s, {size['ssbs']:.0f} SSBs, "
-        f"{size['bytes'] * 1e-6:.0f} MB"
-    )
-
-
-def files_app(what: str) -> typer.Typer:
-    """Returns the commands that list, show and check the files of one kind."""
-    kinds = {
-        "site": Site,
-        "vehicle": Vehicle,
-        "scenario": Scenario,
-        "platform": Platform,
-        "plant": Plant,
-    }
-    kind: Any = kinds[what]
-    files = typer.Typer(no_args_is_help=True, help=f"Show, check and describe {what} files.")
-    example = kind.names()[0]
-
-    @files.command(
-        "list",
-        help=f"Names of the shipped {what}s.",
-        epilog=f"Example: [bold]access-av {what} list[/]",
-    )
-    def list_names() -> None:
-        for name in kind.names():
-            console.print(name)
-
-    @files.command(
-        help=f"Print a {what} file with all default values.",
-        epilog=f"Example: [bold]access-av {what} show {example} > mine.toml[/]",
-    )
-    def show(name: Annotated[str, typer.Argument(help="Shipped name, or path.")]) -> None:
-        print(kind.load(name).to_toml(), end="")
-
-    command = files.command(
-        name="check",
-        help=f"Check {what} files: exit code 2 for invalid ones, warnings for implausible ones.",
-        epilog=f"Example: [bold]access-av {what} check mine.toml[/]",
-    )
-    if what == "scenario":
-
-        @command
-        def check_scenarios(names: Names, allow_large: AllowLarge = False) -> None:
-            _check(names, lambda name: read_scenario(name, allow_large=allow_large))
+def _check(name: str, kind: Kind, allow_large: bool) -> None:
+    """Prints the result of the check of one file."""
+    size = ""
+    if kind is Kind.SCENARIO:
+        read = read_scenario(name, allow_large=allow_large)
+        run = read.size
+        size = (
+            f"; a run of {run['duration_s']:.0f} s, {run['ssbs']:.0f} SSBs, "
+            f"{run['bytes'] * 1e-6:.0f} MB"
+        )
     else:
-
-        @command
-        def check(names: Names) -> None:
-            _check(names, kind.load)
-
-    @files.command(
-        help=f"Print the JSON Schema of {what} files, for editors.",
-        epilog=f"Example: [bold]access-av {what} schema > {what}.schema.json[/]",
-    )
-    def schema() -> None:
-        print(kind.schema_json())
-
-    if what == "platform":
-        files.command(epilog="Example: [bold]access-av platform power jetson-agx-xavier-engine[/]")(
-            power
-        )
-    return files
+        read = CLASSES[kind].load(name)
+    warnings = read.warnings()
+    count = f", {len(warnings)} warning{'s' * (len(warnings) > 1)}" if warnings else ""
+    console.print(f"{name}: valid{count}{size}", soft_wrap=True)
+    announce(name, warnings)
 
 
-def power(name: Annotated[str, typer.Argument(help="Shipped name, or path.")]) -> None:
-    """Compare the modelled and the measured power of a board with all cores busy.
-
-    One row per power mode of the platform file; a dash marks a missing value.
-    """
-    platform = Platform.load(name)
-    made = table(
-        ["mode", "name", "cores", "MHz", "modelled W", "measured W", "difference %"], text=2
-    )
-    for index, mode in enumerate(json.loads(platform.to_json())["modes"]):
-        modelled_w = platform.busy_power_w(index, mode["cores"])
-        measured_w = mode.get("full_load_power_w", {}).get("value")
-        made.add_row(
-            str(mode["mode"]),
-            mode["name"],
-            str(mode["cores"]),
-            f"{mode['cpu_mhz']:.1f}",
-            "–" if modelled_w is None else f"{modelled_w:.2f}",
-            "–" if measured_w is None else f"{measured_w:.2f}",
-            "–"
-            if modelled_w is None or measured_w is None
-            else f"{100.0 * (modelled_w / measured_w - 1.0):+.1f}",
-        )
-    console.print(made)
+@app.command(
+    rich_help_panel=PANEL,
+    epilog="Example: [bold]access-av file schema site > site.schema.json[/]",
+)
+def schema(kind: KindArgument) -> None:
+    """Print the JSON Schema of one kind of settings file, for editors."""
+    print(CLASSES[kind].schema_json())

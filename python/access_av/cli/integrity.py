@@ -55,7 +55,8 @@ def _scales(text: str) -> list[float]:
 
 
 @app.command(
-    epilog="Example: [bold]access-av integrity yard --channel 'as set' --channel inf-sh "
+    rich_help_panel="Integrity and cost",
+    epilog="Example: [bold]access-av design integrity yard --channel 'as set' --channel inf-sh "
     "--num-heads 2 --num-heads 4 --out results/yard-integrity[/]",
 )
 def integrity(

@@ -72,7 +72,7 @@ class _Commands(TyperGroup):
         return command
 
     def resolve_command(self, context: Any, words: list[str]) -> Any:
-        message = renamed.command_message(words[0])
+        message = renamed.command_message(words)
         if message and self.get_command(context, words[0]) is None:
             context.fail(message)
         return super().resolve_command(context, words)
@@ -114,15 +114,35 @@ def _options(
     pass
 
 
-for _room in (
-    *(study, paper, codesign, run, bound, radio, integrity, designs, tune),
-    *(recordings, drives, survey, profile, balance, columns, rerun),
-):
-    app.add_typer(_room.app)
-app.add_typer(new.app, name="new", cls=_Commands)
-app.add_typer(new.export_app)
-for _what in ("site", "vehicle", "scenario", "platform", "plant"):
-    app.add_typer(files.files_app(_what), name=_what, cls=_Commands)
+_METHOD, _DATA = "Paper and configurations", "Data"
+_GROUPS = (
+    ("paper", _METHOD, "Reproduce the paper, and search its open parameters.", (paper, codesign)),
+    (
+        "design",
+        _METHOD,
+        "Plan radio heads, choose operating points, and evaluate integrity, computer and cost.",
+        (bound, radio, integrity, designs, tune, balance, profile),
+    ),
+    (
+        "record",
+        _DATA,
+        "Find SSBs in recordings, locate recorded drives, and survey sites from them.",
+        (recordings, drives, survey),
+    ),
+    (
+        "file",
+        _DATA,
+        "Write, check, show and export settings files; describe the columns of results.",
+        (new, files, columns),
+    ),
+)
+for _module in (study, run, rerun):
+    app.add_typer(_module.app)
+for _name, _panel, _help, _modules in _GROUPS:
+    _group = typer.Typer(no_args_is_help=True, help=_help)
+    for _module in _modules:
+        _group.add_typer(_module.app)
+    app.add_typer(_group, name=_name, cls=_Commands, rich_help_panel=_panel)
 
 
 def main() -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from access_av.cli.files import CLASSES, PANEL, Kind, kind_of
 from access_av.cli.terminal import console
 from access_av.errors import InputError
 from access_av.site_files.drawn import Drawn
@@ -81,9 +83,20 @@ MetresPerUnit = Annotated[
     float | None, typer.Option(min=0.0, help="Unit of a DXF, for example 0.001 for mm.")
 ]
 
-app = typer.Typer(
-    no_args_is_help=True, help="Write an example plant, site, vehicle, scenario or node file."
-)
+app = typer.Typer()
+
+
+class New(str, Enum):
+    """Kind of a file that ``file new`` writes."""
+
+    PLANT = "plant"
+    SITE = "site"
+    VEHICLE = "vehicle"
+    SCENARIO = "scenario"
+    NODE = "node"
+
+
+WITH_SITE = (New.PLANT, New.SITE)
 
 
 def _numbers(option: str, text: str, count: int) -> list[float]:
@@ -158,29 +171,24 @@ def _write(
     drawn: Drawn | None = None,
     placed: Placed | None = None,
 ) -> None:
-    from access_av import _core
+    from access_av._core import SettingsWarning
     from access_av.cli.options import announce
-    from access_av.site_files.templates import missing, new
+    from access_av.site_files.templates import missing
+    from access_av.site_files.templates import new as written
     from access_av.tables.results_directory import write_whole
 
     if file.is_dir():
         raise InputError(f"{file}: is a folder; give the path of a file")
     if file.exists() and not force:
         raise InputError(f"{file}: exists already; --force overwrites it")
-    kinds: dict[str, Any] = {
-        "plant": _core.Plant,
-        "site": _core.Site,
-        "vehicle": _core.Vehicle,
-        "scenario": _core.Scenario,
-    }
     name = "".join(it if it.isalnum() or it in "-_" else "-" for it in file.stem) or kind
-    text = new(kind, name, str(file), drawn, placed)
+    text = written(kind, name, str(file), drawn, placed)
     to_fill = missing(kind, drawn)
     # access-av-node checks a node file.
-    warnings: list[_core.SettingsWarning] = []
-    if kind in kinds:
-        whole = new(kind, name, str(file), drawn, placed, filled=True) if to_fill else text
-        found = kinds[kind].from_toml(whole, str(file)).warnings()
+    warnings: list[SettingsWarning] = []
+    if kind != New.NODE:
+        whole = written(kind, name, str(file), drawn, placed, filled=True) if to_fill else text
+        found = CLASSES[Kind(kind)].from_toml(whole, str(file)).warnings()
         warnings = [] if drawn is not None and not drawn.heads else found
     write_whole(file, text)
     if drawn is not None:
@@ -231,85 +239,81 @@ def _next(kind: str, file: Path) -> str:
         "scenario": f"access-av run {file}",
         "node": f"access-av-node --site yard --vehicle tugger {file} --dry-run",
     }
-    return commands.get(kind, f"access-av {kind} check {file}")
+    return commands.get(kind, f"access-av file check {file}")
 
 
-def _site_command(kind: str, begins: str, example: str) -> None:
-    """Adds a command that writes a file with a site."""
-
-    def command(
-        file: Target,
-        force: Force = False,
-        road: Road = None,
-        heads: Heads = None,
-        walls: Walls = None,
-        origin: OriginText = None,
-        road_layer: RoadLayer = "ROAD",
-        heads_layer: HeadsLayer = "HEADS",
-        walls_layer: WallsLayer = "WALLS",
-        two_points: TwoPoints = None,
-        length_m: Length = None,
-        metres_per_unit: MetresPerUnit = None,
-        underlay: Picture = None,
-        underlay_points: PicturePoints = None,
-        underlay_length_m: PictureLength = None,
-        underlay_metres_per_pixel: PictureScale = None,
-        underlay_zero: PictureZero = None,
-    ) -> None:
-        from access_av.site_files.read import Options, read
-
-        options = Options(
-            _origin(origin),
-            road_layer,
-            heads_layer,
-            walls_layer,
-            _scale_m(two_points, length_m, metres_per_unit),
-        )
-        drawn = read(road, heads, options, walls) if road or heads or walls else None
-        placed = _placed(
-            file,
-            underlay,
-            underlay_points,
-            underlay_length_m,
-            underlay_metres_per_pixel,
-            underlay_zero,
-        )
-        _write(kind, file, force, drawn, placed)
-
-    epilog = f"Example: [bold]access-av new {kind} mine.toml {example}[/]"
-    app.command(kind, epilog=epilog, help=begins)(command)
-
-
-_site_command(
-    "plant",
-    "Write a plant file: site, vehicle, fleet, prices and required accuracy.",
-    "--road road.geojson",
+@app.command(
+    rich_help_panel=PANEL,
+    epilog="Example: [bold]access-av file new plant mine.toml --road road.geojson[/]",
 )
-_site_command("site", "Write a site file: road, radio heads and walls.", "--heads-file heads.csv")
+def new(
+    context: typer.Context,
+    kind: Annotated[New, typer.Argument(help="Kind of file.")],
+    file: Target,
+    force: Force = False,
+    road: Road = None,
+    heads: Heads = None,
+    walls: Walls = None,
+    origin: OriginText = None,
+    road_layer: RoadLayer = "ROAD",
+    heads_layer: HeadsLayer = "HEADS",
+    walls_layer: WallsLayer = "WALLS",
+    two_points: TwoPoints = None,
+    length_m: Length = None,
+    metres_per_unit: MetresPerUnit = None,
+    underlay: Picture = None,
+    underlay_points: PicturePoints = None,
+    underlay_length_m: PictureLength = None,
+    underlay_metres_per_pixel: PictureScale = None,
+    underlay_zero: PictureZero = None,
+) -> None:
+    """Write an example file, or a plant or site file from a drawing or map.
+
+    plant: site, vehicle, fleet, prices and required accuracy. site: road, radio heads and walls.
+    vehicle: antennas, odometer, wake-up and platform. scenario: site, vehicle and environment.
+    node: inputs and outputs of access-av-node on a vehicle. All options except --force are for
+    plant and site files.
+    """
+    if kind not in WITH_SITE:
+        _without_site(context, kind)
+        _write(kind.value, file, force)
+        return
+    from access_av.site_files.read import Options, read
+
+    options = Options(
+        _origin(origin),
+        road_layer,
+        heads_layer,
+        walls_layer,
+        _scale_m(two_points, length_m, metres_per_unit),
+    )
+    drawn = read(road, heads, options, walls) if road or heads or walls else None
+    placed = _placed(
+        file,
+        underlay,
+        underlay_points,
+        underlay_length_m,
+        underlay_metres_per_pixel,
+        underlay_zero,
+    )
+    _write(kind.value, file, force, drawn, placed)
 
 
-@app.command(epilog="Example: [bold]access-av new vehicle mine.toml[/]")
-def vehicle(file: Target, force: Force = False) -> None:
-    """Write a vehicle file: antennas, odometer, wake-up and platform."""
-    _write("vehicle", file, force)
+def _without_site(context: typer.Context, kind: New) -> None:
+    """Rejects options of sites for a file without a site."""
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        source = context.get_parameter_source(name)
+        if name in ("kind", "file", "force") or source is None or source.name == "DEFAULT":
+            continue
+        raise InputError(
+            f"{parameter.opts[0]}: only for plant and site files, not for {kind.value}"
+        )
 
 
-@app.command(epilog="Example: [bold]access-av new scenario mine.toml[/]")
-def scenario(file: Target, force: Force = False) -> None:
-    """Write a scenario file: site, vehicle and environment."""
-    _write("scenario", file, force)
-
-
-@app.command(epilog="Example: [bold]access-av new node node.toml[/]")
-def node(file: Target, force: Force = False) -> None:
-    """Write a node file: inputs and outputs of access-av-node on a vehicle."""
-    _write("node", file, force)
-
-
-export_app = typer.Typer()
-
-
-@export_app.command(epilog="Example: [bold]access-av export yard yard.geojson[/]")
+@app.command(
+    rich_help_panel=PANEL, epilog="Example: [bold]access-av file export yard yard.geojson[/]"
+)
 def export(
     site: Annotated[
         str, typer.Argument(help="Site or plant: shipped name, or path of a TOML file.")
@@ -328,12 +332,10 @@ def export(
     from access_av import _core
     from access_av.site_files import csv_file, geojson
     from access_av.site_files.read import of_site
-    from access_av.tables import toml
     from access_av.tables.results_directory import write_whole
 
-    is_plant = (
-        "fleet" in toml.read(Path(site)) if Path(site).is_file() else site not in _core.Site.names()
-    )
+    kind = kind_of(site) if Path(site).exists() else None
+    is_plant = kind is Kind.PLANT or (kind is None and site not in _core.Site.names())
     of = _core.Plant.load(site).scenario().site if is_plant else _core.Site.load(site)
     drawn = of_site(of)
     if file.suffix.lower() in (".geojson", ".json"):

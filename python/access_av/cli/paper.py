@@ -1,4 +1,4 @@
-"""Commands ``evaluate``, ``interpretations``, ``chosen``, ``search``, ``explore`` and ``fit``."""
+"""Commands of the group ``paper``."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ InterpretationOption = Annotated[
 
 
 @app.command(
-    epilog="Example: [bold]access-av evaluate --runs 20 --out results/quick[/]",
+    rich_help_panel="Claims",
+    epilog="Example: [bold]access-av paper evaluate --runs 20 --out results/quick[/]",
 )
 def evaluate(
     interpretation: Annotated[
@@ -112,7 +113,8 @@ def _claims(path: Path) -> dict[str, Any]:
 
 
 @app.command(
-    epilog="Example: [bold]access-av interpretations gate-t-max[/]",
+    rich_help_panel="Claims",
+    epilog="Example: [bold]access-av paper interpretations gate-t-max[/]",
 )
 def interpretations(
     name: Annotated[
@@ -132,7 +134,9 @@ def interpretations(
 
 
 @app.command(
-    epilog="Example: [bold]access-av chosen --runs 100[/]",
+    "assumptions",
+    rich_help_panel="Claims",
+    epilog="Example: [bold]access-av paper assumptions --runs 100[/]",
 )
 def chosen(
     platform: PlatformOption = "jetson-agx-xavier",
@@ -144,7 +148,7 @@ def chosen(
     """Print the open choices of the paper: chosen value, reason, and effect of alternatives.
 
     One choice is changed at a time, in the shipped interpretation and mode 0. The command access-av
-    evaluate --sensitivity evaluates joint changes.
+    paper evaluate --sensitivity evaluates joint changes.
     """
     from dataclasses import asdict
 
@@ -167,7 +171,9 @@ def chosen(
 
 
 @app.command(
-    epilog="Example: [bold]access-av search --worlds 64 --controllers 32[/]",
+    "search-controllers",
+    rich_help_panel="Claims",
+    epilog="Example: [bold]access-av paper search-controllers --worlds 64 --controllers 32[/]",
 )
 def search(
     platform: PlatformOption = "jetson-agx-xavier",
@@ -227,7 +233,8 @@ def _bound(text: str) -> Any:
 
 
 @app.command(
-    epilog="Example: [bold]access-av explore --max-energy-j 260 --max-rms-m 0.15[/]",
+    rich_help_panel="Energy",
+    epilog="Example: [bold]access-av paper explore --max-energy-j 260 --max-rms-m 0.15[/]",
 )
 def explore(
     max_energy_j: Annotated[float | None, _bound("Maximum energy of a trip, in J.")] = None,
@@ -250,8 +257,8 @@ def explore(
 ) -> None:
     """Find operating points of the paper's trip within an energy budget and an error bound.
 
-    Uses the last evaluation, or runs it first. The command access-av designs does this for other
-    trips. Exit code 3 if no operating point qualifies.
+    Uses the last evaluation, or runs it first. The command access-av design sweep does this for
+    other trips. Exit code 3 if no operating point qualifies.
     """
     from access_av.designs.operating_points import Query
     from access_av.designs.operating_points import explore as answer
@@ -288,7 +295,8 @@ def explore(
 
 
 @app.command(
-    epilog="Example: [bold]access-av fit --runs 100 --out fitted.toml[/]",
+    rich_help_panel="Energy",
+    epilog="Example: [bold]access-av paper fit --runs 100 --out fitted.toml[/]",
 )
 def fit(
     interpretation: InterpretationOption = "gate",

@@ -1,12 +1,14 @@
-"""Command ``profile``: time and energy of the computation on this computer."""
+"""Commands ``profile`` and ``power``: time, energy and power of onboard computers."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from access_av._core import Platform
 from access_av.cli.options import AsJson
 from access_av.cli.terminal import console, progress, show_warning, table
 
@@ -14,7 +16,8 @@ app = typer.Typer()
 
 
 @app.command(
-    epilog="Example: [bold]access-av profile --name my-board --out my-board.toml[/]",
+    rich_help_panel="Onboard computer",
+    epilog="Example: [bold]access-av design profile --name my-board --out my-board.toml[/]",
 )
 def profile(
     out: Annotated[Path | None, typer.Option(help="Platform file to write.")] = None,
@@ -70,3 +73,37 @@ def profile(
     console.print(made)
     if out is not None:
         console.print(f"Platform file: {out}", soft_wrap=True)
+
+
+@app.command(
+    rich_help_panel="Onboard computer",
+    epilog="Example: [bold]access-av design power jetson-agx-xavier-engine[/]",
+)
+def power(
+    platform: Annotated[
+        str, typer.Argument(help="Platform: shipped name, or path of a TOML file.")
+    ],
+) -> None:
+    """Compare the modelled and the measured power of a board with all cores busy.
+
+    One row per power mode of the platform file; a dash marks a missing value.
+    """
+    board = Platform.load(platform)
+    made = table(
+        ["mode", "name", "cores", "MHz", "modelled W", "measured W", "difference %"], text=2
+    )
+    for index, mode in enumerate(json.loads(board.to_json())["modes"]):
+        modelled_w = board.busy_power_w(index, mode["cores"])
+        measured_w = mode.get("full_load_power_w", {}).get("value")
+        made.add_row(
+            str(mode["mode"]),
+            mode["name"],
+            str(mode["cores"]),
+            f"{mode['cpu_mhz']:.1f}",
+            "–" if modelled_w is None else f"{modelled_w:.2f}",
+            "–" if measured_w is None else f"{measured_w:.2f}",
+            "–"
+            if modelled_w is None or measured_w is None
+            else f"{100.0 * (modelled_w / measured_w - 1.0):+.1f}",
+        )
+    console.print(made)

@@ -21,7 +21,8 @@ app = typer.Typer()
 
 @app.command(
     "import-paths",
-    epilog="Example: [bold]access-av import-paths paths.parquet --site street.toml "
+    rich_help_panel="Radio heads",
+    epilog="Example: [bold]access-av design import-paths paths.parquet --site street.toml "
     "--carrier-mhz 3750 --out street.npz[/]",
 )
 def import_paths(
@@ -54,8 +55,9 @@ def import_paths(
 
 
 @app.command(
-    epilog="Examples: [bold]access-av plan yard[/], "
-    "[bold]access-av plan yard --masts masts.csv --add 2[/]",
+    rich_help_panel="Radio heads",
+    epilog="Examples: [bold]access-av design plan yard[/], "
+    "[bold]access-av design plan yard --masts masts.csv --add 2[/]",
 )
 def plan(
     scenario: ScenarioArgument,

@@ -28,7 +28,8 @@ Possible remedies:
 
 
 @app.command(
-    epilog="Example: [bold]access-av scan captures/*.sigmf-meta --json[/]",
+    rich_help_panel="Samples",
+    epilog="Example: [bold]access-av record scan captures/*.sigmf-meta --json[/]",
 )
 def scan(
     recordings: Annotated[
@@ -124,7 +125,10 @@ def scan(
         print(json_text(found))
 
 
-@app.command(epilog="Example: [bold]access-av aoa captures/array1.sigmf-meta --json[/]")
+@app.command(
+    rich_help_panel="Samples",
+    epilog="Example: [bold]access-av record aoa captures/array1.sigmf-meta --json[/]",
+)
 def aoa(
     recording: Annotated[Path, typer.Argument(help="SigMF recording of an array.")],
     spacing: Annotated[
@@ -156,7 +160,8 @@ def aoa(
 
 
 @app.command(
-    epilog="Example: [bold]access-av angles drive/iq.sigmf-meta --site drive/site.toml "
+    rich_help_panel="Samples",
+    epilog="Example: [bold]access-av record angles drive/iq.sigmf-meta --site drive/site.toml "
     "--vehicle drive/vehicle.toml --out angles[/]",
 )
 def angles(
@@ -171,11 +176,11 @@ def angles(
     out: Out = None,
     as_json: AsJson = False,
 ) -> None:
-    """Estimate the angles of a recording's SSBs, as input of locate.
+    """Estimate the angles of a recording's SSBs, as input of record locate.
 
     Uses the vehicle's receiver and estimator for every SSB of the site's radio heads. Writes
-    angles.csv, angles.parquet (inputs of [bold]access-av locate --recording[/]), site.toml and
-    vehicle.toml.
+    angles.csv, angles.parquet (inputs of [bold]access-av record locate --recording[/]), site.toml
+    and vehicle.toml.
 
     phase_sigma_rad covers receiver noise and the site's scatter (rician_k_db),
     phase_noise_sigma_rad only receiver noise. Neither covers mounting and calibration of the array,

@@ -16,6 +16,7 @@ import typer
 from access_av.cli.options import MISSED, AsJson
 from access_av.cli.terminal import console, show_warning
 from access_av.errors import InputError
+from access_av.tables import renamed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -24,11 +25,13 @@ app = typer.Typer()
 
 MANIFEST = "manifest.json"
 # Entries of a manifest that differ between two runs of the same command.
-NOT_CONTENT = ("written", "command", "directory", "duration_s", "inputs", "commit", "version")
+NOT_CONTENT = (
+    "written", "command", "repeat", "directory", "duration_s", "inputs", "commit", "version",
+)  # fmt: skip
 # Folders of intermediate results, from which an interrupted command continues.
 NOT_RESULTS = ("parts",)
-# Options without an influence on the results.
-WHERE = ("--out", "--executor", "--threads")
+# Options without an influence on the results, including those of earlier versions.
+WHERE = ("--out", "--executor", "--threads", "--shard", "--dask")
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class Difference:
 
 
 @app.command(
+    rich_help_panel="Plants and scenarios",
     epilog="Example: [bold]access-av run paper --out results/mine; access-av rerun results/mine[/]",
 )
 def rerun(
@@ -138,7 +142,10 @@ def _manifest(results: Path) -> dict[str, Any]:
 
 
 def _arguments(manifest: Mapping[str, Any]) -> list[str]:
-    """Returns the arguments of the command without the options of :data:`WHERE`."""
+    """Returns the arguments of the command without the options of :data:`WHERE`.
+
+    Command and options of an earlier version are replaced by their present names.
+    """
     _, *typed = map(str, manifest["command"])
     found, skipped = list[str](), False
     for argument in typed:
@@ -148,13 +155,13 @@ def _arguments(manifest: Mapping[str, Any]) -> list[str]:
             skipped = True
         elif not argument.startswith(tuple(f"{it}=" for it in WHERE)):
             found.append(argument)
-    return found
+    return renamed.current(found)
 
 
 def _split(command: str) -> list[str]:
     import shlex
 
-    return shlex.split(command)[1:]
+    return renamed.current(shlex.split(command)[1:])
 
 
 def _changed_inputs(manifest: Mapping[str, Any], where: Path) -> list[str]:

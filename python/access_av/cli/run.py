@@ -32,6 +32,7 @@ app = typer.Typer()
 
 
 @app.command(
+    rich_help_panel="Plants and scenarios",
     epilog="Example: [bold]access-av run paper --runs 10 --set site.rician_k_db=10[/]",
 )
 def run(
@@ -106,5 +107,5 @@ def run(
     if assumed:
         console.print(in_words(assumed), soft_wrap=True)
     if (levels := result.service_levels) and not all(verdict.reached for verdict in levels):
-        console.print(f"Possible improvements: access-av plan {scenario}", soft_wrap=True)
+        console.print(f"Possible improvements: access-av design plan {scenario}", soft_wrap=True)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

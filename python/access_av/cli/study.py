@@ -31,7 +31,8 @@ app = typer.Typer()
 
 
 @app.command(
-    epilog="Example: [bold]access-av new plant mine.toml; access-av study mine.toml[/]",
+    rich_help_panel="Plants and scenarios",
+    epilog="Example: [bold]access-av file new plant mine.toml; access-av study mine.toml[/]",
 )
 def study(
     plant: Annotated[str, typer.Argument(help="Plant: shipped name, or path of a TOML file.")],

@@ -15,8 +15,9 @@ app = typer.Typer()
 
 
 @app.command(
-    epilog="Example: [bold]access-av synth yard --angles --out drives/1; "
-    "access-av survey drives/* --site yard --vehicle drives/1/vehicle.toml[/]",
+    rich_help_panel="Drives",
+    epilog="Example: [bold]access-av record synth yard --angles --out drives/1; "
+    "access-av record survey drives/* --site yard --vehicle drives/1/vehicle.toml[/]",
 )
 def survey(
     drives: Annotated[

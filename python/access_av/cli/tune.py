@@ -33,7 +33,8 @@ SHOWN_PERCENTS = (50.0, 90.0, 99.0)
 
 
 @app.command(
-    epilog="Example: [bold]access-av tune yard --max-error-m 0.5 --percentile 99[/]",
+    rich_help_panel="Operating points",
+    epilog="Example: [bold]access-av design tune yard --max-error-m 0.5 --percentile 99[/]",
 )
 def tune(
     scenario: ScenarioArgument,
@@ -124,7 +125,7 @@ def tune(
     }
     given = [text for name, value in asked.items() if value is not None for text in (name, value)]
     directory.write_manifest(
-        repeat=("tune", "scenario.toml", *given),
+        repeat=("design", "tune", "scenario.toml", *given),
         scenario=chosen.name,
         runs=runs,
         seed=seed,
@@ -140,7 +141,7 @@ def tune(
     if not is_kept:
         errors.print(
             "missed: no set point of this policy meets the limits. More radio heads, a better "
-            f"odometer or a surveyed road can help: access-av plan {scenario}",
+            f"odometer or a surveyed road can help: access-av design plan {scenario}",
             style="red",
             soft_wrap=True,
         )

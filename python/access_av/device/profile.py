@@ -122,7 +122,7 @@ class Profile:
         if not self.measured:
             raise InputError("no power mode could be measured: " + "; ".join(self.warnings))
         source = (
-            f"access-av profile {version('access-av')} on {self.machine}, "
+            f"access-av design profile {version('access-av')} on {self.machine}, "
             f"{datetime.now(timezone.utc):%Y-%m-%d}"
         )
         modes = list(dict.fromkeys(each.mode for each in self.measured))

@@ -148,8 +148,8 @@ def check_trip(scenario: Scenario) -> None:
             f"scenario {scenario.name}: {differs[0]} is not the paper's, whose claims `access-av "
             "evaluate` judges on the paper's trip; for errors, angle estimates and energy of this "
             "one: "
-            f"access-av run {scenario.name}; for what any localizer could reach: access-av bound "
-            f"{scenario.name}"
+            f"access-av run {scenario.name}; for what any localizer could reach: access-av design "
+            f"bound {scenario.name}"
         )
 
 

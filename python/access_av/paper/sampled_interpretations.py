@@ -253,7 +253,11 @@ def as_toml(values: Mapping[str, Any], name: str = "found") -> str:
     tables["vehicle"] = {"extends": "paper", **tables["vehicle"]}
     kept = ("name", "position_m", "pci")
     tables["site.radio_heads"] = {it: head[it] for it in kept} | tables["site.radio_heads"]
-    lines = ['extends = "paper"', f'name = "{name}"', 'description = "Found by access-av search"']
+    lines = [
+        'extends = "paper"',
+        f'name = "{name}"',
+        'description = "Found by access-av paper search-controllers"',
+    ]
     for table, entries in tables.items():
         lines += ["", f"[[{table}]]" if table == "site.radio_heads" else f"[{table}]"]
         lines += [f"{key} = {_toml(value)}" for key, value in entries.items()]

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from access_av.paper.own_design import Fair
     from access_av.run.campaign import Campaign
 
-FIT_SOURCE = "access-av fit: agrees with the sums and statements of the paper"
+FIT_SOURCE = "access-av paper fit: agrees with the sums and statements of the paper"
 # Sizes of `evaluate --sensitivity`: environments, controllers in each, runs per setting.
 UNKNOWNS = (512, 2, 8)
 

@@ -1,4 +1,4 @@
-"""Report of ``access-av designs``: table, energy against error, error over time."""
+"""Report of ``access-av design sweep``: table, energy against error, error over time."""
 
 from __future__ import annotations
 

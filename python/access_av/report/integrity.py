@@ -1,4 +1,4 @@
-"""Report of ``access-av integrity``: table, and Stanford diagram of each case."""
+"""Report of ``access-av design integrity``: table, and Stanford diagram of each case."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Report of ``access-av locate``: track, error, innovations, estimated parameters."""
+"""Report of ``access-av record locate``: track, error, innovations, estimated parameters."""
 
 from __future__ import annotations
 

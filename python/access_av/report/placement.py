@@ -1,4 +1,4 @@
-"""Report of ``access-av bound``: the bound along the route and over the site."""
+"""Report of ``access-av design bound``: the bound along the route and over the site."""
 
 from __future__ import annotations
 

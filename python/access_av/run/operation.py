@@ -19,7 +19,7 @@ TOO_WIDE = "protection level above the alert limit of {limit_m:g} m"
 SUSPECTED = "fault of a radio head, the array or the odometer suspected, now or recently"
 REMEDIES = {
     SEARCHING: "a start pose, or more radio heads near the start",
-    CONTRADICTED: "a survey of radio heads and array mounting (access-av survey, from drives)",
+    CONTRADICTED: "a survey of radio heads and array mounting (access-av record survey)",
     TOO_WIDE: "more wake-ups, more radio heads, smaller standard deviations, or a higher "
     "integrity.alert_limit_m if the plant permits it",
     SUSPECTED: "realistic standard deviations of array, odometer and radio heads, because errors "

@@ -126,7 +126,7 @@ def varied(vary: Sequence[str]) -> list[tuple[str, dict[str, Any]]]:
     if len(found) > MOST_VARIANTS:
         raise InputError(
             f"--sweep: {len(found)} variants; at most {MOST_VARIANTS} are compared, "
-            "access-av designs searches more"
+            "access-av design sweep searches more"
         )
     return found if vary else []
 

@@ -34,8 +34,8 @@ def read(file: Path) -> dict[str, Any]:
     """
     try:
         return tomllib.loads(regular(file, MOST_BYTES).read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: {error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"{file}: invalid TOML: {error}") from error
 
 
 @cache

@@ -259,7 +259,7 @@ pub struct UncertaintySettings {
     /// Target horizontal error at which the vehicle wakes up, in metres; x̃_max of the paper.
     /// Angles are estimated as late and as rarely as possible so that the localizer's covariance
     /// stays below it. The actual error exceeds the target if the covariance is too small or no
-    /// radio head is in range. `access-av tune` finds the target for a required error.
+    /// radio head is in range. `access-av design tune` finds the target for a required error.
     #[schemars(range(min = 1e-3, max = 1e3))]
     pub target_error_m: f64,
     /// Probability that the error is below `target_error_m` at a wake-up, given a correct covariance.

@@ -10,7 +10,7 @@ use crate::angle_log::{AngleLog, angle};
 use crate::error::RecordingError;
 
 /// Reads the angles of the `access_av_msgs/msg/AngleVerdict` messages of an MCAP file or a rosbag2
-/// folder, optionally of one topic. A node or `access-av locate` records these messages. Verdicts
+/// folder, optionally of one topic. A node or `access-av record locate` records these messages. Verdicts
 /// without an angle are skipped. In files that were written before the messages had `resolved` and
 /// `at_head`, all angles are resolved and measured on the vehicle.
 ///

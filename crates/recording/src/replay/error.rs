@@ -104,7 +104,7 @@ pub enum ReplayError {
     /// The recording contains no SSB of the site.
     #[error(
         "{file}: the recording contains no SSB of a radio head of the site; check the carrier, the band, and \
-         pci and ssb_index; `access-av scan` lists the cells"
+         pci and ssb_index; `access-av record scan` lists the cells"
     )]
     NoSsb {
         /// Path of the recording.

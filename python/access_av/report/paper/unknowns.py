@@ -28,9 +28,9 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
     found = study.sensitivity
     if found is None:
         return (
-            "<p>Not computed. <code>access-av evaluate --sensitivity</code> draws interpretations "
-            "from the ranges of the unspecified parameters, and computes the sensitivity of each "
-            "claim to each parameter.</p>"
+            "<p>Not computed. <code>access-av paper evaluate --sensitivity</code> draws "
+            "interpretations from the ranges of the unspecified parameters, and computes the "
+            "sensitivity of each claim to each parameter.</p>"
         )
     specs["sobol"] = _index_chart(found)
     specs["share"] = _share_chart(found)

@@ -166,7 +166,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "odometry",
             "An odometry sample",
-            "`odometry.csv` of `access-av synth`; `access-av locate --odometry`",
+            "`odometry.csv` of `access-av record synth`; `access-av record locate --odometry`",
             ("time_s", "distance_m", "speed_mps", "yaw_rate_radps"),
             {
                 "distance_m": "speeds or wheel columns are given (the column is absent)",
@@ -177,29 +177,31 @@ TABLES: Mapping[str, Table] = {
         Table(
             "poses",
             "An odometry sample with the pose of the vehicle",
-            "`poses.parquet` of `access-av locate`; `access_av.locate(…).poses`",
+            "`poses.parquet` of `access-av record locate`; `access_av.locate(…).poses`",
             _POSES,
             _POSES_NULL,
         ),
         Table(
             "smoothed",
             "An odometry sample with the smoothed pose of the vehicle",
-            "`smoothed.parquet` of `access-av locate --smooth`; `access_av.locate(…).smoothed`",
+            "`smoothed.parquet` of `access-av record locate --smooth`; "
+            "`access_av.locate(…).smoothed`",
             _POSES,
             {**_POSES_NULL, **dict.fromkeys((*_LEVELS, "integrity"), "always")},
         ),
         Table(
             "angles",
             "An angle and its use by the localizer",
-            "`angles.parquet` of `access-av locate`; `access_av.locate(…).angles`. A CSV log of "
-            "angles for `access-av locate --recording` has some of the first seven: docs/locate.md",
+            "`angles.parquet` of `access-av record locate`; `access_av.locate(…).angles`. A CSV "
+            "log of angles for `access-av record locate --recording` has some of the first seven: "
+            "docs/locate.md",
             ("time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "accepted", "reason", *_COMPARED),
             {**dict.fromkeys(_ANGLE, _NO_ANGLE), **dict.fromkeys(_COMPARED, _NOT_COMPARED)},
         ),
         Table(
             "ranges",
             "A range and its use by the localizer",
-            "`ranges.parquet` of `access-av locate`; `access_av.locate(…).ranges`",
+            "`ranges.parquet` of `access-av record locate`; `access_av.locate(…).ranges`",
             ("time_s", "pci", "ssb_index", *_RANGE, "accepted", "reason", *_COMPARED),
             {
                 "range_sigma_m": "`ranging.sigma_m` of the vehicle applies",
@@ -209,14 +211,14 @@ TABLES: Mapping[str, Table] = {
         Table(
             "recorded_angles",
             "An angle estimated from a recording",
-            "`angles.csv` and `angles.parquet` of `access-av angles`; "
-            "`access_av.estimate_angles(…).angles`; `access-av locate --recording`",
+            "`angles.csv` and `angles.parquet` of `access-av record angles`; "
+            "`access_av.estimate_angles(…).angles`; `access-av record locate --recording`",
             ("time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "phase_noise_sigma_rad", "resolved"),
         ),
         Table(
             "findings",
             "A vehicle parameter that the localizer estimates",
-            "`findings.parquet` of `access-av locate`; `access_av.locate(…).findings`",
+            "`findings.parquet` of `access-av record locate`; `access_av.locate(…).findings`",
             ("constant", "constant_unit", "stated_value", "found_value", "found_value_std"),
         ),
         Table(
@@ -228,7 +230,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "bound_route",
             "An SSB of the drive (the bound uses every SSB)",
-            "`bound.parquet` of `access-av bound`; `access_av.bound(…).route`",
+            "`bound.parquet` of `access-av design bound`; `access_av.bound(…).route`",
             (
                 "time_s", "along_m", "x_m", "y_m", "bound_m", "along_std_m", "across_std_m",
                 "heading_std_rad", "odometer_scale_std",
@@ -237,7 +239,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "bound_map",
             "A square of the site, at its centre",
-            "`map.parquet` of `access-av bound`; `access_av.bound(…).site`",
+            "`map.parquet` of `access-av design bound`; `access_av.bound(…).site`",
             ("x_m", "y_m", "bound_m"),
             {"bound_m": "the radio heads do not determine the position"},
         ),
@@ -255,7 +257,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "integrity_cases",
             "A case of an integrity campaign",
-            "`integrity.parquet` of `access-av integrity`; `Case.as_record()`",
+            "`integrity.parquet` of `access-av design integrity`; `Case.as_record()`",
             (
                 "variant", "mismatch", "channel", "heads", "runs", "availability",
                 "unavailable_share", "exceedances", "exceedance_share", "exceedance_share_low",
@@ -267,19 +269,19 @@ TABLES: Mapping[str, Table] = {
         Table(
             "masts",
             "A candidate mast, added alone",
-            "`masts.parquet` of `access-av plan`; `access_av.plan(…).ranking`",
+            "`masts.parquet` of `access-av design plan`; `access_av.plan(…).ranking`",
             ("name", "x_m", "y_m", "z_m", "p90_bound_m"),
         ),
         Table(
             "survey",
             "A surveyed parameter of site or vehicle",
-            "`survey.parquet` of `access-av survey`; `access_av.survey(…).table()`",
+            "`survey.parquet` of `access-av record survey`; `access_av.survey(…).table()`",
             ("key", "unit", "before", "std_before", "found", "std", "is_learnt"),
         ),
         Table(
             "bound_heads",
             "A radio head",
-            "`access-av bound --json`; `access_av.bound(…).heads`",
+            "`access-av design bound --json`; `access_av.bound(…).heads`",
             (
                 "name", "pci", "ssb_index", "x_m", "y_m", "nearest_m", "farthest_m",
                 "least_expected_snr_db", "most_expected_snr_db", "visible_share",
@@ -309,8 +311,8 @@ TABLES: Mapping[str, Table] = {
         Table(
             "operating_points",
             "An operating point of an interpretation of the paper",
-            "`operating_points.parquet` of `access-av evaluate`; `access-av explore --json`; all "
-            "but `interpretation`: `access_av.evaluate(…).points`",
+            "`operating_points.parquet` of `access-av paper evaluate`; `access-av paper explore "
+            "--json`; all but `interpretation`: `access_av.evaluate(…).points`",
             (
                 "interpretation", "campaign", "mode", "mode_name", "method", "adaptive",
                 "base_wake_up_ms",
@@ -398,7 +400,8 @@ TABLES: Mapping[str, Table] = {
         Table(
             "compared",
             "A percentile of the error of a variant",
-            "`compared.parquet` of `access-av run`, `study`, `locate` and `integrity`, with "
+            "`compared.parquet` of `access-av run`, `study`, `record locate` and `design integrity`, "
+            "with "
             "--sweep "
             "or --against",
             (
@@ -421,21 +424,22 @@ TABLES: Mapping[str, Table] = {
         Table(
             "designs",
             "A design of a scenario in its worst environment, over runs common to all designs",
-            "`designs.parquet` of `access-av designs`; `kept` of `access-av choose --json`",
+            "`designs.parquet` of `access-av design sweep`; `kept` of `access-av design select "
+            "--json`",
             ("design", *_IN_THE_WORST, "on_front"),
             {"energy_j": _NO_FIGURE, **_IN_THE_WORST_NULL},
         ),
         Table(
             "design_worlds",
             "A design of a scenario in one of several environments",
-            "`worlds.parquet` of `access-av designs`",
+            "`worlds.parquet` of `access-av design sweep`",
             ("design", *_IN_THE_WORST),
             {"energy_j": _NO_FIGURE, **_IN_THE_WORST_NULL},
         ),
         Table(
             "errors",
             "A setting of an interpretation and an SSB",
-            "`errors.parquet` of `access-av evaluate`; all but `interpretation`: "
+            "`errors.parquet` of `access-av paper evaluate`; all but `interpretation`: "
             "`access_av.evaluate(…).errors`",
             (
                 "interpretation", "method", "adaptive", "base_wake_up_ms", "time_s",
@@ -446,13 +450,13 @@ TABLES: Mapping[str, Table] = {
         Table(
             "snr",
             "An SSB, over all runs",
-            "`snr.parquet` of `access-av evaluate`; `access_av.evaluate(…).snr`",
+            "`snr.parquet` of `access-av paper evaluate`; `access_av.evaluate(…).snr`",
             ("time_s", "mean_true_snr_db"),
         ),
         Table(
             "claims",
             "A claim of the paper under an interpretation",
-            "`claims.json` of `access-av evaluate`",
+            "`claims.json` of `access-av paper evaluate`",
             (
                 "interpretation", "id", "statement", "paper_section", "stated", "obtained",
                 "interval", "unit",
@@ -471,7 +475,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "evaluation_runs",
             "A run of a setting of the evaluation",
-            "`evaluation_runs.parquet` of `access-av evaluate`",
+            "`evaluation_runs.parquet` of `access-av paper evaluate`",
             (
                 *_SETTING, "run", "aoa_estimates", "rms_error_m", "max_error_x_m", "max_error_y_m",
                 "longest_gap_s", "energy_j",
@@ -485,7 +489,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "resamples",
             "A bootstrap resample of the runs of an operating point",
-            "`resamples.parquet` of `access-av evaluate`",
+            "`resamples.parquet` of `access-av paper evaluate`",
             (
                 *_SETTING, "resample", "aoa_estimates", "worst_error_x_m", "worst_error_y_m",
                 "rms_error_m", "late_to_early", "share_below_music", "share_below_esprit",
@@ -502,7 +506,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "ablations",
             "An interpretation and a power mode, with a constant in place of the controller",
-            "`ablations.parquet` of `access-av evaluate`",
+            "`ablations.parquet` of `access-av paper evaluate`",
             (
                 "interpretation", "mode", "constant_ms", "aoa_estimates", "constant_aoa_estimates",
                 "rms_error_m", "constant_rms_m", "gain_m", "gain_low_m", "gain_high_m", "matters",
@@ -511,7 +515,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "fixed_front",
             "MUSIC at a fixed interval",
-            "`fixed_front.parquet` of `access-av evaluate`",
+            "`fixed_front.parquet` of `access-av paper evaluate`",
             (
                 "base_wake_up_ms", "aoa_estimates", "worst_error_x_m", "worst_error_y_m",
                 "rms_error_m",
@@ -520,7 +524,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "proposed_vs_paper",
             "A power mode: localizer and wake-up of this project, and the paper's adaptive point",
-            "`proposed_vs_paper.parquet` of `access-av evaluate`",
+            "`proposed_vs_paper.parquet` of `access-av paper evaluate`",
             (
                 "mode", "map", "aoa_estimates", "papers_aoa_estimates", "energy_j",
                 "papers_energy_j",
@@ -535,7 +539,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "equal_information",
             "A localization method in mode 0, with its information",
-            "`equal_information.parquet` of `access-av evaluate`",
+            "`equal_information.parquet` of `access-av paper evaluate`",
             (
                 "real_odometer", "map", "who", "aoa_estimates", "rms_error_m", "rms_low_m",
                 "rms_high_m", "worst_error_m",
@@ -545,7 +549,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "fit_degrees_of_freedom",
             "A free parameter of the energy fit, in addition to the rows above",
-            "`fit_degrees_of_freedom.parquet` of `access-av evaluate`",
+            "`fit_degrees_of_freedom.parquet` of `access-av paper evaluate`",
             (
                 "freedom", "free_numbers", "solved_numbers", "claims_reproduced",
                 "agree_by_construction", "agree_by_arithmetic", "average_saving_percent",
@@ -556,8 +560,8 @@ TABLES: Mapping[str, Table] = {
         Table(
             "assumptions",
             "A value of an open choice of the paper: the shipped value or an alternative",
-            "`assumptions.parquet` of `access-av evaluate --sensitivity`; `access-av chosen "
-            "--json`",
+            "`assumptions.parquet` of `access-av paper evaluate --sensitivity`; "
+            "`access-av paper assumptions --json`",
             (
                 "what", "value", "why", "is_shipped", "aoa_estimates", "worst_error_m",
                 "rms_error_m", "rms_std_m", "fixed_rms_m", "every_ssb_rms_m",
@@ -566,7 +570,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "sensitivity",
             "A claim and an open choice of the paper",
-            "`sensitivity.parquet` of `access-av evaluate --sensitivity`",
+            "`sensitivity.parquet` of `access-av paper evaluate --sensitivity`",
             (
                 "claim", "dimension", "first", "total", "first_low", "first_high", "total_low",
                 "total_high",
@@ -597,7 +601,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "cells",
             "An SSB found in a recording",
-            "`access-av scan --json`; all but `recording`: `access_av.nr.record(cell)`",
+            "`access-av record scan --json`; all but `recording`: `access_av.nr.record(cell)`",
             (
                 "recording", "pci", "ssb_index", "ssb_index_is_guess", "half_frame", "sfn",
                 "cfo_hz", "snr_db", "sample_start", "sample_offset", "mib_bits", "ssb_freq_hz",
@@ -617,7 +621,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "bursts",
             "An annotated burst of an array's recording",
-            "`access-av aoa --json`",
+            "`access-av record aoa --json`",
             (
                 "sample_start", "azimuth_from_broadside_deg", "sigma_deg", "snr_db", "label",
                 "verdict", "doubt", "p_value", "truth_deg",
