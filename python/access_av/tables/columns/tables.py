@@ -400,10 +400,8 @@ TABLES: Mapping[str, Table] = {
         Table(
             "compared",
             "A percentile of the error of a variant",
-            "`compared.parquet` of `access-av run`, `study`, `record locate` and `design integrity`, "
-            "with "
-            "--sweep "
-            "or --against",
+            "`compared.parquet` of `access-av run`, `study`, `record locate` and `design "
+            "integrity` with --sweep or --against",
             (
                 "variant", "runs", "percent", "percentile_m", "percentile_low_m",
                 "percentile_high_m", "delta_m", "delta_low_m", "delta_high_m", "lost_runs",
