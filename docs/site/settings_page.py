@@ -19,7 +19,7 @@ KINDS: dict[str, Any] = {
 }
 INTRODUCTION = """# Settings
 
-This page is generated from the JSON Schemas of the settings files. `access-av vehicle schema`
+This page is generated from the JSON Schemas of the settings files. `access-av file schema vehicle`
 prints the schema of vehicle files for an editor; `site`, `scenario`, `plant` and `platform` have
 the same command. Unknown keys, wrong types and values outside the range are rejected with exit
 code 2. [Plausibility checks](checks.md) describes the warnings. [Messages of the

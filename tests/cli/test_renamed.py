@@ -33,6 +33,8 @@ COMMANDS = {
     "--hypotheses": ["design", "integrity", "yard"],
     "integrity --heads": ["design", "integrity", "yard"],
     "new --heads": ["file", "new", "plant", "mine.toml"],
+    "--shard": ["design", "sweep", "yard"],
+    "--dask": ["paper", "evaluate"],
 }
 
 
@@ -44,10 +46,8 @@ def test_old_options(access_av: Callable[..., Finished], old: str, new: str) -> 
     text = " ".join(done.err.replace("│", " ").split())
     assert f"renamed in version 0.2.0: write {new}" in text, done.err
     option = new.split()[0]
-    assert (
-        option
-        in access_av(*command[: 1 + (command[0] in ("paper", "design", "file"))], "--help").out
-    )
+    is_grouped = command[0] in ("paper", "design", "file")
+    assert option in access_av(*command[: 1 + is_grouped], "--help").out
 
 
 @pytest.mark.parametrize(("old", "new"), renamed.names("commands").items())

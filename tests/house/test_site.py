@@ -36,7 +36,7 @@ def test_site_builds_without_warnings() -> None:
             for key, item in table.get("properties", {}).items():
                 assert "const" in item or f"| `{key}` |" in settings, key
     commands = (pages / "commands.md").read_text(encoding="utf-8")
-    for command in ("run", "study", "locate", "vehicle schema"):
+    for command in ("run", "study", "record locate", "file schema"):
         assert f"## access-av {command}\n" in commands
     python = (pages / "python-api.md").read_text(encoding="utf-8")
     for name in access_av.__all__:

@@ -46,7 +46,7 @@ def option_message(option: str, command: str) -> str | None:
     --------
     >>> option_message("--vary", "access-av run")
     'No such option: --vary. It was renamed in version 0.2.0: write --sweep'
-    >>> option_message("--heads", "access-av new plant")
+    >>> option_message("--heads", "access-av file new")
     'No such option: --heads. It was renamed in version 0.2.0: write --heads-file'
     """
     new = _option(option, command.split())

@@ -577,14 +577,14 @@ TABLES: Mapping[str, Table] = {
         Table(
             "sensitivity_claims",
             "A claim",
-            "`sensitivity_claims.parquet` of `access-av evaluate --sensitivity`",
+            "`sensitivity_claims.parquet` of `access-av paper evaluate --sensitivity`",
             ("claim", "share_met", "share_met_low", "share_met_high", "explained_variance"),
             {"explained_variance": "the margin is equal in all drawn interpretations"},
         ),
         Table(
             "sensitivity_sample",
             "A drawn interpretation and an open choice of the paper",
-            "`sensitivity_sample.parquet` of `access-av evaluate --sensitivity`",
+            "`sensitivity_sample.parquet` of `access-av paper evaluate --sensitivity`",
             (
                 "interpretation_index", "environment_index", "dimension", "coordinate",
                 "num_choices", "drawn_value",
@@ -593,7 +593,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             "sensitivity_margins",
             "A drawn interpretation and a claim",
-            "`sensitivity_margins.parquet` of `access-av evaluate --sensitivity`",
+            "`sensitivity_margins.parquet` of `access-av paper evaluate --sensitivity`",
             ("interpretation_index", "claim", "margin"),
         ),
         Table(
