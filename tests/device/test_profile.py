@@ -306,7 +306,7 @@ def test_a_counter_that_jumps_is_refused(tmp_path: Path) -> None:
 
 def test_a_sensor_that_does_not_see_the_load_has_stopped() -> None:
     still = Window(0.0, 2.0, Interval(10.0, 0.1), is_constant=True)
-    with pytest.raises(SensorError, match="same, idle and busy"):
+    with pytest.raises(SensorError, match="equal, idle and busy"):
         above_idle(still, still)
 
 
@@ -439,7 +439,7 @@ def test_a_sensor_that_does_not_see_the_load_keeps_its_windows(
     found = device.profile(tmp_path, window_s=1.0)
     (each,) = found.measured
     assert each.energy_j is None
-    assert "same, idle and busy" in str(each.why_not)
+    assert "equal, idle and busy" in str(each.why_not)
     for window in (each.idle, each.busy):
         assert window is not None
         assert window.energy_j.low <= 15.0 * window.duration_s <= window.energy_j.high

@@ -56,7 +56,6 @@ def test_a_log_of_angles_locates_as_its_samples_do(
     out = tmp_path / "angles"
     done = access_av(
         "record",
-        "record",
         "angles",
         drive / "iq.sigmf-meta",
         "--site",

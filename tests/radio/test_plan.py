@@ -113,7 +113,6 @@ def test_the_command_plans_and_refuses(tmp_path: Path, access_av: Callable[..., 
     (tmp_path / "short.toml").write_text(SHORT.to_toml())
     done = access_av(
         "design",
-        "design",
         "plan",
         tmp_path / "short.toml",
         "--masts",
