@@ -65,7 +65,7 @@ from access_av.lazy import attach
 
 if TYPE_CHECKING:
     from access_av import drives, paper, statistics
-    from access_av.designs.operating_points import Query, explore
+    from access_av.designs.query import Query, explore
     from access_av.device.platform import Platform
     from access_av.drives.angle_log import AngleLog, estimate_angles
     from access_av.drives.recorded import Drive, SynthesizedDrive, locate, synthesize
@@ -141,7 +141,7 @@ if not TYPE_CHECKING:
         __name__,
         {
             "access_av.drives.angle_log": ["AngleLog", "estimate_angles"],
-            "access_av.designs.operating_points": ["Query", "explore"],
+            "access_av.designs.query": ["Query", "explore"],
             "access_av.drives.recorded": ["Drive", "SynthesizedDrive", "locate", "synthesize"],
             "access_av.run.difference": ["Difference", "difference"],
             "access_av.run.error_bound": ["ErrorBound", "bound"],

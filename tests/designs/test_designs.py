@@ -23,10 +23,10 @@ from access_av import Scenario, columns
 from access_av.designs import driven
 from access_av.designs.driven import Design, Driven, designs_of, in_worlds
 from access_av.designs.front import front, may_be_front
-from access_av.designs.search import Found, rounds, search
+from access_av.designs.query import Query, what_to_change
+from access_av.designs.search import Found, rounds, search, suggested
 from access_av.designs.space import Space, sobol
-from access_av.designs.suggested import suggested
-from access_av.designs.table import Constraints, rows_of, rows_of_worlds, what_to_change
+from access_av.designs.table import rows_of, rows_of_worlds
 from access_av.device.platform import Platform
 from access_av.errors import InputError
 from access_av.report.designs import render_designs
@@ -408,18 +408,18 @@ def test_the_table_has_its_documented_columns() -> None:
 
 def test_constraints_choose_the_least_energy() -> None:
     rows = rows_of(cloud(20, PAIRS))
-    assert Constraints(max_rms_m=0.25).kept(rows)["design"][0] == 1
-    assert Constraints(max_energy_j=3.0, max_rms_m=0.15).kept(rows).is_empty()
+    assert Query(max_rms_m=0.25).kept(rows)["design"][0] == 1
+    assert Query(max_energy_j=3.0, max_rms_m=0.15).kept(rows).is_empty()
 
 
 def test_an_unreachable_limit_reports_the_reachable_value() -> None:
     rows = rows_of(cloud(20, PAIRS))
-    advice = what_to_change(Constraints(max_energy_j=3.0, max_rms_m=0.15), rows)
+    advice = what_to_change(Query(max_energy_j=3.0, max_rms_m=0.15), rows)
     assert advice[0].startswith("energy 4 J instead of 3 J: design 3")
     assert advice[1].startswith("RMS error 0.2")
     assert " m instead of 0.15 m: " in advice[1]
     assert "design 1" in advice[1]
-    advice = what_to_change(Constraints(max_energy_j=0.0, max_rms_m=0.0), rows)
+    advice = what_to_change(Query(max_energy_j=0.0, max_rms_m=0.0), rows)
     assert advice[0].startswith("energy: no value of this limit alone is sufficient")
 
 
@@ -459,7 +459,7 @@ def test_a_design_is_judged_in_the_worst_of_its_worlds(
     assert rows["p99_error_m"].to_list() == pytest.approx([0.2, 0.9])
     assert rows["world"][1] == "rician_k_db 5"
     assert of_worlds["p99_error_m"].to_list() == pytest.approx([0.2, 0.2, 0.9, 0.05])
-    kept = Constraints(max_error_m=0.3).kept(rows)
+    kept = Query(max_error_m=0.3).kept(rows)
     assert kept["choice"].to_list() == ["interval_ms 2000"]
     page = render_designs(Scenario.load("paper"), found.driven, rows, of_worlds)
     assert "Worst environment" in page
@@ -468,7 +468,7 @@ def test_a_design_is_judged_in_the_worst_of_its_worlds(
 
 def test_what_too_few_drives_say_is_not_called_kept() -> None:
     row = {"p99_error_m": 0.28, "p99_error_low_m": 0.2, "p99_error_high_m": 0.4}
-    bound = Constraints(max_error_m=0.3, percentile=99.0)
+    bound = Query(max_error_m=0.3, percentile=99.0)
     assert bound.keeps(row)
     assert not bound.keeps_surely(row)
     assert "too few runs" in bound.in_words(row)[0]
@@ -476,7 +476,7 @@ def test_what_too_few_drives_say_is_not_called_kept() -> None:
     assert bound.in_words({**row, "p99_error_m": 0.31})[0].endswith("missed")
     assert bound.in_words({**row, "p99_error_high_m": None})[0].endswith("too few runs")
     with pytest.raises(InputError, match=r"percentile 42: it can be 50, 90, 95, 99, 99\.9"):
-        Constraints(max_error_m=0.3, percentile=42.0)
+        Query(max_error_m=0.3, percentile=42.0)
 
 
 def test_rounds_of_halving() -> None:

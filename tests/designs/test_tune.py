@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from access_av import InputError, Scenario
-from access_av.designs.space import Dimension
-from access_av.designs.table import Constraints
-from access_av.designs.tune import _around, space_of, tune
+from access_av.designs.query import Query
+from access_av.designs.tune import space_of, tune
 from access_av.run.campaign import Campaign
 from access_av.run.result_cache import ResultCache
 
@@ -20,6 +19,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from conftest import Finished
+
+pytest.importorskip("optuna", reason="the extra `optuna` is not installed")
 
 BOARD = {"vehicle.platform": {"name": "jetson-agx-xavier-engine", "mode": 0}}
 
@@ -41,8 +42,8 @@ def campaign(tmp_path: Path) -> Campaign:
 
 def test_least_energy_that_keeps_the_error(campaign: Campaign) -> None:
     scenario = short({"policy": "fixed", "interval_ms": 20.0})
-    every = Constraints(max_rms_m=1.0)
-    found = tune(campaign, scenario, every, designs=6, runs=3)
+    every = Query(max_rms_m=1.0)
+    found = tune(campaign, scenario, every, designs=18, runs=3)
     assert found.after.rms_m <= 1.0
     # The odometer drifts slowly, so that few angles are sufficient.
     assert found.after.aoa_estimates.mean() < 0.2 * found.before.aoa_estimates.mean()
@@ -54,11 +55,11 @@ def test_least_energy_that_keeps_the_error(campaign: Campaign) -> None:
 
 def test_least_error_that_keeps_the_energy_and_drives_are_kept(campaign: Campaign) -> None:
     scenario = short({"policy": "fixed", "interval_ms": 5000.0})
-    bound = Constraints(max_energy_j=1e6)
-    found = tune(campaign, scenario, bound, designs=6, runs=3)
+    bound = Query(max_energy_j=1e6)
+    found = tune(campaign, scenario, bound, designs=18, runs=3)
     assert found.after.rms_m < found.before.rms_m
     parts = sorted(campaign.parts.path.iterdir())
-    again = tune(campaign, scenario, bound, designs=6, runs=3)
+    again = tune(campaign, scenario, bound, designs=18, runs=3)
     assert sorted(campaign.parts.path.iterdir()) == parts
     assert again.after.design.values == found.after.design.values
 
@@ -81,8 +82,8 @@ def test_an_optimal_design_is_kept(campaign: Campaign, monkeypatch: pytest.Monke
     energy."""
     monkeypatch.setattr("access_av.designs.driven.simulated", pretended)
     scenario = short({"policy": "fixed", "interval_ms": 400.0})
-    for bound in (Constraints(max_rms_m=0.2), Constraints(max_error_m=0.397, percentile=99.0)):
-        found = tune(campaign, scenario, bound, designs=8, runs=3)
+    for bound in (Query(max_rms_m=0.2), Query(max_error_m=0.397, percentile=99.0)):
+        found = tune(campaign, scenario, bound, designs=24, runs=3)
         assert not found.is_better
         assert found.after is found.before
         assert found.after.design.scenario.vehicle == scenario.vehicle
@@ -93,10 +94,10 @@ def test_a_percentile_is_kept_by_the_least_energy(
 ) -> None:
     monkeypatch.setattr("access_av.designs.driven.simulated", pretended)
     scenario = short({"policy": "fixed", "interval_ms": 20.0})
-    found = tune(campaign, scenario, Constraints(max_error_m=0.3), designs=16, runs=3)
+    found = tune(campaign, scenario, Query(max_error_m=0.3), designs=48, runs=3)
     assert found.is_better
     [error] = found.after.percentiles([99.0])
-    # 1.98 of the RMS error: 230 ms reach it; rounds of 16 points come within a tenth of that.
+    # 1.98 of the RMS error: 230 ms reach it; 48 points come within a tenth of that.
     assert 0.3 * 0.9**0.5 < error.value <= 0.3
 
 
@@ -127,26 +128,19 @@ def test_what_is_tuned_is_what_the_policy_has() -> None:
     assert not space_of(fixed).dimensions
 
 
-def test_a_range_narrows_within_itself() -> None:
-    narrowed = _around(Dimension("a", (), 1.0, 1000.0, is_log=True), 1.0)
-    assert (narrowed.low, narrowed.high) == (1.0, pytest.approx(10**0.5))
-    narrowed = _around(Dimension("a", (), 0.0, 9.0), 4.0)
-    assert (narrowed.low, narrowed.high) == (2.5, 5.5)
-
-
 def test_bad_questions(campaign: Campaign, access_av: Callable[..., Finished]) -> None:
     with pytest.raises(InputError, match="no limit given"):
-        tune(campaign, short({"policy": "fixed"}), Constraints())
+        tune(campaign, short({"policy": "fixed"}), Query())
     none = short({"policy": "fixed", "interval_ms": 80.0}).with_overrides(
         {"vehicle.platform": {"name": "jetson-agx-xavier", "mode": 0}}
     )
     with pytest.raises(InputError, match="has no energy of this method"):
-        tune(campaign, none, Constraints(max_rms_m=1.0), designs=2, runs=1)
+        tune(campaign, none, Query(max_rms_m=1.0), designs=2, runs=1)
     due = {"policy": "fixed", "interval_ms": 80.0}
     absolute = {"kind": "absolute", "snr_db": 10.0}
     empty = short({"policy": "gated", "snr_set_point": absolute, "trigger": due})
     with pytest.raises(InputError, match="nothing to tune"):
-        tune(campaign, empty, Constraints(max_rms_m=1.0))
+        tune(campaign, empty, Query(max_rms_m=1.0))
     done = access_av("design", "tune", "yard", "--max-rms-m", "-1")
     assert done.code == 2
 
@@ -162,6 +156,7 @@ def test_command(access_av: Callable[..., Finished], tmp_path: Path) -> None:
     )  # fmt: skip
     assert done.code == 0, done.err
     told = json.loads(done.out)
-    assert told["drives"] in (2 + 3 * 2 * 2 + 2 * (6 + 2), 2 + 3 * 2 * 2 + 2 * (6 + 3))
+    # Two suggestions, both again, and two or three for the comparison; two runs each.
+    assert told["drives"] in (2 * (2 + 2 + 2), 2 * (2 + 2 + 3))
     vehicle = (tmp_path / "out/vehicle.toml").read_text()
     assert f"interval_ms = {told['values']['vehicle.wake_up.interval_ms']}" in vehicle

@@ -1,10 +1,14 @@
 from __future__ import annotations
 
-import polars as pl
+from typing import TYPE_CHECKING
+
 import pytest
 
 import synthetic
-from access_av.designs.operating_points import Query, explore, pareto_front
+from access_av.designs.query import Query, explore
+
+if TYPE_CHECKING:
+    import polars as pl
 
 
 @pytest.fixture(scope="module")
@@ -40,8 +44,3 @@ def test_nothing_may_qualify(points: pl.DataFrame) -> None:
 def test_a_query_reads_as_a_sentence() -> None:
     assert str(Query(max_energy_j=260.0, max_rms_m=0.15)) == "energy ≤ 260 J and RMS error ≤ 0.15 m"
     assert str(Query()) == "any operating point"
-
-
-def test_pareto_front_has_no_beaten_point() -> None:
-    points = pl.DataFrame({"energy_j": [3.0, 1.0, 2.0, 2.5], "rms_error_m": [0.1, 0.3, 0.2, 0.25]})
-    assert pareto_front(points)["energy_j"].to_list() == [1.0, 2.0, 3.0]

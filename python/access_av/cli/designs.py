@@ -83,9 +83,8 @@ def designs(
     select), worlds.parquet, report.html, scenario.toml and space.toml.
     """
     from access_av.designs.driven import in_worlds
-    from access_av.designs.search import search
+    from access_av.designs.search import search, suggested
     from access_av.designs.space import Space
-    from access_av.designs.suggested import suggested
     from access_av.designs.table import rows_of, rows_of_worlds
     from access_av.errors import InputError
     from access_av.report.designs import render_designs
@@ -179,7 +178,7 @@ def choose(
     in every environment. If none does, the command prints the limits that would have to change,
     with exit code 3.
     """
-    from access_av.designs.table import Constraints, what_to_change
+    from access_av.designs.query import Query, what_to_change
     from access_av.errors import InputError
     from access_av.tables import validation
     from access_av.tables.results_directory import json_text
@@ -189,9 +188,15 @@ def choose(
         raise InputError(f"{results}: no designs here ({TABLE} is missing)")
     rows = validation.read(file, "table of designs")
     validation.check_types(rows, str(file), "designs")
-    constraints = Constraints(max_energy_j, max_rms_m, max_worst_m, max_error_m, percentile)
-    kept = constraints.kept(rows)
-    advice = what_to_change(constraints, rows) if kept.is_empty() else []
+    limits = Query(
+        max_energy_j=max_energy_j,
+        max_rms_m=max_rms_m,
+        max_worst_m=max_worst_m,
+        max_error_m=max_error_m,
+        percentile=percentile,
+    )
+    kept = limits.kept(rows)
+    advice = what_to_change(limits, rows) if kept.is_empty() else []
     if as_json:
         print(json_text({"kept": kept.to_dicts(), "advice": advice}))
     elif advice:
@@ -200,8 +205,8 @@ def choose(
             console.print(f"  {line}", soft_wrap=True)
     else:
         title = f"{kept.height} of {rows.height} designs meet the limits, the least energy first"
-        _show(kept, title, constraints.percent)
-        for line in constraints.in_words(kept.row(0, named=True)):
+        _show(kept, title, limits.percent)
+        for line in limits.in_words(kept.row(0, named=True)):
             console.print(f"First design: {line}.", soft_wrap=True)
     if advice:
         raise typer.Exit(MISSED)

@@ -260,8 +260,8 @@ def explore(
     Uses the last evaluation, or runs it first. The command access-av design sweep does this for
     other trips. Exit code 3 if no operating point qualifies.
     """
-    from access_av.designs.operating_points import Query
-    from access_av.designs.operating_points import explore as answer
+    from access_av.designs.query import Query
+    from access_av.designs.query import explore as answer
     from access_av.report.paper.results import operating_points
     from access_av.statistics.percentiles import column, ends_text
     from access_av.tables.results_directory import json_text
@@ -270,8 +270,9 @@ def explore(
         points = operating_points(results, interpretation, progress=tick)
     if not fixed:
         points = points.filter(adaptive=True)
-    bounds = (max_energy_j, max_rms_m, max_worst_m, max_aoa_estimates, mode, max_error_m)
-    query = Query(*bounds) if percentile is None else Query(*bounds, percentile)
+    query = Query(
+        max_energy_j, max_rms_m, max_worst_m, max_aoa_estimates, mode, max_error_m, percentile
+    )
     found = answer(points, query)
     if as_json:
         print(json_text(found.to_dicts()))
@@ -285,11 +286,11 @@ def explore(
         return
     show_points(found, title=f"Operating points with {query}")
     best = found.row(0, named=True)
-    name = column(query.percentile)
+    name = column(query.percent)
     ends = [best[name.replace("_error_m", f"_error_{end}_m")] for end in ("low", "high")]
     console.print(
         f"Least energy: mode {best['mode']}, {best['energy_j']:.1f} J "
-        f"(energy per execution: {best['energy_provenance']}); {query.percentile:g} % of errors "
+        f"(energy per execution: {best['energy_provenance']}); {query.percent:g} % of errors "
         f"within {best[name]:.3g} m (95 %: {ends_text(*ends)})."
     )
 

@@ -53,8 +53,8 @@ def tune(
     ] = "jetson-agx-xavier-engine",
     mode: Annotated[int, typer.Option(min=0, max=255, help="Power mode of the platform.")] = 0,
     designs: Annotated[
-        int, typer.Option(min=2, max=10_000, help="Points per round; three rounds.")
-    ] = 64,
+        int, typer.Option(min=2, max=10_000, help="Number of points that Optuna suggests.")
+    ] = 192,
     runs: Runs = 20,
     seed: Seed = 1,
     executor: ExecutorOption = None,
@@ -72,7 +72,8 @@ def tune(
     Exit code 0: the limits are met in these runs. 3: a limit is missed; the message gives its
     margin.
     """
-    from access_av.designs.table import Constraints, row_of
+    from access_av.designs.query import Query
+    from access_av.designs.table import row_of
     from access_av.designs.tune import space_of
     from access_av.designs.tune import tune as search
     from access_av.run.campaign import campaign
@@ -81,19 +82,25 @@ def tune(
     chosen = load_scenario(
         scenario, overrides={"vehicle.platform": {"name": platform, "mode": mode}}
     )
-    constraints = Constraints(max_energy_j, max_rms_m, max_worst_m, max_error_m, percentile)
+    limits = Query(
+        max_energy_j=max_energy_j,
+        max_rms_m=max_rms_m,
+        max_worst_m=max_worst_m,
+        max_error_m=max_error_m,
+        percentile=percentile,
+    )
     with progress("Tuning") as tick, campaign(RESULTS / "parts", executor, threads) as kept:
         found = search(
             kept,
             chosen,
-            constraints,
+            limits,
             designs=designs,
             runs=runs,
             seed=seed,
             progress=tick,
         )
     row = row_of(found.after)
-    is_kept, verdicts = constraints.keeps(row), constraints.in_words(row)
+    is_kept, verdicts = limits.keeps(row), limits.in_words(row)
     directory = ResultsDirectory.create(f"tune-{chosen.name}", out)
     directory.write_text("vehicle.toml", found.after.design.scenario.vehicle.to_toml())
     record = {

@@ -1,11 +1,9 @@
 """Optimization of gains, weights and set points of a wake-up policy.
 
-Each round simulates evenly spread points in a box that is a third as wide as the last one, around
-the best point so far. All points use the same runs, and the given policy is one of the points.
-Selection by these runs is biased; therefore the best points are simulated again in new runs. Two of
-them are compared with the given policy in a third set of runs: the best one, and the best one that
-meets the limits with the upper ends of its intervals. The given policy remains unless one of them
-is better.
+Optuna suggests the points, all of which use the same runs. Selection by these runs is biased;
+therefore the best points are simulated again in new runs. Two of them are compared with the given
+policy in a third set of runs: the best one, and the best one that meets the limits with the upper
+ends of its intervals. The given policy remains unless one of them is better.
 """
 
 from __future__ import annotations
@@ -17,9 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from access_av.designs.driven import designs_of, drive, joined
-from access_av.designs.front import differences, student
+from access_av.designs.front import differences
+from access_av.designs.search import suggested
 from access_av.designs.space import Dimension, Space
 from access_av.errors import InputError
+from access_av.statistics.distributions import student_quantile
 from access_av.statistics.percentiles import column
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from access_av._core import Scenario
     from access_av.designs.driven import Design, Driven
-    from access_av.designs.table import Constraints
+    from access_av.designs.query import Query
     from access_av.run.campaign import Campaign
 
 # Tunable keys of each policy: key, minimum, maximum; logarithmic scale if positive.
@@ -53,9 +53,7 @@ RANGES: dict[str, list[Range]] = {
         ("snr_headroom_db", 0.0, 12.0),
     ],
 }
-ROUNDS = 3
 FINALISTS = 8
-NARROWER = 3.0
 
 
 @dataclass(frozen=True)
@@ -111,7 +109,7 @@ def space_of(scenario: Scenario) -> Space:
 def tune(
     campaign: Campaign,
     scenario: Scenario,
-    constraints: Constraints,
+    limits: Query,
     *,
     designs: int = 64,
     runs: int = 20,
@@ -122,100 +120,91 @@ def tune(
 
     Parameters
     ----------
-    constraints
+    limits
         Limits. The objective is minimum energy. If only the energy is limited, it is the minimum
         error: of the percentile if given, otherwise RMS.
     designs
-        Number of points per round.
+        Number of points that Optuna suggests.
     runs
         Number of runs per point, of the second simulation and of the final comparison.
 
     Raises
     ------
     InputError
-        No limit, or a platform without the energy of the method.
+        No limit, a platform without the energy of the method, or Optuna is not installed.
     """
-    if constraints.is_empty:
+    if limits.is_empty:
         raise InputError("no limit given: add a maximum error or a maximum energy")
     space = space_of(scenario)
     if not space.dimensions:
         raise InputError(f"{scenario.name}: its wake-up policy has nothing to tune")
-    goal = _Goal(constraints)
-    [as_it_was] = designs_of(scenario, [{}])
-    tried = _driven(campaign, [as_it_was], 0, runs, seed)
-    done = runs
-    for _ in range(ROUNDS):
-        points = designs_of(scenario, space.sobol(designs))
-        tried += _driven(campaign, points, 0, runs, seed)
-        tried = sorted(tried, key=goal.with_margin)[:FINALISTS]
-        done += runs * len(points)
-        best = next(it.design.values for it in tried if it.design.values)
-        space = Space(tuple(_around(it, best[it.key]) for it in space.dimensions))
-        if progress is not None:
-            progress(done, (ROUNDS * designs + 1) * runs)
+    goal = _Goal(limits)
+
+    def again(some: list[Design], first_run: int) -> list[Driven]:
+        made = drive(campaign, some, first_run=first_run, runs=runs, seed=seed)
+        return [joined(one, [part]) for one, part in zip(some, made, strict=True)]
+
+    found = suggested(
+        campaign,
+        scenario,
+        space,
+        count=designs,
+        runs=runs,
+        seed=seed,
+        goal=goal.for_search,
+        progress=progress,
+    )
+    tried = sorted(found.driven, key=goal.with_margin)
     if not np.isfinite(tried[0].mean_energy_j):
         name = tried[0].design.platform.name
         raise InputError(f"platform {name} has no energy of this method")
-    finalists = [it.design for it in tried if it.design.values]
-    again = _driven(campaign, finalists, runs, runs, seed)
-    safest, best_found = (min(again, key=it).design for it in (goal.with_margin, goal.as_found))
-    last = [as_it_was, safest, *([best_found] if best_found is not safest else [])]
+    finalists = [it.design for it in tried[:FINALISTS]]
+    confirmed = again(finalists, runs)
+    safest, best = (min(confirmed, key=it).design for it in (goal.with_margin, goal.as_found))
+    [baseline] = designs_of(scenario, [{}])
+    last = [baseline, safest, *([best] if best is not safest else [])]
     # Prefer the first of equal ones, which is the given policy.
-    before, *others = _driven(campaign, last, 2 * runs, runs, seed)
+    before, *others = again(last, 2 * runs)
     after = min([before, *others], key=goal.as_found)
     less = -differences(after, [before])[0][:, [0, 2, 1]]
-    return Tuned(before, after, less, done + runs * (len(finalists) + len(last)))
+    return Tuned(before, after, less, found.drives + runs * (len(finalists) + len(last)))
 
 
 @dataclass(frozen=True)
 class _Goal:
     """Order of designs: violation of the limits, then objective."""
 
-    constraints: Constraints
+    limits: Query
 
     def as_found(self, driven: Driven) -> tuple[float, float]:
         """Returns the sort key by the mean results."""
-        return self._rank(driven, with_margin=False)
+        objective, constraints = self._rated(driven, with_margin=False)
+        return max(0.0, *constraints.values()), objective
 
     def with_margin(self, driven: Driven) -> tuple[float, float]:
         """Returns the sort key by the upper ends of the errors' intervals."""
-        return self._rank(driven, with_margin=True)
+        objective, constraints = self.for_search(driven)
+        return max(0.0, *constraints.values()), objective
 
-    def _rank(self, driven: Driven, *, with_margin: bool) -> tuple[float, float]:
-        bounds, count = self.constraints, driven.square_m2.size
+    def for_search(self, driven: Driven) -> tuple[float, dict[str, float]]:
+        """Returns the objective, and the relative violation of each limit with its margin."""
+        return self._rated(driven, with_margin=True)
+
+    def _rated(self, driven: Driven, *, with_margin: bool) -> tuple[float, dict[str, float]]:
+        limits, count = self.limits, driven.square_m2.size
         square_m2 = driven.rms_m**2
         if with_margin and count > 1:
             spread_m2 = float(np.std(driven.square_m2, ddof=1))
-            square_m2 += student(count - 1) * spread_m2 / np.sqrt(count)
-        [error] = driven.percentiles([bounds.percent], of_seen=True)
+            square_m2 += student_quantile(0.975, count - 1) * spread_m2 / np.sqrt(count)
+        [error] = driven.percentiles([limits.percent], of_seen=True)
         error_m = error.high if with_margin and error.high is not None else error.value
         row = {
             "energy_j": driven.mean_energy_j,
             "rms_error_m": float(np.sqrt(square_m2)),
             "p90_max_error_m": driven.p90_worst_m,
-            column(bounds.percent): error_m,
+            column(limits.percent): error_m,
         }
-        beyond = max(1.0, *bounds.excess(row).values())
-        if not bounds.binds_energy_alone:
-            return beyond, driven.mean_energy_j
-        return beyond, driven.rms_m if bounds.percentile is None else error_m
-
-
-def _driven(
-    campaign: Campaign, points: list[Design], first_run: int, runs: int, seed: int
-) -> list[Driven]:
-    made = drive(campaign, points, first_run=first_run, runs=runs, seed=seed)
-    parts = zip(points, made, strict=True)
-    return [joined(point, [part]) for point, part in parts]
-
-
-def _around(dimension: Dimension, value: float) -> Dimension:
-    """Returns a narrower range around a value, within the present one."""
-    low, high = dimension.low, dimension.high
-    if dimension.is_log:
-        factor = (high / low) ** (0.5 / NARROWER)
-        ends = max(low, value / factor), min(high, value * factor)
-    else:
-        half = 0.5 * (high - low) / NARROWER
-        ends = max(low, value - half), min(high, value + half)
-    return Dimension(dimension.key, (), *ends, dimension.is_log)
+        constraints = {name: ratio - 1.0 for name, ratio in limits.excess(row).items()}
+        if not limits.binds_energy_alone:
+            return driven.mean_energy_j, constraints
+        return driven.rms_m if limits.percentile is None else error_m, constraints

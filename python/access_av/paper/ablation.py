@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from access_av.paper.evaluation import cases, fixed_interval
+from access_av.paper.outcome import interval
 from access_av.paper.statements import paper_numbers
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def compare(
 ) -> Ablation:
     """Compares runs with the controller and runs with the constant, with equal seeds."""
     gains_m = constant.rms_error_m - drives.rms_error_m
-    low_m, high_m = np.quantile(gains_m[1:], (0.025, 0.975)) if len(gains_m) > 1 else (0.0, 0.0)
+    low_m, high_m = interval(gains_m) if len(gains_m) > 1 else (0.0, 0.0)
     least_m = LEAST_SHARE * float(drives.rms_error_m[0])
     return Ablation(
         interpretation=interpretation,
@@ -102,8 +103,8 @@ def compare(
         rms_error_m=float(drives.rms_error_m[0]),
         constant_rms_m=float(constant.rms_error_m[0]),
         gain_m=float(gains_m[0]),
-        gain_low_m=float(low_m),
-        gain_high_m=float(high_m),
+        gain_low_m=low_m,
+        gain_high_m=high_m,
         matters=1 if low_m > least_m else -1 if high_m < -least_m else 0,
         constant=constant,
     )

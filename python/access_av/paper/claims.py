@@ -11,6 +11,7 @@ from access_av.errors import InputError
 from access_av.paper import energy_fit
 from access_av.paper.findings import FINDINGS, Finding, MissingFigureError
 from access_av.paper.margins import margin
+from access_av.paper.outcome import interval
 from access_av.paper.statements import stated_claims
 
 if TYPE_CHECKING:
@@ -290,7 +291,7 @@ def _interval(value: Any) -> Any:
             return None
         each = {key: _interval(item) for key, item in value.items()}
         return each if any(each.values()) else None
-    drawn = np.atleast_1d(value)[1:]
-    if len(drawn) < 2 or np.ptp(drawn) == 0.0:
+    values = np.atleast_1d(value)
+    if len(values) < 3 or np.ptp(values[1:]) == 0.0:
         return None
-    return [round(float(end), 4) for end in np.quantile(drawn, (0.025, 0.975))]
+    return [round(end, 4) for end in interval(values)]

@@ -13,12 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from access_av.device.platform import Platform
 from access_av.paper.interpretations import load
 from access_av.paper.own_design import tracked
 from access_av.run.simulation import Simulation, simulate
+from access_av.statistics.paired import paired_mean
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
 
 PAPERS_BOARD, OUR_BOARD = "jetson-agx-xavier", "jetson-agx-xavier-engine"
 EXTENTS = ("low", "value", "high")
-# Two-sided 95 % of a normal distribution.
-SURE = 1.96
 
 
 @dataclass(frozen=True)
@@ -103,16 +100,15 @@ def compare(
         there = tracked(here, mode.base_wake_up_ms["music"])
         one = simulate(here, runs=runs, seed=seed, platform=papers, threads=threads)
         other = simulate(there, runs=runs, seed=seed, platform=papers, threads=threads)
-        less_m = (one.runs["rms_error_m"] - other.runs["rms_error_m"]).to_numpy()
-        half_m = SURE * float(np.std(less_m, ddof=1) / np.sqrt(runs)) if runs > 1 else float("inf")
-        mean_m = float(np.mean(less_m))
         found.append(
             Compared(
                 mode=mode.number,
                 paper=_point(one, here, papers),
                 policy=_point(other, there, papers),
                 engine=_point(other, there, ours),
-                rms_error_reduction_m=(mean_m, mean_m - half_m, mean_m + half_m),
+                rms_error_reduction_m=paired_mean(
+                    *(it.runs["rms_error_m"].to_numpy() for it in (one, other))
+                ),
             )
         )
         if progress is not None:

@@ -169,6 +169,15 @@ def resamples(runs: int, count: int, seed: int = 0) -> Numbers:
     return np.vstack([np.full(runs, 1.0 / runs), drawn])
 
 
+def interval(values: Numbers) -> tuple[float, float]:
+    """Returns the 95 % interval of a number over the variants after the first.
+
+    Without resamples both ends are the number itself.
+    """
+    low, high = np.quantile(values[1:] if len(values) > 1 else values, (0.025, 0.975))
+    return float(low), float(high)
+
+
 def _late_to_early(errors_m: Numbers) -> Numbers:
     quarter = errors_m.shape[1] // 4
     early, late = errors_m[:, :quarter], errors_m[:, -quarter:]

@@ -20,12 +20,13 @@ import polars as pl
 
 from access_av._core import Bound
 from access_av.paper.findings import MissingFigureError, energy_j
+from access_av.paper.outcome import interval
 
 if TYPE_CHECKING:
     from access_av._core import Scenario
     from access_av.paper.driver import Driver
     from access_av.paper.evaluation import Evaluation
-    from access_av.paper.outcome import Drives, Numbers
+    from access_av.paper.outcome import Drives
 
 # Target error of the proposed policy with a probability of 90 %: the paper's 0.3 m.
 BOUND_M = 0.3
@@ -137,8 +138,8 @@ def beside(evaluation: Evaluation, mode: int, ours: Drives, *, knows_road: bool)
         pass
     less_m = papers.rms_error_m - ours.rms_error_m
     less = papers.aoa_estimates - ours.aoa_estimates
-    least_m, most_m = _interval(less_m)
-    least, most = _interval(less)
+    least_m, most_m = interval(less_m)
+    least, most = interval(less)
     return Comparison(
         mode=mode,
         map=knows_road,
@@ -253,7 +254,7 @@ def fair(driver: Driver, evaluation: Evaluation) -> list[Fair]:
 
 
 def _fair(real: bool, knows_road: bool, who: str, drives: Drives) -> Fair:
-    low_m, high_m = _interval(drives.rms_error_m)
+    low_m, high_m = interval(drives.rms_error_m)
     return Fair(
         real_odometer=real,
         knows_road=knows_road,
@@ -271,10 +272,3 @@ def _bound(real: bool, knows_road: bool, scenario: Scenario) -> Fair:
     route = pl.DataFrame(Bound(scenario).along_route())
     rms_m = float(route.select((pl.col("bound_m") ** 2).mean().sqrt()).item())
     return Fair(real, knows_road, "bound", float(route.height), rms_m, rms_m, rms_m, None)
-
-
-def _interval(values: Numbers) -> tuple[float, float]:
-    if len(values) < 2:
-        return float(values[0]), float(values[0])
-    low, high = np.quantile(values[1:], (0.025, 0.975))
-    return float(low), float(high)

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av.statistics.bootstrap import bootstrap_interval
-from access_av.statistics.proportions import clopper_pearson
+from access_av.statistics.proportions import share_interval
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -124,10 +123,7 @@ def of_runs(errors_m: ArrayLike, step_s: float) -> list[Verdict]:
         # The share of all is the mean of the runs, because they have equal lengths.
         shares = (errors_m <= level.accuracy_m).mean(axis=1)
         share = float(shares.mean())
-        least, _ = clopper_pearson(int(share * looks), looks)
-        if runs > 1:
-            least = min(least, bootstrap_interval(shares[:, None], lambda it: float(it.mean()))[0])
-        verdicts.append(Verdict(level, share, least))
+        verdicts.append(Verdict(level, share, share_interval(shares, looks)[0]))
     return verdicts
 
 

@@ -1,4 +1,4 @@
-"""Quantiles of the chi-squared and beta distributions.
+"""Quantiles of the chi-squared, beta and Student distributions.
 
 SciPy is imported at first use, because its import is slower than that of the package.
 """
@@ -54,6 +54,20 @@ def beta_quantile(probability: float, a: float, b: float) -> float:
     from scipy.special import betaincinv
 
     return float(betaincinv(a, b, probability))
+
+
+def student_quantile(probability: float, freedom: float) -> float:
+    """Value that Student's t with ``freedom`` degrees stays below with ``probability``.
+
+    Examples
+    --------
+    >>> [round(student_quantile(0.975, freedom), 3) for freedom in (1, 2, 19)]
+    [12.706, 4.303, 2.093]
+    """
+    _check(probability, freedom)
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, probability))
 
 
 def _check(probability: float, *shapes: float) -> None:

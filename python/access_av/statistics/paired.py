@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from access_av.statistics.distributions import student_quantile
 from access_av.statistics.percentiles import resampled
 
 if TYPE_CHECKING:
@@ -51,8 +52,6 @@ def paired_difference(
     >>> bool(found[0] < 0.0 and found[2] < 0.0)
     True
     """
-    from scipy.special import stdtrit
-
     mine, its = (np.atleast_2d(np.asarray(it, dtype=np.float64)) for it in (errors, others))
     if len(mine) != len(its):
         raise ValueError(f"{len(mine)} drives cannot be paired with {len(its)}")
@@ -66,9 +65,35 @@ def paired_difference(
     if not np.isfinite(spread).all():
         return difference, -np.inf, np.inf
     half = (
-        float(stdtrit(runs - 1, 0.975)) * float(np.std(spread, ddof=1)) * np.sqrt(runs / (runs - 1))
+        student_quantile(0.975, runs - 1)
+        * float(np.std(spread, ddof=1))
+        * np.sqrt(runs / (runs - 1))
     )
     return difference, difference - half, difference + half
+
+
+def paired_mean(
+    values: NDArray[np.float64], others: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Returns the mean difference over pairs of runs, and its 95 % interval by Student's t.
+
+    If only one of the variants has unknown (infinite) values, the difference is infinite.
+
+    Examples
+    --------
+    >>> [round(it, 3) for it in paired_mean(np.array([1.0, 2.0, 3.5]), np.array([0.0, 1.0, 2.0]))]
+    [1.167, 0.45, 1.884]
+    """
+    known = float(np.isfinite(others).all()), float(np.isfinite(values).all())
+    if 0.0 in known:
+        sure = np.inf * (known[0] - known[1]) if known[0] != known[1] else 0.0
+        return sure, sure, sure
+    less = values - others
+    mean = float(np.mean(less))
+    if less.size < 2:
+        return mean, -np.inf, np.inf
+    half = student_quantile(0.975, less.size - 1) * float(np.std(less, ddof=1)) / np.sqrt(less.size)
+    return mean, float(mean - half), float(mean + half)
 
 
 def _less(first: float, second: float) -> float:

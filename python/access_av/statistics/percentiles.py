@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av.statistics.distributions import beta_quantile
+from access_av.statistics.distributions import student_quantile
 from access_av.statistics.proportions import clopper_pearson
 
 if TYPE_CHECKING:
@@ -200,9 +200,7 @@ def resampled(
 def _beyond(runs: int) -> float:
     """Returns the share of the resamples outside each end of a 95 % interval."""
     freedom = runs - 1
-    # Student's t squared, by the beta distribution of t² / (t² + freedom).
-    share = beta_quantile(0.95, 0.5, 0.5 * freedom)
-    t = math.sqrt(freedom * share / (1.0 - share) * runs / freedom)
+    t = student_quantile(0.975, freedom) * math.sqrt(runs / freedom)
     return 0.5 * math.erfc(t / math.sqrt(2.0))
 
 

@@ -1,11 +1,17 @@
-"""Intervals of a proportion from independent trials."""
+"""Intervals of a proportion from independent trials, or from runs with correlated epochs."""
 
 from __future__ import annotations
 
 import math
 from statistics import NormalDist
+from typing import TYPE_CHECKING
 
+from access_av.statistics.bootstrap import bootstrap_interval
 from access_av.statistics.distributions import beta_quantile
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 def clopper_pearson(
@@ -80,6 +86,34 @@ def wilson(successes: int, trials: int, *, probability: float = 0.95) -> tuple[f
     half = z * math.sqrt((share * (1.0 - share) + 0.25 * spread) / trials)
     scale = 1.0 + spread
     return max(0.0, (middle - half) / scale), min(1.0, (middle + half) / scale)
+
+
+def share_interval(shares: NDArray[np.float64], independent: int) -> tuple[float, float]:
+    """Returns the 95 % interval of the mean of a share over runs.
+
+    Each end is the wider one of two intervals: the bootstrap over whole runs, which covers
+    differences between runs, and Clopper and Pearson's, which covers events that have not occurred.
+
+    Parameters
+    ----------
+    shares
+        Share of each run, (runs,); the runs have equal lengths.
+    independent
+        Number of independent epochs of all runs.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> low, high = share_interval(np.ones(50), independent=1000)
+    >>> round(low, 4), high
+    (0.9963, 1.0)
+    """
+    share = float(shares.mean())
+    low, high = clopper_pearson(int(share * independent), independent)
+    if len(shares) > 1:
+        least, most = bootstrap_interval(shares)
+        low, high = min(low, least), max(high, most)
+    return low, max(high, share)
 
 
 def _check(successes: int, trials: int, probability: float) -> None:

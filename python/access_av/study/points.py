@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av.designs.front import not_beaten
 from access_av.device.platform import Platform
+from access_av.statistics.pareto import pareto_front
 from access_av.study.trips import EXTENTS, Driven, Energy, platform_name
 from access_av.study.verdicts import Judgement
 
@@ -210,7 +210,7 @@ def front(found: Sequence[Point]) -> list[int]:
         return []
     energy_j = np.array([point.energy_j for point in found])
     error_m = np.array([point.error_m for point in found])
-    return [int(place) for place in not_beaten(energy_j, error_m) if np.isfinite(error_m[place])]
+    return [int(place) for place in pareto_front(energy_j, error_m) if np.isfinite(error_m[place])]
 
 
 def recommended(found: Sequence[Point]) -> int | None:

@@ -13,7 +13,7 @@ from access_av.device.platform import Platform
 from access_av.run.pairs import ErrorSamples
 from access_av.run.simulation import simulate
 from access_av.statistics.integrity import Integrity
-from access_av.statistics.proportions import clopper_pearson
+from access_av.statistics.proportions import share_interval
 from access_av.study.verdicts import NotOk
 
 if TYPE_CHECKING:
@@ -222,20 +222,9 @@ class Driven(ErrorSamples):
 
 
 def share_within(driven: ErrorSamples, error_m: float) -> tuple[float, float, float]:
-    """Share of the time within an error, and the ends of its 95 % interval.
-
-    Each end is the wider one of the bootstrap over whole runs and of Clopper and Pearson's interval
-    for the number of independent positions.
-    """
+    """Share of the time within an error, and the ends of its 95 % interval."""
     shares = (driven.errors_m <= error_m).mean(axis=1)
-    share = float(shares.mean())
-    low, high = clopper_pearson(int(share * driven.independent), driven.independent)
-    if driven.runs > 1:
-        rng = np.random.default_rng(0)
-        drawn = rng.integers(0, driven.runs, (2000, driven.runs))
-        least, most = np.quantile(shares[drawn].mean(axis=1), [0.025, 0.975])
-        low, high = min(low, float(least)), max(high, float(most))
-    return share, low, max(high, share)
+    return float(shares.mean()), *share_interval(shares, driven.independent)
 
 
 def _of_runs(found: Integrity | None, runs: slice) -> Integrity | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import altair as alt
 import polars as pl
 
-from access_av.designs.operating_points import Query, explore
+from access_av.designs.query import Query, explore
 from access_av.paper.statements import ADAPTIVE_LABEL, of_claim
 from access_av.report.chart import finish
 from access_av.report.labels import domain, layers, placed
