@@ -30,6 +30,8 @@ KEEP_ONE_IN = 3
 FIRST_RUNS = 2
 # Number of designs per batch of suggestions, enough for all workers.
 BATCH = 16
+# The first third of the suggestions for a goal covers the space evenly, by a Sobol sequence.
+STARTUP_SHARE = 3
 # Objective value of a design without position or without energy.
 HOPELESS = 1e12
 
@@ -143,8 +145,8 @@ def suggested(
         Number of suggestions.
     goal
         Returns objective and constraints by name of a design; a constraint is met up to 0. The
-        tree-structured Parzen estimator minimizes the objective. Default: NSGA-II minimizes energy
-        and squared error.
+        tree-structured Parzen estimator minimizes the objective; the space must consist of ranges.
+        Default: NSGA-II minimizes energy and squared error.
 
     Raises
     ------
@@ -161,11 +163,14 @@ def suggested(
     sampler = (
         optuna.samplers.NSGAIISampler(seed=seed % 2**32, population_size=BATCH)
         if goal is None
-        else optuna.samplers.TPESampler(seed=seed % 2**32)
+        else optuna.samplers.TPESampler(seed=seed % 2**32, n_startup_trials=count // STARTUP_SHARE)
     )
     study = optuna.create_study(
         directions=["minimize"] * (2 if goal is None else 1), sampler=sampler
     )
+    if goal is not None:
+        for values in space.sobol(count // STARTUP_SHARE):
+            study.enqueue_trial(values)
     kept: dict[str, tuple[Mapping[str, Any], list[Part]]] = {}
     done = 0
     while done < count:
