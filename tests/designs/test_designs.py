@@ -185,7 +185,7 @@ def test_workers_that_die_lose_nothing_that_is_finished(
     tmp_path: Path, whole: dict[str, bytes]
 ) -> None:
     parts = ResultCache(tmp_path / "dying")
-    with pytest.raises(CampaignError, match=r"workers are gone.*the same command goes on"):
+    with pytest.raises(CampaignError, match=r"workers are gone.*repeat the command to continue"):
         Campaign(parts, Dying(5)).run(tasks())
     assert len(contents(parts.path)) == 5
     Campaign(parts).run(tasks())
