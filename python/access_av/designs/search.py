@@ -169,8 +169,8 @@ def suggested(
         directions=["minimize"] * (2 if goal is None else 1), sampler=sampler
     )
     if goal is not None:
-        for values in space.sobol(count // STARTUP_SHARE):
-            study.enqueue_trial(values)
+        for point in space.sobol(count // STARTUP_SHARE):
+            study.enqueue_trial(point)
     kept: dict[str, tuple[Mapping[str, Any], list[Part]]] = {}
     done = 0
     while done < count:
