@@ -32,6 +32,7 @@ from access_av.errors import InputError
 from access_av.report.designs import render_designs
 from access_av.run.campaign import Campaign, CampaignError, Task
 from access_av.run.campaign import campaign as opened
+from access_av.run.pairs import ErrorSamples
 from access_av.run.result_cache import ResultCache
 
 if TYPE_CHECKING:
@@ -356,7 +357,10 @@ def known(energy_j: float, rms_m: float, noise: np.ndarray, own: np.ndarray, lab
         square_m2=square_m2,
         energy_j=np.full(noise.size, energy_j),
         worst_m=3.0 * np.sqrt(square_m2),
-        error_m=np.sqrt(square_m2)[:, None] * np.linspace(0.1, 2.0, 40, dtype=np.float32),
+        errors=ErrorSamples(
+            errors_m=np.sqrt(square_m2)[:, None] * np.linspace(0.1, 2.0, 40, dtype=np.float32),
+            duration_s=2.0,
+        ),
         aoa_estimates=np.ones(noise.size),
         bursts_received=np.ones(noise.size),
         track_s=np.arange(3.0),

@@ -198,7 +198,7 @@ def search(
     """
     from access_av.cli.paper_tables import show_search
     from access_av.device.platform import Platform
-    from access_av.paper.sampled_interpretations import as_toml, confirmed, sample
+    from access_av.paper.sampled_interpretations import as_scenario, confirmed, sample
     from access_av.run.campaign import campaign
     from access_av.tables.results_directory import RESULTS, write_whole
 
@@ -218,7 +218,7 @@ def search(
     show_search(found, checked)
     if out is not None:
         best = checked[0].values if checked else found.values(found.best()[0])
-        write_whole(out, as_toml(best))
+        write_whole(out, as_scenario(best).to_toml())
         console.print(f"Interpretation: {out}", soft_wrap=True)
 
 

@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av import _core
 from access_av._core import Scenario, SettingsError
 from access_av.designs.space import shown
 from access_av.device.platform import Platform
 from access_av.errors import InputError
 from access_av.run.campaign import Task
+from access_av.run.pairs import ErrorSamples
 from access_av.run.plug_in_files import checksum, load, split
-from access_av.run.plug_ins import factory
-from access_av.run.service_levels import INDEPENDENT_S
-from access_av.statistics.percentiles import PERCENTS, Percentile, percentiles
+from access_av.run.simulation import simulate
+from access_av.statistics.percentiles import PERCENTS, Percentile
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -84,8 +83,8 @@ class Driven:
         vehicle was never found, or the platform has no energy.
     worst_m
         Maximum error of each run.
-    error_m
-        Horizontal error of each run, shape (runs, times); infinite while the position is unknown.
+    errors
+        Horizontal errors of each run.
     track_s, track_m2
         Times, and mean squared error over the runs at these times.
     worlds
@@ -97,7 +96,7 @@ class Driven:
     square_m2: NDArray[np.float64]
     energy_j: NDArray[np.float64]
     worst_m: NDArray[np.float64]
-    error_m: NDArray[np.float32]
+    errors: ErrorSamples
     aoa_estimates: NDArray[np.float64]
     bursts_received: NDArray[np.float64]
     track_s: NDArray[np.float64]
@@ -133,9 +132,7 @@ class Driven:
                 max(of_worlds, key=lambda found: found.value)
                 for of_worlds in zip(*each, strict=True)
             ]
-        driven_s = self.error_m.shape[0] * float(self.track_s[-1])
-        independent = None if of_seen else max(1, int(driven_s / INDEPENDENT_S))
-        return percentiles(self.error_m, percents, independent=independent)
+        return self.errors.percentiles(percents, of_seen=of_seen)
 
 
 def in_worst(worlds: Sequence[Driven]) -> Driven:
@@ -234,21 +231,20 @@ def simulated(
     plug_ins: Sequence[tuple[str, str]] = (),
 ) -> dict[str, NDArray[Any]]:
     """Simulates one part: runs of a scenario, in one thread."""
-    factories: dict[str, Any] = {role: factory(load(role, text), role) for role, text in plug_ins}
-    found = _core.simulate(
+    found = simulate(
         Scenario.from_toml(scenario),
-        runs,
-        seed,
+        runs=runs,
+        seed=seed,
         first_run=first_run,
         threads=1,
         errors_every=ERROR_EVERY,
-        **factories,
+        **{role: load(role, text) for role, text in plug_ins},
     )
-    if found.errors_m is None:  # keep_trajectories is set
+    if found.errors_m is None:  # errors_every is set
         raise RuntimeError("the simulation kept no errors")
     error_m = np.hypot(found.errors_m[..., 0], found.errors_m[..., 1])
     columns = ["aoa_estimates", "bursts_received", "rms_error_m", "max_error_m"]
-    columns += ["energy_j"] if "estimator" in factories else []
+    columns += ["energy_j"] if "estimator" in dict(plug_ins) else []
     track = slice(None, None, TRACK_EVERY)
     return {
         **{name: np.asarray(found.runs[name], dtype=np.float64) for name in columns},
@@ -282,7 +278,9 @@ def joined(design: Design, parts: Sequence[Part]) -> Driven:
         square_m2=np.nan_to_num(rms_m**2, nan=np.inf),
         energy_j=energy_j,
         worst_m=np.nan_to_num(worst_m, nan=np.inf),
-        error_m=np.concatenate([part["error_m"] for part in parts]),
+        errors=ErrorSamples(
+            errors_m=np.concatenate([part["error_m"] for part in parts]), duration_s=duration_s
+        ),
         aoa_estimates=aoa_estimates,
         bursts_received=bursts_received,
         track_s=track_s,

@@ -11,14 +11,11 @@ import polars as pl
 from access_av._core import MeasurementTraces
 from access_av.paper.outcome import Drives, Numbers, resamples
 from access_av.paper.statements import METHODS
-from access_av.run.service_levels import INDEPENDENT_S
+from access_av.run.pairs import ErrorSamples
 from access_av.run.simulation import Simulation, simulate
-from access_av.statistics.percentiles import percentiles
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from numpy.typing import NDArray
 
     from access_av._core import Scenario
     from access_av.device.platform import Platform
@@ -37,13 +34,11 @@ class Driven:
 
     drives: Drives
     steps: pl.DataFrame
-    error_m: NDArray[np.float32]
+    errors: ErrorSamples
 
     def percentiles(self) -> list[Percentile]:
         """Returns percentiles of the horizontal error over all runs and times."""
-        driven_s = len(self.error_m) * float(self.steps["time_s"][-1])
-        independent = max(1, int(driven_s / INDEPENDENT_S))
-        return percentiles(self.error_m, independent=independent, resamples=RESAMPLES)
+        return self.errors.percentiles(resamples=RESAMPLES)
 
 
 @dataclass
@@ -143,7 +138,10 @@ class Driver:
                 runs=drives.runs.with_columns(other_j, found.runs["longest_gap_s"]),
             ),
             found.steps,
-            np.hypot(*np.moveaxis(found.errors_m[:, ::SPARSE], -1, 0)),
+            ErrorSamples(
+                errors_m=np.hypot(*np.moveaxis(found.errors_m[:, ::SPARSE], -1, 0)),
+                duration_s=float(found.steps["time_s"][-1]),
+            ),
         )
 
     def _weights(self) -> Numbers:

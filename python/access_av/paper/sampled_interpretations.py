@@ -7,7 +7,6 @@ part on disk, so that an interrupted search continues.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,6 @@ from access_av.device.platform import Platform
 from access_av.paper.claims import margins
 from access_av.paper.driver import Driver
 from access_av.paper.evaluation import Case, cases, outcome_of
-from access_av.paper.interpretations import OPEN, Interpretation
 from access_av.paper.open_choices import (
     CONTROLLER,
     GATE,
@@ -234,40 +232,11 @@ def _side_by_side(interpretations: list[Drives]) -> Drives:
     )
 
 
-def as_interpretation(values: Mapping[str, Any], name: str = "found") -> Interpretation:
-    """Returns a sampled point as an interpretation."""
-    scenario = Scenario.from_toml(as_toml(values, name))
-    return Interpretation(name, "Found by the search", scenario, OPEN, keeps_t_max=True)
-
-
-def as_toml(values: Mapping[str, Any], name: str = "found") -> str:
-    """Returns a sampled point as a file that overrides the paper's scenario."""
-    [head] = json.loads(Scenario.load("paper").to_json())["site"]["radio_heads"]
-    tables: dict[str, dict[str, Any]] = {"site": {}, "site.radio_heads": {}, "vehicle": {}}
+def as_scenario(values: Mapping[str, Any], name: str = "found") -> Scenario:
+    """Returns a sampled point as a scenario."""
+    named_alike = {"name": name, "description": "Found by access-av paper search"}
     changes = world_changes(values) | controller_changes(values, values)
-    for path, value in changes.items():
-        table, _, key = path.rpartition(".")
-        if isinstance(value, dict):
-            table, key = path, ""
-        tables.setdefault(table.replace("[0]", ""), {}).update({key: value} if key else value)
-    tables["vehicle"] = {"extends": "paper", **tables["vehicle"]}
-    kept = ("name", "position_m", "pci")
-    tables["site.radio_heads"] = {it: head[it] for it in kept} | tables["site.radio_heads"]
-    lines = [
-        'extends = "paper"',
-        f'name = "{name}"',
-        'description = "Found by access-av paper search-controllers"',
-    ]
-    for table, entries in tables.items():
-        lines += ["", f"[[{table}]]" if table == "site.radio_heads" else f"[{table}]"]
-        lines += [f"{key} = {_toml(value)}" for key, value in entries.items()]
-    return "\n".join(lines) + "\n"
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + " }"
-    return json.dumps(value)
+    return Scenario.load("paper").with_overrides(named_alike | changes)
 
 
 # Number of best interpretations that are simulated again, because a maximum over few runs is

@@ -14,7 +14,7 @@ from access_av.errors import InputError
 from access_av.run.campaign import Task
 from access_av.run.fault_injection import Overrides, hypotheses, mismatches
 from access_av.run.pairs import UNCHANGED, ErrorSamples
-from access_av.run.simulation import Simulation
+from access_av.run.simulation import simulate
 from access_av.statistics.alarms import Alarms
 from access_av.statistics.consistency import horizontal_error_m
 from access_av.statistics.extremes import ObtainedRisk
@@ -242,15 +242,13 @@ def drive(
 
 def driven(scenario: str, first_run: int, runs: int, seed: int) -> dict[str, NDArray[Any]]:
     """Simulates one part: errors, levels and states of every step, in one thread."""
-    found = Simulation.of(
-        _core.simulate(
-            _core.Scenario.from_toml(scenario),
-            runs,
-            seed,
-            first_run=first_run,
-            threads=1,
-            keep_trajectories=True,
-        )
+    found = simulate(
+        _core.Scenario.from_toml(scenario),
+        runs=runs,
+        seed=seed,
+        first_run=first_run,
+        threads=1,
+        keep_trajectories=True,
     )
     if found.trajectories is None:  # keep_trajectories is set
         raise RuntimeError("the simulation kept no trajectories")

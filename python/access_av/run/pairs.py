@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from access_av.run.service_levels import INDEPENDENT_S
 from access_av.statistics.paired import paired_difference
-from access_av.statistics.percentiles import percentiles
+from access_av.statistics.percentiles import PERCENTS, percentiles
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -45,8 +45,8 @@ class ErrorSamples:
         Name of the rows, in the plural.
     """
 
-    name: str
-    errors_m: NDArray[np.float64]
+    name: str = ""
+    errors_m: NDArray[Any]
     duration_s: float
     rows: str = DRIVES
 
@@ -65,9 +65,20 @@ class ErrorSamples:
         """Energy of a trip; ``None`` if it is unknown."""
         return None
 
+    def percentiles(
+        self, percents: Sequence[float] = PERCENTS, *, of_seen: bool = False, resamples: int = 1000
+    ) -> list[Percentile]:
+        """Returns percentiles of the error with their 95 % intervals.
+
+        With ``of_seen`` the intervals are those of the bootstrap alone, which ignores events that
+        did not occur in the runs. Comparisons of designs use them.
+        """
+        independent = None if of_seen else self.independent
+        return percentiles(self.errors_m, percents, independent=independent, resamples=resamples)
+
     def percentile(self, percent: float) -> Percentile:
         """Returns a percentile of the error with its 95 % interval."""
-        [found] = percentiles(self.errors_m, [percent], independent=self.independent)
+        [found] = self.percentiles([percent])
         return found
 
     @property

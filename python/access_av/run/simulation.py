@@ -17,10 +17,11 @@ from access_av.device.platform import Platform
 from access_av.errors import ImplausibleSettingsWarning
 from access_av.run import service_levels
 from access_av.run.operation import Operation
+from access_av.run.pairs import ErrorSamples
 from access_av.run.plug_ins import factory
 from access_av.statistics.consistency import Consistency, horizontal_error_m
 from access_av.statistics.integrity import Integrity
-from access_av.statistics.percentiles import Percentile, column, percentiles
+from access_av.statistics.percentiles import Percentile, column
 from access_av.tables.numbers import number
 from access_av.tables.result import Origin, Result, origin
 
@@ -146,9 +147,8 @@ class Simulation(Result):
         errors_m = self.horizontal_errors_m
         if errors_m is None or np.isnan(errors_m).all():
             return None
-        driven_s = len(errors_m) * float(self.steps["time_s"][-1])
-        independent = max(1, int(driven_s / service_levels.INDEPENDENT_S))
-        return percentiles(errors_m, independent=independent)
+        duration_s = float(self.steps["time_s"][-1])
+        return ErrorSamples(errors_m=errors_m, duration_s=duration_s).percentiles()
 
     @property
     def mean_error_m(self) -> float | None:
@@ -226,6 +226,7 @@ def simulate(
     *,
     runs: int = 1,
     seed: int = 1,
+    first_run: int = 0,
     platform: Platform | None = None,
     threads: int | None = None,
     keep_trajectories: bool = False,
@@ -245,6 +246,8 @@ def simulate(
         Number of runs.
     seed
         Seed of all random streams; equal seeds give bit-identical results.
+    first_run
+        Index of the first run: runs of equal seed and index are equal.
     platform
         Onboard computer. Default: that of the scenario.
     threads
@@ -321,6 +324,7 @@ def simulate(
         scenario,
         runs,
         seed,
+        first_run=first_run,
         platform=platform.core if platform else None,
         threads=threads,
         keep_trajectories=keep_trajectories,
