@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from access_av import Scenario
+from access_av.designs.space import named
 from access_av.device.platform import Platform
 from access_av.paper import sampled_interpretations
 from access_av.paper.interpretations import OPEN, Interpretation
@@ -20,7 +21,6 @@ from access_av.paper.open_choices import (
     WORLD,
     Dimension,
     latin_hypercube,
-    named,
 )
 from access_av.paper.unknowns import sobol
 from access_av.run.campaign import Campaign

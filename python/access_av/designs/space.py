@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -26,13 +26,27 @@ NOT_CHOSEN = ("channel", "truth", "faults", "site.rician_k_db")
 
 @dataclass(frozen=True)
 class Dimension:
-    """One key and its values: a list of choices, or a range from ``low`` to ``high``."""
+    """One key and its values: a list of choices, or a range.
+
+    Attributes
+    ----------
+    label
+        Display name.
+    low, high
+        Range; logarithmic if ``is_log``.
+    choices
+        Values, if it is not a range.
+    """
 
     key: str
-    choices: tuple[Any, ...] = ()
+    label: str = ""
     low: float = 0.0
-    high: float = 0.0
+    high: float = 1.0
     is_log: bool = False
+    choices: tuple[Any, ...] = ()
+
+    # Significant digits of values of a range.
+    digits: ClassVar[int] = 6
 
     def at(self, coordinate: float) -> Any:
         """Returns the value at a coordinate from 0 to 1.
@@ -44,9 +58,23 @@ class Dimension:
         """
         if self.choices:
             return self.choices[min(int(coordinate * len(self.choices)), len(self.choices) - 1)]
+        value = self.low + (self.high - self.low) * coordinate
         if self.is_log:
-            return float(f"{self.low * (self.high / self.low) ** coordinate:.6g}")
-        return float(f"{self.low + (self.high - self.low) * coordinate:.6g}")
+            value = self.low * (self.high / self.low) ** coordinate
+        return float(f"{value:.{self.digits}g}")
+
+    @property
+    def range_text(self) -> str:
+        """Returns the choices or the range as text."""
+        return ", ".join(self.choices) if self.choices else f"{self.low:g} to {self.high:g}"
+
+
+def named(dimensions: Sequence[Dimension], coordinates: Sequence[float]) -> dict[str, Any]:
+    """Returns the values at coordinates by the keys of the dimensions."""
+    return {
+        dimension.key: dimension.at(float(coordinate))
+        for dimension, coordinate in zip(dimensions, coordinates, strict=True)
+    }
 
 
 @dataclass(frozen=True)
@@ -140,8 +168,7 @@ class Space:
         points = sobol(count, len(self.dimensions))
         found: dict[str, dict[str, Any]] = {}
         for point in points:
-            pairs = zip(self.dimensions, point, strict=True)
-            design = {dimension.key: dimension.at(float(at)) for dimension, at in pairs}
+            design = named(self.dimensions, point.tolist())
             found.setdefault(repr(design), design)
         return list(found.values())
 

@@ -102,7 +102,7 @@ def space_of(scenario: Scenario) -> Space:
             continue
         if key.startswith("trigger.") and policy["trigger"]["policy"] != "pid":
             continue
-        found.append(Dimension(f"vehicle.wake_up.{key}", (), low, high, low > 0.0))
+        found.append(Dimension(f"vehicle.wake_up.{key}", "", low, high, low > 0.0))
     return Space(tuple(found))
 
 

@@ -26,6 +26,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.errors import InputError
+from access_av.signal.manifold import wrapped
 from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
@@ -311,7 +312,7 @@ class _Problem:
             ahead = self.meet(values + step, exact, used)
             behind = self.meet(values - step, exact, used)
             both = zip(ahead, behind, strict=True)
-            slopes.append([_wrapped(a[0] - b[0]) / (2.0 * step.sum()) for a, b in both])
+            slopes.append([wrapped(a[0] - b[0]) / (2.0 * step.sum()) for a, b in both])
         information = np.diag(self.model.stds_before**-2.0)
         gradient = (values - self.model.before) / self.model.stds_before**2
         for index, (residual, variance, counted) in enumerate(met):
@@ -368,7 +369,3 @@ def _identify(problem: _Problem) -> Survey:
 def _normalised(residual: Numbers, variance: Numbers, used: Flags) -> float:
     kept = used & np.isfinite(residual)
     return float(np.sum(residual[kept] ** 2 / variance[kept]))
-
-
-def _wrapped(angle_rad: Numbers) -> Numbers:
-    return (angle_rad + np.pi) % (2.0 * np.pi) - np.pi

@@ -17,7 +17,7 @@ from access_av.tables import toml
 from access_av.tables.toml import shipped
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
     from pathlib import Path
 
 FLEET = ("vehicles", "hours_per_day", "days_per_year", "years")
@@ -106,23 +106,8 @@ def balance(figures: Mapping[str, Any]) -> Balance:
     >>> found.saved.low > 0.0, found.payback_years.high
     (True, 0.0)
     """
-    _only(
-        figures,
-        "",
-        {"currency", "grid", "grid_g_per_kwh", "electricity_per_kwh", "fleet", "before", "after"},
-    )
-    fleet = figures.get("fleet", {})
-    _only(fleet, "fleet.", {*FLEET, *TRIPS, *INFRASTRUCTURE})
-    use = {name: _range(fleet, f"fleet.{name}").central for name in FLEET}
-    for name, usual in INFRASTRUCTURE.items():
-        use[name] = _range(fleet, f"fleet.{name}").central if name in fleet else usual
-    if not 0.0 <= use["hours_per_day"] <= 24.0:
-        raise InputError("fleet.hours_per_day: it must be from 0 to 24")
-    use["trips"] = _trips(fleet, use["hours_per_day"])
-    price = _range(figures, "electricity_per_kwh")
-    grams = _grid(figures)
-    before, after = (_way(figures, name, use, price, grams) for name in ("before", "after"))
-    years = use["years"]
+    years, found = ways(figures, ("before", "after"))
+    before, after = found["before"], found["after"]
     saved = before.capital.minus(after.capital).plus(
         before.yearly.minus(after.yearly).scaled(years)
     )
@@ -140,6 +125,29 @@ def balance(figures: Mapping[str, Any]) -> Balance:
             after.capital.minus(before.capital), before.yearly.minus(after.yearly)
         ),
     )
+
+
+def ways(figures: Mapping[str, Any], names: Collection[str]) -> tuple[float, dict[str, Way]]:
+    """Returns the years of use, and cost, energy and carbon of each named table of the figures.
+
+    Raises
+    ------
+    InputError
+        A figure is missing or invalid; the message names the key and what is allowed.
+    """
+    common = {"currency", "grid", "grid_g_per_kwh", "electricity_per_kwh", "fleet"}
+    _only(figures, "", {*common, *names})
+    fleet = figures.get("fleet", {})
+    _only(fleet, "fleet.", {*FLEET, *TRIPS, *INFRASTRUCTURE})
+    use = {name: _range(fleet, f"fleet.{name}").central for name in FLEET}
+    for name, usual in INFRASTRUCTURE.items():
+        use[name] = _range(fleet, f"fleet.{name}").central if name in fleet else usual
+    if not 0.0 <= use["hours_per_day"] <= 24.0:
+        raise InputError("fleet.hours_per_day: it must be from 0 to 24")
+    use["trips"] = _trips(fleet, use["hours_per_day"])
+    price = _range(figures, "electricity_per_kwh")
+    grams = _grid(figures)
+    return use["years"], {name: _way(figures, name, use, price, grams) for name in names}
 
 
 def _trips(fleet: Mapping[str, Any], hours: float) -> float:

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from access_av.designs import space
 from access_av.paper.statements import paper_numbers
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from access_av.paper.outcome import Numbers
 
@@ -26,44 +27,10 @@ MIDDLE_SNR_DB, SHIPPED_EIRP_DBM = 5.0, -17.3
 
 
 @dataclass(frozen=True)
-class Dimension:
-    """Parameter that the paper does not specify.
+class Dimension(space.Dimension):
+    """Parameter that the paper does not specify."""
 
-    Attributes
-    ----------
-    label
-        Display name.
-    low, high
-        Range; logarithmic where ``is_log``.
-    choices
-        Possible values, if it is not a number.
-    """
-
-    name: str
-    label: str
-    low: float = 0.0
-    high: float = 1.0
-    is_log: bool = False
-    choices: tuple[str, ...] = ()
-
-    def at(self, coordinate: float) -> Any:
-        """Returns the value at a coordinate from 0 to 1.
-
-        Examples
-        --------
-        >>> Dimension("scale", "", 2.0, 20.0, is_log=True).at(1.0)
-        20.0
-        """
-        if self.choices:
-            return self.choices[min(int(coordinate * len(self.choices)), len(self.choices) - 1)]
-        if self.is_log:
-            return float(f"{self.low * (self.high / self.low) ** coordinate:.4g}")
-        return float(f"{self.low + (self.high - self.low) * coordinate:.4g}")
-
-    @property
-    def range_text(self) -> str:
-        """Range as text."""
-        return ", ".join(self.choices) if self.choices else f"{self.low:g} to {self.high:g}"
+    digits: ClassVar[int] = 4
 
 
 WORLD = (
@@ -169,11 +136,3 @@ def latin_hypercube(count: int, dimensions: int, seed: int) -> Numbers:
     rng = np.random.default_rng(seed)
     strata = np.stack([rng.permutation(count) for _ in range(dimensions)], axis=1)
     return np.asarray((strata + rng.random((count, dimensions))) / count)
-
-
-def named(dimensions: Sequence[Dimension], coordinates: Sequence[float]) -> dict[str, Any]:
-    """Returns the values at coordinates, by the names of the dimensions."""
-    return {
-        dimension.name: dimension.at(float(coordinate))
-        for dimension, coordinate in zip(dimensions, coordinates, strict=True)
-    }

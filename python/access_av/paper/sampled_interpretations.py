@@ -14,6 +14,7 @@ import numpy as np
 
 from access_av import _core
 from access_av._core import Scenario
+from access_av.designs.space import named
 from access_av.device.platform import Platform
 from access_av.paper.claims import margins
 from access_av.paper.driver import Driver
@@ -28,7 +29,6 @@ from access_av.paper.open_choices import (
     Dimension,
     controller_changes,
     latin_hypercube,
-    named,
     world_changes,
 )
 from access_av.paper.outcome import Drives, Numbers
@@ -277,7 +277,7 @@ def confirmed(
         tasks = []
         for labelled in worlds:
             [*points] = labelled.values()
-            world = {dimension.name: points[0][dimension.name] for dimension in WORLD}
+            world = {dimension.key: points[0][dimension.key] for dimension in WORLD}
             task = _task(platform, world, points, runs, seed)
             tasks.append(replace(task, depends_on={**task.depends_on, "confirmed": True}))
         return [
@@ -314,5 +314,5 @@ def _neighbours(found: Sample, index: int) -> dict[str, dict[str, Any]]:
             step = 1.0 / len(dimension.choices) if dimension.choices else 0.1
             there[d] += step if start[d] < 0.5 else -step
             values = named(found.dimensions, there.tolist())
-            neighbours[f"beside it, {dimension.label}: {values[dimension.name]}"] = values
+            neighbours[f"beside it, {dimension.label}: {values[dimension.key]}"] = values
     return neighbours

@@ -105,10 +105,10 @@ class Unknowns:
             {
                 "interpretation_index": index,
                 "environment_index": int(sample.world[index]),
-                "dimension": dimension.name,
+                "dimension": dimension.key,
                 "coordinate": float(sample.coordinates[index, d]),
                 "num_choices": len(dimension.choices),
-                "drawn_value": str(points[index][dimension.name]),
+                "drawn_value": str(points[index][dimension.key]),
             }
             for index in range(self.interpretations)
             for d, dimension in enumerate(sample.dimensions)
@@ -165,7 +165,7 @@ def sobol(sample: Sample, runs: int, *, seed: int = 0, count: int = RESAMPLES) -
     indices = [
         Index(
             claim,
-            dimension.name,
+            dimension.key,
             *(float(of_claim[c][which, d]) for which in (0, 1)),
             *(float(end[c, which, d]) for which in (0, 1) for end in (low, high)),
         )

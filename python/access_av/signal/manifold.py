@@ -93,7 +93,7 @@ class _Series:
         bend = np.minimum(before - 2 * here + after, -1e-300)
         place = best + np.clip(0.5 * (before - after) / bend, -0.5, 0.5)
         left = 1 - here / np.maximum(np.sum(np.abs(snapshots) ** 2, axis=1), 1e-300)
-        return _wrapped(place * (2 * np.pi / _AZIMUTHS)), np.clip(left, 0, 1)
+        return wrapped(place * (2 * np.pi / _AZIMUTHS)), np.clip(left, 0, 1)
 
     def misfits(
         self, snapshots: NDArray[np.complex128], azimuths: NDArray[np.float64]
@@ -277,7 +277,8 @@ def _geometry(
     return responses
 
 
-def _wrapped(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+def wrapped(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns angles in radians between −π (exclusive) and π."""
     return -((-angles + np.pi) % (2 * np.pi) - np.pi)
 
 
@@ -301,7 +302,7 @@ def _fit(
         if unknown_orientation:
             # Rotate every group to the directions estimated with the present manifold.
             found, _ = series.azimuths(received)
-            turns = [_centre(_wrapped(found - azimuths)[members == group]) for group in present]
+            turns = [_centre(wrapped(found - azimuths)[members == group]) for group in present]
             orientations = np.array(turns)
         turned = azimuths + orientations[np.searchsorted(present, members)]
         base = _geometry(places, turned) * np.ones_like(received)
@@ -329,9 +330,9 @@ def _fit(
 def _centre(angles: NDArray[np.float64]) -> float:
     """Returns the circular median: the angle with the smallest mean distance."""
     trials = np.linspace(-np.pi, np.pi, 180, endpoint=False)
-    distances = np.abs(_wrapped(angles[:, None] - trials)).mean(axis=0)
+    distances = np.abs(wrapped(angles[:, None] - trials)).mean(axis=0)
     middle = trials[distances.argmin()]
-    return float(middle + np.median(_wrapped(angles - middle)))
+    return float(middle + np.median(wrapped(angles - middle)))
 
 
 def _errors(
@@ -340,9 +341,9 @@ def _errors(
     members: NDArray[np.intp],
     unknown_orientation: bool,
 ) -> NDArray[np.float64]:
-    errors = _wrapped(found - azimuths)
+    errors = wrapped(found - azimuths)
     if unknown_orientation:
         for group in np.unique(members):
             own = members == group
-            errors[own] = _wrapped(errors[own] - _centre(errors[own]))
+            errors[own] = wrapped(errors[own] - _centre(errors[own]))
     return errors

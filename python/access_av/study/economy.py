@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from access_av.economics.balance import balance
+from access_av.economics import balance
 from access_av.economics.carbon import Range
 from access_av.run.error_bound import along_route
 from access_av.tables.toml import shipped
@@ -189,9 +189,7 @@ def ways(plant: _core.Plant, point: Point, prices: Prices) -> dict[str, Way]:
             "energy_j_per_trip": 0.0,
         },
     }
-    return {
-        name: balance({**common, "before": way, "after": way}).before for name, way in found.items()
-    }
+    return balance.ways({**common, **found}, found)[1]
 
 
 def total(way: Way, years: float) -> Range:

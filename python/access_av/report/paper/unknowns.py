@@ -68,7 +68,7 @@ def _short(claim: str) -> str:
 
 
 def _index_chart(found: Unknowns) -> Spec:
-    labels = {each.name: each.label for each in DIMENSIONS}
+    labels = {each.key: each.label for each in DIMENSIONS}
     rows = [
         {
             "claim": _short(each.claim),
