@@ -20,19 +20,33 @@ if TYPE_CHECKING:
 CONSTANT, FRONT, TRACKER, EQUAL = "constant", "front", "tracker", "equal"
 
 
-def of_drives(drives: Drives, energy_per_execution_j: float | None, **key: Any) -> pl.DataFrame:
+# Columns that identify a setting: type, and value unless given.
+_KEY: dict[str, tuple[Any, Any]] = {
+    "interpretation": (pl.String, None),
+    "campaign": (pl.String, None),
+    "mode": (pl.Int64, None),
+    "method": (pl.String, "music"),
+    "adaptive": (pl.Boolean, False),
+    "base_wake_up_ms": (pl.Float64, None),
+    "variant": (pl.String, ""),
+}
+
+
+def of_drives(
+    drives: Drives | None, energy_per_execution_j: float | None = None, **key: Any
+) -> pl.DataFrame:
     """Returns the runs of a setting; columns ``evaluation_runs`` of :mod:`access_av.columns`.
 
     Parameters
     ----------
     drives
-        Runs of the setting. The table is empty without single runs.
+        Runs of the setting. Without single runs the table is empty.
     energy_per_execution_j
         Energy per angle estimate; ``None`` if unknown.
     key
-        Columns that identify the setting.
+        Columns that identify the setting; by default fixed MUSIC without power mode.
     """
-    if drives.runs is None:
+    if drives is None or drives.runs is None:
         return pl.DataFrame()
     energy_j = (
         pl.lit(None, dtype=pl.Float64)
@@ -40,7 +54,7 @@ def of_drives(drives: Drives, energy_per_execution_j: float | None, **key: Any) 
         else pl.col("aoa_estimates") * energy_per_execution_j + pl.col("other_energy_j")
     )
     return drives.runs.select(
-        *_key(**key),
+        *_key(key),
         "run",
         "aoa_estimates",
         "rms_error_m",
@@ -51,24 +65,10 @@ def of_drives(drives: Drives, energy_per_execution_j: float | None, **key: Any) 
     )
 
 
-def _key(
-    *,
-    interpretation: str,
-    campaign: str,
-    mode: int | None,
-    method: str,
-    adaptive: bool,
-    base_wake_up_ms: float | None,
-    variant: str = "",
-) -> list[pl.Expr]:
+def _key(given: Mapping[str, Any]) -> list[pl.Expr]:
     return [
-        pl.lit(interpretation).alias("interpretation"),
-        pl.lit(campaign).alias("campaign"),
-        pl.lit(mode, dtype=pl.Int64).alias("mode"),
-        pl.lit(method).alias("method"),
-        pl.lit(adaptive).alias("adaptive"),
-        pl.lit(base_wake_up_ms, dtype=pl.Float64).alias("base_wake_up_ms"),
-        pl.lit(variant).alias("variant"),
+        pl.lit(given.get(name, usual), dtype=kind).alias(name)
+        for name, (kind, usual) in _KEY.items()
     ]
 
 
@@ -127,7 +127,7 @@ def resamples_of(evaluation: Evaluation) -> list[pl.DataFrame]:
             for name, value in values.items()
         }
         table = pl.DataFrame(columns, schema_overrides=schema)
-        tables.append(table.select(*_key(**key), pl.all()))
+        tables.append(table.select(*_key(key), pl.all()))
     return tables
 
 

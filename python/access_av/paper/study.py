@@ -134,31 +134,41 @@ class Study:
         """Yields the runs of every setting: operating points and their references."""
         for each in self.evaluations:
             yield from run_tables.runs_of(each)
-        music: dict[str, Any] = {"method": "music", "mode": None, "base_wake_up_ms": None}
-        shown: dict[str, Any] = {**music, "interpretation": self.shown.interpretation.name}
+        shown = self.shown.interpretation.name
         for one in self.ablations:
-            key = {
-                **music,
-                "interpretation": one.interpretation,
-                "base_wake_up_ms": one.constant_ms,
-            }
-            key |= {"campaign": run_tables.CONSTANT, "mode": one.mode, "adaptive": False}
-            if one.constant is not None:
-                yield run_tables.of_drives(one.constant, None, **key)
+            yield run_tables.of_drives(
+                one.constant,
+                interpretation=one.interpretation,
+                campaign=run_tables.CONSTANT,
+                mode=one.mode,
+                base_wake_up_ms=one.constant_ms,
+            )
         for interval_ms, drives in self.front:
-            key = {**shown, "campaign": run_tables.FRONT, "base_wake_up_ms": interval_ms}
-            yield run_tables.of_drives(drives, None, adaptive=False, **key)
+            yield run_tables.of_drives(
+                drives,
+                interpretation=shown,
+                campaign=run_tables.FRONT,
+                base_wake_up_ms=interval_ms,
+            )
         for mine in self.proposed_vs_paper:
             per_execution_j = self.shown.outcome.energy_per_execution_j[mine.mode].get("music")
-            each_j = None if per_execution_j is None else float(per_execution_j.flat[0])
-            key = {**shown, "campaign": run_tables.TRACKER, "mode": mine.mode}
-            key["variant"] = "road map" if mine.map else "no road map"
-            if mine.ours is not None:
-                yield run_tables.of_drives(mine.ours, each_j, adaptive=True, **key)
+            yield run_tables.of_drives(
+                mine.ours,
+                None if per_execution_j is None else float(per_execution_j.flat[0]),
+                interpretation=shown,
+                campaign=run_tables.TRACKER,
+                mode=mine.mode,
+                adaptive=True,
+                variant="road map" if mine.map else "no road map",
+            )
         for equal in self.equal_information:
-            key = {**shown, "campaign": run_tables.EQUAL, "variant": equal.variant}
-            if equal.drives is not None:
-                yield run_tables.of_drives(equal.drives, None, adaptive=True, **key)
+            yield run_tables.of_drives(
+                equal.drives,
+                interpretation=shown,
+                campaign=run_tables.EQUAL,
+                adaptive=True,
+                variant=equal.variant,
+            )
 
 
 def study(
