@@ -157,7 +157,7 @@ def test_the_command_reports_parameters_that_were_not_estimated_or_do_not_fit(
         {"array.mounting_rad": 1.57, "array.mounting_std_rad": 0.01}
     )
     (tmp_path / "turned.toml").write_text(turned.to_toml())
-    done = access_av(*arguments[:2], "--site", "yard", "--vehicle", tmp_path / "turned.toml")
+    done = access_av(*arguments[:3], "--site", "yard", "--vehicle", tmp_path / "turned.toml")
     assert "are outliers and were left out" in done.err
 
 

@@ -27,7 +27,8 @@ class Range:
     @classmethod
     def read(cls, entry: Mapping[str, float]) -> Range:
         """Returns the range of an entry of the file."""
-        return cls(float(entry["low"]), float(entry["central"]), float(entry["high"]))
+        central = entry["central"] if "central" in entry else entry["value"]
+        return cls(float(entry["low"]), float(central), float(entry["high"]))
 
     def scaled(self, factor: float) -> Range:
         """Returns all three values multiplied by a factor."""
@@ -75,15 +76,27 @@ def footprint(thing: str, units: int, grid: str) -> Footprint:
     133.5
     """
     entry = _facts()["things"][thing]
-    use_wh = Range.read(entry["power_w"]).times(Range.read(entry["lifetime_h"]))
+    embodied_kg, embodied_source = published(entry["embodied"])
+    power_w, power_source = (
+        published(entry["power"])
+        if "power" in entry
+        else (Range.read(entry["power_w"]), entry["power_source"])
+    )
+    use_wh = power_w.times(Range.read(entry["lifetime_h"]))
     return Footprint(
-        embodied_kg=Range.read(entry["embodied_kg"]).scaled(units),
+        embodied_kg=embodied_kg.scaled(units),
         use_kg=use_wh.scaled(units * grids()[grid] / 1e6),
         source=(
-            f"Embodied: {entry['embodied_source']}. Power: {entry['power_source']}. "
+            f"Embodied: {embodied_source}. Power: {power_source}. "
             f"Lifetime: {entry['lifetime_source']}."
         ),
     )
+
+
+def published(name: str) -> tuple[Range, str]:
+    """Returns a figure of ``prices.toml`` and its source."""
+    entry = shipped("economics", "prices.toml")[name]
+    return Range.read(entry), str(entry["source"])
 
 
 def use_kg_per_year(energy_j_per_day: float, grid: str) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from access_av.economics.carbon import published
 from access_av.tables.toml import shipped
 
 
@@ -32,13 +33,14 @@ def roadside_units(units: int) -> RoadsideUnitCost:
     >>> roadside_units(4).capital_low_usd
     52000.0
     """
-    entry = shipped("economics", "cost.toml")["roadside_unit"]
+    capital, source = published("roadside_unit")
+    yearly, _ = published("roadside_unit_yearly")
     return RoadsideUnitCost(
         units=units,
-        capital_low_usd=float(units * entry["capital_usd"]["low"]),
-        capital_high_usd=float(units * entry["capital_usd"]["high"]),
-        yearly_usd=float(units * entry["yearly_usd"]),
-        source=entry["source"],
+        capital_low_usd=units * capital.low,
+        capital_high_usd=units * capital.high,
+        yearly_usd=units * yearly.central,
+        source=source,
     )
 
 

@@ -57,11 +57,14 @@ class Prices:
         of_currencies = facts.pop("currency")
         currency = str(own.get("currency", of_currencies["name"]))
         rate = own.get("currency_per_usd") or of_currencies["per_usd"][currency]
-        per_usd, converted = _range(rate), f"{rate['value']:g} {currency} per USD: {rate['source']}"
+        per_usd, converted = (
+            Range.read(rate),
+            f"{rate['value']:g} {currency} per USD: {rate['source']}",
+        )
         ranges, sources = {}, {}
         for name, fact in facts.items():
             figure = own.get(name, fact)
-            ranges[name], sources[name] = _range(figure), str(figure["source"])
+            ranges[name], sources[name] = Range.read(figure), str(figure["source"])
             if name not in own and not name.endswith(NO_MONEY) and currency != "USD":
                 ranges[name] = ranges[name].times(per_usd)
                 sources[name] += f"; {converted}"
@@ -98,13 +101,13 @@ def day(plant: _core.Plant, point: Point) -> Day:
     switched_on_h = fleet["vehicles"] * fleet["hours_per_day"]
     return Day(
         trips_wh=trip_j(point).scaled(trips / 3600.0),
-        idle_wh=None if point.idle_w is None else _range(point.idle_w).scaled(switched_on_h),
+        idle_wh=None if point.idle_w is None else Range.read(point.idle_w).scaled(switched_on_h),
     )
 
 
 def trip_j(point: Point) -> Range:
     """Returns the energy of a trip in joules, low to high, without the idle energy of the board."""
-    return _range(
+    return Range.read(
         {extent: energy.estimates_j + energy.listening_j for extent, energy in point.energy.items()}
     )
 
@@ -121,10 +124,6 @@ def composition(point: Point, day_of: Day, fleet: Mapping[str, Any]) -> dict[str
         "receiver": energy.listening_j * trips / 3600.0,
     }
     return parts if day_of.idle_wh is None else {**parts, "idle": day_of.idle_wh.central}
-
-
-def _range(ends: Mapping[str, float]) -> Range:
-    return Range(float(ends["low"]), float(ends["value"]), float(ends["high"]))
 
 
 def anchors(prices: Prices, road_m: float) -> Range:
@@ -156,7 +155,7 @@ def ways(plant: _core.Plant, point: Point, prices: Prices) -> dict[str, Way]:
     }
     computer = _item(prices, "computer", embodied="computer_embodied_kg")
     if point.idle_w is not None:
-        computer["power_w"] = _ends(_range(point.idle_w))
+        computer["power_w"] = _ends(Range.read(point.idle_w))
     receiver = _item(prices, "receiver", embodied="receiver_embodied_kg")
     ours = {"onboard": [receiver], "energy_j_per_trip": _ends(trip_j(point))}
     lidar = _item(prices, "lidar", power="lidar_power_w", embodied="lidar_embodied_kg")
