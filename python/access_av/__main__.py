@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
+
 from access_av import interrupt
 
 
 def main() -> None:
     """Runs the command line; Ctrl-C is handled from the first import on."""
+    # Campaigns have one thread per core; further threads of linear algebra would busy-wait. NumPy
+    # reads the variable when it is imported.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         interrupt.guard()
         from access_av.cli.main import main as run
