@@ -377,7 +377,7 @@ def test_a_foreign_table(access_av: Cli, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-8"])
 def test_terminals_of_any_encoding(encoding: str) -> None:
-    done = shell("columns", "trajectories", PYTHONIOENCODING=encoding)  # m², …
+    done = shell("file", "columns", "trajectories", PYTHONIOENCODING=encoding)  # m², …
     assert done.returncode == 0, done.stderr
     name = shell("file", "check", "größe-日本", PYTHONIOENCODING=encoding)
     assert name.returncode == 2, name.stderr

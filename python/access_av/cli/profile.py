@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +10,7 @@ import typer
 from access_av._core import Platform
 from access_av.cli.options import AsJson
 from access_av.cli.terminal import console, progress, show_warning, table
+from access_av.settings import as_dict
 
 app = typer.Typer()
 
@@ -92,7 +92,7 @@ def power(
     made = table(
         ["mode", "name", "cores", "MHz", "modelled W", "measured W", "difference %"], text=2
     )
-    for index, mode in enumerate(json.loads(board.to_json())["modes"]):
+    for index, mode in enumerate(as_dict(board)["modes"]):
         modelled_w = board.busy_power_w(index, mode["cores"])
         measured_w = mode.get("full_load_power_w", {}).get("value")
         made.add_row(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from access_av.run.campaign import Task
 from access_av.run.pairs import ErrorSamples
 from access_av.run.plug_in_files import checksum, load, split
 from access_av.run.simulation import simulate
+from access_av.settings import platform_name
 from access_av.statistics.percentiles import PERCENTS, Percentile
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ def designs_of(
                 load(role, text)
             ordered = dict(sorted({**settings, **(given or {})}.items()))
             changed = scenario.with_overrides(ordered)
-            name = _platform_name(changed)
+            name = platform_name(changed.vehicle)
             board = platforms.setdefault(name, Platform.load(name))
             resolved = changed.resolved(board.core)
             board.core.energy_j(resolved.vehicle, 0, 0, 0.0)
@@ -286,7 +286,3 @@ def joined(design: Design, parts: Sequence[Part]) -> Driven:
         track_s=track_s,
         track_m2=track_m2,
     )
-
-
-def _platform_name(scenario: Scenario) -> str:
-    return str(json.loads(scenario.vehicle.to_json())["platform"]["name"])

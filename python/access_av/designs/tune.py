@@ -8,7 +8,6 @@ ends of its intervals. The given policy remains unless one of them is better.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +18,7 @@ from access_av.designs.front import differences
 from access_av.designs.search import suggested
 from access_av.designs.space import Dimension, Space
 from access_av.errors import InputError
+from access_av.settings import as_dict
 from access_av.statistics.distributions import student_quantile
 from access_av.statistics.percentiles import column
 
@@ -91,7 +91,7 @@ def space_of(scenario: Scenario) -> Space:
     >>> [dimension.key.split('.')[-1] for dimension in space_of(Scenario.load("yard")).dimensions]
     ['target_error_m', 'min_variance_reduction_m2', 'snr_headroom_db']
     """
-    policy = json.loads(scenario.resolved().vehicle.to_json())["wake_up"]
+    policy = as_dict(scenario.resolved().vehicle)["wake_up"]
     found = []
     for key, low, high in RANGES[policy["policy"]]:
         table: Any = policy

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from access_av import _core
+from access_av.settings import as_dict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -106,7 +106,7 @@ class Platform:
     @cached_property
     def name(self) -> str:
         """Returns the short name."""
-        return str(json.loads(self.core.to_json())["name"])
+        return str(as_dict(self.core)["name"])
 
     @cached_property
     def modes(self) -> tuple[PowerMode, ...]:
@@ -122,7 +122,7 @@ class Platform:
                     for method, figure in _by_method(mode["energy_per_execution_j"]).items()
                 },
             )
-            for mode in json.loads(self.core.to_json())["modes"]
+            for mode in as_dict(self.core)["modes"]
         )
 
     @cached_property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.errors import InputError
+from access_av.settings import as_dict
 from access_av.tables import validation
 from access_av.tables.columns.tables import TABLES
 
@@ -64,7 +64,7 @@ class AngleLog:
 
     def csv(self) -> str:
         """Returns the angles as CSV; leading comments explain the standard deviations."""
-        rician_k_db = json.loads(self.site.to_json())["rician_k_db"]
+        rician_k_db = as_dict(self.site)["rician_k_db"]
         return (
             "# phase_sigma_rad: receiver noise and the site's "
             f"scatter (rician_k_db = {rician_k_db:g})\n"

@@ -13,7 +13,6 @@ define the frame.
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor
@@ -26,6 +25,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.errors import InputError
+from access_av.settings import as_dict
 from access_av.signal.manifold import wrapped
 from access_av.tables.result import Origin, Result, origin
 
@@ -156,7 +156,7 @@ def read_drive(folder: str | Path) -> SurveyDrive:
     if not there:
         raise InputError(f"{folder}: neither odometry.csv nor odometry.mcap is here")
     vehicle = _core.Vehicle.load(str(folder / "vehicle.toml"))
-    stated = json.loads(vehicle.to_json())
+    stated = as_dict(vehicle)
     start = stated.get("start", {}).get("pose")
     if start is None:
         raise InputError(
@@ -230,8 +230,8 @@ class _Model:
         phase_std_rad: float,
     ) -> None:
         self.site, self.vehicle = site, vehicle
-        heads = json.loads(site.to_json())["radio_heads"]
-        array = json.loads(vehicle.to_json())["array"]
+        heads = as_dict(site)["radio_heads"]
+        array = as_dict(vehicle)["array"]
         self.heads = [(head["pci"], head.get("ssb_index", 0)) for head in heads]
         self._heights_m = [head["position_m"][2] for head in heads]
         keys, before, stds = [], [], []

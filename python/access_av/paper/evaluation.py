@@ -10,7 +10,6 @@ simulated once, with the same seeds as all others.
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -28,6 +27,7 @@ from access_av.paper.findings import MissingFigureError, energy_j
 from access_av.paper.interpretations import SHIPPED, Interpretation, load
 from access_av.paper.outcome import Drives, Outcome
 from access_av.paper.statements import METHODS, paper_numbers
+from access_av.settings import as_dict
 from access_av.statistics.percentiles import as_columns, names
 from access_av.tables.result import Origin, Result, origin
 
@@ -55,7 +55,7 @@ class Setting:
 
 def fixed_interval(scenario: Scenario, interval_ms: float) -> dict[str, Any]:
     """Returns the wake-up settings of a fixed interval, with the SSB selection of the scenario."""
-    wake_up = json.loads(scenario.to_json())["vehicle"]["wake_up"]
+    wake_up = as_dict(scenario)["vehicle"]["wake_up"]
     clock = wake_up.get("trigger", wake_up).get("ssb_selection", "first-after")
     return {"policy": "fixed", "interval_ms": interval_ms, "ssb_selection": clock}
 
@@ -317,7 +317,7 @@ def outcome_of(
 
 def settings_of(interpretation: Interpretation, platform: Platform) -> dict[str, float]:
     """Returns the values of an interpretation for the settings that the paper specifies."""
-    scenario = json.loads(interpretation.scenario.resolved(platform.core).to_json())
+    scenario = as_dict(interpretation.scenario.resolved(platform.core))
     vehicle = scenario["vehicle"]
     controller = vehicle["wake_up"].get("trigger", vehicle["wake_up"])
     names = ("kp", "ki", "kd", "weight_snr", "weight_velocity", "t_max_ms")

@@ -7,7 +7,6 @@ of the paper's claims.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from access_av._core import Scenario
 from access_av.errors import InputError
 from access_av.paper.statements import paper_numbers
+from access_av.settings import as_dict
 from access_av.tables.toml import shipped
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class Interpretation:
     @property
     def wake_up(self) -> dict[str, Any]:
         """Wake-up settings of the interpretation."""
-        return dict(json.loads(self.scenario.to_json())["vehicle"]["wake_up"])
+        return dict(as_dict(self.scenario)["vehicle"]["wake_up"])
 
     @property
     def is_gated(self) -> bool:
@@ -58,7 +58,7 @@ class Interpretation:
     def t_max_s(self) -> float | None:
         """The paper's t_max in seconds; ``None`` without a controller."""
         resolved = self.scenario.resolved()
-        settings = json.loads(resolved.to_json())["vehicle"]["wake_up"]
+        settings = as_dict(resolved)["vehicle"]["wake_up"]
         t_max_ms = settings.get("trigger", settings).get("t_max_ms")
         return None if t_max_ms is None else t_max_ms / 1e3
 
@@ -129,8 +129,8 @@ def check_trip(scenario: Scenario) -> None:
     --------
     >>> check_trip(Scenario.load("paper"))
     """
-    paper = json.loads(Scenario.load("paper").to_json())
-    other = json.loads(scenario.to_json())
+    paper = as_dict(Scenario.load("paper"))
+    other = as_dict(scenario)
     differs = [
         what
         for what, place in (

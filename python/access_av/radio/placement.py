@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections import Counter
@@ -17,6 +16,7 @@ from access_av import _core
 from access_av.errors import InputError
 from access_av.run import service_levels
 from access_av.run.error_bound import along_route
+from access_av.settings import as_dict
 from access_av.tables import validation
 from access_av.tables.result import Origin, Result, origin
 
@@ -113,7 +113,7 @@ def plan(
     """
     if not isinstance(scenario, _core.Scenario):
         scenario = _core.Scenario.load(scenario)
-    site = json.loads(scenario.site.to_json())
+    site = as_dict(scenario.site)
     heads = site["radio_heads"]
     candidates = _beside(scenario, site) if masts is None else _candidates(masts)
     if not 1 <= add <= len(candidates):

@@ -9,7 +9,6 @@ to compute such a table with Sionna RT.
 from __future__ import annotations
 
 import io
-import json
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +18,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.errors import InputError
+from access_av.settings import as_dict
 from access_av.tables import validation
 from access_av.tables.results_directory import write_whole
 
@@ -79,7 +79,7 @@ def import_paths(
         table if isinstance(table, pl.DataFrame) else validation.read(Path(table), "table of paths")
     )
     held = site if isinstance(site, _core.Site) else _core.Site.load(site)
-    of_site = json.loads(held.to_json())
+    of_site = as_dict(held)
     heads, site_mhz = of_site["radio_heads"], of_site["carrier_mhz"]
     where = "paths" if isinstance(table, pl.DataFrame) else str(table)
     indices = {"ssb_index"} & set(rows.columns)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from access_av import _core
 from access_av.run import service_levels
 from access_av.run.error_bound import along_route
+from access_av.settings import as_dict
 
 if TYPE_CHECKING:
     import numpy as np
@@ -161,7 +161,7 @@ def next_level(scenario: _core.Scenario | str, planned: Plan | None = None) -> N
 
 def _settings(scenario: _core.Scenario) -> dict[str, dict[str, Any]]:
     """Returns descriptions of the changes and their settings."""
-    site, vehicle = (json.loads(part.to_json()) for part in (scenario.site, scenario.vehicle))
+    site, vehicle = (as_dict(part) for part in (scenario.site, scenario.vehicle))
     made = {}
     period_ms = site["ssb"]["period_ms"] / 2.0
     if period_ms >= SHORTEST_PERIOD_MS:

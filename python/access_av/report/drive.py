@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from html import escape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
@@ -13,6 +12,7 @@ from access_av.report.page import sheet
 from access_av.report.parts import figure, section, service_levels, source, table, tile, warnings
 from access_av.report.played import CAPTION as PLAYED
 from access_av.run.assumptions import energy_boundary, in_words, optimistic_assumptions
+from access_av.settings import as_dict
 from access_av.tables.numbers import value_text
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, appendix: st
         )
     integrity = result.integrity
     if integrity is not None:
-        vehicle = json.loads(scenario.resolved().vehicle.to_json())
+        vehicle = as_dict(scenario.resolved().vehicle)
         alert_limit_m = vehicle["integrity"]["alert_limit_m"]
         specs["stanford"] = charts.stanford(result.trajectories, alert_limit_m)
         sections.append(

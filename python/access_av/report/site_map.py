@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -11,6 +10,7 @@ import altair as alt
 import polars as pl
 
 from access_av.report.chart import GREEN, GREY, to_scale
+from access_av.settings import as_dict
 from access_av.site_files.picture import underlay
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class Frame:
 
 def heads_of(site: _core.Site) -> pl.DataFrame:
     """Returns the radio heads of a site: ``name``, ``pci``, ``ssb_index``, ``x_m``, ``y_m``."""
-    heads = json.loads(site.to_json())["radio_heads"]
+    heads = as_dict(site)["radio_heads"]
     return pl.DataFrame(
         [
             {
@@ -110,6 +110,6 @@ def walls_of(site: _core.Site) -> list[dict[str, float]]:
     """Returns the wall segments of a site, from ``x_m``, ``y_m`` to ``x2_m``, ``y2_m``."""
     return [
         {"x_m": x_m, "y_m": y_m, "x2_m": x2_m, "y2_m": y2_m}
-        for wall in json.loads(site.to_json()).get("walls", ())
+        for wall in as_dict(site).get("walls", ())
         for (x_m, y_m), (x2_m, y2_m) in pairwise(wall["points_m"])
     ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from html import escape
 from importlib.metadata import version
@@ -23,6 +22,7 @@ from access_av.report.study_parts import (
     sources,
 )
 from access_av.run.assumptions import in_words, optimistic_assumptions
+from access_av.settings import as_dict
 from access_av.study import economy
 from access_av.study.verdicts import NotOk
 
@@ -153,7 +153,7 @@ def _verdict(study: Study) -> str:
         "Target", "Lost drives", "Required", "Percentile", "Interval", "Within", "Interval of it",
         "Verdict",
     )  # fmt: skip
-    written = json.loads(study.plant.to_json())
+    written = as_dict(study.plant)
     channel = written["poor_channel"]["model"]
     return section(
         "Is it good enough?",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from access_av.report.labels import layers as labels
 from access_av.report.played import played, received_of, steps_of
 from access_av.report.site_map import Frame, heads_of
 from access_av.report.study_parts import numbered
+from access_av.settings import as_dict
 from access_av.study.economy import trip_j
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def _classes(target_m: float) -> list[str]:
 
 
 def _stops(study: Study) -> list[dict[str, Any]]:
-    stops: list[dict[str, Any]] = json.loads(study.plant.to_json())["motion"]["stops"]
+    stops: list[dict[str, Any]] = as_dict(study.plant)["motion"]["stops"]
     return stops
 
 

@@ -19,6 +19,7 @@ from access_av.report.study_parts import (
     watts,
 )
 from access_av.run.assumptions import energy_boundary
+from access_av.settings import as_dict
 from access_av.study import economy
 from access_av.study.operate import MATTERS_SHARE
 from access_av.study.verdicts import Agreement
@@ -113,7 +114,7 @@ def _rivals(study: Study) -> str:
 
 
 def _composition(study: Study, point: Point, day: economy.Day) -> str:
-    fleet = json.loads(study.plant.to_json())["fleet"]
+    fleet = as_dict(study.plant)["fleet"]
     parts = economy.composition(point, day, fleet)
     whole, added = sum(parts.values()), parts["estimates"] + parts["receiver"]
     named = {
@@ -224,7 +225,7 @@ def money_section(study: Study) -> str:
     """Returns the section on money and carbon; empty without a recommendation."""
     if not study.ways:
         return ""
-    fleet = json.loads(study.plant.to_json())["fleet"]
+    fleet = as_dict(study.plant)["fleet"]
     years, currency = fleet["years"], escape(study.prices.currency)
     money = [
         (escape(name), ends(way.capital), ends(way.yearly), ends(economy.total(way, years)))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 from access_av.device.platform import BOUNDARIES, Platform
+from access_av.settings import as_dict
 
 if TYPE_CHECKING:
     from access_av import _core
@@ -23,7 +23,7 @@ def optimistic_assumptions(scenario: _core.Scenario) -> list[str]:
     >>> optimistic_assumptions(_core.Scenario.load("yard").with_overrides(exact))
     ['exact start (vehicle.start)']
     """
-    site, vehicle = (json.loads(it.to_json()) for it in (scenario.site, scenario.vehicle))
+    site, vehicle = (as_dict(it) for it in (scenario.site, scenario.vehicle))
     array, odometer, start = (vehicle[key] for key in ("array", "odometer", "start"))
     tracks = vehicle["localizer"]["kind"] == "tracker"
     heads = site["radio_heads"]
@@ -45,7 +45,7 @@ def optimistic_assumptions(scenario: _core.Scenario) -> list[str]:
         "exact positions of the radio heads (site.radio_heads.all.position_std_m)": not any(
             head["position_std_m"] for head in heads
         ),
-        "truth equal to the nominal model (truth.sample_errors)": json.loads(scenario.to_json())
+        "truth equal to the nominal model (truth.sample_errors)": as_dict(scenario)
         .get("truth", {})
         .get("sample_errors")
         is False,
@@ -65,7 +65,7 @@ def energy_boundary(scenario: _core.Scenario) -> str | None:
     >>> energy_boundary(_core.Scenario.load("yard"))
     'above idle'
     """
-    settings = json.loads(scenario.vehicle.to_json())["platform"]
+    settings = as_dict(scenario.vehicle)["platform"]
     platform = Platform.load(settings["name"]).core
     energy_j = platform.energy_j(scenario.vehicle, 1, 1, 1.0)
     return None if energy_j is None else BOUNDARIES[energy_j[-1]]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,6 +13,7 @@ import polars as pl
 from access_av import _core
 from access_av.errors import InputError
 from access_av.run import service_levels
+from access_av.settings import as_dict
 from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
     """
     if not isinstance(scenario, _core.Scenario):
         scenario = _core.Scenario.load(scenario)
-    settings = json.loads(scenario.site.to_json())
+    settings = as_dict(scenario.site)
     core = _core.Bound(scenario)
     route = pl.DataFrame(core.along_route())
     heads = _heads(core, settings["radio_heads"], route)

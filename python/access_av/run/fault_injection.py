@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from access_av.settings import as_dict
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -52,8 +53,8 @@ def mismatches(scenario: _core.Scenario) -> dict[str, Overrides]:
     >>> found["array 1 degree off"]
     {'truth.vehicle.array.mounting_rad': 0.0175}
     """
-    site = json.loads(scenario.site.to_json())
-    vehicle = json.loads(scenario.vehicle.to_json())
+    site = as_dict(scenario.site)
+    vehicle = as_dict(scenario.vehicle)
     heads, odometer = site["radio_heads"], vehicle["odometer"]
 
     def moved(count: int) -> Overrides:
@@ -103,8 +104,8 @@ def hypotheses(scenario: _core.Scenario, scales: Iterable[float] = SIZES) -> dic
     >>> found["array mounting x 3"]
     {'truth.vehicle.array.mounting_rad': 0.03}
     """
-    site = json.loads(scenario.site.to_json())
-    vehicle = json.loads(scenario.vehicle.to_json())
+    site = as_dict(scenario.site)
+    vehicle = as_dict(scenario.vehicle)
     found: dict[str, Overrides] = {}
     for scale in scales:
         for name, case in _of_size(site, vehicle, scale).items():

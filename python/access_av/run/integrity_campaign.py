@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from access_av.run.campaign import Task
 from access_av.run.fault_injection import Overrides, hypotheses, mismatches
 from access_av.run.pairs import UNCHANGED, ErrorSamples
 from access_av.run.simulation import simulate
+from access_av.settings import as_dict
 from access_av.statistics.alarms import Alarms
 from access_av.statistics.consistency import horizontal_error_m
 from access_av.statistics.extremes import ObtainedRisk
@@ -107,7 +107,7 @@ class Case:
 
 def _settings(scenario: _core.Scenario) -> dict[str, Any]:
     """Returns the complete ``[integrity]`` settings of the vehicle."""
-    found: dict[str, Any] = json.loads(scenario.vehicle.to_json())["integrity"]
+    found: dict[str, Any] = as_dict(scenario.vehicle)["integrity"]
     return found
 
 
@@ -197,7 +197,7 @@ def drive(
     for name in only or ():
         if name not in known:
             raise InputError(f"mismatch {name!r}: there are {', '.join(known)}")
-    cells = [head["pci"] for head in json.loads(scenario.site.to_json())["radio_heads"]]
+    cells = [head["pci"] for head in as_dict(scenario.site)["radio_heads"]]
     for count in heads or ():
         if not 1 <= count <= len(cells):
             raise InputError(f"{count} radio heads: the site has {len(cells)}")

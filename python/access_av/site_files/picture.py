@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import base64
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from access_av.errors import InputError
+from access_av.settings import as_dict
 from access_av.tables.results_directory import regular
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def underlay(site: _core.Site) -> Underlay | None:
     InputError
         Missing or too large file, or neither PNG nor JPEG.
     """
-    named = json.loads(site.to_json()).get("underlay")
+    named = as_dict(site).get("underlay")
     if named is None:
         return None
     path = Path(named["file"])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ import numpy as np
 from access_av import _core
 from access_av.errors import InputError
 from access_av.run.error_bound import along_route
+from access_av.settings import as_dict
 from access_av.site_files import csv_file, dxf, geojson
 from access_av.site_files.drawn import Drawn, Head, checked, numbered
 
@@ -152,7 +152,7 @@ def of_site(site: _core.Site) -> Drawn:
     >>> len(drawn.heads), len(drawn.road_m) > 100
     (4, True)
     """
-    settings = json.loads(site.to_json())
+    settings = as_dict(site)
     heads = [
         Head(one["name"], x_m, y_m, z_m, one["pci"])
         for one in settings["radio_heads"]

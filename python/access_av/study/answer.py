@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ from access_av import _core
 from access_av.errors import InputError
 from access_av.run.service_levels import INDEPENDENT_S
 from access_av.run.simulation import simulate
+from access_av.settings import as_dict
 from access_av.study import economy
 from access_av.study.measures import measures
 from access_av.study.operate import operate
@@ -90,7 +90,7 @@ def study_plant(
         )
     targets, (_, percent) = Targets.of(plant), plant.target
     present = 0
-    fleet = json.loads(plant.to_json())["fleet"]
+    fleet = as_dict(plant)["fleet"]
     usual = _runs(scenario) if runs is None else runs
     full = min(2 * usual, max(usual, _sure(scenario, percent))) if runs is None else runs
     pairs, few, fewest = (min(full, max(2, round(share * usual))) for share in SHARES)
@@ -152,10 +152,10 @@ def study_plant(
 
 def _runs(scenario: _core.Scenario) -> int:
     """Returns the number of runs within the budget."""
-    wake_up = json.loads(scenario.resolved().vehicle.to_json())["wake_up"]
+    wake_up = as_dict(scenario.resolved().vehicle)["wake_up"]
     share = WOKEN_SHARE
     if wake_up["policy"] == "fixed":
-        period_ms = json.loads(scenario.site.to_json())["ssb"]["period_ms"]
+        period_ms = as_dict(scenario.site)["ssb"]["period_ms"]
         share = min(1.0, period_ms / wake_up["interval_ms"])
     return int(min(MOST, max(FEWEST, BUDGET_ANGLES // (share * scenario.size["ssbs"]))))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from access_av.economics import balance
 from access_av.economics.carbon import Range
 from access_av.run.error_bound import along_route
+from access_av.settings import as_dict
 from access_av.tables.toml import shipped
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Prices:
     @classmethod
     def of(cls, plant: _core.Plant) -> Prices:
         """Returns the prices of a plant, completed by published figures."""
-        own: dict[str, Any] = json.loads(plant.to_json()).get("prices", {})
+        own: dict[str, Any] = as_dict(plant).get("prices", {})
         facts = dict(shipped("economics", "prices.toml"))
         of_currencies = facts.pop("currency")
         currency = str(own.get("currency", of_currencies["name"]))
@@ -96,7 +96,7 @@ class Day:
 
 def day(plant: _core.Plant, point: Point) -> Day:
     """Returns the energy of a day of the fleet at an operating point."""
-    fleet = json.loads(plant.to_json())["fleet"]
+    fleet = as_dict(plant)["fleet"]
     trips = fleet["vehicles"] * fleet["trips_per_day"]
     switched_on_h = fleet["vehicles"] * fleet["hours_per_day"]
     return Day(
@@ -140,7 +140,7 @@ def ways(plant: _core.Plant, point: Point, prices: Prices) -> dict[str, Way]:
     during the hours of the fleet. Every computer is counted with its price, production and idle
     power.
     """
-    written = json.loads(plant.to_json())
+    written = as_dict(plant)
     road_m = along_route(plant.scenario())["along_m"].to_list()
     fleet, heads = written["fleet"], len(written["site"]["radio_heads"])
     common = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.run.error_bound import VISIBLE_SNR_DB, along_route
+from access_av.settings import as_dict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -139,13 +139,13 @@ def _dilution(
 
 def radio_heads(scenario: _core.Scenario) -> list[Mapping[str, Any]]:
     """Returns the radio heads of a scenario's site."""
-    heads: list[Mapping[str, Any]] = json.loads(scenario.site.to_json())["radio_heads"]
+    heads: list[Mapping[str, Any]] = as_dict(scenario.site)["radio_heads"]
     return heads
 
 
 def worst_places(places: pl.DataFrame, plant: _core.Plant) -> list[WorstPlace]:
     """Returns the positions with the largest errors, at least :data:`APART_M` apart."""
-    written = json.loads(plant.to_json())
+    written = as_dict(plant)
     left = places.sort("target_error_m", descending=True, maintain_order=True)
     found: list[WorstPlace] = []
     for row in left.iter_rows(named=True):

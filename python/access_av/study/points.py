@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from access_av.device.platform import Platform
+from access_av.settings import as_dict, platform_name, ssb_period_s
 from access_av.statistics.pareto import pareto_front
-from access_av.study.trips import EXTENTS, Driven, Energy, platform_name
+from access_av.study.trips import EXTENTS, Driven, Energy
 from access_av.study.verdicts import Judgement
 
 if TYPE_CHECKING:
@@ -102,10 +103,10 @@ class Point:
 
 def operations(scenario: _core.Scenario) -> list[Operation]:
     """Returns the operations that a study simulates; that of the vehicle is the first."""
-    vehicle = json.loads(scenario.resolved().vehicle.to_json())
+    vehicle = as_dict(scenario.resolved().vehicle)
     method, own = vehicle["estimator"]["method"], in_words(vehicle["wake_up"])
     found = [Operation("unchanged", method, own, {})]
-    period_ms = json.loads(scenario.site.to_json())["ssb"]["period_ms"]
+    period_ms = as_dict(scenario.site)["ssb"]["period_ms"]
     for interval_ms in FIXED_MS:
         wake_up: dict[str, Any] = {"policy": "fixed", "interval_ms": interval_ms}
         name = in_words(wake_up)
@@ -143,15 +144,15 @@ def mode_groups(scenario: _core.Scenario) -> list[list[PowerMode]]:
     estimate. Modes without a figure for the method are left
     out, and modes in which an estimate takes longer than the period of the SSBs.
     """
-    platform = Platform.load(platform_name(scenario))
-    period_s = json.loads(scenario.site.to_json())["ssb"]["period_ms"] * 1e-3
+    platform = Platform.load(platform_name(scenario.vehicle))
+    period_s = ssb_period_s(scenario.site)
     found: dict[str, list[PowerMode]] = {}
     for mode in platform.modes:
         vehicle = scenario.with_overrides({MODE_KEY: mode.number}).vehicle
         parts = platform.core.energy_j(vehicle, 1, 1, 1.0)
         if parts is None or platform.core.base_wake_up_s(vehicle) > period_s:
             continue
-        resolved = json.loads(vehicle.resolved(platform.core).to_json())
+        resolved = as_dict(vehicle.resolved(platform.core))
         del resolved["platform"]["mode"]
         wake_up = resolved["wake_up"]
         asks = wake_up["policy"] == "uncertainty" and wake_up.get("wake_up_cost") is None
@@ -162,7 +163,7 @@ def mode_groups(scenario: _core.Scenario) -> list[list[PowerMode]]:
 
 def own_mode(scenario: _core.Scenario) -> int:
     """Returns the power mode of a scenario's vehicle."""
-    return int(json.loads(scenario.vehicle.to_json())["platform"]["mode"])
+    return int(as_dict(scenario.vehicle)["platform"]["mode"])
 
 
 def point(
@@ -175,7 +176,7 @@ def point(
 ) -> Point:
     """Returns the operating point of an operation in a power mode, with its energy."""
     in_mode = driven.scenario.with_overrides({MODE_KEY: mode.number})
-    platform = Platform.load(platform_name(in_mode))
+    platform = Platform.load(platform_name(in_mode.vehicle))
     energy = driven.in_scenario(in_mode).energy(platform)
     if energy is None:  # such modes are in no group
         raise RuntimeError(f"mode {mode.number} has no figure of energy")
@@ -194,7 +195,7 @@ def point(
 
 def idle_w(platform: Platform, number: int) -> dict[str, float] | None:
     """Returns the idle power of a board in watts, low to high; ``None`` if unknown."""
-    written = json.loads(platform.core.to_json())
+    written = as_dict(platform.core)
     [mode] = [mode for mode in written["modes"] if mode["mode"] == number]
     figure = mode.get("idle_power_w") or written.get("idle", {}).get("power_w")
     if figure is None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from access_av.radio.placement import plan
 from access_av.run.error_bound import along_route
+from access_av.settings import as_dict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -61,7 +61,7 @@ def remedies(scenario: _core.Scenario, vehicles: int) -> list[Remedy]:
     vehicles
         Number of vehicles.
     """
-    site, vehicle = (json.loads(part.to_json()) for part in (scenario.site, scenario.vehicle))
+    site, vehicle = (as_dict(part) for part in (scenario.site, scenario.vehicle))
     found = [
         _remember(vehicle),
         _more_ssbs(site),
@@ -160,7 +160,7 @@ def _move(scenario: _core.Scenario, site: Mapping[str, Any]) -> Remedy | None:
 
 def _mast(scenario: _core.Scenario) -> Remedy | None:
     planned = plan(scenario)
-    heads = json.loads(planned.scenario.site.to_json())["radio_heads"]
+    heads = as_dict(planned.scenario.site)["radio_heads"]
     heads[-1] |= {
         key: heads[0][key] for key in ("position_std_m", "eirp_std_db") if heads[0].get(key)
     }

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
+from access_av.settings import as_dict
 from access_av.study import economy
 from access_av.study.targets import table as targets_table
 from access_av.tables.result import Origin, Result, origin
@@ -200,7 +201,7 @@ def _as_toml(value: object) -> str:
 
 def _summary(study: Study) -> dict[str, Any]:
     """Every figure of the page, as plain values for JSON."""
-    written = json.loads(study.plant.to_json())
+    written = as_dict(study.plant)
     fleet = written["fleet"]
     cheapest = None if study.measured is None else study.measured.cheapest
     return {
@@ -258,7 +259,7 @@ def _recommendation(study: Study) -> dict[str, Any]:
     point, day = study.point, study.day
     if point is None or day is None:
         return {"recommended": None, "rivals": [], "day": None}
-    fleet = json.loads(study.plant.to_json())["fleet"]
+    fleet = as_dict(study.plant)["fleet"]
     return {
         "recommended": {
             "name": point.name,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ import polars as pl
 from access_av.device.platform import Platform
 from access_av.run.pairs import ErrorSamples
 from access_av.run.simulation import simulate
+from access_av.settings import platform_name, ssb_period_s
 from access_av.statistics.integrity import Integrity
 from access_av.statistics.proportions import share_interval
 from access_av.study.verdicts import NotOk
@@ -168,7 +168,7 @@ class Driven(ErrorSamples):
         if self.has_own_estimator:
             return None
         vehicle = self.scenario.vehicle
-        core = (platform or Platform.load(platform_name(self.scenario))).core
+        core = (platform or Platform.load(platform_name(self.scenario.vehicle))).core
         estimates, bursts_received = (
             round(float(it.mean())) for it in (self.aoa_estimates, self.bursts_received)
         )
@@ -253,7 +253,7 @@ def drive(
     plug_ins: Mapping[str, Any] | None = None,
 ) -> Driven:
     """Simulates a scenario; an equal seed gives every variant equal environments."""
-    period_s = json.loads(scenario.site.to_json())["ssb"]["period_ms"] * 1e-3
+    period_s = ssb_period_s(scenario.site)
     every = max(1, round(KEPT_EVERY_S / period_s))
     found = simulate(
         scenario,
@@ -288,8 +288,3 @@ def drive(
 def _mean(values: pl.Series) -> float | None:
     """Returns the mean of values; all must be known."""
     return None if values.null_count() else float(values.to_numpy().mean())
-
-
-def platform_name(scenario: _core.Scenario) -> str:
-    """Returns the name of the platform of a scenario's vehicle."""
-    return str(json.loads(scenario.vehicle.to_json())["platform"]["name"])

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from access_av import _core
 from access_av.run.error_bound import along_route
+from access_av.settings import as_dict
 from access_av.site_files.templates import new
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def unverified(plant: _core.Plant) -> list[Unverified]:
     The effect is the change of the posterior Cramér–Rao bound when one value is changed. A value
     that is omitted in the file is equal to a written default.
     """
-    mine, template = json.loads(plant.to_json()), _template()
+    mine, template = as_dict(plant), _template()
     scenario = plant.scenario()
     before_m = _p90_m(scenario)
     found = []
@@ -79,7 +79,7 @@ def unverified(plant: _core.Plant) -> list[Unverified]:
 @cache
 def _template() -> Mapping[str, Any]:
     plant = _core.Plant.from_toml(new("plant", "template", "template"), "template")
-    written: Mapping[str, Any] = json.loads(plant.to_json())
+    written: Mapping[str, Any] = as_dict(plant)
     return written
 
 
