@@ -16,6 +16,7 @@ from access_av.run.campaign import Campaign
 from access_av.run.fault_injection import SIZES, hypotheses, mismatches
 from access_av.run.integrity_campaign import drive
 from access_av.run.result_cache import ResultCache
+from access_av.verdicts import LevelResult
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -169,7 +170,7 @@ def test_service_levels_need_time_as_well_as_accuracy() -> None:
     assert found is not None
     assert found[0].share == 1.0
     # Half a minute is too short for level 2: neither reached nor missed.
-    assert [found[0].outcome, found[1].outcome] == ["too few runs"] * 2
+    assert [found[0].result, found[1].result] == [LevelResult.TOO_FEW_RUNS] * 2
 
 
 def test_an_interrupted_integrity_campaign_is_continued(

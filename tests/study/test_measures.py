@@ -16,7 +16,7 @@ from access_av.study.operate import operate
 from access_av.study.remedies import Remedy
 from access_av.study.targets import Targets
 from access_av.study.trips import Driven, drive
-from access_av.study.verdicts import Agreement, Judgement
+from access_av.verdicts import Agreement, Judgement
 
 if TYPE_CHECKING:
     from access_av import _core

@@ -26,9 +26,9 @@ from access_av.study.compare import table as compared_table
 from access_av.study.places import worst_places
 from access_av.study.points import mode_groups
 from access_av.study.unverified import unverified
-from access_av.study.verdicts import Agreement, Effect, Judgement
 from access_av.tables.columns.tables import TABLES
 from access_av.tables.toml import tomllib
+from access_av.verdicts import Agreement, Effect, Judgement
 from browser import Browser
 
 if TYPE_CHECKING:

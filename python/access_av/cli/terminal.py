@@ -238,7 +238,7 @@ def show_service_levels(verdicts: Sequence[Verdict], title: str = "") -> None:
             f"{verdict.level.availability:.1%}",
             f"{verdict.share:.2%}",
             f"{verdict.least_share:.2%}",
-            verdict.outcome,
+            verdict.result.value,
         )
     console.print(made)
 

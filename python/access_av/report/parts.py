@@ -11,10 +11,6 @@ if TYPE_CHECKING:
     from access_av.run.service_levels import Verdict
 
 
-# Kind of badge for each result of a service level.
-OUTCOMES = {"reached": "yes", "too few runs": "fit", "not reached": "no"}
-
-
 def badge(text: str, kind: str) -> str:
     """Returns a badge; ``kind`` is ``yes``, ``no``, ``fit``, ``arithmetic`` or ``construction``."""
     return f'<span class="badge {kind}">{escape(text)}</span>'
@@ -72,7 +68,7 @@ def service_levels(verdicts: Iterable[Verdict]) -> str:
             f"{verdict.level.availability:.1%}",
             f"{verdict.share:.2%}",
             f"{verdict.least_share:.2%}",
-            badge(verdict.outcome, OUTCOMES[verdict.outcome]),
+            badge(verdict.result.value, verdict.result.badge),
         )
         for verdict in verdicts
     ]

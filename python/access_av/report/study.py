@@ -24,7 +24,7 @@ from access_av.report.study_parts import (
 from access_av.run.assumptions import in_words, optimistic_assumptions
 from access_av.settings import as_dict
 from access_av.study import economy
-from access_av.study.verdicts import NotOk
+from access_av.verdicts import NotOk
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

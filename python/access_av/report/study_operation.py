@@ -22,7 +22,7 @@ from access_av.run.assumptions import energy_boundary
 from access_av.settings import as_dict
 from access_av.study import economy
 from access_av.study.operate import MATTERS_SHARE
-from access_av.study.verdicts import Agreement
+from access_av.verdicts import Agreement
 
 if TYPE_CHECKING:
     from access_av.study.points import Point

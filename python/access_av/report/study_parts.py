@@ -6,7 +6,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from access_av.report.parts import badge, table
-from access_av.study.verdicts import NotOk
+from access_av.verdicts import NotOk
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

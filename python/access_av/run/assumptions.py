@@ -27,33 +27,37 @@ def optimistic_assumptions(scenario: _core.Scenario) -> list[str]:
     array, odometer, start = (vehicle[key] for key in ("array", "odometer", "start"))
     tracks = vehicle["localizer"]["kind"] == "tracker"
     heads = site["radio_heads"]
-    found = {
-        f"angles of {len(heads)} radio heads, assumed exact by dead reckoning": (
-            not tracks and len(heads) > 1
+    monitored = vehicle.get("integrity", {"enabled": True})["enabled"]
+    odometer_errors = [it for key, it in odometer.items() if "noise" in key or key == "scale_std"]
+    sampled = as_dict(scenario).get("truth", {}).get("sample_errors")
+    many = f"angles of {len(heads)} radio heads, assumed exact by dead reckoning"
+    found = [
+        (many, not tracks and len(heads) > 1),
+        ("dead reckoning without protection level (vehicle.localizer.kind)", not tracks),
+        (
+            "no integrity monitor and protection level (vehicle.integrity.enabled)",
+            tracks and not monitored,
         ),
-        "dead reckoning without protection level (vehicle.localizer.kind)": not tracks,
-        "no integrity monitor and protection level (vehicle.integrity.enabled)": tracks
-        and not vehicle.get("integrity", {"enabled": True})["enabled"],
-        "exact start (vehicle.start)": start["known"]
-        and not (start["position_std_m"] or start["heading_std_rad"]),
-        "exact odometer (vehicle.odometer)": not any(
-            value for key, value in odometer.items() if "noise" in key or key == "scale_std"
+        (
+            "exact start (vehicle.start)",
+            start["known"] and not (start["position_std_m"] or start["heading_std_rad"]),
         ),
-        "exact array (vehicle.array.mounting_std_rad, phase_std_rad)": not (
-            array.get("mounting_std_rad") or array.get("phase_std_rad")
+        ("exact odometer (vehicle.odometer)", not any(odometer_errors)),
+        (
+            "exact array (vehicle.array.mounting_std_rad, phase_std_rad)",
+            not (array.get("mounting_std_rad") or array.get("phase_std_rad")),
         ),
-        "exact positions of the radio heads (site.radio_heads.all.position_std_m)": not any(
-            head["position_std_m"] for head in heads
+        (
+            "exact positions of the radio heads (site.radio_heads.all.position_std_m)",
+            not any(head["position_std_m"] for head in heads),
         ),
-        "truth equal to the nominal model (truth.sample_errors)": as_dict(scenario)
-        .get("truth", {})
-        .get("sample_errors")
-        is False,
-        "no energy, because the platform has no value for the method (vehicle.platform.name)": (
-            energy_boundary(scenario) is None
+        ("truth equal to the nominal model (truth.sample_errors)", sampled is False),
+        (
+            "no energy, because the platform has no value for the method (vehicle.platform.name)",
+            energy_boundary(scenario) is None,
         ),
-    }
-    return [what for what, holds in found.items() if holds]
+    ]
+    return [what for what, holds in found if holds]
 
 
 def energy_boundary(scenario: _core.Scenario) -> str | None:

@@ -7,24 +7,12 @@ from typing import TYPE_CHECKING
 
 import polars as pl
 
+from access_av.verdicts import Cause
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from access_av._core import Vehicle
-
-# Causes of unavailability and their remedies, in the order of their test; the first one counts.
-SEARCHING = "first position not found yet"
-CONTRADICTED = "contradictions between radio heads, array and odometer"
-TOO_WIDE = "protection level above the alert limit of {limit_m:g} m"
-SUSPECTED = "fault of a radio head, the array or the odometer suspected, now or recently"
-REMEDIES = {
-    SEARCHING: "a start pose, or more radio heads near the start",
-    CONTRADICTED: "a survey of radio heads and array mounting (access-av record survey)",
-    TOO_WIDE: "more wake-ups, more radio heads, smaller standard deviations, or a higher "
-    "integrity.alert_limit_m if the plant permits it",
-    SUSPECTED: "realistic standard deviations of array, odometer and radio heads, because errors "
-    "within them are no faults",
-}
 
 
 @dataclass(frozen=True)
@@ -47,7 +35,7 @@ class Operation:
     """
 
     reliable: float
-    reasons: Mapping[str, float]
+    reasons: Mapping[Cause, float]
     level_m: float | None
     alert_limit_m: float
     beyond: int | None
@@ -88,16 +76,17 @@ limit of 1 m, 8 % contradictions between radio heads, array and odometer.
         if told["integrity"].null_count() == told.height:
             return None
         ok = (pl.col("integrity") == "ok") & ~pl.col("searching")
+        # The first cause that applies counts.
         reason = (
             pl.when(ok.fill_null(value=False))
             .then(pl.lit(None, dtype=pl.String))
             .when("searching")
-            .then(pl.lit(SEARCHING))
+            .then(pl.lit(Cause.SEARCHING.value))
             .when(pl.col("integrity") == "unavailable")
-            .then(pl.lit(CONTRADICTED))
+            .then(pl.lit(Cause.CONTRADICTED.value))
             .when(pl.col("protection_level_m") > alert_limit_m)
-            .then(pl.lit(TOO_WIDE))
-            .otherwise(pl.lit(SUSPECTED))
+            .then(pl.lit(Cause.TOO_WIDE.value))
+            .otherwise(pl.lit(Cause.SUSPECTED.value))
         )
         why = told.select(reason=reason)["reason"]
         counts = why.drop_nulls().value_counts().sort("count", "reason", descending=[True, False])
@@ -108,7 +97,7 @@ limit of 1 m, 8 % contradictions between radio heads, array and odometer.
             beyond = int((relied["error_m"] > relied["protection_level_m"]).sum())
         return cls(
             reliable=relied.height / told.height,
-            reasons={name: count / told.height for name, count in counts.iter_rows()},
+            reasons={Cause(name): count / told.height for name, count in counts.iter_rows()},
             level_m=float(level_m) if isinstance(level_m, float) else None,
             alert_limit_m=alert_limit_m,
             beyond=beyond,
@@ -134,8 +123,8 @@ limit of 1 m, 8 % contradictions between radio heads, array and odometer.
             )
         if self.reasons:
             whys = [
-                f"{_percent(share)} {name.format(limit_m=self.alert_limit_m)}"
-                for name, share in self.reasons.items()
+                f"{_percent(share)} {cause.words(self.alert_limit_m)}"
+                for cause, share in self.reasons.items()
             ]
             text += f" Otherwise the vehicle must slow down or stop. Causes: {', '.join(whys)}."
         return text
@@ -144,7 +133,7 @@ limit of 1 m, 8 % contradictions between radio heads, array and odometer.
         """Returns the remedy of the most frequent cause; empty above 99 % availability."""
         if not self.reasons or self.reliable > 0.99:
             return ""
-        return f"Remedy: {REMEDIES[next(iter(self.reasons))]}."
+        return f"Remedy: {next(iter(self.reasons)).remedy}."
 
 
 def _percent(share: float) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from access_av.statistics.proportions import share_interval
+from access_av.verdicts import LevelResult
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -67,12 +68,12 @@ class Verdict:
         return self.least_share >= self.level.availability
 
     @property
-    def outcome(self) -> str:
-        """Returns the result as text."""
+    def result(self) -> LevelResult:
+        """Whether the level is reached, also without 95 % confidence."""
         if self.reached:
-            return "reached"
+            return LevelResult.REACHED
         enough = self.share >= self.level.availability
-        return "too few runs" if enough else "not reached"
+        return LevelResult.TOO_FEW_RUNS if enough else LevelResult.NOT_REACHED
 
     def as_record(self) -> dict[str, Any]:
         """Returns the values for JSON."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from access_av.economics.carbon import Range
-from access_av.study.verdicts import Effect, Judgement
+from access_av.verdicts import Effect, Judgement
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

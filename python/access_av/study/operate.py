@@ -17,7 +17,7 @@ from access_av.study.points import (
     recommended,
 )
 from access_av.study.trips import Driven
-from access_av.study.verdicts import Agreement, Judgement
+from access_av.verdicts import Agreement, Judgement
 
 if TYPE_CHECKING:
     from collections.abc import Callable

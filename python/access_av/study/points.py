@@ -12,7 +12,7 @@ from access_av.device.platform import Platform
 from access_av.settings import as_dict, platform_name, ssb_period_s
 from access_av.statistics.pareto import pareto_front
 from access_av.study.trips import EXTENTS, Driven, Energy
-from access_av.study.verdicts import Judgement
+from access_av.verdicts import Judgement
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

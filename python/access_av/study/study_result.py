@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from access_av.study.targets import TargetResult, Targets
     from access_av.study.trips import Driven
     from access_av.study.unverified import Unverified
-    from access_av.study.verdicts import Judgement
+    from access_av.verdicts import Judgement
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import polars as pl
 
 from access_av.run.error_bound import along_route
 from access_av.study.trips import share_within
-from access_av.study.verdicts import Judgement
+from access_av.verdicts import Judgement
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -14,7 +14,7 @@ from access_av.run.simulation import simulate
 from access_av.settings import platform_name, ssb_period_s
 from access_av.statistics.integrity import Integrity
 from access_av.statistics.proportions import share_interval
-from access_av.study.verdicts import NotOk
+from access_av.verdicts import NotOk
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

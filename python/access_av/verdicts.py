@@ -1,4 +1,4 @@
-"""Verdicts of a study, and their wording."""
+"""Verdicts and states of results, and their wording."""
 
 from __future__ import annotations
 
@@ -125,6 +125,43 @@ class NotOk(Enum):
         return _REASONS[self]
 
 
+class Cause(Enum):
+    """Cause of an unavailable position."""
+
+    SEARCHING = "searching"
+    CONTRADICTED = "contradicted"
+    TOO_WIDE = "too_wide"
+    SUSPECTED = "suspected"
+
+    def words(self, alert_limit_m: float) -> str:
+        """Returns the wording for reports, with the alert limit of the vehicle in metres.
+
+        Examples
+        --------
+        >>> Cause.TOO_WIDE.words(1.5)
+        'protection level above the alert limit of 1.5 m'
+        """
+        return _CAUSES[self][0].format(limit_m=alert_limit_m)
+
+    @property
+    def remedy(self) -> str:
+        """Measures against the cause."""
+        return _CAUSES[self][1]
+
+
+class LevelResult(Enum):
+    """Whether runs reach a 3GPP positioning service level; the value is the wording."""
+
+    REACHED = "reached"
+    TOO_FEW_RUNS = "too few runs"
+    NOT_REACHED = "not reached"
+
+    @property
+    def badge(self) -> str:
+        """Kind of the badge of a page: ``yes``, ``fit`` or ``no``."""
+        return _LEVEL_BADGES[self]
+
+
 class Agreement(Enum):
     """Whether two seeds recommend one operating point; `study.json` contains the value."""
 
@@ -148,4 +185,29 @@ _REASONS = {
     NotOk.LEVEL: "level above the alert limit",
     NotOk.SUSPECTED: "suspected fault",
     NotOk.CONTRADICTED: "position lost",
+}
+_LEVEL_BADGES = {
+    LevelResult.REACHED: "yes",
+    LevelResult.TOO_FEW_RUNS: "fit",
+    LevelResult.NOT_REACHED: "no",
+}
+_CAUSES = {
+    Cause.SEARCHING: (
+        "first position not found yet",
+        "a start pose, or more radio heads near the start",
+    ),
+    Cause.CONTRADICTED: (
+        "contradictions between radio heads, array and odometer",
+        "a survey of radio heads and array mounting (access-av record survey)",
+    ),
+    Cause.TOO_WIDE: (
+        "protection level above the alert limit of {limit_m:g} m",
+        "more wake-ups, more radio heads, smaller standard deviations, or a higher "
+        "integrity.alert_limit_m if the plant permits it",
+    ),
+    Cause.SUSPECTED: (
+        "fault of a radio head, the array or the odometer suspected, now or recently",
+        "realistic standard deviations of array, odometer and radio heads, because errors within "
+        "them are no faults",
+    ),
 }
