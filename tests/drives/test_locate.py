@@ -139,7 +139,7 @@ def test_mcap_odometry_and_bad_items_are_taken_in(
     spoilt = tmp_path / "odometry.csv"
     spoilt.write_text("\n".join([*rows[:100], "nan,1,2", rows[50], "a,b", *rows[100:]]))
     given = arguments(drive, tmp_path / "again")
-    given[4] = spoilt
+    given[5] = spoilt
     done = access_av(*given)
     assert done.code == 0, done.err
     assert done.err.count("left out") == 3
@@ -192,11 +192,11 @@ def test_a_drive_that_cannot_be_located_has_a_reason(
     positions = re.findall(r"position_m = \[[^]]*\]", text)
     site.write_text(text.replace(positions[1], positions[0]))
     given = arguments(drive, tmp_path)
-    given[6] = site
+    given[7] = site
     done = access_av(*given)
     assert done.code == 2
     assert "radio_heads[1].position_m" in done.err
-    given[6], given[4] = drive / "site.toml", tmp_path / "none.csv"
+    given[6], given[5] = drive / "site.toml", tmp_path / "none.csv"
     assert access_av(*given).code == 2
 
 
@@ -219,7 +219,7 @@ def test_without_an_initial_pose_the_vehicle_is_found(
     vehicle = tmp_path / "vehicle.toml"
     vehicle.write_text(without_start((drive / "vehicle.toml").read_text()))
     given = arguments(drive, tmp_path / "out")
-    given[10] = vehicle
+    given[11] = vehicle
     done = access_av(*given, "--truth", drive / "truth.tum")
     assert done.code == 0, done.err
     driven_m = float(re.findall(r"Position found after ([0-9.]+) m", done.out)[0])
@@ -258,7 +258,7 @@ def test_one_radio_head_cannot_find_it(access_av: Cli, drive: Path, tmp_path: Pa
     text = without_start((drive / "vehicle.toml").read_text())
     vehicle.write_text(text.replace("[receiver]", "[receiver]\npci_allow_list = [1]"))
     given = arguments(drive, tmp_path / "out")
-    given[10] = vehicle
+    given[11] = vehicle
     done = access_av(*given)
     assert done.code == 2
     assert "start.pose" in done.err
@@ -295,7 +295,7 @@ def test_a_recording_of_two_antennas_is_refused(
     (tmp_path / "two.sigmf-meta").write_text(json.dumps(meta))
     (tmp_path / "two.sigmf-data").symlink_to(drive / "iq.sigmf-data")
     given = arguments(drive, tmp_path / "out")
-    given[2] = tmp_path / "two.sigmf-meta"
+    given[3] = tmp_path / "two.sigmf-meta"
     done = access_av(*given)
     assert done.code == 2
     assert "2 channels; the vehicle's array has 4" in done.err
