@@ -196,7 +196,7 @@ def test_a_drive_that_cannot_be_located_has_a_reason(
     done = access_av(*given)
     assert done.code == 2
     assert "radio_heads[1].position_m" in done.err
-    given[6], given[5] = drive / "site.toml", tmp_path / "none.csv"
+    given[7], given[5] = drive / "site.toml", tmp_path / "none.csv"
     assert access_av(*given).code == 2
 
 
