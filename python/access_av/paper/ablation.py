@@ -7,7 +7,7 @@ of a run is the effect of the controller.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -63,10 +63,6 @@ class Ablation:
     gain_high_m: float
     matters: int
     constant: Drives | None = field(default=None, repr=False, compare=False)
-
-    def as_row(self) -> dict[str, Any]:
-        """Returns a row of the table ``ablations``."""
-        return {key: value for key, value in vars(self).items() if key != "constant"}
 
 
 def ablate(driver: Driver, evaluation: Evaluation) -> list[Ablation]:

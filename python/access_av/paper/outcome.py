@@ -6,15 +6,15 @@ its runs (for intervals), or the interpretations of a search. Claims treat all o
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
 Numbers: TypeAlias = NDArray[np.float64]
 # Interval, in SSBs, of the stored errors over time of resamples. Maxima, and all figures of the
@@ -176,6 +176,13 @@ def interval(values: Numbers) -> tuple[float, float]:
     """
     low, high = np.quantile(values[1:] if len(values) > 1 else values, (0.025, 0.975))
     return float(low), float(high)
+
+
+def rows(records: Sequence[Any]) -> pl.DataFrame:
+    """Returns one row per record; the columns are the fields that its ``repr`` shows."""
+    return pl.DataFrame(
+        [{it.name: getattr(each, it.name) for it in fields(each) if it.repr} for each in records]
+    )
 
 
 def _late_to_early(errors_m: Numbers) -> Numbers:

@@ -13,7 +13,7 @@ a real one. It adds the result of one single angle, and the posterior bound.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
@@ -72,10 +72,6 @@ class Comparison:
     estimates_saved_low: float
     estimates_saved_high: float
     ours: Drives | None = field(default=None, repr=False, compare=False)
-
-    def as_row(self) -> dict[str, Any]:
-        """Returns a row of the table ``proposed_vs_paper``."""
-        return {key: value for key, value in vars(self).items() if key != "ours"}
 
     @property
     def is_better(self) -> bool:
@@ -180,45 +176,32 @@ class Fair:
     ----------
     real_odometer
         Whether odometer and start have errors, as :data:`REAL` has them.
-    knows_road
+    map
         Whether the method has a map of the road.
     who
         ``paper``, ``ours``, ``one angle``, or ``bound``: the lower bound of any localizer with an
         angle at every SSB.
     rms_low_m, rms_high_m
-        95 % interval of ``rms_m`` over the runs.
+        95 % interval of ``rms_error_m`` over the runs.
     drives
         Runs; ``None`` for the bound.
     """
 
     real_odometer: bool
-    knows_road: bool
+    map: bool
     who: str
     aoa_estimates: float
-    rms_m: float
+    rms_error_m: float
     rms_low_m: float
     rms_high_m: float
-    worst_m: float | None
+    worst_error_m: float | None
     drives: Drives | None = field(default=None, repr=False, compare=False)
 
     @property
     def variant(self) -> str:
         """Odometer, road map and method, in the notation of the table of runs."""
         odometer = "real odometer" if self.real_odometer else "exact odometer"
-        return f"{odometer}, {'' if self.knows_road else 'no '}road map, {self.who}"
-
-    def as_row(self) -> dict[str, Any]:
-        """Returns a row of the table ``equal_information``."""
-        return {
-            "real_odometer": self.real_odometer,
-            "map": self.knows_road,
-            "who": self.who,
-            "aoa_estimates": self.aoa_estimates,
-            "rms_error_m": self.rms_m,
-            "rms_low_m": self.rms_low_m,
-            "rms_high_m": self.rms_high_m,
-            "worst_error_m": self.worst_m,
-        }
+        return f"{odometer}, {'' if self.map else 'no '}road map, {self.who}"
 
 
 def fair(driver: Driver, evaluation: Evaluation) -> list[Fair]:
@@ -257,13 +240,13 @@ def _fair(real: bool, knows_road: bool, who: str, drives: Drives) -> Fair:
     low_m, high_m = interval(drives.rms_error_m)
     return Fair(
         real_odometer=real,
-        knows_road=knows_road,
+        map=knows_road,
         who=who,
         aoa_estimates=float(drives.aoa_estimates[0]),
-        rms_m=float(drives.rms_error_m[0]),
+        rms_error_m=float(drives.rms_error_m[0]),
         rms_low_m=low_m,
         rms_high_m=high_m,
-        worst_m=float(drives.worst_m[0]),
+        worst_error_m=float(drives.worst_m[0]),
         drives=drives,
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
@@ -18,6 +18,7 @@ from access_av.paper.driver import Driver
 from access_av.paper.energy_fit import fit_energy
 from access_av.paper.evaluation import Evaluation, cases, demands, evaluate, evaluate_with
 from access_av.paper.interpretations import SHIPPED
+from access_av.paper.outcome import rows
 from access_av.paper.sampled_interpretations import sample
 from access_av.paper.unknowns import Unknowns, sobol
 
@@ -111,10 +112,10 @@ class Study:
             "operating_points": named["points"],
             "errors": named["errors"],
             "snr": self.shown.snr,
-            "ablations": pl.DataFrame([each.as_row() for each in self.ablations]),
+            "ablations": rows(self.ablations),
             "fixed_front": pl.DataFrame(front),
-            "proposed_vs_paper": pl.DataFrame([each.as_row() for each in self.proposed_vs_paper]),
-            "equal_information": pl.DataFrame([each.as_row() for each in self.equal_information]),
+            "proposed_vs_paper": rows(self.proposed_vs_paper),
+            "equal_information": rows(self.equal_information),
             "evaluation_runs": run_tables.joined(self._runs()),
             "resamples": run_tables.joined(
                 table for each in self.evaluations for table in run_tables.resamples_of(each)
@@ -125,7 +126,7 @@ class Study:
                 [each.as_row() for each in self.fit_options]
             )
         if self.effects:
-            tables["assumptions"] = pl.DataFrame([asdict(each) for each in self.effects])
+            tables["assumptions"] = rows(self.effects)
         if self.sensitivity is not None:
             tables |= self.sensitivity.tables()
         return tables

@@ -319,11 +319,11 @@ def ours_text(study: Study) -> str:
 def fair_text(study: Study) -> str:
     """Returns a text that compares both methods with equal information."""
     rms_m = {
-        (each.real_odometer, each.knows_road, each.who): each.rms_m
+        (each.real_odometer, each.map, each.who): each.rms_error_m
         for each in study.equal_information
     }
     count = {
-        (each.real_odometer, each.knows_road, each.who): each.aoa_estimates
+        (each.real_odometer, each.map, each.who): each.aoa_estimates
         for each in study.equal_information
     }
     if not rms_m:

@@ -80,12 +80,12 @@ def fair(study: Study) -> str:
     rows = [
         (
             "0.3 %, 1 cm/√m; start 0.1 m, 0.02 rad" if each.real_odometer else "exact, exact start",
-            "known" if each.knows_road else "not known",
+            "known" if each.map else "not known",
             names[each.who],
             f"{each.aoa_estimates:.0f}",
-            f"{each.rms_m:.4f}" if each.rms_m < 0.01 else f"{each.rms_m:.3f}",
+            f"{each.rms_error_m:.4f}" if each.rms_error_m < 0.01 else f"{each.rms_error_m:.3f}",
             f"{each.rms_low_m:.3f} … {each.rms_high_m:.3f}" if each.who != "bound" else "–",
-            number(each.worst_m),
+            number(each.worst_error_m),
         )
         for each in study.equal_information
     ]
