@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 ScenarioArgument = Annotated[
     str, typer.Argument(help="Scenario: shipped name, or path of a TOML file.")
 ]
-ScenarioOption = Annotated[
-    str, typer.Option(help="Scenario: shipped name, or path of a TOML file.")
-]
 PlatformOption = Annotated[
     str, typer.Option(help="Platform: shipped name, or path of a TOML file.")
 ]

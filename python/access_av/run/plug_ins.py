@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 # Attributes of an estimator with the energy or the time of one estimate.
 COSTS = ("energy_per_execution_j", "time_per_execution_s")
-# Number of arguments of a factory: none, or site, vehicle and start.
-FACTORY_ARGUMENTS = (0, 3)
 FUNCTIONS = (types.FunctionType, types.BuiltinFunctionType)
 CONTAINERS = (list, dict, set, bytearray, deque)
 # Methods that change a container.
