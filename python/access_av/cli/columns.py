@@ -25,7 +25,8 @@ def columns(
     as_markdown: Annotated[bool, typer.Option("--markdown", help="Print docs/columns.md.")] = False,
 ) -> None:
     """Print name, unit and meaning of each column, and the condition of a null value."""
-    from access_av.tables.columns import TABLES, as_json, markdown, table
+    from access_av.tables.columns.look_up import as_json, markdown, table
+    from access_av.tables.columns.tables import TABLES
 
     if as_markdown:
         print(markdown(), end="")

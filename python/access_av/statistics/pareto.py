@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def pareto_front(first: ArrayLike, second: ArrayLike) -> NDArray[np.intp]:
     """Returns the indices that no other index exceeds in both quantities, ordered by the first.
 
-    Of equal pairs, the first one remains.
+    The first of equal pairs remains.
 
     Examples
     --------

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from access_av.tables import toml
+from access_av.data import shipped
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,5 +25,5 @@ class Column:
 
 GLOSSARY: Mapping[str, Column] = {
     name: Column(name, *entry)
-    for name, entry in toml.shipped("tables", "columns", "glossary.toml").items()
+    for name, entry in shipped("tables", "columns", "glossary.toml").items()
 }

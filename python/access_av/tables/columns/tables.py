@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from access_av.tables import toml
+from access_av.data import shipped
 from access_av.tables.columns.glossary import GLOSSARY
 
 if TYPE_CHECKING:
@@ -44,5 +44,5 @@ class Table:
 
 TABLES: Mapping[str, Table] = {
     name: Table.of(name, entry)
-    for name, entry in toml.shipped("tables", "columns", "tables.toml").items()
+    for name, entry in shipped("tables", "columns", "tables.toml").items()
 }
