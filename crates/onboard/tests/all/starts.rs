@@ -242,15 +242,19 @@ const STARTS: [Given; 7] = [
 ];
 
 #[test]
-#[ignore = "prints a table of minutes; seeds by STARTS_SEEDS"]
+#[ignore = "prints a table of minutes; seeds by STARTS_SEEDS, rows by STARTS_ONLY and STARTS_PLACE"]
 fn table_of_starts() {
     let seeds: u64 = std::env::var("STARTS_SEEDS").map_or(2, |it| it.parse().unwrap());
-    let only = std::env::var("STARTS_ONLY").unwrap_or_default();
+    let [only, at] =
+        ["STARTS_ONLY", "STARTS_PLACE"].map(|it| std::env::var(it).unwrap_or_default());
     for (name, place) in [
         ("hall", &HALL),
         ("one-sided", &ONE_SIDED),
         ("corridor", &CORRIDOR),
-    ] {
+    ]
+    .into_iter()
+    .filter(|it| it.0.contains(&at))
+    {
         for (what, given) in STARTS.iter().filter(|it| it.0.contains(&only)) {
             for seed in 0..seeds {
                 let Driven {

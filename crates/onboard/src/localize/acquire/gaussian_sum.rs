@@ -52,6 +52,9 @@ const MOST_HYPOTHESES: f64 = 4000.0;
 /// away.
 const LEAST_WEIGHT: f64 = 0.05;
 
+/// Maximum number of hypotheses that the protection level covers one by one.
+const MOST_SINGLE: usize = 64;
+
 /// Region of the search.
 #[derive(Clone, Debug)]
 enum Ground {
@@ -413,7 +416,7 @@ impl GaussianSum {
     /// being located: its contribution to the variances of position and heading is that of a located vehicle.
     pub(super) fn odds_to_neglect(&self, ekf: &Ekf) -> f64 {
         let (here, there) = (
-            self.mixture(f64::NEG_INFINITY, 0.0),
+            Self::mixture(&self.hypotheses, f64::NEG_INFINITY, 0.0),
             ekf.pose(f64::NEG_INFINITY),
         );
         let [x_m, y_m, turned_rad] = here.pose.offset_of(there.pose);
@@ -424,7 +427,7 @@ impl GaussianSum {
 
     /// Returns one filter for all remaining hypotheses once they determine the position.
     pub fn found(&self) -> Option<Ekf> {
-        let all = self.mixture(f64::NEG_INFINITY, 0.0);
+        let all = Self::mixture(&self.hypotheses, f64::NEG_INFINITY, 0.0);
         let is_placed = all.principal_variances()[0] < FOUND_STD_M * FOUND_STD_M;
         let heading_known = match self.ground {
             Ground::Roads(_) => true,
@@ -459,19 +462,32 @@ impl GaussianSum {
     /// covers every hypothesis that may become the best one. The distribution is far from Gaussian
     /// while several hypotheses remain.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
-        self.mixture(time_s, LEAST_WEIGHT)
+        Self::mixture(&self.hypotheses, time_s, LEAST_WEIGHT)
     }
 
-    /// Returns mean and covariance over all hypotheses. In the covariance, the weight of a
+    /// Returns the most probable hypotheses, each with its weight, and one Gaussian with mean and
+    /// covariance of all others. The weights sum to one.
+    pub(super) fn components(&self, time_s: f64) -> impl Iterator<Item = (f64, PoseEstimate)> {
+        let best = self.best();
+        let weight = move |it: &Hypothesis| (it.log_likelihood - best).exp();
+        let total: f64 = self.hypotheses.iter().map(weight).sum();
+        let (single, rest) = (self.hypotheses).split_at(self.hypotheses.len().min(MOST_SINGLE));
+        let rest_weight = rest.iter().map(weight).sum::<f64>() / total;
+        let rest = (!rest.is_empty()).then(|| (rest_weight, Self::mixture(rest, time_s, 0.0)));
+        let single = single.iter();
+        let single = single.map(move |it| (weight(it) / total, it.ekf.pose(time_s)));
+        single.chain(rest)
+    }
+
+    /// Returns mean and covariance over hypotheses. In the covariance, the weight of a
     /// hypothesis is at least `least_weight` times the weight of the best.
-    fn mixture(&self, time_s: f64, least_weight: f64) -> PoseEstimate {
-        let best = self
-            .hypotheses
+    fn mixture(hypotheses: &[Hypothesis], time_s: f64, least_weight: f64) -> PoseEstimate {
+        let best = hypotheses
             .iter()
             .map(|hypothesis| hypothesis.log_likelihood)
             .fold(f64::NEG_INFINITY, f64::max);
         let weighed = || {
-            self.hypotheses.iter().map(|hypothesis| {
+            hypotheses.iter().map(|hypothesis| {
                 let weight = (hypothesis.log_likelihood - best).exp();
                 (weight, hypothesis.ekf.pose(time_s))
             })

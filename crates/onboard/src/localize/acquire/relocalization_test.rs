@@ -7,8 +7,10 @@ use super::gaussian_sum::GaussianSum;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::Ekf;
 use crate::localize::modes::{CERTAIN, log_likelihood, log_likelihood_as_stated};
+use crate::localize::output::PoseEstimate;
 use crate::observation::{AngleMeasurement, OdometrySample};
 use crate::radio_head::RadioHead;
+use crate::settings::IntegritySettings;
 
 /// Minimum distance driven before a result of the search is accepted (m): at standstill, the same
 /// errors repeat.
@@ -18,9 +20,9 @@ const LEAST_WAY_M: f64 = 0.5;
 /// the angle over this distance.
 const INDEPENDENT_M: f64 = 10.0;
 
-/// Probability that a given start is wrong, and is anywhere in the area of the radio heads: equal
-/// to that of a radio head fault.
-const WRONG_START: f64 = 0.01;
+/// Maximum duration of a search with angles and without a result (s). A wrong start is one error for
+/// about this time.
+pub(super) const PATIENCE_S: f64 = 20.0;
 
 /// Maximum interval between angles that counts as time with angles (s).
 const SILENCE_S: f64 = 1.0;
@@ -40,6 +42,11 @@ clone_in_place! {
         pub refutes: bool,
         /// Whether the selected hypothesis explains contradicting angles without a lost vehicle.
         may_mislead: bool,
+        /// Prior probability that the given start is wrong, and the vehicle is anywhere in the area
+        /// of the radio heads: that of a radio head fault.
+        wrong_start: f64,
+        /// Number of independent epochs for which the error of a wrong start lasts.
+        epochs: f64,
         /// Log odds of another start below which a given start is confirmed: those of the integrity risk.
         confirmed_at: f64,
         /// Log-likelihood of the angles for the filter.
@@ -68,6 +75,8 @@ impl RelocalizationTest {
             reported_s: ekf.time_s(),
             refutes: false,
             may_mislead,
+            wrong_start: 0.0,
+            epochs: 1.0,
             confirmed_at: f64::NEG_INFINITY,
             of_filter: 0.0,
             since_m: ekf.driven_m(),
@@ -80,10 +89,15 @@ impl RelocalizationTest {
         }
     }
 
-    /// Creates the test of a given start against a search everywhere else, with the integrity risk of an epoch.
-    pub fn of_start(search: GaussianSum, given: &Ekf, risk: f64) -> Self {
+    /// Creates the test of a given start against a search everywhere else.
+    pub fn of_start(search: GaussianSum, given: &Ekf, settings: &IntegritySettings) -> Self {
+        let risk = settings.risk_per_epoch();
         Self {
             given: Some(Box::new(given.as_stated())),
+            wrong_start: settings
+                .fault_probability
+                .of_radio_head(given.is_with_bias()),
+            epochs: (PATIENCE_S / settings.error_correlation_s).max(1.0),
             confirmed_at: (risk / (1.0 - risk)).ln(),
             ..Self::new(search, given, false)
         }
@@ -94,9 +108,13 @@ impl RelocalizationTest {
         (self.given.as_ref()).is_some_and(|given| self.search.is_at(given))
     }
 
-    /// Whether the probability of another start exceeds the integrity risk.
-    pub fn is_start_open(&self) -> bool {
-        self.is_of_start() && self.log_odds() > self.confirmed_at
+    /// Returns the positions of the search, each with its probability per independent epoch: a wrong
+    /// start is one error for several epochs, and counts once against the integrity risk.
+    pub fn other_starts(&self, time_s: f64) -> impl Iterator<Item = (f64, PoseEstimate)> {
+        let odds = self.log_odds().exp();
+        let probability = odds / (1.0 + odds) / self.epochs;
+        let components = self.search.components(time_s);
+        components.map(move |(weight, pose)| (probability * weight, pose))
     }
 
     /// Whether the search of a given start has found the reported position.
@@ -176,7 +194,7 @@ impl RelocalizationTest {
 
     /// Returns the log odds of another start to the given start.
     fn log_odds(&self) -> f64 {
-        (WRONG_START / (1.0 - WRONG_START)).ln() + self.against_start()
+        (self.wrong_start / (1.0 - self.wrong_start)).ln() + self.against_start()
     }
 
     /// Returns the log-likelihood ratio of all other positions to the given start. A ratio in

@@ -21,7 +21,7 @@ use super::consistency::ConsistencyMonitor;
 use super::gaussian_sum::{GaussianSum, LEAST_HEADS};
 use super::heading_search::HeadingSearch;
 use super::phase::{Evidence, Phase, Transition};
-use super::relocalization_test::RelocalizationTest;
+use super::relocalization_test::{PATIENCE_S, RelocalizationTest};
 use crate::BoxError;
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::RadialQuantile;
@@ -47,9 +47,6 @@ const MOST_NEARBY_M: f64 = 10.0;
 
 /// Minimum time between a search without a better position and the next search (s).
 const REST_S: f64 = 10.0;
-
-/// Maximum duration of a search with angles and without a result (s).
-const PATIENCE_S: f64 = 20.0;
 
 /// Distance after which a confirmation with few angles ends (m).
 const LONG_WAY_M: f64 = 100.0;
@@ -161,9 +158,19 @@ impl Solution {
     }
 
     fn pose(&self, time_s: f64) -> PoseEstimate {
+        self.pose_among(time_s, std::iter::empty())
+    }
+
+    /// Returns the pose, with a protection level that includes other positions, each with its
+    /// probability.
+    fn pose_among(
+        &self,
+        time_s: f64,
+        others: impl Iterator<Item = (f64, PoseEstimate)>,
+    ) -> PoseEstimate {
         match self {
             Self::Bare(ekf) => ekf.pose(time_s),
-            Self::Monitored(monitor) => monitor.pose(time_s),
+            Self::Monitored(monitor) => monitor.pose(time_s, others),
         }
     }
 
@@ -313,8 +320,8 @@ impl Relocalizer {
         let given = solution.ekf();
         let mut search = GaussianSum::as_stated(given.config(), heads);
         search.resume(given);
-        let risk = (self.setup.integrity.unwrap_or_default()).risk_per_epoch();
-        self.test = Some(RelocalizationTest::of_start(search, given, risk));
+        let settings = self.setup.integrity.unwrap_or_default();
+        self.test = Some(RelocalizationTest::of_start(search, given, &settings));
         self.phase = Phase::Confirming;
     }
 
@@ -373,21 +380,6 @@ impl Relocalizer {
         };
         search.resume(ekf);
         Some(search)
-    }
-
-    /// Raises the protection level to another start whose probability exceeds the integrity risk.
-    fn cover_other_start(&self, estimate: &mut PoseEstimate, test: &RelocalizationTest) {
-        let mut both = *estimate;
-        both.cover(&test.search.pose(estimate.time_s));
-        let (Some(integrity), Some(settings)) = (&mut estimate.integrity, self.setup.integrity)
-        else {
-            return;
-        };
-        integrity.raise(self.setup.quantile.radius(both.principal_variances()));
-        let is_ok = integrity.state == IntegrityState::Ok;
-        if is_ok && integrity.protection_level_m > settings.alert_limit_m {
-            integrity.state = IntegrityState::Degraded;
-        }
     }
 
     fn evidence(&self, solution: &Solution, now_s: f64) -> Evidence {
@@ -535,7 +527,11 @@ impl Localizer for Relocalizer {
             estimate.integrity = (self.setup.integrity).map(|_| Integrity::unavailable(level_m));
             return Ok(estimate);
         };
-        let mut estimate = solution.pose(time_s);
+        let of_start = self.test.as_ref().filter(|it| it.is_of_start());
+        let mut estimate = match of_start {
+            Some(test) if !self.is_lost() => solution.pose_among(time_s, test.other_starts(time_s)),
+            _ => solution.pose(time_s),
+        };
         if let (true, Some(test)) = (self.is_lost(), &self.test) {
             let searched = test.search.pose(time_s);
             // In a search along the whole road or in the whole area, the best position may be far
@@ -552,8 +548,6 @@ impl Localizer for Relocalizer {
                 integrity.state = IntegrityState::Unavailable;
                 integrity.raise(level_m);
             }
-        } else if let Some(test) = self.test.as_ref().filter(|it| it.is_start_open()) {
-            self.cover_other_start(&mut estimate, test);
         }
         if self.heading.as_ref().is_some_and(HeadingSearch::doubts)
             && let Some(integrity) = &mut estimate.integrity

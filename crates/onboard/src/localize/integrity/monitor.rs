@@ -260,12 +260,17 @@ impl IntegrityMonitor {
         });
     }
 
-    /// Returns the pose at `time_s`.
-    pub fn pose(&self, time_s: f64) -> PoseEstimate {
+    /// Returns the pose at `time_s`. `others` are positions of a search, each with the probability
+    /// that it is correct instead of the bank.
+    pub fn pose(
+        &self,
+        time_s: f64,
+        others: impl Iterator<Item = (f64, PoseEstimate)>,
+    ) -> PoseEstimate {
         let mut pose = self.bank.leader().pose(time_s);
         let mixture = self.bank.mixture();
         pose.mix(mixture.map(|(probability, right)| (probability, right.pose(time_s))));
-        pose.integrity = Some(self.integrity(time_s));
+        pose.integrity = Some(self.integrity(time_s, others));
         let handover = self.handover.as_ref();
         if let Some(handover) = handover.and_then(|it| it.beside(&pose, RECOVERY_S)) {
             pose.cover(&handover);
@@ -278,10 +283,19 @@ impl IntegrityMonitor {
     }
 
     /// Returns protection level and state at `time_s`.
-    pub fn integrity(&self, time_s: f64) -> Integrity {
+    fn integrity(
+        &self,
+        time_s: f64,
+        others: impl Iterator<Item = (f64, PoseEstimate)>,
+    ) -> Integrity {
         let mut hypotheses = self.hypotheses.borrow_mut();
         hypotheses.clear();
         hypotheses.extend(self.hypotheses_of(&self.bank, time_s).map(|(_, it)| it));
+        let told = self.ekf().pose(time_s);
+        let other = |(probability, pose): (f64, PoseEstimate)| {
+            Hypothesis::new(probability, &pose, 1.0, &told)
+        };
+        hypotheses.extend(others.filter_map(other));
         let levels = self.level.solve(&hypotheses);
         let state = if self.bank.is_outvoted() {
             IntegrityState::Unavailable
@@ -350,7 +364,7 @@ mod tests {
         let (heads, road, ekf) = trip_with_bias(0.9);
         let mut guard = IntegrityMonitor::new(&ekf, &heads, IntegritySettings::default(), None);
         let mut farthest_m: f64 = 0.0;
-        let mut last = guard.pose(0.0);
+        let mut last = guard.pose(0.0, std::iter::empty());
         for step in 1..150 {
             let time_s = f64::from(step) * 0.1;
             guard.odometry(&OdometrySample {
@@ -364,9 +378,9 @@ mod tests {
                 let bearing_rad = truth.point().bearing_rad(head.position) - truth.heading_rad;
                 let is_off = number == 0 && time_s > HIDDEN_S;
                 let off_rad = if is_off { OFF_RAD } else { 0.0 };
-                let before = guard.pose(time_s);
+                let before = guard.pose(time_s, std::iter::empty());
                 guard.update(head, &angle(time_s, PI * bearing_rad.cos() + off_rad));
-                last = guard.pose(time_s);
+                last = guard.pose(time_s, std::iter::empty());
                 let moved_m = last.pose.point().distance_m(before.pose.point());
                 let [before_m2, now_m2] = [&before, &last].map(|it| it.principal_variances()[0]);
                 let std_m = before_m2.max(now_m2).sqrt();

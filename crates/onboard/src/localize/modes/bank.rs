@@ -199,10 +199,10 @@ impl Bank {
         let is_certain = (leading.mode.becomes_nominal_at).is_some_and(|it| leading.odds() > it);
         let is_quiet =
             self.faulty() == 0 && self.in_doubt(CLEARED) == 0 && self.quiet_s(now_s) > RECOVERY_S;
-        (is_certain && is_quiet).then(|| self.about(leading, now_s))
+        (is_certain && is_quiet).then(|| self.about(leading))
     }
 
-    fn about(&self, nominal: &ModeFilter, now_s: f64) -> Self {
+    fn about(&self, nominal: &ModeFilter) -> Self {
         let others = self.modes.iter().filter(|it| it.mode.id != nominal.mode.id);
         let mut modes: Vec<ModeFilter> = others.cloned().collect();
         for it in &mut modes {
@@ -216,14 +216,14 @@ impl Bank {
         }
         Self {
             noise: self.noise.resumed(),
-            ..Self::with(&nominal.ekf, &self.heads, &self.settings, modes, now_s)
+            ..Self::with(&nominal.ekf, &self.heads, &self.settings, modes, self.lost_s)
         }
     }
 
     /// Returns the bank with the selected mode as the nominal one.
     #[cfg(test)]
     pub(super) fn about_leading(&self) -> Option<Self> {
-        self.leading().map(|it| self.about(it, 0.0))
+        self.leading().map(|it| self.about(it))
     }
 
     /// Returns the selected mode: its odds to the nominal mode exceed a minimum and those of every
