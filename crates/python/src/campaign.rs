@@ -465,6 +465,9 @@ fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
     table.set_item("searching", column(py, rows(), |step| step.searching))?;
     let states = rows().map(|step| step.integrity.map(|integrity| integrity.state.name()));
     table.set_item("integrity", PyList::new(py, states.collect::<Vec<_>>())?)?;
+    let hypotheses = rows().map(|step| step.integrity.map(|it| it.hypothesis.name()));
+    let hypotheses = PyList::new(py, hypotheses.collect::<Vec<_>>())?;
+    table.set_item("selected_hypothesis", hypotheses)?;
     Ok(table.unbind())
 }
 

@@ -466,7 +466,8 @@ impl LocatedDrive {
     /// Poses, one per odometry sample. Columns: `time_s`, `x_m`, `y_m`, `heading_rad`, `speed_mps`,
     /// `covariance_xx_m2`, `covariance_xy_m2`, `covariance_yy_m2`, `covariance_heading_rad2`,
     /// `protection_level_m`, `protection_level_along_m` and `protection_level_across_m` (NaN if
-    /// unknown), `integrity` (`ok`, `degraded`, `unavailable` or None) and `searching` (whether the
+    /// unknown), `integrity` (`ok`, `degraded`, `unavailable` or None), `selected_hypothesis` (its
+    /// name, or None if the vehicle is not monitored) and `searching` (whether the
     /// first pose is still unknown, so that the pose is the mean of the possible positions).
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -602,6 +603,9 @@ fn pose_columns<'py>(
     columns.set_item("protection_level_across_m", column(across))?;
     let state = |it: &replay::LocatedPose| Some(it.estimate.integrity?.state.name());
     columns.set_item("integrity", poses.iter().map(state).collect::<Vec<_>>())?;
+    let hypothesis = |it: &replay::LocatedPose| Some(it.estimate.integrity?.hypothesis.name());
+    let hypotheses = poses.iter().map(hypothesis).collect::<Vec<_>>();
+    columns.set_item("selected_hypothesis", hypotheses)?;
     let searching = poses.iter().map(|it| it.searching.is_some());
     columns.set_item("searching", PyArray1::from_iter(py, searching))?;
     let lost = poses.iter().map(|it| it.is_lost);

@@ -8,7 +8,7 @@ use onboard::live::{
     AngleObservation, Continuity, HeadStatus as CoreHead, Live as Core, LiveError,
     Outcome as CoreOutcome, Status as CoreStatus, StreamConfig,
 };
-use onboard::localize::OdometryVerdict;
+use onboard::localize::{OdometryVerdict, SelectedHypothesis};
 use onboard::observation::{MeasurementKind, OdometrySample};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -51,6 +51,10 @@ pub struct LiveStatus {
     what_to_do: &'static str,
     /// Horizontal protection level in metres; `None` without one.
     protection_level_m: Option<f64>,
+    /// Hypothesis that explains the measurements best, and whose position is reported: `nominal`,
+    /// `radio_heads_excluded`, `wheel_slip`, `uncalibrated_array`, `noisy_odometer`,
+    /// `displaced_site` or `noisy_angles`; `None` without a monitored pose.
+    selected_hypothesis: Option<&'static str>,
     /// Number of radio heads identified as faulty.
     faulty: usize,
     /// Time of the last accepted angle in seconds.
@@ -80,6 +84,7 @@ impl From<CoreStatus> for LiveStatus {
             reason: status.reason.to_string(),
             what_to_do: status.reason.what_to_do(),
             protection_level_m: status.protection_level_m,
+            selected_hypothesis: status.selected_hypothesis.map(SelectedHypothesis::name),
             faulty: status.faulty,
             last_angle_s: status.last_angle_s,
             odometry_age_s: status.odometry_age_s,

@@ -94,6 +94,7 @@ class LiveStatus:
     reason: Final[str]
     what_to_do: Final[str]
     protection_level_m: Final[float | None]
+    selected_hypothesis: Final[str | None]
     faulty: Final[int]
     last_angle_s: Final[float | None]
     odometry_age_s: Final[float | None]

@@ -343,7 +343,9 @@ def locate(
 
 
 def _poses(columns: Mapping[str, Any]) -> pl.DataFrame:
-    table = pl.DataFrame(columns, schema_overrides={"integrity": pl.String})
+    table = pl.DataFrame(
+        columns, schema_overrides={"integrity": pl.String, "selected_hypothesis": pl.String}
+    )
     return table.with_columns(pl.col(pl.Float64).fill_nan(None))
 
 

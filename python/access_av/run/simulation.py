@@ -346,5 +346,9 @@ def _warn_of_localizer(scenario: Scenario) -> None:
 
 def _table(columns: Mapping[str, Any]) -> pl.DataFrame:
     """Returns a table with null for unknown values."""
-    words = {name: pl.String for name in ("integrity", "reason") if name in columns}
+    words = {
+        name: pl.String
+        for name in ("integrity", "selected_hypothesis", "reason")
+        if name in columns
+    }
     return pl.DataFrame(columns, schema_overrides=words).fill_nan(None)

@@ -406,6 +406,10 @@ fn diagnosis(status: &Status, heads: &[HeadStatus]) -> DiagnosticStatus {
     if let Some(level_m) = status.protection_level_m {
         values.push(("protection_level_m".to_owned(), format!("{level_m:.3}")));
     }
+    if let Some(hypothesis) = status.selected_hypothesis {
+        let name = hypothesis.name().to_owned();
+        values.push(("selected_hypothesis".to_owned(), name));
+    }
     for active in status.faults.iter() {
         values.push((
             format!("fault {}", active.fault.name()),

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use onboard::live::{HeadStatus, LiveEnergy, Outcome, State, Status};
+use onboard::localize::SelectedHypothesis;
 use onboard::monitor::ActiveFault;
 use schemars::{JsonSchema, SchemaGenerator};
 use serde::Serialize;
@@ -16,6 +17,12 @@ use crate::inbox::Level;
 /// Names of all states.
 fn state_names() -> Vec<&'static str> {
     State::ALL.iter().map(|it| it.name()).collect()
+}
+
+/// Names of all selected hypotheses, and null.
+fn hypothesis_names() -> Vec<Option<&'static str>> {
+    let names = SelectedHypothesis::ALL.iter().map(|it| Some(it.name()));
+    names.chain([None]).collect()
 }
 
 /// Pose, state and reason at one time.
@@ -44,6 +51,10 @@ pub struct PoseFields {
     /// Horizontal protection level in metres; null while the vehicle is not monitored or has no pose.
     #[schemars(range(min = 0.0))]
     pub protection_level_m: Option<f64>,
+    /// Hypothesis that explains the measurements best, and whose position is reported; null while the vehicle is not
+    /// monitored or has no pose. The state does not depend on it.
+    #[schemars(extend("enum" = hypothesis_names()))]
+    pub selected_hypothesis: Option<&'static str>,
     /// Time of the last accepted angle in seconds; null before the first.
     pub last_angle_s: Option<f64>,
     /// Number of SSBs that the receiver tracks.
@@ -103,6 +114,7 @@ impl From<&Status> for PoseFields {
             state: status.state.name(),
             reason: status.reason.to_string(),
             protection_level_m: status.protection_level_m.filter(|it| it.is_finite()),
+            selected_hypothesis: status.selected_hypothesis.map(SelectedHypothesis::name),
             last_angle_s: status.last_angle_s,
             tracked: status.tracked,
             tones: (status.tones.iter().flatten())
@@ -472,7 +484,10 @@ fn short(number: &Value) -> String {
 
 /// Returns the values of an enumeration or constant.
 fn enumeration(schema: &Value) -> Option<String> {
-    let quoted = |it: &Value| it.as_str().map(|it| format!("`{it}`"));
+    let quoted = |it: &Value| {
+        let null = it.is_null().then(|| "null".to_owned());
+        it.as_str().map(|it| format!("`{it}`")).or(null)
+    };
     if let Some(value) = schema.get("const") {
         return quoted(value);
     }

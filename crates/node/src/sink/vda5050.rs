@@ -192,6 +192,7 @@ mod tests {
             state,
             reason: Reason::Nominal,
             protection_level_m,
+            selected_hypothesis: None,
             faulty: 0,
             last_angle_s: None,
             odometry_age_s: None,

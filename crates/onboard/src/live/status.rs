@@ -5,6 +5,7 @@ use std::fmt;
 use nr_ssb::Tone;
 
 use crate::geometry::Pose;
+use crate::localize::SelectedHypothesis;
 use crate::monitor::{ActiveFaults, Fault};
 
 /// State of the pose.
@@ -228,6 +229,8 @@ pub struct Status {
     pub reason: Reason,
     /// Horizontal protection level in metres, if the vehicle is monitored and has a pose.
     pub protection_level_m: Option<f64>,
+    /// Selected hypothesis, if the vehicle is monitored and has a pose.
+    pub selected_hypothesis: Option<SelectedHypothesis>,
     /// Number of radio heads identified as faulty; [`Live::heads`](super::Live::heads) lists them.
     pub faulty: usize,
     /// Time of the last accepted angle, in seconds.

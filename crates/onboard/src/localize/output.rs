@@ -89,6 +89,52 @@ impl IntegrityState {
     }
 }
 
+/// Hypothesis that explains the measurements best, and whose position is reported. The state does
+/// not depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SelectedHypothesis {
+    /// Every error is within its specified standard deviation.
+    Nominal,
+    /// Radio heads are identified as faulty and excluded; every other error is nominal.
+    RadioHeadsExcluded,
+    /// Wheel slip.
+    WheelSlip,
+    /// Wrong mounting angle or phases of the array.
+    UncalibratedArray,
+    /// Odometer noise above the specified one.
+    NoisyOdometer,
+    /// Displacement of the whole site plan.
+    DisplacedSite,
+    /// Angle noise above the specified one.
+    NoisyAngles,
+}
+
+impl SelectedHypothesis {
+    /// All hypotheses.
+    pub const ALL: [Self; 7] = [
+        Self::Nominal,
+        Self::RadioHeadsExcluded,
+        Self::WheelSlip,
+        Self::UncalibratedArray,
+        Self::NoisyOdometer,
+        Self::DisplacedSite,
+        Self::NoisyAngles,
+    ];
+
+    /// Returns the name for files and messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Nominal => "nominal",
+            Self::RadioHeadsExcluded => "radio_heads_excluded",
+            Self::WheelSlip => "wheel_slip",
+            Self::UncalibratedArray => "uncalibrated_array",
+            Self::NoisyOdometer => "noisy_odometer",
+            Self::DisplacedSite => "displaced_site",
+            Self::NoisyAngles => "noisy_angles",
+        }
+    }
+}
+
 /// Protection level and state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Integrity {
@@ -100,6 +146,8 @@ pub struct Integrity {
     pub protection_level_across_m: f64,
     /// State that follows from the protection level and the faults.
     pub state: IntegrityState,
+    /// Selected hypothesis.
+    pub hypothesis: SelectedHypothesis,
     /// Number of radio heads identified as faulty.
     pub faulty: usize,
 }
@@ -112,6 +160,7 @@ impl Integrity {
             protection_level_along_m: level_m,
             protection_level_across_m: level_m,
             state: IntegrityState::Unavailable,
+            hypothesis: SelectedHypothesis::Nominal,
             faulty: 0,
         }
     }

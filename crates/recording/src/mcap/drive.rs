@@ -180,6 +180,8 @@ fn diagnosis(pose: &LocatedPose, lately: &[&AngleResult]) -> DiagnosticStatus {
     if let Some(integrity) = &pose.estimate.integrity {
         let level_m = format!("{:.3}", integrity.protection_level_m);
         values.push(("protection_level_m".to_owned(), level_m));
+        let hypothesis = integrity.hypothesis.name().to_owned();
+        values.push(("selected_hypothesis".to_owned(), hypothesis));
         values.push(("integrity".to_owned(), integrity.state.name().to_owned()));
     }
     DiagnosticStatus {

@@ -41,6 +41,7 @@ impl Live {
             state: State::Waiting,
             reason: Reason::NoOdometry,
             protection_level_m: None,
+            selected_hypothesis: None,
             faulty: 0,
             last_angle_s: self.last_angle_s,
             odometry_age_s: age_s,
@@ -68,6 +69,7 @@ impl Live {
         status.covariance = estimate.covariance;
         let integrity = estimate.integrity;
         status.protection_level_m = integrity.map(|it| it.protection_level_m);
+        status.selected_hypothesis = integrity.map(|it| it.hypothesis);
         status.faulty = integrity.map_or(0, |it| it.faulty);
         (status.state, status.reason) = if age_s > SILENT_S {
             (State::Unavailable, Reason::OdometrySilent { age_s })

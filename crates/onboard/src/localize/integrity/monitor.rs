@@ -15,9 +15,9 @@ use crate::clone_in_place::clone_in_place;
 use crate::gaussian::CERTAIN_SIGMAS;
 use crate::geometry::Pose;
 use crate::localize::ekf::Ekf;
-use crate::localize::modes::{Bank, ModeId, RECOVERY_S};
+use crate::localize::modes::{Bank, RECOVERY_S};
 use crate::localize::output::{Integrity, IntegrityState, PoseEstimate};
-use crate::localize::output::{OdometryVerdict, UpdateVerdict};
+use crate::localize::output::{OdometryVerdict, SelectedHypothesis, UpdateVerdict};
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -206,9 +206,9 @@ impl IntegrityMonitor {
         verdict
     }
 
-    /// Returns the identity of the solution: mode, number of excluded radio heads, restart.
-    fn solution_id(&self) -> (Option<ModeId>, usize, f64) {
-        (self.bank.leading_id(), self.bank.faulty(), self.begun_s)
+    /// Returns the identity of the solution: hypothesis, number of excluded radio heads, restart.
+    fn solution_id(&self) -> (SelectedHypothesis, usize, f64) {
+        (self.bank.selected(), self.bank.faulty(), self.begun_s)
     }
 
     /// Remembers a contradiction of the odometer scale until a filter has estimated the scale,
@@ -313,6 +313,7 @@ impl IntegrityMonitor {
             protection_level_along_m: levels.along_m,
             protection_level_across_m: levels.across_m,
             state,
+            hypothesis: self.bank.selected(),
             faulty: self.bank.faulty(),
         }
     }
@@ -392,5 +393,35 @@ mod tests {
         // The handover ends eventually.
         let std_m = last.principal_variances()[0].sqrt();
         assert!(std_m < 0.5 * farthest_m, "{std_m} m");
+    }
+
+    #[test]
+    fn an_uncalibrated_array_that_becomes_nominal_leaves_the_state_ok() {
+        const TURNED_RAD: f64 = 0.02;
+        let (heads, road, ekf) = trip_with_bias(0.0);
+        let settings = IntegritySettings::default();
+        let mut monitor = IntegrityMonitor::new(&ekf, &heads, settings, None);
+        for step in 1..600 {
+            let time_s = f64::from(step) * 0.1;
+            monitor.odometry(&OdometrySample {
+                time_s,
+                distance_m: 4.0 * time_s,
+                speed_mps: 4.0,
+                yaw_rate_radps: None,
+            });
+            let truth = road.pose(4.0 * time_s);
+            for head in &heads {
+                let bearing_rad = truth.point().bearing_rad(head.position) - truth.heading_rad;
+                monitor.update(head, &angle(time_s, PI * (bearing_rad - TURNED_RAD).cos()));
+            }
+            let integrity = monitor.integrity(time_s, std::iter::empty());
+            let is_ok = integrity.state == IntegrityState::Ok;
+            let is_wide = integrity.protection_level_m > settings.alert_limit_m;
+            assert!(is_ok || is_wide, "{time_s} s: {integrity:?}");
+        }
+        // The mode has become the nominal one, so that the bank has no other filter for it.
+        let selected = monitor.bank().selected();
+        assert_eq!(selected, SelectedHypothesis::UncalibratedArray);
+        assert!(monitor.bank().rebased(60.0).is_none());
     }
 }

@@ -15,10 +15,10 @@
 use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP};
 use super::noise_scale::NoiseScale;
 use super::subsets::{CLEARED, DETECTED, HeadTest, RECOVERY_S, Subsets, exclude};
-use super::table::{Carry, Mode, ModeId, TABLE};
+use super::table::{Carry, Mode, TABLE};
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::{Ekf, PredictedMeasurement};
-use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
+use crate::localize::output::{OdometryVerdict, SelectedHypothesis, UpdateReason, UpdateVerdict};
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -135,6 +135,8 @@ clone_in_place! {
         lost_s: f64,
         /// Filter of all fault-free radio heads with the nominal model.
         pub(super) nominal: Ekf,
+        /// Hypothesis of the nominal filter: nominal, or the mode that has become nominal.
+        base: SelectedHypothesis,
         pub(super) modes: Vec<ModeFilter>,
         noise: NoiseScale,
         /// Prior probability of a fault of each radio head.
@@ -171,6 +173,7 @@ impl Bank {
             modes,
             head_prior: faults.of_radio_head(is_separable),
             nominal,
+            base: SelectedHypothesis::Nominal,
             noise: NoiseScale::new(count),
         }
     }
@@ -215,8 +218,15 @@ impl Bank {
             );
         }
         Self {
+            base: nominal.mode.id,
             noise: self.noise.resumed(),
-            ..Self::with(&nominal.ekf, &self.heads, &self.settings, modes, self.lost_s)
+            ..Self::with(
+                &nominal.ekf,
+                &self.heads,
+                &self.settings,
+                modes,
+                self.lost_s,
+            )
         }
     }
 
@@ -228,7 +238,7 @@ impl Bank {
 
     /// Returns the selected mode: its odds to the nominal mode exceed a minimum and those of every
     /// other mode.
-    fn leading(&self) -> Option<&ModeFilter> {
+    pub(super) fn leading(&self) -> Option<&ModeFilter> {
         let most = (self.modes.iter()).max_by(|one, other| one.odds().total_cmp(&other.odds()));
         most.filter(|it| it.odds() > LEAST_ODDS)
     }
@@ -238,14 +248,20 @@ impl Bank {
         self.leading().map_or(&self.nominal, |it| &it.ekf)
     }
 
-    /// Returns the selected mode if it is not the nominal one.
-    pub fn leading_id(&self) -> Option<ModeId> {
-        self.leading().map(|it| it.mode.id)
+    /// Returns the selected hypothesis: the selected mode, or that of the nominal filter.
+    pub fn selected(&self) -> SelectedHypothesis {
+        match (self.leading(), self.base) {
+            (Some(leading), _) => leading.mode.id,
+            (None, SelectedHypothesis::Nominal) if self.faulty() > 0 => {
+                SelectedHypothesis::RadioHeadsExcluded
+            }
+            (None, base) => base,
+        }
     }
 
     /// Returns odds and filter of a mode.
     #[cfg(test)]
-    pub(super) fn mode(&self, id: ModeId) -> Option<(f64, &Ekf)> {
+    pub(super) fn mode(&self, id: SelectedHypothesis) -> Option<(f64, &Ekf)> {
         let found = self.modes.iter().find(|it| it.mode.id == id);
         found.map(|it| (it.odds(), &it.ekf))
     }

@@ -16,6 +16,5 @@ pub(in crate::localize) use likelihood::{
 pub use odometry_test::OdometryTest;
 pub use subsets::HeadTest;
 pub(in crate::localize) use subsets::RECOVERY_S;
-pub(in crate::localize) use table::ModeId;
 #[cfg(test)]
 pub(in crate::localize) use table::trip;

@@ -3,22 +3,8 @@
 //! additional mode needs a row and its test.
 
 use crate::localize::ekf::{Ekf, EkfConfig, MOST_SLIP};
+use crate::localize::output::SelectedHypothesis;
 use crate::settings::{DriveKind, FaultProbability};
-
-/// Identifier of a mode.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::localize) enum ModeId {
-    /// Wheel slip.
-    Slip,
-    /// Wrong mounting angle or phases of the array.
-    UncalibratedArray,
-    /// Odometer noise above the specified one.
-    NoisyOdometer,
-    /// Displacement of the whole site plan.
-    DisplacedSite,
-    /// Angle noise above the specified one.
-    NoisyAngles,
-}
 
 /// Part of a hypothesis that is retained when another filter becomes the nominal one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,7 +22,7 @@ pub(in crate::localize) enum Carry {
 /// Row of the table.
 #[derive(Debug)]
 pub(in crate::localize) struct Mode {
-    pub id: ModeId,
+    pub id: SelectedHypothesis,
     /// Whether the mode is monitored, given this nominal filter.
     pub applies: fn(&Ekf, &FaultProbability) -> bool,
     /// Prior probability.
@@ -64,7 +50,7 @@ pub(in crate::localize) struct Mode {
 
 /// Default row.
 const ROW: Mode = Mode {
-    id: ModeId::Slip,
+    id: SelectedHypothesis::WheelSlip,
     applies: |_, _| true,
     prior: |_, _| 0.0,
     alter: |_| (),
@@ -78,7 +64,7 @@ const ROW: Mode = Mode {
 };
 
 const SLIP: Mode = Mode {
-    id: ModeId::Slip,
+    id: SelectedHypothesis::WheelSlip,
     prior: |_, faults| faults.odometer,
     alter: |ekf| ekf.expect_slip(MOST_SLIP),
     is_fault: true,
@@ -94,7 +80,7 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
     // With estimated biases, a bias explains the effect of slip. The likelihood ratio soon
     // dominates this prior, and that of noisier angles.
     Mode {
-        id: ModeId::UncalibratedArray,
+        id: SelectedHypothesis::UncalibratedArray,
         applies: |nominal, _| {
             let config = nominal.config();
             config.unstated_array_std_rad != [0.0; 2]
@@ -106,7 +92,7 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
     },
     // The wheels of a differential drive slip slightly with every metre.
     Mode {
-        id: ModeId::NoisyOdometer,
+        id: SelectedHypothesis::NoisyOdometer,
         applies: |nominal, _| {
             let config = nominal.config();
             config.drive == DriveKind::Road
@@ -119,7 +105,7 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
     },
     // Without a map, the radio heads define the frame.
     Mode {
-        id: ModeId::DisplacedSite,
+        id: SelectedHypothesis::DisplacedSite,
         applies: |nominal, faults| faults.site_frame_offset > 0.0 && nominal.has_map(),
         prior: |_, faults| faults.site_frame_offset,
         alter: |ekf| {
@@ -131,7 +117,7 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
         ..ROW
     },
     Mode {
-        id: ModeId::NoisyAngles,
+        id: SelectedHypothesis::NoisyAngles,
         applies: |nominal, _| !nominal.config().estimates_bias(),
         prior: |_, _| 0.02,
         alter: |ekf| ekf.set_noise_scale(Some(1.0)),
@@ -281,7 +267,7 @@ mod tests {
     #[test]
     fn the_nominal_mode_leads_where_all_is_as_stated() {
         let (bank, off_m) = drive(&World::default(), 60.0, EXACT);
-        assert!(bank.leading_id().is_none() && off_m(bank.leader()) < 0.3);
+        assert!(bank.selected() == SelectedHypothesis::Nominal && off_m(bank.leader()) < 0.3);
         let modes = TABLE.iter().filter_map(|it| bank.mode(it.id));
         assert!(modes.into_iter().all(|(odds, _)| odds < 0.1));
         assert!(!bank.nominal().odometer_departs());
@@ -295,11 +281,14 @@ mod tests {
             ..World::default()
         };
         let (bank, off_m) = drive(&world, 60.0, EXACT);
-        assert_eq!(bank.leading_id(), Some(ModeId::UncalibratedArray));
+        assert_eq!(bank.selected(), SelectedHypothesis::UncalibratedArray);
         assert!(off_m(bank.leader()) < 0.3);
-        // With its filter as the nominal one, there is no fault.
+        // With its filter as the nominal one, there is no fault; the hypothesis is still reported.
         let bank = bank.about_leading().unwrap();
-        assert!(bank.leading_id().is_none() && bank.mode(ModeId::UncalibratedArray).is_none());
+        assert!(
+            bank.leading().is_none() && bank.mode(SelectedHypothesis::UncalibratedArray).is_none()
+        );
+        assert_eq!(bank.selected(), SelectedHypothesis::UncalibratedArray);
     }
 
     #[test]
@@ -310,7 +299,7 @@ mod tests {
             ..World::default()
         };
         let (mut bank, off_m) = drive(&world, 60.0, EXACT);
-        assert_eq!(bank.leading_id(), Some(ModeId::DisplacedSite));
+        assert_eq!(bank.selected(), SelectedHypothesis::DisplacedSite);
         let [[xx, ..], [_, yy, _], _] = bank.leader().pose(59.9).covariance.unwrap();
         assert!(off_m(bank.leader()) < 3.0 * (xx + yy).sqrt());
         let found = *bank.leader().belief();
@@ -322,7 +311,8 @@ mod tests {
         // The mode is no reason to exclude a radio head, and remains after an exclusion.
         bank.exclude(0);
         assert!(
-            bank.leading_id() == Some(ModeId::DisplacedSite) && *bank.leader().belief() == found
+            bank.selected() == SelectedHypothesis::DisplacedSite
+                && *bank.leader().belief() == found
         );
     }
 
@@ -334,7 +324,7 @@ mod tests {
             ..World::default()
         };
         let (bank, off_m) = drive(&world, 60.0, EXACT);
-        assert_eq!(bank.leading_id(), Some(ModeId::NoisyAngles));
+        assert_eq!(bank.selected(), SelectedHypothesis::NoisyAngles);
         let variance = |ekf: &Ekf| ekf.belief().covariance[ALONG][ALONG];
         assert!(variance(bank.leader()) > 2.0 * variance(bank.nominal()));
         assert!(off_m(bank.leader()) < 4.0 * variance(bank.leader()).sqrt());
@@ -349,7 +339,7 @@ mod tests {
         };
         let (bank, _) = drive(&world, 30.0, EXACT);
         assert!(bank.noise_scale() > 20.0);
-        let (_, noisy) = bank.mode(ModeId::NoisyAngles).unwrap();
+        let (_, noisy) = bank.mode(SelectedHypothesis::NoisyAngles).unwrap();
         // Relative to the specified K of 10 dB.
         assert!((noisy.config().noise_scale() - 10.0).abs() < 1e-9);
     }
@@ -364,7 +354,7 @@ mod tests {
         let way_m = bank.nominal().driven_m();
         let own_variance = way_m * bank.nominal().config().noise.odometer_m_per_sqrt_m.powi(2);
         let variance = |ekf: &Ekf| ekf.belief().covariance[ALONG][ALONG];
-        let (_, noisier) = bank.mode(ModeId::NoisyOdometer).unwrap();
+        let (_, noisier) = bank.mode(SelectedHypothesis::NoisyOdometer).unwrap();
         let more = variance(noisier) - variance(bank.nominal());
         assert!((more / (8.0 * own_variance) - 1.0).abs() < 0.01, "{more}");
     }
@@ -398,7 +388,7 @@ mod tests {
                 30.0,
                 EXACT,
             );
-            bank.mode(ModeId::Slip).unwrap().0
+            bank.mode(SelectedHypothesis::WheelSlip).unwrap().0
         };
         assert!(odds(0.0) < 1e-3);
         assert!(odds(0.2) > 100.0);
@@ -412,7 +402,7 @@ mod tests {
             ..World::default()
         };
         let (bank, _) = drive(&world, 30.0, EXACT);
-        assert_eq!(bank.leading_id(), Some(ModeId::Slip));
+        assert_eq!(bank.selected(), SelectedHypothesis::WheelSlip);
         let again = bank.restarted(1.0, 30.0).restarted(1.0, 30.0);
         assert_eq!(again.nominal().config(), trip().2.config());
     }
@@ -426,7 +416,7 @@ mod tests {
                 ..World::default()
             };
             let (bank, off_m) = drive(&world, 30.0, EXACT);
-            let (odds, slip) = bank.mode(ModeId::Slip).unwrap();
+            let (odds, slip) = bank.mode(SelectedHypothesis::WheelSlip).unwrap();
             assert!(odds > 0.1, "{odds}");
             let covariance = slip.pose(29.9).covariance.unwrap();
             let std_m = (covariance[0][0] + covariance[1][1]).sqrt();
@@ -454,7 +444,7 @@ mod tests {
             ..World::default()
         };
         let (bank, off_m) = drive(&world, 60.0, bias_rad);
-        assert!(bank.leading_id().is_none() && !bank.is_lost());
+        assert!(bank.selected() == SelectedHypothesis::Nominal && !bank.is_lost());
         let [[xx, ..], [_, yy, _], _] = bank.leader().pose(59.9).covariance.unwrap();
         assert!(off_m(bank.leader()) < 4.0 * (xx + yy).sqrt());
         assert!(off_m(bank.leader()) < 1.0, "{}", off_m(bank.leader()));
@@ -470,7 +460,7 @@ mod tests {
             ..World::default()
         };
         let (bank, off_m) = drive(&world, 60.0, EXACT);
-        assert_eq!(bank.leading_id(), Some(ModeId::DisplacedSite));
+        assert_eq!(bank.selected(), SelectedHypothesis::DisplacedSite);
         let [[xx, ..], [_, yy, _], _] = bank.leader().pose(59.9).covariance.unwrap();
         assert!(off_m(bank.leader()) < 4.0 * (xx + yy).sqrt());
         assert!(off_m(bank.leader()) < off_m(bank.nominal()));
