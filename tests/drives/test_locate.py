@@ -169,8 +169,13 @@ def test_poses_have_integrity_unless_the_monitor_is_disabled(drive: Path, tmp_pa
     poses = locate(drive, vehicle=vehicle).poses
     assert set(poses["integrity"].unique()) <= {"ok", "degraded", "unavailable"}
     assert poses["protection_level_m"].max() > 0.1  # type: ignore[operator]
+    hypotheses = {"nominal", "uncalibrated_array", "noisy_odometer", "wheel_slip"}
+    assert set(poses["selected_hypothesis"].unique()) <= hypotheses
     vehicle.write_text((drive / "vehicle.toml").read_text() + "[integrity]\nenabled = false\n")
-    assert locate(drive, vehicle=vehicle).poses["integrity"].is_null().all()
+    unmonitored = locate(drive, vehicle=vehicle).poses
+    assert unmonitored.select("integrity", "selected_hypothesis").null_count().row(0) == (
+        unmonitored.height, unmonitored.height,
+    )  # fmt: skip
     assert not locate(drive).poses["integrity"].is_null().any()
 
 
