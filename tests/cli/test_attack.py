@@ -23,7 +23,7 @@ def attack(tmp_path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_a_short_attack_finds_nothing(tmp_path: Path) -> None:
+def test_a_short_attack_finds_no_defect(tmp_path: Path) -> None:
     done = attack(tmp_path, "--seed", "2024", "--inputs", "120", "--drives", "12")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "seed 2024" in done.stdout
@@ -48,7 +48,7 @@ def test_damaged_parquet_that_aborts_its_reader_is_rejected(tmp_path: Path) -> N
         ("raise SystemExit(7)", "code"),
     ],
 )
-def test_it_sees_what_it_is_to_see(tmp_path: Path, harm: str, found: str) -> None:
+def test_the_layout_check_detects_faults(tmp_path: Path, harm: str, found: str) -> None:
     script = (
         "import sys, pathlib; from attack import kinds, worker\n"
         f"kinds.KINDS['drive'] = (lambda random, case: case.python({harm!r}), 0)\n"

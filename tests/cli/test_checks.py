@@ -232,7 +232,7 @@ def test_invalid_values_are_rejected_with_a_valid_example(what: str) -> None:
     assert any(key in one.split(" is ")[0] and write in one for one in told), told
 
 
-def test_the_plant_itself_is_fine() -> None:
+def test_the_plant_causes_no_warning() -> None:
     assert scenario().warnings() == []
 
 
@@ -246,7 +246,7 @@ FILES = {
 
 
 @pytest.mark.parametrize("line", FILES)
-def test_decimal_commas_are_named(line: str) -> None:
+def test_decimal_commas_are_reported(line: str) -> None:
     place = "" if "position_m" in line else "position_m = [0.0, 20.0, 8.0]\n"
     with pytest.raises(SettingsError, match=re.escape(FILES[line])):
         Site.from_toml(f'name = "mine"\n[[radio_heads]]\n{place}{line}\n')
@@ -356,7 +356,7 @@ UNLIKE = {
 
 
 @pytest.mark.parametrize("plant", UNLIKE)
-def test_plants_unlike_ours_are_fine(plant: str) -> None:
+def test_other_valid_plants_cause_no_warning(plant: str) -> None:
     site, vehicle, motion = UNLIKE[plant]
     plain = Site.from_toml(f'name = "other"\n{site}')
     carrier = Vehicle.from_toml(f'extends = "default"\nname = "other"\n{vehicle}')
@@ -374,12 +374,12 @@ def test_plants_unlike_ours_are_fine(plant: str) -> None:
 
 
 @pytest.mark.parametrize("kind", [Site, Vehicle, Scenario, Platform])
-def test_nothing_shipped_is_doubtful(kind: type[Site | Vehicle | Scenario | Platform]) -> None:
+def test_shipped_files_cause_no_warning(kind: type[Site | Vehicle | Scenario | Platform]) -> None:
     doubtful = {name: kind.load(name).warnings() for name in kind.names()}
     assert {name: found for name, found in doubtful.items() if found} == {}
 
 
-def test_sites_of_recorded_drives_and_of_a_street_are_fine(data: Path) -> None:
+def test_sites_of_recorded_drives_cause_no_warning(data: Path) -> None:
     tables = sorted(data.glob("*/**/landmarks.csv"))
     assert len(tables) > 4
     for table in tables:
@@ -395,7 +395,9 @@ def test_sites_of_recorded_drives_and_of_a_street_are_fine(data: Path) -> None:
             assert Site.from_toml(text).warnings(robot) == [], table
 
 
-def test_check_warns_and_goes_on(tmp_path: Path, access_av: Callable[..., Finished]) -> None:
+def test_check_continues_after_a_warning(
+    tmp_path: Path, access_av: Callable[..., Finished]
+) -> None:
     (tmp_path / "fine.toml").write_text(PLANT)
     (tmp_path / "deep.toml").write_text(PLANT.replace("25.0, 8.0]", "25.0, -8.0]"))
     done = access_av(

@@ -90,7 +90,7 @@ def test_run_is_the_same_for_one_and_two_threads(access_av: Cli, tmp_path: Path)
         assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
 
 
-def test_set_changes_one_key(access_av: Cli, tmp_path: Path) -> None:
+def test_option_set_changes_one_key(access_av: Cli, tmp_path: Path) -> None:
     done = access_av(
         "run", "paper", "--set", "site.rician_k_db=7.5",
         "--set", "vehicle.estimator.method=esprit",
@@ -103,7 +103,7 @@ def test_set_changes_one_key(access_av: Cli, tmp_path: Path) -> None:
     assert "base_ms = " in written
 
 
-def test_evaluation_leaves_its_files(quick_study: Path) -> None:
+def test_evaluation_writes_its_files(quick_study: Path) -> None:
     names = {path.name for path in (quick_study / "latest").iterdir()}
     assert names == {
         "ablation.svg", "ablations.parquet", "claims.json", "errors.parquet",
@@ -160,7 +160,9 @@ KINDS = ("site", "vehicle", "scenario", "platform", "plant")
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_shipped_files_are_listed_shown_and_fine(access_av: Cli, tmp_path: Path, kind: str) -> None:
+def test_shipped_files_are_listed_shown_and_valid(
+    access_av: Cli, tmp_path: Path, kind: str
+) -> None:
     names = access_av("file", "list", kind).out.split()
     assert names
     for name in names:

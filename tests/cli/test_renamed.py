@@ -74,7 +74,7 @@ def test_command_lines_of_earlier_results_are_translated() -> None:
         assert renamed.current(old.split()) == new.split()
 
 
-def test_the_old_word_for_an_unknown_start(
+def test_the_renamed_value_of_option_start(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
     for name in ("odometry.csv", "angles.csv"):

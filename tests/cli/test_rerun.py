@@ -139,9 +139,7 @@ def test_differences_are_listed(folder: Path, results: Path) -> None:
     assert "5 of " in done.stdout
 
 
-def test_the_copy_of_the_settings_stands_in_for_a_changed_input(
-    folder: Path, results: Path
-) -> None:
+def test_the_copy_of_the_settings_replaces_a_changed_input(folder: Path, results: Path) -> None:
     scenario = folder / "short.toml"
     try:
         scenario.write_text(SCENARIO.replace("285", "280"))
@@ -158,7 +156,7 @@ def test_the_copy_of_the_settings_stands_in_for_a_changed_input(
         assert len(record["changed_inputs"]) == 1
 
 
-def test_what_cannot_be_repeated_is_named(folder: Path, results: Path) -> None:
+def test_results_that_cannot_be_repeated_are_reported(folder: Path, results: Path) -> None:
     def refused(*arguments: str) -> str:
         done = access_av(folder, "rerun", *arguments)
         assert done.returncode == 2, done.stdout

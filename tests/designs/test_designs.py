@@ -85,7 +85,7 @@ def test_bad_spaces_name_the_key(table: dict[str, Any], message: str) -> None:
         Space.of(table)
 
 
-def test_a_design_that_cannot_be_names_key_and_what_is_allowed() -> None:
+def test_an_invalid_design_is_rejected_with_key_and_allowed_values() -> None:
     with pytest.raises(InputError, match=r"platform.mode.*has the modes 0, 1, 2"):
         designs_of(Scenario.load("paper"), [{"vehicle.platform.mode": 9}])
 
@@ -112,7 +112,7 @@ def whole(tmp_path: Path) -> dict[str, bytes]:
     return contents(tmp_path / "whole")
 
 
-def test_same_bytes_whoever_computes(tmp_path: Path, whole: dict[str, bytes]) -> None:
+def test_results_do_not_depend_on_the_executor(tmp_path: Path, whole: dict[str, bytes]) -> None:
     assert len(whole) == 12
     for number, pool in enumerate([ThreadPoolExecutor(3), ProcessPoolExecutor(2)]):
         with pool:
@@ -146,7 +146,7 @@ def test_a_damaged_part_is_reported_and_computed_again(
     assert contents(parts.path) == whole
 
 
-def test_a_full_disk_names_the_part_and_leaves_nothing(
+def test_a_full_disk_is_reported_and_leaves_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: dict[str, bytes]
 ) -> None:
     parts = ResultCache(tmp_path / "full")
@@ -182,9 +182,7 @@ class Dying(Executor):
         return future
 
 
-def test_workers_that_die_lose_nothing_that_is_finished(
-    tmp_path: Path, whole: dict[str, bytes]
-) -> None:
+def test_finished_parts_survive_lost_workers(tmp_path: Path, whole: dict[str, bytes]) -> None:
     parts = ResultCache(tmp_path / "dying")
     with pytest.raises(CampaignError, match=r"workers are gone.*repeat the command to continue"):
         Campaign(parts, Dying(5)).run(tasks())
@@ -193,7 +191,7 @@ def test_workers_that_die_lose_nothing_that_is_finished(
     assert contents(parts.path) == whole
 
 
-def test_an_error_of_the_task_is_its_own(tmp_path: Path) -> None:
+def test_an_error_of_a_task_is_not_a_lost_worker(tmp_path: Path) -> None:
     bad = Task({"bad": 1}, int, ("not a number",))
     with ThreadPoolExecutor(1) as pool, pytest.raises(ValueError, match="invalid literal"):
         Campaign(ResultCache(tmp_path), pool).run([bad])
@@ -220,7 +218,7 @@ campaign.run(tasks(12, 0.02))
 """
 
 
-def test_killed_at_20_random_instants_it_finishes_with_the_same_bytes(
+def test_a_campaign_killed_at_20_random_times_gives_equal_bytes(
     tmp_path: Path, whole: dict[str, bytes]
 ) -> None:
     instants = np.random.default_rng(3).uniform(0.0, 0.05, 20)
@@ -255,7 +253,7 @@ RECIPES = {
 
 
 @pytest.mark.parametrize("recipe", RECIPES)
-def test_a_recipe_gives_the_same_bytes(
+def test_a_recipe_gives_equal_bytes(
     tmp_path: Path, whole: dict[str, bytes], recipe: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module, text = RECIPES[recipe]
@@ -277,7 +275,7 @@ def test_a_recipe_gives_the_same_bytes(
         ("make = 1\n", "no class or function make"),
     ],
 )
-def test_an_executor_that_cannot_be_used_is_named(tmp_path: Path, text: str, message: str) -> None:
+def test_an_unusable_executor_is_reported(tmp_path: Path, text: str, message: str) -> None:
     file = tmp_path / "recipe.py"
     file.write_text(text)
     with pytest.raises(InputError, match=message), opened(tmp_path, f"{file}:make"):
@@ -325,7 +323,7 @@ finally:
     ("dies", "says"),
     [("worker", "finished"), ("scheduler", "the workers are gone")],
 )
-def test_of_a_cluster_any_process_may_die(
+def test_a_process_of_a_cluster_may_end(
     tmp_path: Path, whole: dict[str, bytes], dies: str, says: str
 ) -> None:
     pytest.importorskip("distributed")
@@ -380,7 +378,7 @@ def cloud(runs: int, pairs: list[tuple[float, float]]) -> list[Driven]:
 PAIRS = [(1.0, 0.4), (2.0, 0.2), (2.1, 0.35), (4.0, 0.1), (4.1, 0.1), (8.0, 0.3)]
 
 
-def test_front_and_its_confidence() -> None:
+def test_pareto_front_with_confidence() -> None:
     driven = cloud(20, PAIRS)
     assert set(front(driven)) - {4} == {0, 1, 3}
     # Designs that common random numbers do not separate may be on the front.
@@ -427,7 +425,7 @@ def test_an_unreachable_limit_reports_the_reachable_value() -> None:
     assert advice[0].startswith("energy: no value of this limit alone is sufficient")
 
 
-def test_a_design_is_judged_in_the_worst_of_its_worlds(
+def test_a_design_is_rated_in_its_worst_environment(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One design is better in one environment and much worse in the other."""
@@ -470,7 +468,7 @@ def test_a_design_is_judged_in_the_worst_of_its_worlds(
     assert "Each environment" in page
 
 
-def test_what_too_few_drives_say_is_not_called_kept() -> None:
+def test_limits_are_not_met_with_too_few_runs() -> None:
     row = {"p99_error_m": 0.28, "p99_error_low_m": 0.2, "p99_error_high_m": 0.4}
     bound = Query(max_error_m=0.3, percentile=99.0)
     assert bound.keeps(row)

@@ -40,7 +40,7 @@ def campaign(tmp_path: Path) -> Campaign:
     return Campaign(ResultCache(tmp_path / "parts"))
 
 
-def test_least_energy_that_keeps_the_error(campaign: Campaign) -> None:
+def test_minimum_energy_within_the_error_limit(campaign: Campaign) -> None:
     scenario = short({"policy": "fixed", "interval_ms": 20.0})
     every = Query(max_rms_m=1.0)
     found = tune(campaign, scenario, every, designs=18, runs=3)
@@ -53,7 +53,7 @@ def test_least_energy_that_keeps_the_error(campaign: Campaign) -> None:
     assert mean_j == pytest.approx(paired)
 
 
-def test_least_error_that_keeps_the_energy_and_drives_are_kept(campaign: Campaign) -> None:
+def test_minimum_error_within_the_energy_limit_and_stored_runs(campaign: Campaign) -> None:
     scenario = short({"policy": "fixed", "interval_ms": 5000.0})
     bound = Query(max_energy_j=1e6)
     found = tune(campaign, scenario, bound, designs=18, runs=3)
@@ -89,7 +89,7 @@ def test_an_optimal_design_is_kept(campaign: Campaign, monkeypatch: pytest.Monke
         assert found.after.design.scenario.vehicle == scenario.vehicle
 
 
-def test_a_percentile_is_kept_by_the_least_energy(
+def test_a_percentile_limit_is_met_with_minimum_energy(
     campaign: Campaign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("access_av.designs.driven.simulated", pretended)
@@ -119,7 +119,7 @@ def test_a_constraint_that_is_missed_ends_with_exit_code_3(
     assert access_av(*asked, "--max-error-m", "9", "--percentile", "17").code == 2
 
 
-def test_what_is_tuned_is_what_the_policy_has() -> None:
+def test_tunable_keys_are_those_of_the_policy() -> None:
     gated = {dimension.key for dimension in space_of(Scenario.load("paper")).dimensions}
     assert {"vehicle.wake_up.snr_set_point.offset_db", "vehicle.wake_up.trigger.kp"} <= gated
     absolute = {"kind": "absolute", "snr_db": 10.0}
@@ -128,7 +128,7 @@ def test_what_is_tuned_is_what_the_policy_has() -> None:
     assert not space_of(fixed).dimensions
 
 
-def test_bad_questions(campaign: Campaign, access_av: Callable[..., Finished]) -> None:
+def test_invalid_queries(campaign: Campaign, access_av: Callable[..., Finished]) -> None:
     with pytest.raises(InputError, match="no limit given"):
         tune(campaign, short({"policy": "fixed"}), Query())
     none = short({"policy": "fixed", "interval_ms": 80.0}).with_overrides(

@@ -85,7 +85,7 @@ def labels(sysfs: Path) -> list[str]:
 # Sensors.
 
 
-def test_jetpack_5_adds_rails_and_leaves_out_what_is_none(tmp_path: Path) -> None:
+def test_jetpack_5_adds_rails_and_omits_missing_ones(tmp_path: Path) -> None:
     chip = hwmon(tmp_path, 0, "ina3221", dict(enumerate(RAILS.items(), start=1)))
     hwmon(tmp_path, 1, "ina3221", {1: ("NC", 9.0), 2: ("VDDQ_VDD2_1V8AO", 1.0)})
     write(chip / "in7_label", "sum of shunt voltages")
@@ -106,7 +106,7 @@ def test_jetpack_4_reads_iio(tmp_path: Path) -> None:
     assert sum(rail.read_w()[0] for rail in found.rails) == pytest.approx(5.0)
 
 
-def test_a_sensor_of_two_names_is_read_once(tmp_path: Path) -> None:
+def test_a_sensor_with_two_names_is_read_once(tmp_path: Path) -> None:
     device = iio(tmp_path, {"VDD_IN": 3.0})
     for other in ("bus/iio/devices", "bus/i2c/drivers/ina3221x/1-0040"):
         (tmp_path / other).mkdir(parents=True)
@@ -131,7 +131,7 @@ def test_thor_reads_the_ina238(tmp_path: Path) -> None:
     assert found.rails[0].read_w()[0] == pytest.approx(30.0)
 
 
-def test_psys_contains_the_packages_and_they_their_parts(tmp_path: Path) -> None:
+def test_psys_includes_packages_and_packages_include_their_parts(tmp_path: Path) -> None:
     zones = {
         "intel-rapl:0": "package-0",
         "intel-rapl:0:0": "core",
@@ -143,7 +143,7 @@ def test_psys_contains_the_packages_and_they_their_parts(tmp_path: Path) -> None
     assert labels(tmp_path) == ["psys"]
 
 
-def test_no_sensor_is_none(tmp_path: Path) -> None:
+def test_without_a_sensor_none_is_returned(tmp_path: Path) -> None:
     assert counters.find(tmp_path) is None
 
 
@@ -237,7 +237,7 @@ POWERS = {
 
 @pytest.mark.parametrize("power", POWERS)
 @pytest.mark.parametrize("bench", BENCHES)
-def test_energy_put_in_lies_in_the_interval(
+def test_simulated_energy_is_in_the_interval(
     tmp_path: Path, bench: Callable[[Path], Bench], power: str
 ) -> None:
     window, put_in_j = bench(tmp_path).window(1.6, POWERS[power])
@@ -246,7 +246,7 @@ def test_energy_put_in_lies_in_the_interval(
 
 
 @pytest.mark.parametrize("bench", BENCHES)
-def test_energy_above_idle_lies_in_the_interval(
+def test_energy_above_idle_is_in_the_interval(
     tmp_path: Path, bench: Callable[[Path], Bench]
 ) -> None:
     rig = bench(tmp_path)
@@ -304,13 +304,13 @@ def test_a_counter_that_jumps_is_refused(tmp_path: Path) -> None:
         rig.window(2.0, lambda t: 15.0 if abs(t - 1.0) > 2e-3 else 20_000.0)
 
 
-def test_a_sensor_that_does_not_see_the_load_has_stopped() -> None:
+def test_a_sensor_without_response_to_the_load_has_stopped() -> None:
     still = Window(0.0, 2.0, Interval(10.0, 0.1), is_constant=True)
     with pytest.raises(SensorError, match="equal, idle and busy"):
         above_idle(still, still)
 
 
-def test_a_sensor_that_goes_away_is_named(tmp_path: Path) -> None:
+def test_a_missing_sensor_is_reported(tmp_path: Path) -> None:
     rig = jetpack_6(tmp_path)
     found = counters.find(tmp_path)
     assert found is not None
@@ -404,7 +404,7 @@ def test_profile_of_a_board_with_modes(jetson: Path, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_mode_is_put_back_when_interrupted(jetson: Path, ending: signal.Signals) -> None:
+def test_the_mode_is_restored_after_an_interruption(jetson: Path, ending: signal.Signals) -> None:
     board = power_modes.find(jetson, jetson / "sys")
 
     def work() -> None:
@@ -419,7 +419,7 @@ def test_mode_is_put_back_when_interrupted(jetson: Path, ending: signal.Signals)
     assert Path(os.environ["STATE"]).read_text().strip() == "1"
 
 
-def test_clocks_of_cpufreq_are_put_back(tmp_path: Path) -> None:
+def test_cpufreq_clocks_are_restored(tmp_path: Path) -> None:
     policy = tmp_path / "sys/devices/system/cpu/cpufreq/policy0"
     write(policy / "scaling_available_frequencies", "600000 1500000 2400000")
     write(policy / "scaling_max_freq", 1500000)
@@ -431,7 +431,7 @@ def test_clocks_of_cpufreq_are_put_back(tmp_path: Path) -> None:
     assert (policy / "scaling_max_freq").read_text().strip() == "1500000"
 
 
-def test_a_sensor_that_does_not_see_the_load_keeps_its_windows(
+def test_windows_of_a_sensor_without_response_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hwmon(tmp_path / "sys", 0, "ina3221", {1: ("VDD_IN", 15.0)})

@@ -49,7 +49,7 @@ def log(drive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-def test_a_log_of_angles_locates_as_its_samples_do(
+def test_an_angle_log_gives_the_poses_of_its_samples(
     access_av: Cli, drive: Path, tmp_path: Path
 ) -> None:
     site, vehicle = drive / "site.toml", drive / "vehicle.toml"
@@ -99,7 +99,7 @@ def test_a_log_of_angles_locates_as_its_samples_do(
     assert (apart_m < deviation_m).all()
 
 
-def test_the_deviation_holds_all_of_the_error(drive: Path, log: Path) -> None:
+def test_the_standard_deviation_covers_the_whole_error(drive: Path, log: Path) -> None:
     """The noise alone is far below the error; with the scatter, the mean normalized square is
     one."""
     truth = json.loads((drive / "iq.sigmf-meta").read_text())

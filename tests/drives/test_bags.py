@@ -113,7 +113,7 @@ def test_the_source_of_the_yaw_rate_is_reported(driven: Robot, tmp_path: Path) -
     assert driven.rms_error_m(silent) > as_told_m + 0.02
 
 
-def test_an_imu_that_does_not_serve_is_named(driven: Robot, tmp_path: Path) -> None:
+def test_an_unusable_imu_is_reported(driven: Robot, tmp_path: Path) -> None:
     turning = odometry(driven, heading=True)
     cases = {
         "without an angular velocity that is known": imu(driven, known=False),
@@ -130,7 +130,7 @@ def test_an_imu_that_does_not_serve_is_named(driven: Robot, tmp_path: Path) -> N
             locate(driven, tmp_path, folder, imu_topic="/imu/data")
 
 
-def test_of_several_imus_one_is_chosen(access_av: Cli, driven: Robot, tmp_path: Path) -> None:
+def test_one_of_several_imus_is_selected(access_av: Cli, driven: Robot, tmp_path: Path) -> None:
     gyroscopes = [
         *imu(driven, topic="/imu/front"),
         *imu(driven, turned=-1.0, topic="/imu/back"),
@@ -198,7 +198,7 @@ def test_several_files_are_read_in_order_of_time(driven: Robot, tmp_path: Path) 
         locate(driven, tmp_path, folder)
 
 
-def test_what_is_no_mcap_is_refused_with_what_to_do(driven: Robot, tmp_path: Path) -> None:
+def test_files_other_than_mcap_are_rejected_with_advice(driven: Robot, tmp_path: Path) -> None:
     old = bag.write(tmp_path / "old", odometry(driven), storage=StoragePlugin.SQLITE3)
     (file,) = old.glob("*.db3")
     for path in (old, file):
@@ -213,7 +213,7 @@ def test_what_is_no_mcap_is_refused_with_what_to_do(driven: Robot, tmp_path: Pat
         locate(driven, tmp_path, empty)
 
 
-def test_messages_that_cannot_be_are_left_out(driven: Robot, tmp_path: Path) -> None:
+def test_invalid_messages_are_omitted(driven: Robot, tmp_path: Path) -> None:
     """Invalid quaternions give no yaw rate; truncated messages are reported or counted."""
     messages = odometry(driven, heading=True)
     for k, wrong in ((100, (0.0,) * 4), (200, (float("nan"),) * 4), (300, (1e300,) * 4)):

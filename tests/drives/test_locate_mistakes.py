@@ -179,7 +179,7 @@ def test_a_correct_drive_has_no_suspicions(tmp_path: Path, seed: int) -> None:
 
 
 @pytest.mark.parametrize("kind", SUSPECTED)
-def test_the_likely_mistake_is_named(tmp_path: Path, kind: str) -> None:
+def test_the_probable_mistake_is_reported(tmp_path: Path, kind: str) -> None:
     spoil, says = SUSPECTED[kind]
     # Speeds of kilometres per second cause a long search. Rejected yaw rates have no immediate
     # effect.
@@ -209,7 +209,9 @@ def test_wheels_in_millimetres_are_not_relied_on(tmp_path: Path) -> None:
     ("by_rad", "says"),
     [(-math.pi / 2, "further to the left"), (math.pi, "heading the other way")],
 )
-def test_a_wrong_heading_is_named_and_overcome(tmp_path: Path, by_rad: float, says: str) -> None:
+def test_a_wrong_heading_is_reported_and_corrected(
+    tmp_path: Path, by_rad: float, says: str
+) -> None:
     spoilt = robot()
     x, y, heading_rad = spoilt.start
     spoilt.start = (x, y, heading_rad + by_rad)
@@ -220,7 +222,7 @@ def test_a_wrong_heading_is_named_and_overcome(tmp_path: Path, by_rad: float, sa
 
 
 @pytest.mark.parametrize("kind", REMARKED)
-def test_it_is_remarked_on(tmp_path: Path, kind: str) -> None:
+def test_the_mistake_causes_a_remark(tmp_path: Path, kind: str) -> None:
     spoil, says = REMARKED[kind]
     # If no angle fits, the search is long.
     spoilt = robot({"all of the angle in degrees": 45.0}.get(kind, 90.0))
@@ -232,7 +234,7 @@ def test_it_is_remarked_on(tmp_path: Path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", REFUSED)
-def test_it_is_refused(tmp_path: Path, kind: str) -> None:
+def test_the_mistake_is_rejected(tmp_path: Path, kind: str) -> None:
     spoil, says = REFUSED[kind]
     spoilt = robot()
     spoil(spoilt)
@@ -252,7 +254,7 @@ def test_a_truth_of_another_time_is_refused(access_av: Cli, tmp_path: Path) -> N
     assert (done.code, "truth.tum: contains no pose" in done.err) == (2, True)
 
 
-def test_one_radio_head_elsewhere_is_named(tmp_path: Path) -> None:
+def test_a_misplaced_radio_head_is_reported(tmp_path: Path) -> None:
     """One of six radio heads at a wrong position is reported with its estimated position."""
     spoilt = robot()
     x, y = HEADS_M[13]
@@ -266,7 +268,7 @@ def test_one_radio_head_elsewhere_is_named(tmp_path: Path) -> None:
     assert drive.is_reliable == (spoilt.rms_error_m(drive) < 0.5)
 
 
-def test_never_found_is_no_success(access_av: Cli, tmp_path: Path) -> None:
+def test_a_vehicle_that_is_never_found_is_no_success(access_av: Cli, tmp_path: Path) -> None:
     whole = robot(3.0)
     whole.angles = whole.angles.filter(pci=11)  # one radio head does not determine a position
     arguments = whole.write(tmp_path)

@@ -131,7 +131,7 @@ FILLED: dict[str, tuple[Callable[[Fields], Fields], str | None]] = {
 
 
 @pytest.mark.parametrize("kind", FILLED)
-def test_messages_are_read_as_they_are_filled(
+def test_messages_of_different_drivers_are_read(
     driven: Robot, fields: list[Fields], as_csv_m: float, tmp_path: Path, kind: str
 ) -> None:
     change, says = FILLED[kind]
@@ -149,7 +149,7 @@ def test_messages_are_read_as_they_are_filled(
     ("x_m", "field"),
     [(1.0001644e256, "x is 1.0001644e256"), (-3e13, "x is -3e13"), (math.inf, "x is missing")],
 )
-def test_a_position_that_is_none_is_left_out(
+def test_an_invalid_position_is_omitted(
     driven: Robot, fields: list[Fields], as_csv_m: float, tmp_path: Path, x_m: float, field: str
 ) -> None:
     spoilt = list(fields)
@@ -193,7 +193,7 @@ def test_one_impossible_value_does_not_move_the_vehicle(
 
 
 @pytest.mark.parametrize("value", [0.0, math.nan])
-def test_messages_without_any_motion_are_named(
+def test_messages_without_motion_are_rejected(
     driven: Robot, fields: list[Fields], tmp_path: Path, value: float
 ) -> None:
     empty = [replace(it, x_m=value, y_m=value, speed_mps=value) for it in fields]
@@ -202,7 +202,7 @@ def test_messages_without_any_motion_are_named(
     assert any("pose.pose.position never changes" in it for it in drive.diagnoses), drive.diagnoses
 
 
-def test_a_late_first_usable_message_is_named(
+def test_a_late_first_usable_message_is_reported(
     driven: Robot, fields: list[Fields], tmp_path: Path
 ) -> None:
     late = [replace(it, x_m=math.nan) if k < 100 else it for k, it in enumerate(fields)]
@@ -224,7 +224,7 @@ def test_stamps_before_the_clock_was_set_are_left_out(
     assert driven.rms_error_m(drive) < as_csv_m + SAME_M
 
 
-def test_the_time_of_the_recorder_stands_in_for_a_stamp_that_was_not_set(
+def test_the_recorder_time_replaces_a_missing_stamp(
     driven: Robot, fields: list[Fields], as_csv_m: float, tmp_path: Path
 ) -> None:
     messages = [it.message() for it in fields]
@@ -246,7 +246,7 @@ def test_the_time_of_the_recorder_stands_in_for_a_stamp_that_was_not_set(
     assert driven.rms_error_m(drive) < as_csv_m + SAME_M
 
 
-def test_motion_to_the_side_is_named_where_it_does_harm(
+def test_lateral_motion_is_reported_if_it_causes_an_error(
     driven: Robot, fields: list[Fields], tmp_path: Path
 ) -> None:
     """A vehicle that slides by 6 m differs from the position of its odometer."""
@@ -288,7 +288,7 @@ def test_fields_and_topics_have_the_names_of_the_file(
         ("wide.csv", "time_s,speed_mps\n0,1\n".encode("utf-16-le"), "UTF-16"),
     ],
 )
-def test_other_formats_are_named(
+def test_other_formats_are_reported(
     driven: Robot, tmp_path: Path, name: str, content: bytes, says: str
 ) -> None:
     driven.write(tmp_path)

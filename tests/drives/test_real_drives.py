@@ -34,7 +34,7 @@ def bench() -> Any:
 
 @pytest.fixture(scope="module")
 def converted(bench: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The robot's drive as Robot1 of a data set, converted."""
+    """Returns the robot's drive, written as Robot1 of a data set and converted."""
     told, rng = robot(120.0), np.random.default_rng(5)
     dataset = tmp_path_factory.mktemp("MRCLAM_Dataset0")
     times = EPOCH_S + told.odometry["time_s"].to_numpy()
@@ -69,7 +69,7 @@ def converted(bench: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_what_is_converted_is_the_drive(bench: Any, converted: Path) -> None:
+def test_the_converted_drive_equals_the_original(bench: Any, converted: Path) -> None:
     drive, told = bench.read(converted), robot(120.0)
     assert drive["odometry"]["time_s"][0] == 0.0
     assert np.diff(drive["odometry"]["time_s"]) == pytest.approx(1 / bench.RATE_HZ, abs=1e-6)

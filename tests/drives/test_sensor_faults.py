@@ -38,7 +38,7 @@ def test_a_drive_without_faults_has_no_diagnosis(drive: Path) -> None:
     assert found.diagnoses == []
 
 
-def test_a_fault_that_lasts_is_a_remark_and_a_diagnosis(drive: Path, tmp_path: Path) -> None:
+def test_a_lasting_fault_causes_a_remark_and_a_diagnosis(drive: Path, tmp_path: Path) -> None:
     log = pl.read_csv(drive / "odometry.csv")
     before = log.filter(pl.col("time_s") < STOPS_S)
     stops = pl.col("time_s") >= STOPS_S
@@ -58,7 +58,7 @@ def test_a_fault_that_lasts_is_a_remark_and_a_diagnosis(drive: Path, tmp_path: P
     assert "check the odometer" in diagnosis
 
 
-def test_a_fault_that_ends_is_no_diagnosis(drive: Path, tmp_path: Path) -> None:
+def test_an_ended_fault_causes_no_diagnosis(drive: Path, tmp_path: Path) -> None:
     log = pl.read_csv(drive / "odometry.csv")
     stops = pl.col("time_s").is_between(5.0, 6.0)
     before = log.filter(pl.col("time_s") < 5.0)

@@ -82,7 +82,7 @@ def test_trips_a_day_are_as_stated_and_not_one_after_the_other() -> None:
             balance(bad)
 
 
-def test_ranges_hold_whatever_the_figures_turn_out_to_be() -> None:
+def test_ranges_contain_every_combination_of_the_figures() -> None:
     wide = balance(figures())
     for price in (900.0, 1200.0):
         for energy_j in (50.0, 200.0):
@@ -94,7 +94,7 @@ def test_ranges_hold_whatever_the_figures_turn_out_to_be() -> None:
             assert wide.saved_kg.low <= found.saved_kg.central <= wide.saved_kg.high
 
 
-def test_no_payback_is_said() -> None:
+def test_a_missing_payback_is_reported() -> None:
     dear = figures()
     dear["after"]["onboard"][0]["yearly"] = 1000.0
     assert balance(dear).payback_years is None
@@ -131,9 +131,7 @@ def test_every_item_needs_a_source_and_every_grid_a_name() -> None:
         balance(bad)
 
 
-def test_the_example_is_a_file_of_ones_own(
-    access_av: Callable[..., Finished], tmp_path: Path
-) -> None:
+def test_the_example_file_is_valid(access_av: Callable[..., Finished], tmp_path: Path) -> None:
     mine = tmp_path / "mine.toml"
     mine.write_text(text())
     assert balance(read(mine)) == balance(read(None))

@@ -22,7 +22,7 @@ def test_the_papers_saving_per_day_follows_from_its_saving_per_trip() -> None:
     assert saving.fleet_per_day_mj(100) == pytest.approx(39.884, rel=1e-3)
 
 
-def test_a_saving_per_day_is_of_its_own_trip_and_duty() -> None:
+def test_the_daily_saving_uses_the_duration_and_duty_of_the_trip() -> None:
     long = cost.Saving(per_trip_j=370.8, trip_s=178.6, duty=0.5)
     assert long.trips_per_day == pytest.approx(43_200 / 178.6)
     assert long.per_day_kj == pytest.approx(398.84 * 80.33 / 178.6 / 2, rel=1e-3)
@@ -41,11 +41,11 @@ def test_use_is_power_times_lifetime_times_grid() -> None:
     assert box.use_kg.central == pytest.approx(2 * 10 * 35_040 * 381e-6)
 
 
-def test_an_energy_a_day_is_365_times_as_much_a_year() -> None:
+def test_energy_per_year_is_365_times_energy_per_day() -> None:
     # 3 kWh a day at 381 g.
     assert carbon.use_kg_per_year(3 * 3.6e6, "germany") == pytest.approx(3 * 365 * 0.381)
 
 
-def test_unknown_grid() -> None:
+def test_an_unknown_grid_is_rejected() -> None:
     with pytest.raises(KeyError, match="atlantis"):
         carbon.footprint("onboard_box", 1, "atlantis")

@@ -42,7 +42,7 @@ def test_crates_use_only_what_is_below_them() -> None:
         assert used & CRATES.keys() <= CRATES[package["name"]], package["name"]
 
 
-def test_nothing_on_board_that_does_not_belong_there() -> None:
+def test_on_vehicle_code_has_no_random_numbers_threads_or_files() -> None:
     tree = cargo("tree", "-p", "onboard", "-e", "normal", "--prefix", "none")
     found = {line.split()[0] for line in tree.splitlines() if line.strip()}
     assert {"onboard", "aoa-array", "nr-ssb"} <= found
@@ -142,7 +142,7 @@ def test_the_architecture_page_names_existing_files() -> None:
             assert found, f"{path} in: {row}"
 
 
-def test_where_is_what_names_files_that_are_there() -> None:
+def test_the_source_table_names_existing_files() -> None:
     page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
     section = page.split("### Source files by topic")[1].split("\n## ")[0]
     answers = re.findall(r"^\| .+ \| `([\w/.-]+)` \|$", section, re.M)

@@ -51,7 +51,7 @@ def test_no_two_modules_import_each_other() -> None:
         pytest.fail(" -> ".join(error.args[1]))
 
 
-def test_what_is_general_does_not_import_the_paper() -> None:
+def test_general_modules_do_not_import_the_paper() -> None:
     for module, imported in GRAPH.items():
         if module not in TOP and not module.startswith(PAPERS):
             assert not {name for name in imported if name.startswith(PAPERS)}, module
@@ -74,7 +74,7 @@ def test_no_two_folders_use_each_other() -> None:
         pytest.fail(" -> ".join(error.args[1]))
 
 
-def test_no_file_name_means_two_things() -> None:
+def test_file_names_are_unique() -> None:
     paths = [path.relative_to(PACKAGE / "access_av") for path in FILES.values()]
     names = [
         path.name
@@ -92,7 +92,7 @@ def test_public_modules_are_imported_by_their_public_names() -> None:
     ]
 
 
-def test_modules_import_from_where_a_thing_is() -> None:
+def test_modules_import_from_the_defining_module() -> None:
     packages = {module for module, path in FILES.items() if path.name == "__init__.py"}
     for module, imported in GRAPH.items():
         assert module in TOP or not imported & packages, module
@@ -106,7 +106,7 @@ def test_packages_only_re_export() -> None:
                 assert isinstance(node, allowed), (module, ast.unparse(node))
 
 
-def test_everything_is_reached_and_documented() -> None:
+def test_every_public_name_is_accessible_and_documented() -> None:
     for package in (access_av, access_av.paper):
         for name in package.__all__:
             found = getattr(package, name)

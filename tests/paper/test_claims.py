@@ -132,7 +132,7 @@ def test_claims_by_arithmetic_or_construction_do_not_count_as_reproduced() -> No
     assert "not counted as reproduced" in summary.counts_text(claims)
 
 
-def test_the_deviation_is_the_tolerance_at_which_the_verdict_changes() -> None:
+def test_the_deviation_is_the_tolerance_of_a_changed_verdict() -> None:
     outcome = synthetic.evaluation().outcome
     judged = [claim for claim in check_claims(outcome) if claim.deviation]
     assert judged
@@ -156,7 +156,7 @@ def test_the_spread_of_single_trips_is_reported_with_the_mean() -> None:
     assert claim.spread["worst_error_of_a_trip_p99_m"] == pytest.approx(0.496, abs=1e-3)
 
 
-def test_what_cannot_be_judged_is_named_and_the_others_are_judged() -> None:
+def test_claims_without_a_value_are_reported_and_the_others_are_evaluated() -> None:
     stated = dict(stated_claims())
     stated["a1_adaptive_worst_m"] = {**stated["a1_adaptive_worst_m"], "rule": "almost"}
     stated["b1_not_ours"] = stated["e2_mode0_executions"]
@@ -176,7 +176,7 @@ def test_what_cannot_be_judged_is_named_and_the_others_are_judged() -> None:
     }
 
 
-def test_a_platform_without_a_figure_is_named_and_the_others_are_judged() -> None:
+def test_a_platform_without_a_figure_is_reported_and_the_others_are_evaluated() -> None:
     outcome = synthetic.evaluation().outcome
     energies_j = {
         mode: {method: value for method, value in each.items() if (mode, method) != (4, "esprit")}
@@ -195,7 +195,7 @@ def test_a_platform_without_a_figure_is_named_and_the_others_are_judged() -> Non
     assert "no energy per execution of ESPRIT in mode 4" in lacking[0].note
 
 
-def test_a_platform_without_a_mode_is_named() -> None:
+def test_a_platform_without_a_mode_is_reported() -> None:
     outcome = synthetic.evaluation().outcome
     adaptive = {mode: drives for mode, drives in outcome.adaptive.items() if mode != 1}
     found = {claim.id: claim for claim in check_claims(replace(outcome, adaptive=adaptive))}
@@ -213,7 +213,7 @@ def test_records_have_the_promised_fields() -> None:
         assert isinstance(record["seed_sensitive"], bool)
 
 
-def test_evidence_follows_from_what_was_chosen() -> None:
+def test_evidence_depends_on_the_selected_parameters() -> None:
     entries = stated_claims()
     kinds = {name: evidence(entry, chosen=["controller"]) for name, entry in entries.items()}
     of_kind = {

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 ENGINE = "jetson-agx-xavier-engine"
 
 
-def test_wall_power_is_that_of_the_public_measurements(data: Path) -> None:
+def test_wall_power_equals_the_public_measurements(data: Path) -> None:
     file = data / "agx_xavier_mlperf_v11_power.csv"
     rows = [
         row
@@ -40,7 +40,7 @@ def test_wall_power_is_that_of_the_public_measurements(data: Path) -> None:
         assert modelled_w == pytest.approx(measured_w[number], rel=0.1), number
 
 
-def test_each_measured_mode_is_foretold_by_the_others() -> None:
+def test_each_measured_mode_is_predicted_by_the_others() -> None:
     """The model is fitted without a mode and predicts the power of this mode."""
     modes = json.loads(Platform.load(ENGINE).core.to_json())["modes"]
     points = np.array(
@@ -68,7 +68,7 @@ def test_each_measured_mode_is_foretold_by_the_others() -> None:
 
 
 @pytest.mark.parametrize("name", Platform.names())
-def test_shipped_platforms_say_where_their_numbers_are_from(name: str) -> None:
+def test_shipped_platforms_have_sources(name: str) -> None:
     board = json.loads(Platform.load(name).core.to_json())
     if name != "jetson-agx-xavier":
         cycles = board["cpu"]["cycles_per_execution"].values()
@@ -94,7 +94,7 @@ def test_energy_of_a_trip_grows_with_every_parameter(name: str) -> None:
     assert result.runs["energy_listening_j"][0] > result.runs["energy_aoa_estimates_j"][0] > 0.0
 
 
-def test_ours_is_better_in_error_and_energy_in_every_mode() -> None:
+def test_the_proposed_method_has_less_error_and_energy_in_every_mode() -> None:
     found = compare("gate", runs=4, seed=5)
     assert [each.mode for each in found] == list(range(8))
     for each in found:

@@ -20,24 +20,24 @@ def test_budget_of_210_j_leaves_mode_7(points: pl.DataFrame) -> None:
     assert explore(points, Query(max_energy_j=210.0))["mode"].to_list() == [7]
 
 
-def test_answers_come_by_energy(points: pl.DataFrame) -> None:
+def test_results_are_ordered_by_energy(points: pl.DataFrame) -> None:
     found = explore(points, Query())
     assert found.height == 8
     assert found["energy_j"].is_sorted()
 
 
-def test_every_bound_is_kept(points: pl.DataFrame) -> None:
+def test_every_bound_is_met(points: pl.DataFrame) -> None:
     found = explore(
         points, Query(max_energy_j=260.0, max_rms_m=0.15, max_worst_m=0.2, max_aoa_estimates=350)
     )
     assert sorted(found["mode"]) == [2, 3]
 
 
-def test_modes_can_be_chosen(points: pl.DataFrame) -> None:
+def test_modes_can_be_selected(points: pl.DataFrame) -> None:
     assert sorted(explore(points, Query(modes=[1, 4]))["mode"]) == [1, 4]
 
 
-def test_nothing_may_qualify(points: pl.DataFrame) -> None:
+def test_an_empty_result_is_valid(points: pl.DataFrame) -> None:
     assert explore(points, Query(max_energy_j=1.0)).is_empty()
 
 

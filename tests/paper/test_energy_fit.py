@@ -40,7 +40,7 @@ def test_mode_0_meets_the_stated_sums(demands: dict[int, ModeDemand], energies: 
     assert adaptive_j == pytest.approx(stated["adaptive_mode_0"], rel=0.05)
 
 
-def test_budgets_are_kept(demands: dict[int, ModeDemand], energies: Energies) -> None:
+def test_budgets_are_met(demands: dict[int, ModeDemand], energies: Energies) -> None:
     adaptive_j = {m: energies[m]["music"] * d.adaptive_aoa_estimates for m, d in demands.items()}
     assert adaptive_j[7] == pytest.approx(206.5)
     assert [mode for mode, energy in adaptive_j.items() if energy <= 210.0] == [7]
@@ -70,7 +70,7 @@ def savings(demands: dict[int, ModeDemand], energies: Energies) -> dict[int, lis
     }
 
 
-def test_methods_draw_one_power_ratio_in_all_modes(
+def test_power_ratios_of_the_methods_are_equal_in_all_modes(
     demands: dict[int, ModeDemand], energies: Energies
 ) -> None:
     for method in METHODS[1:]:
@@ -102,13 +102,13 @@ def test_each_fit_parameter_has_the_described_effect(demands: dict[int, ModeDema
         assert free[mode][method] == pytest.approx(fit_energy(demands)[mode][method])
 
 
-def test_numbers_that_are_free_are_counted() -> None:
+def test_fit_parameters_are_counted() -> None:
     assert numbers(()) == (1, 1)
     assert numbers() == (10, 4)
     assert numbers(tuple(FREEDOMS)) == (11, 5)
 
 
-def test_the_shipped_platform_holds_what_the_fit_gives() -> None:
+def test_the_shipped_platform_equals_the_fit() -> None:
     shipped = Platform.load("jetson-agx-xavier")
     fitted = study.fit_platform("paper", "jetson-agx-xavier", runs=10, seed=2)
     for held, found in zip(shipped.modes, fitted.modes, strict=True):

@@ -78,7 +78,7 @@ def test_the_effect_of_a_fit_parameter_equals_an_evaluation_with_it(
     )
 
 
-def test_a_subset_of_readings_has_a_headline_of_its_own(evaluations: list[Evaluation]) -> None:
+def test_a_subset_of_interpretations_has_its_own_headline(evaluations: list[Evaluation]) -> None:
     for each in evaluations:
         alone = study([each], SHIPPED)
         assert summary.headline(alone) == NONE

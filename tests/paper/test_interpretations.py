@@ -32,14 +32,14 @@ def driver() -> Driver:
     return Driver(Platform.load("jetson-agx-xavier"), runs=12, seed=3)
 
 
-def test_one_of_them_is_the_shipped_scenario() -> None:
+def test_the_shipped_scenario_is_an_interpretation() -> None:
     shipped, paper = interpretations.load(interpretations.SHIPPED).scenario, Scenario.load("paper")
     named = {"name": "paper", "description": paper.description}
     assert shipped.with_overrides(named) == paper
 
 
 @pytest.mark.parametrize("name", interpretations.names())
-def test_t_max_is_kept_by_every_reading_that_claims_to(name: str, driver: Driver) -> None:
+def test_t_max_is_kept_by_interpretations_with_this_property(name: str, driver: Driver) -> None:
     interpretation = interpretations.load(name)
     for base_ms in BASE_MS:
         place = "trigger.base_ms" if interpretation.is_gated else "base_ms"
@@ -61,7 +61,7 @@ def test_only_gates_wait_for_a_better_ssb() -> None:
     assert len(gated) == 7
 
 
-def test_a_controller_of_no_gain_makes_no_difference(driver: Driver) -> None:
+def test_a_controller_with_zero_gains_has_no_effect(driver: Driver) -> None:
     """Algorithm 1 with gains of zero is the constant t_base, which the report must state."""
     gate = interpretations.load("gate")
     idle = interpretations.Interpretation(
@@ -85,7 +85,7 @@ def test_a_controller_of_no_gain_makes_no_difference(driver: Driver) -> None:
     assert ">helps<" not in page
 
 
-def test_behind_the_gate_algorithm_1_is_idle(driver: Driver) -> None:
+def test_algorithm_1_has_no_effect_behind_the_gate(driver: Driver) -> None:
     found = ablation.ablate(driver, evaluate_with(driver, interpretations.load("gate")))
     assert [each.matters for each in found] == [0, 0, 0, 0]
     for each in found:
@@ -107,7 +107,7 @@ def test_an_unknown_reading_is_named() -> None:
         interpretations.load("gaet")
 
 
-def test_a_reading_that_contradicts_itself_is_named_and_the_others_are_judged(
+def test_a_contradictory_interpretation_is_reported_and_the_others_are_evaluated(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
     file = tmp_path / "hasty.toml"

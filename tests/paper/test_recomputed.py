@@ -341,7 +341,7 @@ def test_claim(name: str, interpretation: Interpretation) -> None:
     ]
     entry, value = CLAIMS[name], FOUND[name](interpretation)
     by = np.atleast_1d(margin(entry, value))
-    # Figures and bounds: the sample.
+    # Figures and bounds use the original sample.
     if entry["rule"] == "modes":
         within = [
             mode
@@ -473,7 +473,7 @@ def test_the_maximum_of_a_run_is_over_every_ssb(interpretation: Interpretation) 
         assert runs[f"max_error_{axis}_m"][0] == pytest.approx(worst_m, rel=1e-5)
 
 
-def test_comparisons_follow_from_the_runs(tables: Tables) -> None:
+def test_comparisons_can_be_computed_from_the_runs(tables: Tables) -> None:
     def rms_m(rows: pl.DataFrame) -> NDArray[np.float64]:
         return np.sqrt(tables.weights @ rows.sort("run")["rms_error_m"].to_numpy() ** 2)
 
@@ -589,7 +589,7 @@ def test_the_page_shows_the_tables(tables: Tables) -> None:
     assert "The source of the paper contains no figures" in tables.page
 
 
-def test_the_halves_of_the_promise_follow_from_the_verdicts(tables: Tables) -> None:
+def test_claim_groups_follow_from_the_verdicts(tables: Tables) -> None:
     for cells, name in zip(
         rows_of(tables.page, "Accuracy half"), tables.manifest["interpretations"], strict=True
     ):
@@ -605,7 +605,7 @@ def test_the_halves_of_the_promise_follow_from_the_verdicts(tables: Tables) -> N
         assert cells[3].endswith(f"{adaptive['longest_gap_s'].max():.2f} s")
 
 
-def test_what_each_freedom_of_the_fit_obtains(tables: Tables) -> None:
+def test_claims_of_each_fit_parameter(tables: Tables) -> None:
     """The shipped row counts the claims as they are listed."""
     gate = [it for it in tables.claims if it["interpretation"] == "gate"]
     counts = [

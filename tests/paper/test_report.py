@@ -58,7 +58,7 @@ def test_holds_readings_claims_settings_and_version(page: str) -> None:
         assert text in page
 
 
-def test_is_small_enough_to_mail(page: str) -> None:
+def test_report_size_is_limited(page: str) -> None:
     assert len(page.encode()) < 2_000_000
 
 
@@ -77,7 +77,7 @@ def test_the_report_states_an_effect_of_the_controller_only_if_it_is_significant
         assert other not in text
 
 
-def test_sentences_are_made_from_what_was_obtained() -> None:
+def test_sentences_depend_on_the_results() -> None:
     study = synthetic.study()
     assert "hold together under none of 2 interpretations" in summary.headline(study)
     met = {claim.id: replace(claim, verdict="reproduced") for claim in study.of("gate")}

@@ -48,7 +48,7 @@ def test_the_second_implementation_is_short_and_independent() -> None:
     assert "access_av" not in text
 
 
-def test_what_the_paper_leaves_open_is_the_same_in_both() -> None:
+def test_unspecified_parameters_are_equal_in_both() -> None:
     paper = json.loads(Scenario.load("paper").to_json())
     [head] = paper["site"]["radio_heads"]
     assert head["eirp_dbm"] == second.POWER_DBM + 10.0
@@ -89,7 +89,7 @@ CASES: dict[str, tuple[str, Callable[[], Scenario], Callable[[second.Trip], seco
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_both_execute_and_err_alike(
+def test_both_have_equal_estimates_and_errors(
     name: str, driver: Driver, trip: second.Trip, angles: dict[str, np.ndarray]
 ) -> None:
     method, scenario, policy = CASES[name]

@@ -52,7 +52,7 @@ def drawn(
     )
 
 
-def test_indices_of_a_function_that_is_known() -> None:
+def test_sobol_indices_of_a_known_function() -> None:
     """3 a + 2 ab + choice on (−1, 1): variances 3, 4/9 and 1, noise 0.25; d has no effect."""
     dimensions = (
         *(Dimension(name, name) for name in "ab"),
@@ -89,7 +89,7 @@ def test_indices_of_a_function_that_is_known() -> None:
     assert covered >= 45, covered
 
 
-def test_a_search_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_search_continues(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     judged = []
     judge = sampled_interpretations.judge
 

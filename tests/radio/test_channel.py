@@ -110,7 +110,9 @@ def test_a_traced_line_of_sight_is_that_of_the_geometry(tmp_path: Path) -> None:
         assert np.sqrt(np.mean(apart**2)) < 0.03, fidelity
 
 
-def test_the_hall_comes_with_its_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_shipped_hall_contains_its_paths(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shipped = HALL / "paths.npz"
     assert shipped.stat().st_size < 50_000
     script = runpy.run_path(str(HALL / "trace.py"))
@@ -137,7 +139,7 @@ def test_the_bound_has_the_paths_k(tmp_path: Path) -> None:
     assert bound(hall, map_step_m=4.0).site.filter(pl.col("y_m") > 20.0)["bound_m"].is_null().all()
 
 
-def test_arrays_may_lie_by_columns(tmp_path: Path) -> None:
+def test_arrays_in_column_major_order(tmp_path: Path) -> None:
     with np.load(HALL / "paths.npz") as held:
         arrays = {name: held[name] for name in held.files}
     by_columns = {name: np.asfortranarray(array) for name, array in arrays.items()}
@@ -230,7 +232,7 @@ def test_a_scenario_refuses_paths_of_another_site(
         assert message in done.err
 
 
-def test_the_street_can_be_driven(tmp_path: Path, data: Path) -> None:
+def test_the_street_can_be_simulated(tmp_path: Path, data: Path) -> None:
     street = data / "street"
     if not street.is_dir():
         pytest.skip("no ray-traced street among the reference data")

@@ -42,7 +42,7 @@ def walled() -> Scenario:
     return trip(**{"site.walls": [WALL]})
 
 
-def test_no_angle_is_taken_through_a_wall(walled: Scenario) -> None:
+def test_no_angle_is_estimated_through_a_wall(walled: Scenario) -> None:
     found = simulate(walled, runs=1, seed=3, keep_trajectories=True)
     assert found.aoa_estimates is not None
     assert found.trajectories is not None
@@ -97,7 +97,7 @@ def test_glass_weakens_and_does_not_hide() -> None:
     assert weaker_db[0, 0] == pytest.approx(2.624, abs=1e-3)
 
 
-def test_walls_that_cannot_be_are_named() -> None:
+def test_invalid_walls_are_rejected() -> None:
     site = json.loads(trip().site.to_json())
 
     def said(*walls: dict[str, Any]) -> list[str]:

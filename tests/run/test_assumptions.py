@@ -47,12 +47,12 @@ def test_shipped_plants_are_monitored_and_without_exact_values(name: str) -> Non
         ({"vehicle.platform.name": "jetson-agx-xavier"}, "vehicle.platform"),
     ],
 )
-def test_each_is_named_with_its_key(changes: dict[str, object], named: str) -> None:
+def test_each_value_is_reported_with_its_key(changes: dict[str, object], named: str) -> None:
     [found] = optimistic_assumptions(Scenario.load("yard").with_overrides(changes))
     assert f"({named}" in found
 
 
-def test_the_paper_and_dead_reckoning_by_many_heads_are_named(
+def test_dead_reckoning_with_several_radio_heads_causes_a_warning(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
     done = access_av("run", "paper", "--set", "motion.start_at_m=290", "--out", tmp_path)

@@ -59,7 +59,7 @@ def test_four_times_the_angles_halve_the_error_bound() -> None:
     assert abs(once / fourfold - 2.0) < 1e-3
 
 
-def test_one_head_alone_leaves_a_direction_open() -> None:
+def test_one_radio_head_leaves_a_direction_undetermined() -> None:
     alone = bound("paper", map_step_m=50.0)
     assert alone.site["bound_m"].null_count() == alone.site.height
     assert "does not determine a position" in render_bound(alone)

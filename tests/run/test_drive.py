@@ -51,7 +51,7 @@ def test_a_monitored_tracker_reports_protection_levels(guarded: Simulation) -> N
     assert integrity.exceedances < 0.05 * integrity.epochs
 
 
-def test_dead_reckoning_states_none() -> None:
+def test_dead_reckoning_has_no_protection_level() -> None:
     result = simulate("paper", runs=1, keep_trajectories=True)
     assert result.trajectories is not None
     for name in ("protection_level_m", "integrity", "covariance_xx_m2", "covariance_xy_m2"):
@@ -78,7 +78,7 @@ def test_page_has_every_chart_and_loads_nothing(guarded: Simulation) -> None:
     assert epochs == guarded.trajectories.height
 
 
-def test_integrity_is_there_without_trajectories(guarded: Simulation) -> None:
+def test_integrity_statistics_without_trajectories(guarded: Simulation) -> None:
     again = simulate(GUARDED, runs=2, seed=4)
     assert again.trajectories is None
     assert again.integrity is not None
@@ -144,7 +144,7 @@ def test_a_simulation_has_a_one_line_representation_and_a_hash() -> None:
     assert result.scenario == Scenario.load("paper")
 
 
-def test_what_is_not_relied_on_has_a_reason_each() -> None:
+def test_every_unavailable_time_has_one_reason() -> None:
     rng = np.random.default_rng(7)
     steps = pl.DataFrame(
         {
@@ -183,7 +183,7 @@ def test_an_unknown_start_reports_the_time_until_the_first_pose(
     assert "NaN" not in (tmp_path / "report.html").read_text().split("const charts = ")[1][:200_000]
 
 
-def test_a_vehicle_that_cannot_be_found_has_no_error() -> None:
+def test_a_vehicle_without_position_has_no_error() -> None:
     # No SSB is received.
     silent = {f"site.radio_heads[{index}].eirp_dbm": -140.0 for index in (0, 1)}
     scenario = Scenario.load("paper-real-odometry-2").with_overrides(

@@ -113,7 +113,7 @@ def test_designs_take_plug_ins(access_av: Callable[..., Finished], folder: Path)
         ("broken.py:Mine", "broken.py fails with ZeroDivisionError"),
     ],
 )
-def test_what_is_no_plug_in_is_named(
+def test_an_invalid_plug_in_is_rejected(
     text: str, said: str, access_av: Callable[..., Finished], folder: Path
 ) -> None:
     (folder / "broken.py").write_text("1 / 0\n")

@@ -58,7 +58,7 @@ MAKERS: dict[str, Callable[[], Any]] = {
 
 
 @pytest.mark.parametrize("name", MAKERS)
-def test_a_result_is_saved_and_loaded_unchanged(name: str, tmp_path: Path) -> None:
+def test_a_saved_and_loaded_result_is_unchanged(name: str, tmp_path: Path) -> None:
     found, again = MAKERS[name](), MAKERS[name]()
     assert found == again
     assert hash(found) == hash(again)
@@ -91,7 +91,7 @@ def test_any_difference_in_content_is_a_difference() -> None:
     assert found == other, "another version that obtains the same is no difference"
 
 
-def test_files_of_another_kind_are_named(tmp_path: Path) -> None:
+def test_files_of_another_kind_are_rejected(tmp_path: Path) -> None:
     text = tmp_path / "text.zip"
     text.write_text("no archive")
     with pytest.raises(InputError, match=r"text\.zip: not a result"):
@@ -114,7 +114,7 @@ def test_files_of_another_kind_are_named(tmp_path: Path) -> None:
         replace(simulated(), seed=bartlett).save(tmp_path / "x.zip")  # type: ignore[arg-type]
 
 
-def test_a_sweep_is_what_its_simulations_are() -> None:
+def test_a_sweep_equals_its_simulations() -> None:
     vary: dict[str, list[Any]] = {
         "estimator": [None, bartlett],
         "policy": [None, EveryFifth],
@@ -162,7 +162,7 @@ def test_paired_comparisons_need_pairs() -> None:
         access_av.difference(one, found)
 
 
-def test_nothing_to_vary_is_named() -> None:
+def test_an_empty_space_is_rejected() -> None:
     for vary in ({}, {"site.rician_k_db": []}):
         with pytest.raises(InputError, match="at least one key"):
             access_av.sweep(SHORT, vary, runs=1)

@@ -41,5 +41,5 @@ def test_a_difference_between_truth_and_model_changes_the_results(name: str) -> 
     assert anees(name, 4, EXACT) > 5.0
 
 
-def test_a_noisy_odometer_shows() -> None:
+def test_a_noisy_odometer_is_visible_in_the_consistency() -> None:
     assert 1.3 < anees("yard-odometer-noisy", 12, EXACT) < anees("yard-heads-off", 4, EXACT)

@@ -118,7 +118,7 @@ def test_constant_snapshots_are_as_good_as_random_ones(method: Callable[..., Any
     assert rmse / bound < 1.14
 
 
-def test_esprit_does_not_write_over_its_own_views() -> None:
+def test_esprit_by_least_and_total_least_squares() -> None:
     angles = np.radians([100, 65])  # -10 and 25 degrees from broadside
     steering = np.exp(1j * np.pi * np.cos(angles) * np.arange(8)[:, None])
     waveforms = np.exp(2j * np.pi * np.outer([1, 3], np.arange(16)) / 16)
@@ -139,7 +139,7 @@ def test_covariance_keeps_the_mean() -> None:
     assert aoa.forward_backward(expected[1]) == pytest.approx(average[1])
 
 
-def test_coherent_sources_need_forward_backward() -> None:
+def test_coherent_sources_require_forward_backward_averaging() -> None:
     truth = np.radians([60, 105])
     steering = np.exp(1j * np.pi * np.cos(truth) * np.arange(4)[:, None])
     coherent = np.outer(steering @ [1, 0.8 * np.exp(1j)], np.ones(10))
@@ -168,7 +168,7 @@ def test_calibration_from_a_reference_burst(method: Callable[..., Any]) -> None:
     assert method(measured, calibration=found).angle_rad == pytest.approx(angles, abs=2e-3)
 
 
-def test_spacing_is_honoured() -> None:
+def test_element_spacing_is_used() -> None:
     steering = np.exp(2j * np.pi * 0.458 * np.cos(0.9) * np.arange(4))
     snapshots = np.outer(steering, np.ones(5))
     for method in METHODS:
@@ -338,7 +338,7 @@ def test_spectra_peak_at_the_sources() -> None:
         aoa.spectrum(samples, [-1.0])
 
 
-def test_limits_are_named() -> None:
+def test_values_outside_the_limits_are_rejected() -> None:
     samples = np.ones((4, 4), complex)
     for call, message in (
         (lambda: aoa.music(samples, spacing_wavelengths=1e-300), "0.01 to 100"),
@@ -415,7 +415,7 @@ def test_bad_places(places: Any, options: dict[str, Any], message: str) -> None:
         aoa.direction(np.ones((5, 4), complex), places, **options)
 
 
-def test_what_is_no_plane_wave_is_named() -> None:
+def test_a_misfit_of_the_plane_wave_is_reported() -> None:
     rng = np.random.default_rng(21)
     count = 400
     noise = rng.normal(size=(count, 4, 20, 2)) @ [1, 1j] / np.sqrt(2)

@@ -88,6 +88,6 @@ def test_the_drive_is_located(circle: Path) -> None:
         ),
     ],
 )
-def test_what_makes_no_array_is_refused(changes: dict[str, object], said: str) -> None:
+def test_invalid_arrays_are_rejected(changes: dict[str, object], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         Scenario.load("paper-real-odometry-2").with_overrides(CIRCLE | changes)

@@ -105,7 +105,7 @@ def test_a_manifold_without_places_is_fitted_too() -> None:
         ({"snapshots": np.zeros((8, 9))}, "power"),
     ],
 )
-def test_impossible_input_of_a_fit_is_named(arguments: dict[str, object], said: str) -> None:
+def test_invalid_input_of_a_fit_is_rejected(arguments: dict[str, object], said: str) -> None:
     given = {"snapshots": np.ones((8, 9)), "azimuths_rad": np.arange(9.0)} | arguments
     with pytest.raises(ValueError, match=said):
         aoa.fit_manifold(**given)  # type: ignore[arg-type]
@@ -175,7 +175,7 @@ def real_phases(file: Path) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
 # 90 % of the errors on the opposite half are below 13 degrees: two of its 24 pairs of position and
 # beacon have strong reflections. Their errors are 5 to 12 degrees even in a fit of all positions.
 @pytest.mark.parametrize(("first", "percentile_deg"), [(0, 6.0), (1, 13.5)])
-def test_a_manifold_of_half_of_the_positions_is_good_at_the_others(
+def test_a_manifold_fitted_to_half_of_the_positions_is_accurate_at_the_others(
     data: Path, first: int, percentile_deg: float
 ) -> None:
     received, azimuths, positions = [], [], []

@@ -72,7 +72,7 @@ def test_amplitudes_and_powers_agree_with_the_measurements(cells: list[nr.Cell])
     assert "range_rate_m_s" in repr(it)
 
 
-def test_cells_of_a_search_have_none() -> None:
+def test_cells_of_a_search_have_no_annotations() -> None:
     burst = nr.build_burst(42, ssb_indices=[1], sfn=0, ssb_freq_hz=SSB_HZ)
     [cell] = nr.search(burst, RATE_HZ, centre_frequency_hz=SSB_HZ, ssb_freq_hz=SSB_HZ)
     assert cell.observables is None

@@ -55,7 +55,7 @@ def write(path: Path, azimuths_deg: list[float], **changes: Any) -> Path:
     return path
 
 
-def test_calibrates_and_turns_the_right_way(tmp_path: Path) -> None:
+def test_calibration_and_sign_of_the_angle(tmp_path: Path) -> None:
     azimuths_deg = [-50.0, -10.0, 0.0, 35.0, 60.0]
     bursts = estimate_bursts(write(tmp_path / "array", azimuths_deg))
     assert [burst.sample_start for burst in bursts] == [BURST * (2 * k + 1) for k in range(5)]

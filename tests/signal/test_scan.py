@@ -69,7 +69,7 @@ def values(cells: list[nr.Cell]) -> list[dict[str, object]]:
     return [nr.record(cell) for cell in cells]
 
 
-def test_a_kept_searcher_finds_what_a_new_search_does() -> None:
+def test_a_reused_searcher_equals_a_new_search() -> None:
     kept = searcher()
     for sfn in (5, 6):
         samples = array_burst(ssb_indices=[0, 3], sfn=sfn)
@@ -147,7 +147,7 @@ def test_a_channel_estimate_carries_its_covariance() -> None:
             aoa.whiten(cell.channel, wrong)
 
 
-def test_channels_come_with_the_cells_searched_and_tracked_alike() -> None:
+def test_searched_and_tracked_cells_contain_the_channel() -> None:
     samples = array_burst()
     [found] = nr.search(samples, RATE_HZ, centre_frequency_hz=SSB_HZ, ssb_freq_hz=SSB_HZ)
     antennas = samples.shape[0]
@@ -197,14 +197,14 @@ def test_search_rejects_invalid_input_with_a_reason() -> None:
         nr.search(samples, RATE_HZ, centre_frequency_hz=SSB_HZ, ssb_freq_hz=SSB_HZ)
 
 
-def test_bursts_refuse_what_no_cell_sends() -> None:
+def test_bursts_reject_invalid_cell_settings() -> None:
     for wrong in ({"pci": 1008}, {"ssb_indices": [8]}, {"case": "F"}, {"lmax": 5}, {"gains": [1]},
                   {"mib_bits": "01"}, {"sfn": 1024}, {"sample_rate_hz": 5e6}):  # fmt: skip
         with pytest.raises(ValueError, match=r".+"):
             nr.build_burst(**{"pci": 1, "ssb_indices": [0, 1], **wrong})  # type: ignore[arg-type]
 
 
-def test_noise_holds_no_cell(access_av: Cli, tmp_path: Path) -> None:
+def test_noise_contains_no_cell(access_av: Cli, tmp_path: Path) -> None:
     file = tmp_path / "noise.cf32"
     noise = np.random.default_rng(1).normal(size=(40_000, 2)) @ [1, 1j]
     noise.astype(np.complex64).tofile(file)

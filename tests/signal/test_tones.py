@@ -74,7 +74,7 @@ def test_the_index_of_an_ssb_without_its_pbch_is_a_guess() -> None:
     assert "(guess)" in repr(cell)
 
 
-def test_angles_of_phases_alone_are_as_uncertain_as_they_are() -> None:
+def test_standard_deviations_of_phase_only_angles_are_correct() -> None:
     rng = np.random.default_rng(6)
     angles = rng.uniform(0.6, 2.5, 4000)
     steering = np.exp(1j * np.pi * np.cos(angles)[:, None] * np.arange(4))[:, :, None]

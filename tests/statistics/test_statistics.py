@@ -81,7 +81,7 @@ def test_proportions() -> None:
             clopper_pearson(successes, trials)
 
 
-def test_clopper_pearson_covers_what_it_says() -> None:
+def test_clopper_pearson_has_its_coverage() -> None:
     successes = np.random.default_rng(1).binomial(50, 0.1, size=2000)
     ends = {count: clopper_pearson(count, 50) for count in np.unique(successes).tolist()}
     covered = np.mean([ends[count][0] <= 0.1 <= ends[count][1] for count in successes.tolist()])
@@ -237,7 +237,7 @@ def guarded(*steps: tuple[float, float | None, str | None], run: int = 0) -> pl.
     )
 
 
-def test_integrity_is_counted_by_hand() -> None:
+def test_integrity_statistics_equal_a_manual_count() -> None:
     table = guarded(
         (0.5, 1.0, "ok"),
         (0.2, 0.1, "ok"),
@@ -260,7 +260,7 @@ def test_integrity_is_counted_by_hand() -> None:
     assert Integrity.of(table.tail(1)) is None
 
 
-def test_exceedances_are_known_by_runs_not_by_epochs() -> None:
+def test_exceedance_intervals_use_runs_instead_of_epochs() -> None:
     good = [guarded(*[(0.1, 1.0, "ok")] * 50, run=run) for run in range(19)]
     bad = guarded(*[(2.0, 1.0, "ok")] * 50, run=19)
     found = Integrity.of(pl.concat([*good, bad]))
@@ -335,7 +335,7 @@ def test_peaks_over_a_threshold_are_counted_where_they_can_be() -> None:
     assert exceedance([], 0.5) == 0.0
 
 
-def test_obtained_risk_is_that_of_a_gaussian() -> None:
+def test_estimated_risk_equals_that_of_a_gaussian() -> None:
     rng = np.random.default_rng(5)
     runs, blocks = 60, 40
     # Two epochs in a block, the second with the error of the first: one independent error each.
@@ -382,7 +382,7 @@ def test_percentiles_are_those_of_all_and_their_intervals_of_whole_runs() -> Non
         assert outside < 0.025 * 200
 
 
-def test_intervals_of_percentiles_hold_what_they_are_of() -> None:
+def test_percentile_intervals_have_their_coverage() -> None:
     """With forty runs; the interval of the 99th percentile is too short if the runs differ."""
     rng = np.random.default_rng(11)
     many = np.abs(rng.standard_normal((4000, 60))) * rng.lognormal(0.0, 0.5, (4000, 1))
@@ -399,7 +399,7 @@ def test_intervals_of_percentiles_hold_what_they_are_of() -> None:
     assert min(held.values()) >= 142.5 - 4.0 * 2.7
 
 
-def test_what_was_seen_too_seldom_has_no_high_end() -> None:
+def test_rare_events_have_an_infinite_upper_end() -> None:
     errors = np.abs(np.random.default_rng(2).standard_normal((20, 100)))
     few, enough = (percentiles(errors, [99.0], independent=it)[0] for it in (300, 2000))
     # 367 errors within a limit show with 97.5 % confidence that 99 % are: 0.99**367 < 0.025.

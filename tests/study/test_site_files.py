@@ -63,7 +63,7 @@ def reference(bends: Site) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize("file", ["degrees.geojson", "metres.geojson", "plain.csv", "german.csv"])
-def test_a_road_is_the_same_after_it_was_written_and_read(
+def test_an_exported_and_imported_road_is_equal(
     access_av: Callable[..., Any],
     tmp_path: Path,
     bends: Site,
@@ -171,7 +171,7 @@ def test_a_drawing_gives_the_same_road(
         (4, ("--metres-per-unit", "1", "--road-layer", "WAY"), "another unit"),
     ],
 )
-def test_a_drawing_whose_scale_or_layer_is_not_sure_is_refused(
+def test_a_drawing_with_uncertain_scale_or_layer_is_rejected(
     access_av: Callable[..., Any],
     tmp_path: Path,
     units: int,
@@ -211,7 +211,7 @@ def head_at(*place: float) -> dict[str, Any]:
         ("x_m,y_m\n0,0\n0.1,0\n", None, "another unit"),
     ],
 )
-def test_files_that_are_no_plant_are_named(
+def test_files_other_than_plants_are_rejected(
     access_av: Callable[..., Any],
     tmp_path: Path,
     road: dict[str, Any] | str,
@@ -233,7 +233,7 @@ def test_files_that_are_no_plant_are_named(
     assert str(tmp_path) in done.err
 
 
-def test_names_with_markup_stay_names(access_av: Callable[..., Any], tmp_path: Path) -> None:
+def test_markup_in_names_is_not_interpreted(access_av: Callable[..., Any], tmp_path: Path) -> None:
     name = 'a "mast" <script>alert(1)</script> [red]'
     heads = tmp_path / "heads.geojson"
     heads.write_text(geojson.text(Drawn(heads=[Head(name, 60.0, 25.0, 8.0, 5)]), None), "utf-8")
@@ -258,13 +258,13 @@ def test_new_files_are_not_written_over_others(
     assert "folder" in access_av("file", "new", "plant", tmp_path).err
 
 
-def test_a_scale_is_that_of_two_points() -> None:
+def test_two_points_determine_the_scale() -> None:
     assert dxf.metres_per_unit((0.0, 0.0, 3.0, 4.0), 10.0) == pytest.approx(2.0)
     with pytest.raises(InputError, match="two different points"):
         dxf.metres_per_unit((1.0, 1.0, 1.0, 1.0), 10.0)
 
 
-def test_heads_far_from_a_road_are_named() -> None:
+def test_radio_heads_far_from_the_road_are_rejected() -> None:
     drawn = Drawn(road_m=[(0.0, 0.0), (100.0, 0.0)], heads=[Head("far", 0.0, 9000.0, 8.0)])
     with pytest.raises(InputError, match="9 km from the road"):
         checked(drawn, "road.csv", "heads.csv", "walls.dxf")
@@ -274,7 +274,7 @@ def test_heads_far_from_a_road_are_named() -> None:
 
 
 @pytest.mark.parametrize("origin", [(), ("--origin", "48.1,11.5")], ids=["metres", "degrees"])
-def test_walls_are_the_same_after_they_were_written_and_read(
+def test_exported_and_imported_walls_are_equal(
     access_av: Callable[..., Any], tmp_path: Path, bends: Site, origin: tuple[str, ...]
 ) -> None:
     corners = [[float(x_m), 12.0] for x_m in range(90, 240)]  # more than a table may have
@@ -334,7 +334,7 @@ def picture(width: int, height: int) -> bytes:
 JPEG = bytes.fromhex("ffd8ffe000104a46494600010100000100010000ffffc0000b0800c8012c01011100")
 
 
-def test_a_picture_lies_under_a_site_where_two_points_and_a_length_say(
+def test_a_background_image_is_placed_by_two_points_and_a_length(
     access_av: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "drawings").mkdir()
@@ -396,7 +396,7 @@ def test_a_picture_lies_under_a_site_where_two_points_and_a_length_say(
         ),
     ],
 )
-def test_pictures_that_cannot_be_used_are_named(
+def test_unusable_pictures_are_rejected(
     access_av: Callable[..., Any],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

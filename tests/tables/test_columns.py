@@ -77,7 +77,7 @@ def test_units_in_names_are_the_units() -> None:
             assert column.unit in ("1", "text", "true or false", "any"), column.name
 
 
-def test_the_page_is_made_from_the_table() -> None:
+def test_the_page_is_generated_from_the_table() -> None:
     page = (ROOT / "docs/columns.md").read_text(encoding="utf-8")
     assert page == columns.markdown(), "make docs"
 

@@ -58,7 +58,7 @@ def test_another_output_directory_is_used_without_a_latest_link(
     assert [path.name for path in tmp_path.iterdir()] == ["else"]
 
 
-def test_a_named_directory_under_results_is_the_latest_too(
+def test_latest_also_points_to_a_named_directory_under_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -74,7 +74,7 @@ def test_an_existing_file_that_blocks_the_output_is_named(tmp_path: Path) -> Non
         ResultsDirectory.create("run", tmp_path / "file")
 
 
-def test_a_pipe_or_a_link_is_written_to_and_not_replaced(tmp_path: Path) -> None:
+def test_output_to_a_pipe_or_link_does_not_replace_it(tmp_path: Path) -> None:
     pipe, link, file = tmp_path / "pipe", tmp_path / "link", tmp_path / "file"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)

@@ -38,7 +38,7 @@ def poses(command: list[str | Path], drive: Path, folder: Path, sources: str) ->
     return tum.read_bytes()
 
 
-def test_poses_are_the_same_on_another_processor(tmp_path: Path) -> None:
+def test_poses_are_equal_on_another_processor(tmp_path: Path) -> None:
     emulated = [str(EMULATOR), "-L", LIBRARIES, EMULATED_NODE]
     log_angles("yard", tmp_path / "log", duration_s=60.0)
     angles = f'angles.file = "{tmp_path}/log/angles.csv"\n'

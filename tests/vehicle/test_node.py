@@ -104,7 +104,7 @@ def played(folder: Path, messages: list[dict[str, Any]], more: str) -> None:
 
 
 @pytest.mark.parametrize("rotation", ["rotate_s = 30.0", "rotate_mb = 0.1"])
-def test_each_file_of_a_day_is_whole_and_together_they_hold_all(
+def test_the_files_of_a_day_are_complete_and_contain_all_messages(
     tmp_path: Path, rotation: str
 ) -> None:
     start = {"type": "set-pose", "x_m": -100.0, "y_m": 0.0, "heading_rad": 0.0}
@@ -173,7 +173,7 @@ def test_angles_recorded_by_a_node_are_played_back(tmp_path: Path) -> None:
     assert np.abs(first - again).max() < 1e-6
 
 
-def test_a_recording_in_real_time_is_not_read_where_nothing_is_wanted(tmp_path: Path) -> None:
+def test_a_real_time_recording_is_read_only_for_requested_bursts(tmp_path: Path) -> None:
     drive = tmp_path / "drive"
     access_av.synthesize("yard", drive, duration_s=9.0)
     wake_up_every(drive, 3.0)
@@ -300,14 +300,14 @@ def test_every_radio_head_is_received_through_sockets(live: Live) -> None:
     assert error_m < last["protection_level_m"], last
 
 
-def test_sources_that_fall_silent_are_named(live: Live) -> None:
+def test_silent_sources_are_reported(live: Live) -> None:
     events = [it for it in live.records if it["type"] == "event"]
     silent = {it["source"] for it in events if it["text"].startswith("nothing has come for")}
     assert silent == {"samples", "messages"}
     assert events[-1]["text"].endswith("ends")
 
 
-def test_mcap_is_whole_and_read_by_others(live: Live) -> None:
+def test_mcap_is_complete_and_readable_by_other_tools(live: Live) -> None:
     (file,) = (live.folder / "mcap").iterdir()
     with file.open("rb") as stream:
         summary = make_reader(stream).get_summary()
@@ -439,7 +439,7 @@ def driven_by_udp(drive: Path, folder: Path, page: int, broker: Broker) -> Itera
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
-def test_two_tabs_come_back_after_a_restart(drive: Path, tmp_path: Path) -> None:
+def test_two_tabs_reconnect_after_a_restart(drive: Path, tmp_path: Path) -> None:
     page, broker = free_port(), Broker()
     live = "document.getElementById('link')?.textContent === 'live'"
     lost = "document.getElementById('link')?.className === 'lost'"
@@ -496,7 +496,7 @@ def test_the_position_is_one_of_vda_5050_2_1(drive: Path, tmp_path: Path) -> Non
         ('adress = "x"', "did you mean `address`"),
     ],
 )
-def test_settings_that_cannot_be_meant_are_refused(
+def test_implausible_settings_are_rejected(
     drive: Path, tmp_path: Path, change: str, said: str
 ) -> None:
     stream = {"rate_msps": "3.84", "centre_mhz": "3500.0", "antennas": "[0, 1, 2, 3]"}

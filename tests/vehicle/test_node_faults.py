@@ -184,7 +184,7 @@ def test_every_mcap_reader_reads_the_file_of_a_killed_node(
         assert reader.message_count == len(messages) > 200
 
 
-def test_a_pipeline_that_gives_no_record_is_not_localized(tmp_path: Path) -> None:
+def test_a_pipeline_without_records_is_not_localized(tmp_path: Path) -> None:
     """The time without a record is a gap in a recording that is played in real time."""
     broker = Broker()
     known = {"integrity.enabled": False, "start.pose": {"x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0}}

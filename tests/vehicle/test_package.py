@@ -42,7 +42,7 @@ def root(package: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_files_have_their_places_modes_and_owner(package: Path) -> None:
+def test_files_have_paths_modes_and_owner(package: Path) -> None:
     listing = subprocess.run(
         ["dpkg-deb", "--contents", str(package)],
         capture_output=True,
