@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TypeVar
 
 from access_av.cli.options import announce
-from access_av.cli.terminal import console, progress, table
+from access_av.cli.terminal import progress, show
+from access_av.report.shown import compared
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -110,17 +111,5 @@ def show_compared(found: Sequence[Compared]) -> None:
     """Prints the comparison of variants, if any."""
     if not found:
         return
-    percents, driven = found[0].percents, found[0].driven
-    head = ["variant", *(f"p{it:g} / m" for it in percents), "reliability"]
-    head += ["energy / J", "difference"]
-    made = table(head, text=1, title=f"Comparison, {driven.runs} {driven.rows} each")
-    for it in found:
-        energy_j = it.driven.energy_j
-        made.add_row(
-            it.driven.name,
-            *(f"{it.driven.percentile(percent).value:.3f}" for percent in percents),
-            it.reliability(),
-            "–" if energy_j is None else f"{energy_j:.2f}",
-            it.in_words(),
-        )
-    console.print(made)
+    driven = found[0].driven
+    show(compared(found), title=f"Comparison, {driven.runs} {driven.rows} each")

@@ -22,6 +22,7 @@ from rich.progress import (
 from rich.table import Table as RichTable
 
 from access_av._core import brief
+from access_av.report import shown
 from access_av.signal.methods import label
 from access_av.signal.recorded_angles import mean_absolute_error_deg
 from access_av.tables.numbers import unsigned_zero, value_text
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from access_av.drives.angle_log import AngleLog
     from access_av.radio.placement import Plan
     from access_av.radio.upgrades import NextLevel
+    from access_av.report.shown import Shown
     from access_av.run.service_levels import Verdict
     from access_av.run.simulation import Simulation
     from access_av.signal.recorded_angles import BurstAngle
@@ -124,6 +126,16 @@ def table(head: Sequence[str], *, title: str = "", text: int = 1) -> RichTable:
     for index, name in enumerate(head):
         made.add_column(name, justify="left" if index < text else "right", overflow="fold")
     return made
+
+
+def show(content: Shown, *, title: str = "") -> None:
+    """Prints a table that a report shows, too."""
+    made = table(content.head, title=title)
+    for index, column in enumerate(made.columns):
+        column.justify = "left" if index in content.texts else "right"
+    for row in content.rows:
+        made.add_row(*(cell if isinstance(cell, str) else cell.text for cell in row))
+    console.print(made)
 
 
 def width(made: RichTable) -> int:
@@ -225,24 +237,6 @@ def show_simulation(result: Simulation, title: str, energy_boundary: str | None)
         console.print(f"3GPP positioning service: {reached_in_words(levels)} reached (see report).")
 
 
-def show_service_levels(verdicts: Sequence[Verdict], title: str = "") -> None:
-    """Prints the 3GPP service levels and whether they are reached."""
-    head = ["3GPP level", "accuracy m", "required", "within", "at least (95 %)", "result"]
-    if is_narrow():
-        head = ["level", "m", "required", "within", "at least", "result"]
-    made = table(head, title=title)
-    for verdict in verdicts:
-        made.add_row(
-            verdict.level.name,
-            f"{verdict.level.accuracy_m:g}",
-            f"{verdict.level.availability:.1%}",
-            f"{verdict.share:.2%}",
-            f"{verdict.least_share:.2%}",
-            verdict.result.value,
-        )
-    console.print(made)
-
-
 def show_plan(found: Plan) -> None:
     """Prints the selected masts, and the next best ones."""
     console.print(
@@ -253,16 +247,13 @@ def show_plan(found: Plan) -> None:
     for row in found.ranking.head(10).iter_rows(named=True):
         made.add_row(row["name"], f"{row['p90_bound_m']:.3f}")
     console.print(made)
-    show_service_levels(found.verdicts, title=f"with {', '.join(found.chosen)}")
+    show(shown.service_levels(found.verdicts), title=f"with {', '.join(found.chosen)}")
 
 
 def show_next_level(found: NextLevel) -> None:
     """Prints where the site fails the next service level, and the effect of changes."""
     console.print(found.in_words())
-    made = table([f"change (baseline {found.share:.2%})", "within", "reached"])
-    for change in found.changes:
-        made.add_row(change.what, f"{change.share:.2%}", "yes" if change.reaches else "no")
-    console.print(made)
+    show(shown.next_level(found))
 
 
 def show_bound(summary: dict[str, Any], verdicts: Sequence[Verdict]) -> None:
@@ -272,20 +263,8 @@ def show_bound(summary: dict[str, Any], verdicts: Sequence[Verdict]) -> None:
         made.add_row(name, f"{summary[key]:.3f}")
     made.add_row("worst position", f"{summary['max_m']:.3f}")
     console.print(made)
-    made = table(["radio head", "PCI", "SSB", "distance m", "SNR dB", "visible"])
-    for head in summary["heads"]:
-        made.add_row(
-            head["name"],
-            str(head["pci"]),
-            str(head["ssb_index"]),
-            f"{head['nearest_m']:.0f}–{head['farthest_m']:.0f}",
-            "–"
-            if head["least_expected_snr_db"] is None
-            else f"{head['least_expected_snr_db']:.0f} to {head['most_expected_snr_db']:.0f}",
-            f"{head['visible_share']:.1%}",
-        )
-    console.print(made)
-    show_service_levels(verdicts)
+    show(shown.radio_heads(summary["heads"]))
+    show(shown.service_levels(verdicts))
 
 
 def show_columns(columns: Table) -> None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import TYPE_CHECKING
 
-from access_av.report.parts import section, table
-from access_av.tables.numbers import number
+from access_av.report.parts import section, shown
+from access_av.report.shown import compared
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,25 +20,11 @@ def compared_section(found: Sequence[Compared], combined: str = "") -> str:
     """
     if not found:
         return ""
-    percents = found[0].percents
-    rows = [
-        (
-            escape(it.driven.name),
-            *(f"{it.driven.percentile(percent).value:.3f} m" for percent in percents),
-            escape(it.in_words()),
-            escape(it.reliability()),
-            "–" if it.driven.energy_j is None else f"{number(it.driven.energy_j, 2)} J",
-        )
-        for it in found
-    ]
-    head = (
-        "Variant", *(f"Percentile {percent:g}" for percent in percents),
-        f"Percentile {percents[-1]:g}, difference to the first", "Reliability", "Energy of a trip",
-    )  # fmt: skip
     return section(
         "Comparison of variants",
         (f"{combined}. " if combined else "")
-        + f"Horizontal error, {found[0].driven.runs} {found[0].driven.rows} each, in equal "
-        "environments. Differences are paired, with 95 % intervals.",
-        table(head, rows, numbers=range(1, len(percents) + 1)),
+        + f"Percentiles of the horizontal error, {found[0].driven.runs} {found[0].driven.rows} "
+        "each, in equal environments. Differences to the first variant are paired, with 95 % "
+        "intervals.",
+        shown(compared(found)),
     )

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from access_av.errors import InputError
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, section, service_levels, source, table, tile, warnings
+from access_av.report.parts import figure, section, shown, source, table, tile, warnings
 from access_av.report.played import CAPTION as PLAYED
+from access_av.report.shown import service_levels
 from access_av.run.assumptions import energy_boundary, in_words, optimistic_assumptions
 from access_av.settings import as_dict
 from access_av.tables.numbers import value_text
@@ -87,7 +88,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, appendix: st
                 "Horizontal accuracy and availability of TS 22.261, 7.3.2.2, and the industrial "
                 "target of TR 38.857, over all runs. A level is reached if the lower end of the "
                 "95 % interval reaches it.",
-                service_levels(levels),
+                shown(service_levels(levels)),
             )
         )
     sections.append(appendix)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
+from access_av.report.shown import Badge
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from access_av.run.service_levels import Verdict
+    from access_av.report.shown import Shown
 
 
 def badge(text: str, kind: str) -> str:
@@ -59,21 +61,14 @@ def table(
     )
 
 
-def service_levels(verdicts: Iterable[Verdict]) -> str:
-    """Returns the table of 3GPP's positioning service levels with their results."""
+def shown(content: Shown) -> str:
+    """Returns a table that the terminal shows, too."""
     rows = [
-        (
-            escape(verdict.level.name),
-            f"{verdict.level.accuracy_m:g} m",
-            f"{verdict.level.availability:.1%}",
-            f"{verdict.share:.2%}",
-            f"{verdict.least_share:.2%}",
-            badge(verdict.result.value, verdict.result.badge),
-        )
-        for verdict in verdicts
+        [badge(*cell) if isinstance(cell, Badge) else escape(cell) for cell in row]
+        for row in content.rows
     ]
-    head = ("3GPP service level", "accuracy", "asked", "within", "at least (95 %)", "")
-    return table(head, rows, numbers=(1, 2, 3, 4))
+    numbers = [it for it in range(len(content.head)) if it not in content.texts]
+    return table(content.head, rows, numbers=numbers)
 
 
 def section(title: str, text: str, body: str) -> str:

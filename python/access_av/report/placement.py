@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING
 
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import badge, figure, service_levels, source, table, tile, warnings
+from access_av.report.parts import figure, shown, source, tile, warnings
+from access_av.report.shown import next_level, radio_heads, service_levels
 from access_av.run.error_bound import MAP_TRAVEL_M, VISIBLE_SNR_DB
-from access_av.tables.numbers import number
 
 if TYPE_CHECKING:
     from access_av.radio.upgrades import NextLevel
     from access_av.run.error_bound import ErrorBound
-
-_ENOUGH = {True: ("enough", "yes"), False: ("not enough", "no")}
 
 
 def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:
@@ -35,22 +33,6 @@ def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:
         "route": charts.bound_along_route(bound.route),
         "site": charts.bound_over_site(bound),
     }
-    head = ("Radio head", "PCI", "SSB", "x / m", "y / m", "Distance / m", "SNR / dB", "Visible")
-    rows = [
-        (
-            escape(one["name"]),
-            str(one["pci"]),
-            str(one["ssb_index"]),
-            number(one["x_m"], 1),
-            number(one["y_m"], 1),
-            f"{one['nearest_m']:.0f} to {one['farthest_m']:.0f}",
-            "–"
-            if one["least_expected_snr_db"] is None
-            else f"{one['least_expected_snr_db']:.1f} to {one['most_expected_snr_db']:.1f}",
-            f"{one['visible_share']:.1%}",
-        )
-        for one in summary["heads"]
-    ]
     sections = (
         "<section><h2>Along the route</h2><p>Posterior Cramér–Rao bound with an angle of every "
         "radio head at every SSB: no localizer with the information of the scenario has a "
@@ -58,10 +40,10 @@ def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:
         f"<section><h2>Over the site</h2><p>{_map_text(bound)}</p>{figure('site')}</section>"
         "<section><h2>Radio heads</h2><p>By the link budget, before shadowing and fading. Visible: "
         f"share of the route’s SSBs with an SNR of {VISIBLE_SNR_DB:g} dB or more, the detection "
-        f"limit of 3GPP (TS 38.133).</p>{table(head, rows, numbers=range(1, 8))}"
+        f"limit of 3GPP (TS 38.133).</p>{shown(radio_heads(summary['heads']))}"
         "</section><section><h2>Service levels</h2><p>Levels of TS 22.261, 7.3.2.2, and TR 38.857 "
         "for Gaussian errors as small as the bound. No localizer reaches a level that is not "
-        f"reached here.</p>{service_levels(bound.verdicts)}{_missed(missed)}</section>"
+        f"reached here.</p>{shown(service_levels(bound.verdicts))}{_missed(missed)}</section>"
         "<section><h2>Provenance</h2>"
         f"{source('Scenario with all default values', scenario.to_toml())}</section>"
     )
@@ -88,11 +70,7 @@ def _missed(level: NextLevel | None) -> str:
     """Returns the shortfall, and the effect of each single change."""
     if level is None:
         return ""
-    rows = [
-        (escape(it.what), f"{it.share:.2%}", badge(*_ENOUGH[it.reaches])) for it in level.changes
-    ]
-    head = (f"Change, for level {escape(level.level.name)}", "within", "result")
-    return f"<p>{escape(level.in_words())}</p>{table(head, rows, numbers=(1,))}"
+    return f"<p>{escape(level.in_words())}</p>{shown(next_level(level))}"
 
 
 def _map_text(bound: ErrorBound) -> str:
