@@ -48,7 +48,7 @@ def service_levels(verdicts: Iterable[Verdict]) -> Shown:
     --------
     >>> from access_av.run.service_levels import of_bound
     >>> service_levels(of_bound([0.1], [0.1])).rows[0]
-    ('1', '10', '90.0%', '100.00%', '100.00%', Badge(text='reached', kind='yes'))
+    ('1', '10', '95.0%', '100.00%', '100.00%', Badge(text='reached', kind='yes'))
     """
     rows = [
         (
