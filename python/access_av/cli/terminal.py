@@ -23,6 +23,7 @@ from rich.table import Table as RichTable
 
 from access_av._core import brief
 from access_av.report import shown
+from access_av.report.shown import Badge
 from access_av.signal.methods import label
 from access_av.signal.recorded_angles import mean_absolute_error_deg
 from access_av.tables.numbers import unsigned_zero, value_text
@@ -130,11 +131,21 @@ def table(head: Sequence[str], *, title: str = "", text: int = 1) -> RichTable:
 
 def show(content: Shown, *, title: str = "") -> None:
     """Prints a table that a report shows, too."""
-    made = table(content.head, title=title)
-    for index, column in enumerate(made.columns):
-        column.justify = "left" if index in content.texts else "right"
+    shown_columns = [
+        it for it in range(len(content.head)) if not (is_narrow() and it in content.details)
+    ]
+    # Only long texts wrap; a narrow terminal shows units below the names of the columns.
+    heads = [
+        content.head[it].replace(" / ", "\n" if is_narrow() else " / ") for it in shown_columns
+    ]
+    made = table(heads, title=title)
+    for index, column in zip(shown_columns, made.columns, strict=True):
+        is_text = index in content.texts
+        column.justify = "left" if is_text else "right"
+        column.no_wrap = not is_text or any(isinstance(row[index], Badge) for row in content.rows)
     for row in content.rows:
-        made.add_row(*(cell if isinstance(cell, str) else cell.text for cell in row))
+        cells = (row[it] for it in shown_columns)
+        made.add_row(*(it.text if isinstance(it, Badge) else it for it in cells))
     console.print(made)
 
 
@@ -247,7 +258,10 @@ def show_plan(found: Plan) -> None:
     for row in found.ranking.head(10).iter_rows(named=True):
         made.add_row(row["name"], f"{row['p90_bound_m']:.3f}")
     console.print(made)
-    show(shown.service_levels(found.verdicts), title=f"with {', '.join(found.chosen)}")
+    show(
+        shown.service_levels(found.verdicts),
+        title=f"3GPP positioning service levels with {', '.join(found.chosen)}",
+    )
 
 
 def show_next_level(found: NextLevel) -> None:
@@ -264,7 +278,7 @@ def show_bound(summary: dict[str, Any], verdicts: Sequence[Verdict]) -> None:
     made.add_row("worst position", f"{summary['max_m']:.3f}")
     console.print(made)
     show(shown.radio_heads(summary["heads"]))
-    show(shown.service_levels(verdicts))
+    show(shown.service_levels(verdicts), title="3GPP positioning service levels")
 
 
 def show_columns(columns: Table) -> None:

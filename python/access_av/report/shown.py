@@ -34,15 +34,20 @@ class Shown:
         Cells of each row.
     texts
         Columns with text; the others are right-aligned.
+    details
+        Columns that a narrow terminal omits.
     """
 
     head: Sequence[str]
     rows: Sequence[Sequence[str | Badge]]
     texts: Sequence[int] = (0,)
+    details: Sequence[int] = ()
 
 
 def service_levels(verdicts: Iterable[Verdict]) -> Shown:
     """Returns 3GPP's positioning service levels with their results.
+
+    "At least" is the lower end of the 95 % interval of the share within the error.
 
     Examples
     --------
@@ -61,7 +66,7 @@ def service_levels(verdicts: Iterable[Verdict]) -> Shown:
         )
         for it in verdicts
     ]
-    head = ("3GPP level", "accuracy / m", "required", "within", "at least (95 %)", "result")
+    head = ("level", "error / m", "target", "within", "at least", "result")
     return Shown(head, rows, (0, 5))
 
 
@@ -90,7 +95,7 @@ def radio_heads(heads: Iterable[dict[str, Any]]) -> Shown:
             )
         )
     head = ("radio head", "PCI", "SSB", "x / m", "y / m", "distance / m", "SNR / dB", "visible")
-    return Shown(head, rows)
+    return Shown(head, rows, details=(3, 4))
 
 
 def compared(found: Sequence[Compared]) -> Shown:
