@@ -306,6 +306,17 @@ impl Engine {
                 self.report_clocks();
                 self.publish_heard(Some(came))?;
             }
+            Input::Range(range) => {
+                let (pci, ssb_index) = (range.pci, range.ssb_index);
+                match self.live.range(&range) {
+                    Ok(verdict) if verdict.reason == UpdateReason::UnknownRadioHead => {
+                        self.report_unknown(pci, ssb_index);
+                    }
+                    Ok(_) => self.clock.see(range.time_s),
+                    Err(error) => self.refused("ranges", &error),
+                }
+                self.report_clocks();
+            }
             Input::Command(command) => self.command(command),
             Input::Remark {
                 level,

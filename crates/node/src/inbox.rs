@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use num_complex::Complex32;
 use onboard::geometry::Pose;
-use onboard::live::{AngleObservation, contiguity_tolerance_s};
+use onboard::live::{AngleObservation, RangeObservation, contiguity_tolerance_s};
 use onboard::observation::OdometrySample;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -102,6 +102,8 @@ pub enum Input {
     Odometry(OdometrySample),
     /// An angle.
     Angle(AngleObservation),
+    /// A range or delay.
+    Range(RangeObservation),
     /// A command.
     Command(Command),
     /// Event of a source.

@@ -72,6 +72,35 @@ pub struct SensedSsb {
     pub snr_db: f64,
 }
 
+/// Delay, range rate, carrier phase and power of an SSB, by the clock of the receiver. Delay, rate
+/// and phase contain the clocks of vehicle and radio head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SsbRanging {
+    /// Delay of the first path in seconds, relative to a constant that is common to all cells.
+    pub delay_s: f64,
+    /// Its standard deviation in seconds: noise and multipath.
+    pub delay_sigma_s: f64,
+    /// Whether the first path may be weaker than the others, or blocked; the standard deviation of
+    /// the delay then does not cover its error.
+    pub is_first_path_uncertain: bool,
+    /// Rate of the pseudorange in m/s, positive if the distance increases.
+    pub rate_mps: f64,
+    /// Its standard deviation in m/s: noise and multipath.
+    pub rate_sigma_mps: f64,
+    /// Duration over which the rate is measured, in seconds.
+    pub rate_interval_s: f64,
+    /// Whether the rate is a difference of carrier phases, with which it shares its information.
+    pub is_rate_of_phases: bool,
+    /// Carrier phase of the first antenna in radians.
+    pub phase_rad: f64,
+    /// Its standard deviation in radians: noise and multipath.
+    pub phase_sigma_rad: f64,
+    /// Power per resource element of all paths, mean over the antennas, in dBFS.
+    pub ss_rsrp_dbfs: f64,
+    /// Power of the first path, in dBFS.
+    pub first_path_dbfs: f64,
+}
+
 /// SSB received by the array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SsbObservation {
@@ -84,6 +113,8 @@ pub struct SsbObservation {
     /// Whether the SSB is the first of its beam after a search detected it. It is processed alone,
     /// because the other SSBs of its burst may have been processed before the search ended.
     pub is_first: bool,
+    /// Delay, range rate, carrier phase and power, if the receiver measures them.
+    pub ranging: Option<SsbRanging>,
     elements: usize,
     /// Snapshots, one after another.
     values: Vec<Complex64>,
@@ -103,6 +134,7 @@ impl SsbObservation {
             noise_variance: None,
             cfo_hz: 0.0,
             is_first: false,
+            ranging: None,
             elements,
             values: Vec::with_capacity(elements * MAX_SNAPSHOTS),
         }
@@ -123,6 +155,7 @@ impl SsbObservation {
         self.ssb = ssb;
         self.noise_variance = None;
         (self.cfo_hz, self.is_first) = (0.0, false);
+        self.ranging = None;
         self.values.clear();
     }
 
@@ -131,6 +164,7 @@ impl SsbObservation {
         self.values.clone_from(&other.values);
         (self.ssb, self.noise_variance) = (other.ssb, other.noise_variance);
         (self.cfo_hz, self.is_first) = (other.cfo_hz, other.is_first);
+        self.ranging = other.ranging;
         self.elements = other.elements;
     }
 

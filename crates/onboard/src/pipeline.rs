@@ -7,14 +7,17 @@ use crate::link_budget::LinkBudget;
 use crate::localize::ekf::EstimatedConstants;
 use crate::localize::{
     self, AngleMeasurement, AngleUpdate, Ekf, Integrity, IntegrityState, Localizer,
-    OdometryVerdict, OutOfSequenceBuffer, PoseEstimate, Recovered, UpdateReason, UpdateVerdict,
+    OdometryVerdict, OutOfSequenceBuffer, PoseEstimate, RangeUpdate, Recovered, UpdateReason,
+    UpdateVerdict,
 };
 use crate::manifold::Measurand;
 use crate::monitor::{ActiveFaults, Change, Fallback, Monitors};
 use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
 use crate::radio_head::RadioHead;
 use crate::range::RangeMeasurement;
-use crate::settings::{Check, Platform, SettingsError, Site, Vehicle, check_together};
+use crate::settings::{
+    Check, Platform, SPEED_OF_LIGHT_MPS, SettingsError, Site, Vehicle, check_together,
+};
 use crate::thermal::ThermalNoise;
 use crate::wake_up::{self, Situation, WakeUpPolicy};
 use crate::walls::Walls;
@@ -38,11 +41,25 @@ pub struct Pipeline {
     aoa_estimates: Vec<AngleResult>,
     /// Updates for the localizer.
     burst: Vec<AngleUpdate>,
+    /// Delays, range rates and carrier phases of the burst, if the vehicle uses them.
+    ranges: Vec<RangeUpdate>,
+    ranging: Option<RangingUse>,
     /// Sensor monitors, if the vehicle has integrity monitoring and a built-in localizer.
     monitors: Option<Box<Monitors>>,
     faults: ActiveFaults,
     keeps_journal: bool,
 }
+
+/// Use of the receiver's delays, range rates and carrier phases.
+#[derive(Debug, Clone, Copy)]
+struct RangingUse {
+    range_rate: bool,
+    carrier_phase: bool,
+    wavelength_m: f64,
+}
+
+/// Number of measurements per SSB in addition to the angle.
+const RANGES_PER_SSB: usize = 3;
 
 /// Model that is constant during a drive.
 struct VisibilityModel {
@@ -235,6 +252,14 @@ impl Pipeline {
             chosen: Vec::with_capacity(heads.len()),
             aoa_estimates: Vec::with_capacity(heads.len()),
             burst: Vec::with_capacity(heads.len()),
+            ranges: Vec::with_capacity(RANGES_PER_SSB * heads.len()),
+            ranging: (vehicle.ranging.filter(|_| vehicle.has_one_way_ranging())).map(|it| {
+                RangingUse {
+                    range_rate: it.range_rate,
+                    carrier_phase: it.carrier_phase,
+                    wavelength_m: site.wavelength_m(),
+                }
+            }),
             monitors: is_monitored.then(|| Box::new(Monitors::new(site, vehicle, heads.len()))),
             faults: ActiveFaults::default(),
             keeps_journal: false,
@@ -344,6 +369,7 @@ impl Pipeline {
         self.sensed.clear();
         self.aoa_estimates.clear();
         self.burst.clear();
+        self.ranges.clear();
         let receiver_on = self.listens(time_s)?;
         let is_wanted = self.is_wanted(time_s);
         let now = self
@@ -383,6 +409,7 @@ impl Pipeline {
             let are_right = |monitors: &Monitors| !monitors.faults().has_channel();
             if self.monitors.as_deref().is_none_or(are_right) {
                 self.localizer.update(&mut self.burst)?;
+                self.localizer.update_ranges(&mut self.ranges)?;
                 for update in &self.burst {
                     if let Some(angle_result) = self.aoa_estimates.get_mut(update.number) {
                         angle_result.verdict = update.verdict;
@@ -404,8 +431,13 @@ impl Pipeline {
         })
     }
 
-    /// Updates the localizer with a range to the radio head with this PCI and SSB index. The range
-    /// must not be older than the newest odometry.
+    /// Returns the delays, range rates and carrier phases of the last received burst, with the
+    /// verdict of the localizer; empty unless the vehicle has one-way ranging.
+    pub fn ranges(&self) -> &[RangeUpdate] {
+        &self.ranges
+    }
+
+    /// Updates the localizer with a range to the radio head with this PCI and SSB index.
     ///
     /// # Errors
     /// Errors of a custom localizer.
@@ -529,6 +561,7 @@ impl Pipeline {
         if let Some(monitors) = &mut self.monitors {
             monitors.ssb(observation);
         }
+        self.collect_ranges(observation);
         let estimated = self.estimator.estimate(observation)?;
         let bound_rad = || self.thermal.sigma_rad(ssb.snr_db);
         let measured = estimated.and_then(|estimated| {
@@ -536,6 +569,41 @@ impl Pipeline {
         });
         self.collect(ssb, measured);
         Ok(())
+    }
+
+    /// Stores delay, range rate and carrier phase of an SSB for the localizer.
+    fn collect_ranges(&mut self, observation: &SsbObservation) {
+        let (Some(using), Some(ranging)) = (self.ranging, observation.ranging) else {
+            return;
+        };
+        let ssb = observation.ssb;
+        let sends = |head: &&RadioHead| head.sends(ssb.pci, ssb.ssb_index);
+        let Some(&head) = self.visibility_model.heads.iter().find(sends) else {
+            return;
+        };
+        let time_s = ssb.time_s - self.angle_time_offset_s;
+        let delay = (!ranging.is_first_path_uncertain).then(|| {
+            let range_m = SPEED_OF_LIGHT_MPS * ranging.delay_s;
+            let sigma_m = SPEED_OF_LIGHT_MPS * ranging.delay_sigma_s;
+            RangeMeasurement::range(time_s, range_m, Some(sigma_m))
+        });
+        // A rate of carrier phases has the same information as the phases.
+        let uses_rate = using.range_rate && !(using.carrier_phase && ranging.is_rate_of_phases);
+        let rate = uses_rate.then(|| {
+            let (rate_mps, sigma_mps) = (ranging.rate_mps, ranging.rate_sigma_mps);
+            RangeMeasurement::range_rate(time_s, rate_mps, sigma_mps, ranging.rate_interval_s)
+        });
+        let phase = using.carrier_phase.then(|| {
+            let (phase_rad, sigma_rad) = (ranging.phase_rad, ranging.phase_sigma_rad);
+            RangeMeasurement::carrier_phase(time_s, phase_rad, sigma_rad, using.wavelength_m)
+        });
+        for measured in [rate, delay, phase].into_iter().flatten() {
+            self.ranges.push(RangeUpdate {
+                head,
+                measured,
+                verdict: UpdateVerdict::unused(UpdateReason::Unusable),
+            });
+        }
     }
 
     /// Stores the angle of an SSB for the localizer, which processes those of a burst together.

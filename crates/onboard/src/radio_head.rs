@@ -64,6 +64,9 @@ impl From<&RadioHeadSettings> for RadioHead {
                 offset_std_m: settings.clock_offset_std_ns.map(|ns| METRES_PER_NS * ns),
                 wander_m_per_sqrt_s: (settings.clock_wander_ns_per_sqrt_s)
                     .map(|ns| METRES_PER_NS * ns),
+                // 1 ppb is 1 ns/s.
+                frequency_std_mps: (settings.clock_frequency_std_ppb)
+                    .map(|ppb| METRES_PER_NS * ppb),
             },
         }
     }

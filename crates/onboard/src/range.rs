@@ -1,19 +1,71 @@
 //! Ranges: measured distances to radio heads, from a two-way time of flight or a one-way delay.
 
-use crate::settings::{RangingKind, RangingSettings, SPEED_OF_LIGHT_MPS};
+use crate::settings::{ArraySettings, RangingKind, RangingSettings, SPEED_OF_LIGHT_MPS};
 
 /// Distance that light travels in a nanosecond (m).
 pub const METRES_PER_NS: f64 = SPEED_OF_LIGHT_MPS * 1e-9;
 
-/// Range or pseudorange to a radio head.
+/// Quantity that a [`RangeMeasurement`] measures. One file of `localize/ekf` predicts each.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum RangeQuantity {
+    /// Two-way range, or one-way delay times the speed of light (m).
+    #[default]
+    Range,
+    /// Rate of the pseudorange, from the frequency offset (m/s): positive if the distance increases.
+    RangeRate {
+        /// Duration over which the rate is measured (s).
+        interval_s: f64,
+    },
+    /// Pseudorange by the carrier phase (m), known except for a multiple of the wavelength.
+    CarrierPhase,
+}
+
+/// Range, range rate or carrier phase to a radio head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RangeMeasurement {
     /// Time in seconds.
     pub time_s: f64,
-    /// Measured distance in metres; for a one-way delay, the delay times the speed of light.
-    pub range_m: f64,
-    /// Standard deviation of the noise in metres; `None` for that of the vehicle's settings.
-    pub sigma_m: Option<f64>,
+    /// Measured quantity.
+    pub quantity: RangeQuantity,
+    /// Measured value in metres; of a range rate in m/s.
+    pub value: f64,
+    /// Standard deviation of the noise in the unit of the value; `None` for that of the vehicle's
+    /// settings, which exists for ranges only.
+    pub sigma: Option<f64>,
+}
+
+impl RangeMeasurement {
+    /// Creates a range or pseudorange.
+    pub const fn range(time_s: f64, range_m: f64, sigma_m: Option<f64>) -> Self {
+        Self {
+            time_s,
+            quantity: RangeQuantity::Range,
+            value: range_m,
+            sigma: sigma_m,
+        }
+    }
+
+    /// Creates the rate of a pseudorange, measured over a duration.
+    pub const fn range_rate(time_s: f64, rate_mps: f64, sigma_mps: f64, interval_s: f64) -> Self {
+        Self {
+            time_s,
+            quantity: RangeQuantity::RangeRate { interval_s },
+            value: rate_mps,
+            sigma: Some(sigma_mps),
+        }
+    }
+
+    /// Creates a pseudorange by a carrier phase in radians, which decreases by 2π per wavelength of
+    /// distance.
+    pub fn carrier_phase(time_s: f64, phase_rad: f64, sigma_rad: f64, wavelength_m: f64) -> Self {
+        let metres_per_rad = wavelength_m / std::f64::consts::TAU;
+        Self {
+            time_s,
+            quantity: RangeQuantity::CarrierPhase,
+            value: -metres_per_rad * phase_rad,
+            sigma: Some(metres_per_rad * sigma_rad),
+        }
+    }
 }
 
 /// Clock of a radio head.
@@ -25,6 +77,9 @@ pub struct HeadClock {
     pub offset_std_m: Option<f64>,
     /// Random walk of the clock (m/√s); `None` if it is not specified.
     pub wander_m_per_sqrt_s: Option<f64>,
+    /// Standard deviation of the carrier's relative frequency error, as a rate of the pseudorange
+    /// (m/s); `None` if it is not specified.
+    pub frequency_std_mps: Option<f64>,
 }
 
 /// Model of the ranges of a vehicle, in metres and seconds.
@@ -36,6 +91,8 @@ pub struct RangeModel {
     pub sigma_m: Option<f64>,
     /// Antenna relative to the odometer's reference point `[forward, left, up]` (m).
     pub position_m: [f64; 3],
+    /// Antenna of the carrier phases: the first one of the array.
+    pub phase_position_m: [f64; 3],
     /// Standard deviation of the relative scale error, which all radio heads share.
     pub scale_std: f64,
     /// Standard deviation of the offset of each radio head (m) ...
@@ -50,6 +107,12 @@ pub struct RangeModel {
     pub drift_std_mps: f64,
     /// ... and its random walk (m/s/√s).
     pub drift_walk_mps_per_sqrt_s: f64,
+    /// Wavelength of the carrier (m).
+    pub wavelength_m: f64,
+    /// Whether range rates are used ...
+    pub uses_range_rate: bool,
+    /// ... and carrier phases.
+    pub uses_carrier_phase: bool,
 }
 
 /// Standard deviation of an unspecified clock offset of a radio head (ns): cell phase
@@ -60,15 +123,35 @@ const UNSTATED_CLOCK_STD_NS: f64 = 3000.0;
 /// frequency noise of 1e-9 at one second.
 const UNSTATED_WANDER_NS_PER_SQRT_S: f64 = 1.0;
 
+/// Standard deviation of an unspecified frequency error of a radio head (ppb): maximum error of a
+/// wide-area base station (TS 38.104, 6.5.1).
+const UNSTATED_FREQUENCY_STD_PPB: f64 = 50.0;
+
+/// Returns the position of the first antenna of an array in a row; that of the array's centre
+/// otherwise.
+fn first_antenna_m(array: &ArraySettings, wavelength_m: f64) -> [f64; 3] {
+    let [forward_m, left_m, up_m] = array.position_m;
+    let behind = 0.5 * (f64::from(array.elements) - 1.0) * array.spacing_wavelengths;
+    let behind_m = if array.shape.is_row() {
+        behind * wavelength_m
+    } else {
+        0.0
+    };
+    let (sin, cos) = array.mounting_rad.sin_cos();
+    [forward_m - behind_m * cos, left_m - behind_m * sin, up_m]
+}
+
 impl RangeModel {
-    /// Creates the model of a vehicle whose array is at `array_position_m`.
-    pub fn new(settings: &RangingSettings, array_position_m: [f64; 3]) -> Self {
+    /// Creates the model of a vehicle with this array.
+    pub fn new(settings: &RangingSettings, array: &ArraySettings, wavelength_m: f64) -> Self {
         let is_one_way = settings.kind == RangingKind::OneWay;
         let of_clock = |ns: f64| if is_one_way { METRES_PER_NS * ns } else { 0.0 };
         Self {
             is_one_way,
             sigma_m: settings.sigma_m,
-            position_m: settings.position_m.unwrap_or(array_position_m),
+            position_m: settings.position_m.unwrap_or(array.position_m),
+            phase_position_m: (settings.position_m)
+                .unwrap_or_else(|| first_antenna_m(array, wavelength_m)),
             scale_std: settings.scale_std(),
             offset_std_m: settings.offset_std_m,
             offset_walk_m_per_sqrt_m: settings.offset_walk_m_per_sqrt_m,
@@ -77,6 +160,9 @@ impl RangeModel {
             // A drift of 1 ppb is 1 ns/s.
             drift_std_mps: of_clock(settings.clock_drift_std_ppb),
             drift_walk_mps_per_sqrt_s: of_clock(settings.clock_drift_walk_ppb_per_sqrt_s),
+            wavelength_m,
+            uses_range_rate: is_one_way && settings.range_rate,
+            uses_carrier_phase: is_one_way && settings.carrier_phase,
         }
     }
 
@@ -93,5 +179,13 @@ impl RangeModel {
             offset_m.unwrap_or_else(|| metres(UNSTATED_CLOCK_STD_NS)),
             wander.unwrap_or_else(|| metres(UNSTATED_WANDER_NS_PER_SQRT_S)),
         ]
+    }
+
+    /// Returns the standard deviation of a radio head's frequency error, as a rate of the
+    /// pseudorange (m/s).
+    pub fn frequency_std_mps(&self, clock: &HeadClock) -> f64 {
+        // 1 ppb is 1 ns/s.
+        let usual = METRES_PER_NS * UNSTATED_FREQUENCY_STD_PPB;
+        clock.frequency_std_mps.unwrap_or(usual)
     }
 }

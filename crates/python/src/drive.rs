@@ -526,7 +526,10 @@ impl LocatedDrive {
     #[getter]
     fn ranges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let columns = PyDict::new(py);
-        let each = || self.core.ranges.iter();
+        let is_range = |it: &&replay::LocatedRange| {
+            it.range.measured.quantity == onboard::range::RangeQuantity::Range
+        };
+        let each = || self.core.ranges.iter().filter(is_range);
         let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
         let column = |value: &dyn Fn(&replay::LocatedRange) -> f64| {
             PyArray1::from_iter(py, each().map(value))
@@ -538,8 +541,8 @@ impl LocatedDrive {
         )?;
         let indices = each().map(|it| it.range.ssb_index);
         columns.set_item("ssb_index", PyArray1::from_iter(py, indices))?;
-        columns.set_item("range_m", column(&|it| it.range.measured.range_m))?;
-        let sigma = column(&|it| or_nan(it.range.measured.sigma_m));
+        columns.set_item("range_m", column(&|it| it.range.measured.value))?;
+        let sigma = column(&|it| or_nan(it.range.measured.sigma));
         columns.set_item("range_sigma_m", sigma)?;
         let accepted = each().map(|it| it.verdict.accepted);
         columns.set_item("accepted", PyArray1::from_iter(py, accepted))?;

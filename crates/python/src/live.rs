@@ -6,7 +6,7 @@ use onboard::Custom;
 use onboard::geometry::Pose;
 use onboard::live::{
     AngleObservation, Continuity, HeadStatus as CoreHead, Live as Core, LiveError,
-    Outcome as CoreOutcome, Status as CoreStatus, StreamConfig,
+    Outcome as CoreOutcome, RangeObservation, RangeValue, Status as CoreStatus, StreamConfig,
 };
 use onboard::localize::{OdometryVerdict, SelectedHypothesis};
 use onboard::observation::{MeasurementKind, OdometrySample};
@@ -437,6 +437,62 @@ impl Live {
             core.angle(&angle)
         })
         .map_err(live_error)
+    }
+
+    /// Add a two-way range or one-way delay to a radio head that was measured elsewhere. The vehicle
+    /// needs `[ranging]`. Returns the verdict of the localizer.
+    ///
+    /// Parameters
+    /// ----------
+    /// pci : int
+    ///     Physical cell identity of the radio head.
+    /// time_s : float
+    ///     Time in seconds.
+    /// range_m : float, optional
+    ///     Two-way range in metres, or
+    /// delay_ns : float, optional
+    ///     one-way delay by the clocks of vehicle and radio head, in nanoseconds.
+    /// sigma : float, optional
+    ///     Standard deviation in the unit of the value; by default `ranging.sigma_m` of the vehicle.
+    /// ssb_index : int
+    ///     Index of the SSB in its burst.
+    /// arrival_s : float, optional
+    ///     Arrival time of the range according to a monotonic clock, in seconds.
+    #[pyo3(signature = (pci, time_s, *, range_m = None, delay_ns = None, sigma = None, ssb_index = 0, arrival_s = None))]
+    #[allow(clippy::too_many_arguments)] // Python's keywords
+    fn range(
+        &self,
+        py: Python<'_>,
+        pci: u16,
+        time_s: f64,
+        range_m: Option<f64>,
+        delay_ns: Option<f64>,
+        sigma: Option<f64>,
+        ssb_index: u8,
+        arrival_s: Option<f64>,
+    ) -> PyResult<&'static str> {
+        let value = match (range_m, delay_ns) {
+            (Some(range_m), None) => RangeValue::RangeM(range_m),
+            (None, Some(delay_ns)) => RangeValue::DelayNs(delay_ns),
+            _ => {
+                let text = "range: give either range_m or delay_ns";
+                return Err(PyValueError::new_err(text));
+            }
+        };
+        let arrival_s = finite_arrival(arrival_s)?;
+        let range = RangeObservation {
+            pci,
+            ssb_index,
+            time_s,
+            value,
+            sigma,
+        };
+        let verdict = py.detach(|| {
+            let mut core = self.core();
+            core.set_arrival(arrival_s);
+            core.range(&range)
+        });
+        Ok(verdict.map_err(live_error)?.reason.name())
     }
 
     /// Return the clock step of the odometry in seconds that was detected since the last call; the

@@ -108,7 +108,7 @@ pub fn read_range_log(file: &Path) -> Result<RangeLog, RecordingError> {
     }
     log.ranges
         .sort_by(|one, other| time_s(one).total_cmp(&time_s(other)));
-    let delays_ns = || (log.ranges.iter()).map(|it| it.measured.range_m.abs() / METRES_PER_NS);
+    let delays_ns = || (log.ranges.iter()).map(|it| it.measured.value.abs() / METRES_PER_NS);
     let is_of_seconds = delays_ns().all(|ns| ns < LEAST_DELAY_NS) && delays_ns().any(|ns| ns > 0.0);
     if has_delays && is_of_seconds {
         let most = delays_ns().fold(0.0, f64::max);
@@ -173,10 +173,6 @@ fn range(values: &[Option<f64>], has_delays: bool) -> Result<LoggedRange, String
     Ok(LoggedRange {
         pci,
         ssb_index,
-        measured: RangeMeasurement {
-            time_s,
-            range_m,
-            sigma_m,
-        },
+        measured: RangeMeasurement::range(time_s, range_m, sigma_m),
     })
 }

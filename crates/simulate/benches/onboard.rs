@@ -71,6 +71,7 @@ fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
     let antennas: [&[Complex32]; ANTENNAS] = std::array::from_fn(|n| samples[n].as_slice());
     let mut receiver = Receiver::new(ReceiverConfig {
         search_every_s: f64::INFINITY,
+        measures_ranging: false,
         ..ReceiverConfig::new(&site, &vehicle)
     })
     .unwrap();

@@ -38,6 +38,8 @@ impl IdealFilter {
             steps: self.run(seed, run).enumerate().map(step).collect(),
             aoa_estimates: Vec::new(),
             bursts_received: 0,
+            ranges: 0,
+            accepted_ranges: 0,
             constants: None,
             out_of_reach: 0,
         }

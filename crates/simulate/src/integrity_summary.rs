@@ -153,6 +153,8 @@ mod tests {
             steps: steps.iter().enumerate().map(step).collect(),
             aoa_estimates: Vec::new(),
             bursts_received: 0,
+            ranges: 0,
+            accepted_ranges: 0,
             constants: None,
             out_of_reach: 0,
         }

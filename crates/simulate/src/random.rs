@@ -44,6 +44,8 @@ pub enum Purpose {
     ScatterTurn = 17,
     /// Time offset of the receiver's clock.
     Clock = 18,
+    /// Clocks of the radio heads and of the vehicle that one-way delays contain.
+    RangingClock = 19,
 }
 
 /// Random streams of one run.

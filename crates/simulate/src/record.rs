@@ -2,7 +2,7 @@
 
 use onboard::geometry::Pose;
 use onboard::localize::ekf::EstimatedConstants;
-use onboard::localize::{Integrity, IntegrityState};
+use onboard::localize::{Integrity, IntegrityState, RangeUpdate};
 use onboard::monitor::ActiveFaults;
 use onboard::{AngleResult, BurstResult, Pipeline};
 
@@ -83,6 +83,10 @@ pub struct RunRecord {
     pub aoa_estimates: Vec<AngleResult>,
     /// Number of SSB bursts received.
     pub bursts_received: usize,
+    /// Number of delays, range rates and carrier phases of received SSBs ...
+    pub ranges: usize,
+    /// ... and of those that the localizer accepted.
+    pub accepted_ranges: usize,
     /// Estimated constants of the vehicle at the end of the run; `None` if the localizer estimates
     /// none.
     pub constants: Option<EstimatedConstants>,
@@ -108,6 +112,8 @@ impl RunRecord {
             steps: Vec::with_capacity(steps),
             aoa_estimates: Vec::with_capacity(steps),
             bursts_received: 0,
+            ranges: 0,
+            accepted_ranges: 0,
             constants: None,
             out_of_reach: 0,
         }
@@ -118,6 +124,12 @@ impl RunRecord {
         self.bursts_received += usize::from(heard.receiver_on);
         self.aoa_estimates.extend_from_slice(heard.aoa_estimates);
         self.out_of_reach += usize::from(heard.keeps_bound == Some(false));
+    }
+
+    /// Adds the delays, range rates and carrier phases of a burst.
+    pub(crate) fn add_ranges(&mut self, ranges: &[RangeUpdate]) {
+        self.ranges += ranges.len();
+        self.accepted_ranges += ranges.iter().filter(|it| it.verdict.accepted).count();
     }
 
     /// Adds the true and estimated poses at an SSB.

@@ -248,6 +248,7 @@ impl Drive {
         };
         let heard = self.onboard.process_burst(burst.vehicle.time_s, source);
         record.add(&heard.map_err(SimulationError::of_drive)?);
+        record.add_ranges(self.onboard.ranges());
         let mut snrs_db = burst.snrs_db;
         snrs_db.clear();
         self.spare.push(snrs_db);

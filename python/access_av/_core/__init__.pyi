@@ -177,6 +177,17 @@ class Live:
         at_head: bool = False,
         arrival_s: float | None = None,
     ) -> None: ...
+    def range(
+        self,
+        pci: int,
+        time_s: float,
+        *,
+        range_m: float | None = None,
+        delay_ns: float | None = None,
+        sigma: float | None = None,
+        ssb_index: int = 0,
+        arrival_s: float | None = None,
+    ) -> str: ...
     def clock_step(self) -> float | None: ...
     def clock_disagreement_s(self) -> float | None: ...
     def flush(self) -> None: ...

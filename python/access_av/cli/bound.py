@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from access_av.cli.options import AllowLarge, AsJson, Out, ScenarioArgument, load_scenario
-from access_av.cli.terminal import console, progress, show_bound
+from access_av.cli.terminal import console, progress, show_bound, show_kinds
 
 app = typer.Typer()
 
@@ -23,6 +23,10 @@ def bound(
     map_step_m: Annotated[
         float | None, typer.Option(help="Side of the map's squares.", show_default="by the size")
     ] = None,
+    kinds: Annotated[
+        bool,
+        typer.Option("--kinds", help="Also bound delays, carrier phases and power, by clock."),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Compute the smallest possible localization error of a site.
@@ -31,8 +35,11 @@ def bound(
     the 3GPP service levels that it permits, where it fails the next one, and the cheapest change
     that reaches it.
 
-    Writes bound.parquet, map.parquet, report.html, scenario.toml and manifest.json.
+    Writes bound.parquet, map.parquet, report.html, scenario.toml and manifest.json. --kinds prints
+    the bound with further measurements of each SSB, for several clocks, with and without a road,
+    and writes kinds.parquet.
     """
+    from access_av.radio.measurement_kinds import kinds_table
     from access_av.radio.upgrades import next_level
     from access_av.report.placement import render_bound
     from access_av.run.error_bound import bound as error_bound
@@ -43,6 +50,9 @@ def bound(
     with progress("Bounding"):
         found = error_bound(chosen, map_step_m=map_step_m)
         missed = next_level(chosen)
+        by_kind = kinds_table(chosen) if kinds else None
+    if by_kind is not None:
+        directory.write_table("kinds.parquet", by_kind)
     directory.write_table("bound.parquet", found.route)
     directory.write_table("map.parquet", found.site)
     directory.write_text("report.html", render_bound(found, missed))
@@ -53,9 +63,13 @@ def bound(
     summary = found.summary()
     if as_json:
         record = {**summary, "next_level": missed and missed.as_record()}
+        if by_kind is not None:
+            record["kinds"] = by_kind.to_dicts()
         print(json_text({**record, "directory": str(directory.path)}))
         return
     show_bound(summary, found.verdicts)
+    if by_kind is not None:
+        show_kinds(by_kind)
     if missed is not None:
         console.print(missed.in_words())
         console.print(f"Further radio heads: access-av design plan {scenario}", soft_wrap=True)

@@ -281,6 +281,21 @@ def show_bound(summary: dict[str, Any], verdicts: Sequence[Verdict]) -> None:
     show(shown.service_levels(verdicts), title="3GPP positioning service levels")
 
 
+def show_kinds(bounds: pl.DataFrame) -> None:
+    """Prints the bound by radio heads, kind of measurement and clocks."""
+    header = ["radio heads", "measurements", "clocks", "without road m", "with road m"]
+    made = table(header, title="Lower bound by measurement", text=3)
+    for row in bounds.to_dicts():
+        made.add_row(
+            str(row["num_heads"]),
+            row["kinds"],
+            row["clocks"],
+            f"{row['bound_without_road_m']:.3f}",
+            f"{row['bound_with_road_m']:.3f}",
+        )
+    console.print(made)
+
+
 def show_columns(columns: Table) -> None:
     """Prints the columns of one table."""
     where = columns.where.replace("`", "")

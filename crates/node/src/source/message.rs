@@ -1,7 +1,7 @@
 //! Newline-delimited JSON messages, one object per line.
 
 use onboard::geometry::Pose;
-use onboard::live::AngleObservation;
+use onboard::live::{AngleObservation, RangeObservation, RangeValue};
 use onboard::observation::{MeasurementKind, OdometrySample};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -11,7 +11,7 @@ use crate::clock::unix_s;
 use crate::inbox::{Command, Input};
 
 /// Allowed values of the key `type`.
-const TYPES: &str = "odometry, angle, set-pose, reset, exclude or readmit";
+const TYPES: &str = "odometry, angle, range, set-pose, reset, exclude or readmit";
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -36,6 +36,19 @@ struct Angle {
     resolved: bool,
     #[serde(default)]
     at_head: bool,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Range {
+    time_s: f64,
+    pci: u16,
+    #[serde(default)]
+    ssb_index: u8,
+    range_m: Option<f64>,
+    sigma_m: Option<f64>,
+    delay_ns: Option<f64>,
+    delay_sigma_ns: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -87,6 +100,7 @@ pub fn parse(line: &[u8]) -> Result<Option<Input>, String> {
     Ok(Some(match kind.as_str() {
         Some("odometry") => odometry(&read(message)?),
         Some("angle") => angle(&read(message)?),
+        Some("range") => range(&read(message)?)?,
         Some("set-pose") => set_pose(&read(message)?),
         Some("reset") => {
             let Reset {} = read(message)?;
@@ -147,6 +161,29 @@ const fn angle(message: &Angle) -> Input {
     })
 }
 
+fn range(message: &Range) -> Result<Input, String> {
+    let (value, sigma) = match (message.range_m, message.delay_ns) {
+        (Some(range_m), None) if message.delay_sigma_ns.is_none() => {
+            (RangeValue::RangeM(range_m), message.sigma_m)
+        }
+        (None, Some(delay_ns)) if message.sigma_m.is_none() => {
+            (RangeValue::DelayNs(delay_ns), message.delay_sigma_ns)
+        }
+        _ => {
+            return Err(
+                "a range has either range_m and sigma_m, or delay_ns and delay_sigma_ns".to_owned(),
+            );
+        }
+    };
+    Ok(Input::Range(RangeObservation {
+        pci: message.pci,
+        ssb_index: message.ssb_index,
+        time_s: message.time_s,
+        value,
+        sigma,
+    }))
+}
+
 const fn set_pose(message: &SetPose) -> Input {
     Input::Command(Command::SetPose {
         time_s: message.time_s,
@@ -174,6 +211,14 @@ mod tests {
         let angle =
             br#"{"type":"angle","time_s":1,"pci":11,"phase_rad":0.1,"phase_sigma_rad":0.02}"#;
         assert!(matches!(parse(angle), Ok(Some(Input::Angle(it))) if it.pci == 11));
+        let range = br#"{"type":"range","time_s":1,"pci":11,"delay_ns":120,"delay_sigma_ns":5}"#;
+        assert!(matches!(
+            parse(range),
+            Ok(Some(Input::Range(RangeObservation {
+                value: RangeValue::DelayNs(120.0),
+                ..
+            })))
+        ));
         let pose = br#"{"type":"set-pose","x_m":1,"y_m":2,"heading_rad":0}"#;
         assert!(matches!(
             parse(pose),
@@ -211,6 +256,10 @@ mod tests {
             (
                 r#"{"type":"set-pose","x_m":1,"y_m":2,"heading_rad":0,"covariance":[[1,0,0],[0,"1",0],[0,0,1]]}"#,
                 "covariance[1][1]: invalid type: string",
+            ),
+            (
+                r#"{"type":"range","time_s":1,"pci":1,"range_m":5,"delay_ns":5}"#,
+                "either range_m",
             ),
             (
                 r#"{"type":"angle","time_s":1,"pci":-1,"phase_rad":0,"phase_sigma_rad":1}"#,

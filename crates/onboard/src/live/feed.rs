@@ -2,7 +2,10 @@
 
 mod commands;
 mod condition;
+mod ranges;
 mod reception;
+
+pub use ranges::{RangeObservation, RangeValue};
 
 use std::collections::VecDeque;
 

@@ -48,7 +48,7 @@ mod time_base;
 mod time_check;
 
 pub use error::LiveError;
-pub use feed::{AngleObservation, Live, LiveEnergy};
+pub use feed::{AngleObservation, Live, LiveEnergy, RangeObservation, RangeValue};
 pub use outcome::{HeadStatus, Outcome};
 pub use samples::{cf32, ci8, ci16};
 pub use saved::{MAX_GROWTH_M, Resumption, SavedState};

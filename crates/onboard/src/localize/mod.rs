@@ -22,7 +22,7 @@ pub use choose::built_in;
 pub use dead_reckoning::DeadReckoning;
 pub use ekf::Ekf;
 pub use localizer::{Localizer, Recovered, copy_into};
-pub use out_of_sequence::{AngleUpdate, HISTORY_S, OutOfSequenceBuffer};
+pub use out_of_sequence::{AngleUpdate, HISTORY_S, OutOfSequenceBuffer, RangeUpdate};
 pub use output::{
     InitialPose, Integrity, IntegrityState, OdometryVerdict, PoseEstimate, SelectedHypothesis,
     UpdateReason, UpdateVerdict,

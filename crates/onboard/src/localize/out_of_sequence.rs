@@ -1,10 +1,10 @@
-//! Out-of-sequence measurements: replay of late angles.
+//! Out-of-sequence measurements: replay of late angles and ranges.
 //!
 //! On a vehicle, the angle of an SSB always arrives after newer odometry. Copies of the localizer
 //! are therefore stored at intervals, with all subsequent inputs. For a late angle, the newest copy
 //! before it is restored, and the subsequent inputs are repeated, once for all angles of a burst.
-//! The result is bit-identical to that of angles in order. After initialisation nothing is
-//! allocated.
+//! Ranges are processed alike. The result is bit-identical to that of measurements in order. After
+//! initialisation nothing is allocated.
 
 use std::collections::VecDeque;
 
@@ -60,12 +60,60 @@ pub struct AngleUpdate {
     pub verdict: UpdateVerdict,
 }
 
+/// Range, range rate or carrier phase, and the result of its update.
+#[derive(Debug, Clone, Copy)]
+pub struct RangeUpdate {
+    /// Radio head of the measurement.
+    pub head: RadioHead,
+    /// Measured value.
+    pub measured: RangeMeasurement,
+    /// Result of the update.
+    pub verdict: UpdateVerdict,
+}
+
+/// Measurement with a result, of a burst.
+trait Update {
+    fn time_s(&self) -> f64;
+    /// Returns the input, with its index in its burst while the burst is processed.
+    fn event(&self, number: Option<usize>) -> Event;
+    fn set(&mut self, verdict: UpdateVerdict);
+}
+
+impl Update for AngleUpdate {
+    fn time_s(&self) -> f64 {
+        self.measured.time_s
+    }
+
+    fn event(&self, number: Option<usize>) -> Event {
+        Event::Angle(self.head, self.measured, number)
+    }
+
+    fn set(&mut self, verdict: UpdateVerdict) {
+        self.verdict = verdict;
+    }
+}
+
+impl Update for RangeUpdate {
+    fn time_s(&self) -> f64 {
+        self.measured.time_s
+    }
+
+    fn event(&self, number: Option<usize>) -> Event {
+        Event::Range(self.head, self.measured, number)
+    }
+
+    fn set(&mut self, verdict: UpdateVerdict) {
+        self.verdict = verdict;
+    }
+}
+
 #[derive(Clone, Copy)]
 enum Event {
     Odometry(OdometrySample),
     /// Angle, and its index in its burst while the burst is processed.
     Angle(RadioHead, AngleMeasurement, Option<usize>),
-    Range(RadioHead, RangeMeasurement),
+    /// Range, and its index in its burst while the burst is processed.
+    Range(RadioHead, RangeMeasurement, Option<usize>),
 }
 
 impl Event {
@@ -73,7 +121,7 @@ impl Event {
         match self {
             Self::Odometry(sample) => sample.time_s,
             Self::Angle(_, measured, _) => measured.time_s,
-            Self::Range(_, measured) => measured.time_s,
+            Self::Range(_, measured, _) => measured.time_s,
         }
     }
 }
@@ -128,6 +176,18 @@ impl OutOfSequenceBuffer {
     /// # Errors
     /// Errors of the localizer.
     pub fn update(&mut self, burst: &mut [AngleUpdate]) -> Result<(), BoxError> {
+        self.update_each(burst)
+    }
+
+    /// Updates with the ranges of a burst at their own times, and stores the result of each.
+    ///
+    /// # Errors
+    /// Errors of the localizer.
+    pub fn update_ranges(&mut self, burst: &mut [RangeUpdate]) -> Result<(), BoxError> {
+        self.update_each(burst)
+    }
+
+    fn update_each<T: Update>(&mut self, burst: &mut [T]) -> Result<(), BoxError> {
         for number in 0..burst.len() {
             let (_, rest) = burst.split_at_mut(number);
             let Some(update) = rest.first_mut() else {
@@ -135,18 +195,20 @@ impl OutOfSequenceBuffer {
             };
             // Between the same two odometry samples, the order of angles does not matter. The
             // localizer rejects a time that is NaN.
-            let time_s = update.measured.time_s;
+            let time_s = update.time_s();
             if time_s < self.now_s || (self.copies > 0 && time_s < self.newest_s) {
                 return self.update_late(rest);
             }
-            update.verdict = self.localizer.update(&update.head, &update.measured)?;
-            self.remember(Event::Angle(update.head, update.measured, None));
+            let event = update.event(None);
+            if let Some(verdict) = self.process(&event)? {
+                update.set(verdict);
+            }
+            self.remember(event);
         }
         Ok(())
     }
 
-    /// Updates with a range that is not older than the newest odometry; an older one is rejected as
-    /// too late.
+    /// Updates with a range at its own time.
     ///
     /// # Errors
     /// Errors of the localizer.
@@ -155,26 +217,42 @@ impl OutOfSequenceBuffer {
         head: &RadioHead,
         measured: &RangeMeasurement,
     ) -> Result<UpdateVerdict, BoxError> {
-        let verdict = self.localizer.update_range(head, measured)?;
-        if verdict.reason != UpdateReason::TooLate && measured.time_s.is_finite() {
-            self.remember(Event::Range(*head, *measured));
+        let mut update = [RangeUpdate {
+            head: *head,
+            measured: *measured,
+            verdict: UpdateVerdict::unused(UpdateReason::Unusable),
+        }];
+        if measured.time_s.is_finite() {
+            self.update_ranges(&mut update)?;
         }
+        let [RangeUpdate { verdict, .. }] = update;
         Ok(verdict)
     }
 
-    fn update_late(&mut self, burst: &mut [AngleUpdate]) -> Result<(), BoxError> {
+    /// Passes an input to the localizer and returns the result of a measurement.
+    fn process(&mut self, event: &Event) -> Result<Option<UpdateVerdict>, BoxError> {
+        match event {
+            Event::Odometry(sample) => self.localizer.odometry(sample).map(|_| None),
+            Event::Angle(head, measured, _) => self.localizer.update(head, measured).map(Some),
+            Event::Range(head, measured, _) => {
+                self.localizer.update_range(head, measured).map(Some)
+            }
+        }
+    }
+
+    fn update_late<T: Update>(&mut self, burst: &mut [T]) -> Result<(), BoxError> {
         for update in &mut *burst {
-            let reason = if update.measured.time_s.is_nan() {
+            let reason = if update.time_s().is_nan() {
                 UpdateReason::Unusable
             } else {
                 UpdateReason::TooLate
             };
-            update.verdict = UpdateVerdict::unused(reason);
+            update.set(UpdateVerdict::unused(reason));
         }
         let copies = self.kept.iter().take(self.copies);
         let oldest_s = (copies.clone().next()).map_or(f64::INFINITY, |copy| copy.time_s);
-        let in_memory = |update: &&AngleUpdate| update.measured.time_s >= oldest_s;
-        let times_s = burst.iter().filter(in_memory).map(|it| it.measured.time_s);
+        let in_memory = |update: &&T| update.time_s() >= oldest_s;
+        let times_s = burst.iter().filter(in_memory).map(Update::time_s);
         let first_s = times_s.fold(f64::INFINITY, f64::min);
         let from = copies.take_while(|copy| copy.time_s <= first_s).count();
         let Some(copy) = from.checked_sub(1).and_then(|from| self.kept.get(from)) else {
@@ -189,32 +267,30 @@ impl OutOfSequenceBuffer {
         }
         for (number, update) in burst.iter().enumerate().filter(|(_, it)| in_memory(it)) {
             // In order, it would precede the first later event.
-            let is_later = |event: &Event| event.time_s() > update.measured.time_s;
+            let is_later = |event: &Event| event.time_s() > update.time_s();
             let place = (self.events.iter().skip(taken_in))
                 .position(is_later)
                 .map_or(self.events.len(), |place| taken_in + place);
-            let event = Event::Angle(update.head, update.measured, Some(number));
-            self.events.insert(place, event);
+            self.events.insert(place, update.event(Some(number)));
         }
         // Copies after it do not contain it.
         self.copies = from;
         for index in taken_in..self.events.len() {
-            match self.events.get_mut(index) {
-                Some(Event::Odometry(sample)) => {
-                    let sample = *sample;
-                    self.localizer.odometry(&sample)?;
-                    self.keep_copy_if_due(sample.time_s, index + 1);
-                }
-                Some(Event::Angle(head, measured, waits)) => {
-                    let verdict = self.localizer.update(head, measured)?;
-                    if let Some(update) = waits.take().and_then(|number| burst.get_mut(number)) {
-                        update.verdict = verdict;
-                    }
-                }
-                Some(Event::Range(head, measured)) => {
-                    self.localizer.update_range(head, measured)?;
-                }
-                None => {}
+            let Some(event) = self.events.get_mut(index) else {
+                break;
+            };
+            let waits = match event {
+                Event::Angle(_, _, number) | Event::Range(_, _, number) => number.take(),
+                Event::Odometry(_) => None,
+            };
+            let event = *event;
+            let verdict = self.process(&event)?;
+            if let Event::Odometry(sample) = event {
+                self.keep_copy_if_due(sample.time_s, index + 1);
+            }
+            let update = waits.and_then(|number| burst.get_mut(number));
+            if let (Some(update), Some(verdict)) = (update, verdict) {
+                update.set(verdict);
             }
         }
         self.forget();

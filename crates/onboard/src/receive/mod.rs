@@ -3,6 +3,7 @@
 
 pub mod array_view;
 pub mod despread;
+mod ranging;
 mod receiver;
 pub mod wideband;
 

@@ -13,6 +13,7 @@ use num_complex::Complex64;
 use thiserror::Error;
 
 use super::despread::Despread;
+use super::ranging::RangingClock;
 use super::wideband::line_of_sight;
 use crate::elements::for_elements;
 use crate::manifold::ArrayManifold;
@@ -48,6 +49,8 @@ pub struct ReceiverConfig {
     pub beams: Vec<(u16, u8)>,
     /// Interval of the search for further cells, in seconds.
     pub search_every_s: f64,
+    /// Whether delay, range rate, carrier phase and power of every SSB are measured.
+    pub measures_ranging: bool,
 }
 
 impl ReceiverConfig {
@@ -71,6 +74,7 @@ impl ReceiverConfig {
             cells: Some(beams.iter().map(|(pci, _)| *pci).collect()),
             beams,
             search_every_s: 1.0,
+            measures_ranging: vehicle.has_one_way_ranging(),
         }
     }
 
@@ -271,9 +275,9 @@ impl<const A: usize> DynWindowReceiver for (WindowReceiver<A>, Observer<A>) {
         check_antennas::<A>(window.antennas)?;
         let (start, antennas) = (window.start as i64, window.antennas);
         let base_rate_hz = observer.config.spacing.base_rate_hz();
-        receiver.receive(&ssb::Window { start, antennas }, &mut |seen| {
+        receiver.receive(&ssb::Window { start, antennas }, &mut |mut seen| {
             let elapsed_s = (seen.ssb.sample_start - start as f64) / base_rate_hz;
-            take(observer.observe(&seen, window.time_s + elapsed_s));
+            take(observer.observe(&mut seen, window.time_s + elapsed_s));
         })?;
         Ok(())
     }
@@ -328,8 +332,8 @@ impl<const A: usize> DynStreamReceiver for (ssb::StreamReceiver<A>, Observer<A>)
         check_antennas::<A>(antennas)?;
         let (receiver, observer) = self;
         let ratio = receiver.input_per_output();
-        receiver.push(antennas, &mut |seen| {
-            observer.observe_in_stream(&seen, ratio, time_s, take);
+        receiver.push(antennas, &mut |mut seen| {
+            observer.observe_in_stream(&mut seen, ratio, time_s, take);
         })?;
         Ok(())
     }
@@ -342,14 +346,18 @@ impl<const A: usize> DynStreamReceiver for (ssb::StreamReceiver<A>, Observer<A>)
     ) -> Result<(), ReceiveError> {
         let (receiver, observer) = self;
         let ratio = receiver.input_per_output();
-        receiver.gap_to(sample, &mut |seen| {
-            observer.observe_in_stream(&seen, ratio, time_s, take);
+        receiver.gap_to(sample, &mut |mut seen| {
+            observer.observe_in_stream(&mut seen, ratio, time_s, take);
         })?;
         Ok(())
     }
 
     fn reset(&mut self) {
-        self.0.reset();
+        let (receiver, observer) = self;
+        receiver.reset();
+        if let Some(clock) = &mut observer.ranging {
+            clock.reset();
+        }
     }
 }
 
@@ -367,6 +375,8 @@ struct Observer<const A: usize> {
     calibration: [Complex64; A],
     /// Direction finder of a non-linear array.
     finder: Option<DirectionFinder<ArrayManifold<A>, A>>,
+    /// Clock of the delays, if they are measured.
+    ranging: Option<RangingClock>,
     observation: SsbObservation,
     /// Number of SSBs that a search has detected.
     found: u64,
@@ -386,6 +396,9 @@ impl<const A: usize> Observer<A> {
         Ok(Self {
             calibration,
             finder: manifold.map(ArrayManifold::finder).transpose()?,
+            ranging: (config.measures_ranging)
+                .then(|| RangingClock::new(config.spacing, config.ssb_freq_hz, config.period_s))
+                .flatten(),
             observation: SsbObservation::new(A),
             found: 0,
             config,
@@ -393,8 +406,13 @@ impl<const A: usize> Observer<A> {
     }
 
     /// Returns the observation of a received SSB with its reception time.
-    fn observe(&mut self, seen: &Seen<'_, A>, time_s: f64) -> &SsbObservation {
+    fn observe(&mut self, seen: &mut Seen<'_, A>, time_s: f64) -> &SsbObservation {
         self.found += u64::from(!seen.is_followed);
+        let ranging = self.ranging.as_mut().and_then(|clock| {
+            let observed = seen.tracker.observe(seen.ssb)?;
+            let gap_s = seen.unreported_gap / self.config.spacing.base_rate_hz();
+            clock.ranging(seen.ssb.ssb_index, &observed.observables, gap_s)
+        });
         let (config, finder) = (&self.config, self.finder.as_ref());
         let (tracker, ssb) = (&*seen.tracker, seen.ssb);
         let into = &mut self.observation;
@@ -407,12 +425,13 @@ impl<const A: usize> Observer<A> {
             ssb,
             time_s,
         );
+        into.ranging = ranging;
         into
     }
 
     fn observe_in_stream(
         &mut self,
-        seen: &Seen<'_, A>,
+        seen: &mut Seen<'_, A>,
         ratio: f64,
         time_s: &dyn Fn(f64) -> f64,
         take: &mut dyn FnMut(&SsbObservation, f64),

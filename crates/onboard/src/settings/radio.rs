@@ -51,6 +51,11 @@ pub struct RadioHeadSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e4))]
     pub clock_wander_ns_per_sqrt_s: Option<f64>,
+    /// Standard deviation of the carrier's relative frequency error, in parts per billion, for range
+    /// rates. Default: 50 ppb, the maximum error of a base station (TS 38.104, 6.5.1).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e4))]
+    pub clock_frequency_std_ppb: Option<f64>,
 }
 
 /// `[radio_heads.array]`

@@ -45,6 +45,13 @@ pub struct RangingSettings {
     /// One-way delays: random walk of that frequency error, in ppb/√s.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub clock_drift_walk_ppb_per_sqrt_s: f64,
+    /// One-way delays: whether the range rates of received SSBs are used. They measure the
+    /// frequency error of the vehicle's clock and, with a known frequency of the radio heads, the
+    /// heading.
+    pub range_rate: bool,
+    /// One-way delays: whether the carrier phases of received SSBs are used. They need clocks whose
+    /// random walk between two SSBs is below an eighth of a wavelength.
+    pub carrier_phase: bool,
 }
 
 /// Kind of the ranges.
@@ -67,11 +74,13 @@ impl Default for RangingSettings {
             position_m: None,
             scale_std: None,
             offset_std_m: 3.0,
-            offset_walk_m_per_sqrt_m: 0.02,
+            offset_walk_m_per_sqrt_m: 0.01,
             clock_offset_std_ns: 1e6,
             clock_wander_ns_per_sqrt_s: 1.0,
             clock_drift_std_ppb: 2000.0,
             clock_drift_walk_ppb_per_sqrt_s: 1.0,
+            range_rate: true,
+            carrier_phase: false,
         }
     }
 }

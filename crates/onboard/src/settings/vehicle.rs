@@ -9,7 +9,7 @@ use super::error::SettingsError;
 use super::integrity::IntegritySettings;
 use super::localizer::LocalizerSettings;
 use super::odometry::{DriveKind, GyroscopeSettings, LaneKeepingSettings, OdometerSettings};
-use super::ranging::RangingSettings;
+use super::ranging::{RangingKind, RangingSettings};
 use super::receiver::{EstimatorMethod, EstimatorSettings, Pilots, ReceiverSettings};
 use super::site::Site;
 use super::start::StartSettings;
@@ -114,6 +114,13 @@ impl Default for PlatformSettings {
 }
 
 impl Vehicle {
+    /// Whether the localizer uses delays of received SSBs: a tracker with one-way ranging.
+    pub fn has_one_way_ranging(&self) -> bool {
+        let is_one_way = |it: &RangingSettings| it.kind == RangingKind::OneWay;
+        self.ranging.as_ref().is_some_and(is_one_way)
+            && matches!(self.localizer, LocalizerSettings::Tracker(_))
+    }
+
     /// Top speed in m/s.
     pub fn top_speed_mps(&self) -> f64 {
         self.top_speed_kmh / 3.6

@@ -5,8 +5,10 @@
 mod air;
 mod differential;
 mod gap;
+mod live_ranges;
 mod live_times;
 mod random_drives;
+mod range_kinds;
 mod ranges;
 mod receiver;
 mod recovery;

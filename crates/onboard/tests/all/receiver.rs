@@ -58,6 +58,7 @@ impl Air {
             array: ArraySettings::default(),
             cells: None,
             search_every_s: 1.0,
+            measures_ranging: false,
         })
         .unwrap()
     }

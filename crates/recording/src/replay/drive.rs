@@ -134,6 +134,15 @@ impl<'a> Replay<'a> {
             self.drive
                 .aoa_estimates
                 .extend_from_slice(heard.aoa_estimates);
+            let ranges = self.onboard.ranges().iter().map(|it| LocatedRange {
+                range: LoggedRange {
+                    pci: it.head.pci,
+                    ssb_index: it.head.ssb_index,
+                    measured: it.measured,
+                },
+                verdict: it.verdict,
+            });
+            self.drive.ranges.extend(ranges);
             self.remark_on_loss(time_s);
             self.remark_on_faults(time_s);
             ssbs = later;

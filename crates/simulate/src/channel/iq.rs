@@ -17,6 +17,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
+use super::clocks::Clocks;
 use super::head_channel::HeadChannel;
 use crate::random::{Purpose, Streams};
 use crate::scenario::{IqSettings, Scenario};
@@ -41,6 +42,7 @@ pub struct IqAir {
     /// Relative frequency error of the receiver's oscillator; positive means too fast.
     oscillator: f64,
     head_oscillators: Vec<f64>,
+    clocks: Clocks,
     channel_gains: Vec<Complex64>,
     noise: ChaCha8Rng,
     /// Whether samples are also generated between the bursts.
@@ -114,6 +116,7 @@ impl IqAir {
             period_s: site.ssb.period_s(),
             oscillator,
             head_oscillators,
+            clocks: Clocks::new(scenario, streams),
             channel_gains,
             noise: streams.generator(Purpose::SampleNoise, 0),
             continuous: false,
@@ -183,6 +186,7 @@ impl IqAir {
             antenna.resize((end - start) as usize, Complex64::ZERO);
         }
         self.burst.ssb_starts.clear();
+        self.clocks.advance_to(number);
         for (index, (head, snr_db)) in heads.iter().zip(snrs_db).enumerate() {
             let start = self.add_ssb(index, number, half_frame_start, &state, head, *snr_db)?;
             self.burst.ssb_starts.push(start);
@@ -229,7 +233,9 @@ impl IqAir {
         let first_symbol = self.case.start_symbol(head.ssb_index)?;
         let time_s = number as f64 * self.period_s;
         let sight = channel.array().line_of_sight(&state(time_s), head);
-        let delay = sight.distance_m / SPEED_OF_LIGHT_MPS * rate_hz;
+        let clock_s = self.clocks.delay_s(index);
+        let delay = (sight.distance_m / SPEED_OF_LIGHT_MPS + clock_s) * rate_hz;
+        let clock_turn = -(self.ssb_freq_hz * clock_s).fract();
         let start = half_frame_start + self.numerology.symbol_start(first_symbol) as f64 + delay;
         let place = (start - self.burst.start as f64).floor();
         // Apply the fractional part of the delay as a phase ramp over the subcarriers.
@@ -266,7 +272,7 @@ impl IqAir {
                 self.ofdm.modulate(&faded, &mut self.symbol)?;
                 for (n, (to, sample)) in sum.iter_mut().skip(begin).zip(&self.symbol).enumerate() {
                     let at = self.burst.start as f64 + (begin + n) as f64;
-                    let turn = Complex64::cis(TAU * (cfo * at).fract());
+                    let turn = Complex64::cis(TAU * ((cfo * at).fract() + clock_turn));
                     *to += turn * Complex64::new(sample.re.into(), sample.im.into());
                 }
             }

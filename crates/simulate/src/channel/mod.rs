@@ -2,6 +2,7 @@
 //! channel models implement [`Propagation`].
 
 mod blockage;
+mod clocks;
 mod fading;
 mod head_channel;
 mod iq;

@@ -33,6 +33,10 @@ pub struct IqSettings {
     /// Standard deviation of the gain error of each receive channel in dB, drawn once per run.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub channel_gain_db: f64,
+    /// True errors of the clocks of vehicle and radio heads, relative to those of the site file and
+    /// of the vehicle's `[ranging]`. They have an effect only if the vehicle uses one-way delays.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub clock_error_scale: f64,
 }
 
 impl Default for IqSettings {
@@ -45,6 +49,7 @@ impl Default for IqSettings {
             adc_headroom_db: 12.0,
             channel_phase_rad: 0.0,
             channel_gain_db: 0.0,
+            clock_error_scale: 1.0,
         }
     }
 }

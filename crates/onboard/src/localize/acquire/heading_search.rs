@@ -94,6 +94,9 @@ impl HeadingSearch {
         let Ok(predicted) = solution.predict_range(head, measured) else {
             return;
         };
+        if predicted.is_new_sequence {
+            return;
+        }
         self.solution += range_density(&predicted).ln();
         for it in &mut self.filters {
             let predicted = it.ekf.predict_range(head, measured);

@@ -7,4 +7,4 @@ mod range_states;
 
 pub(in crate::localize) use jump_process::{JumpHypotheses, MOST_VARIANCE, independent, repeats};
 pub use multipath_bias::MultipathBias;
-pub(in crate::localize) use range_states::{CLOCK, DRIFT, FIRST_OFFSET, RANGE_SCALE, RangeTerms};
+pub(in crate::localize) use range_states::{CLOCK, DRIFT, HeadState, RANGE_SCALE, RangeTerms};

@@ -1,6 +1,7 @@
 //! States of the ranges, estimated together with the vehicle's state: scale error, offset and drift
-//! of the vehicle's clock, and one offset per radio head. They follow the angles' biases in
-//! [`MultipathBias`], so that vehicle, biases and range states remain one Gaussian.
+//! of the vehicle's clock, and per radio head an offset, a rate offset and a phase offset. They
+//! follow the angles' biases in [`MultipathBias`], so that vehicle, biases and range states remain
+//! one Gaussian.
 
 use super::multipath_bias::{HeadBias, MultipathBias};
 use crate::gaussian::dot;
@@ -14,14 +15,38 @@ pub(in crate::localize) const CLOCK: usize = 1;
 pub(in crate::localize) const DRIFT: usize = 2;
 pub(in crate::localize) const FIRST_OFFSET: usize = 3;
 
-/// Derivative of a range by its four range states: number of the state, and factor.
+/// Derivative of a measurement by its range states: number of the state, and factor.
 pub(in crate::localize) type RangeTerms = [(usize, f64); 4];
+
+/// State of one radio head.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::localize) enum HeadState {
+    /// Offset of its ranges (m).
+    Offset,
+    /// Offset of its range rates (m/s): frequency error.
+    RateOffset,
+    /// Offset of its carrier phases (m): unknown number of wavelengths.
+    PhaseOffset,
+}
+
+impl HeadState {
+    /// Returns the number of the state of radio head `index` of `heads`.
+    pub const fn number(self, index: usize, heads: usize, model: &RangeModel) -> usize {
+        let block = match self {
+            Self::Offset => 0,
+            Self::RateOffset => 1,
+            Self::PhaseOffset => 1 + model.uses_range_rate as usize,
+        };
+        FIRST_OFFSET + block * heads + index
+    }
+}
 
 impl MultipathBias {
     /// Adds the states of the ranges of these radio heads.
     pub fn add_ranges(&mut self, model: &RangeModel, heads: &[RadioHead]) {
         let old = self.heads.len();
-        let count = old + FIRST_OFFSET + heads.len();
+        let blocks = 1 + usize::from(model.uses_range_rate) + usize::from(model.uses_carrier_phase);
+        let count = old + FIRST_OFFSET + blocks * heads.len();
         let mut among = vec![0.0; count * count];
         for (place, &covariance) in self.among.iter().enumerate() {
             if let Some(value) = among.get_mut((place / old) * count + place % old) {
@@ -41,23 +66,36 @@ impl MultipathBias {
             let state = FIRST_OFFSET + number;
             self.add_to(state, state, offset_variance(head));
         }
-        self.add_clocks(model, heads, 0, 1.0);
+        let each = heads.iter().copied();
+        let offset = |head: &RadioHead| model.head_clock(&head.clock)[0];
+        self.add_of_clocks(&each, offset, |one, other, covariance| {
+            (FIRST_OFFSET + one, FIRST_OFFSET + other, covariance)
+        });
+        if model.uses_range_rate {
+            let number = |index| HeadState::RateOffset.number(index, heads.len(), model);
+            let rate = |head: &RadioHead| model.frequency_std_mps(&head.clock);
+            self.add_of_clocks(&each, rate, |one, other, covariance| {
+                (number(one), number(other), covariance)
+            });
+        }
+        // A carrier phase determines its offset at first, so that no prior is needed.
     }
 
-    /// Adds the covariance of the radio heads' clocks: `times` the square of item `of` of
-    /// [`RangeModel::head_clock`]. Radio heads of a clock group share the clock.
-    fn add_clocks(&mut self, model: &RangeModel, heads: &[RadioHead], of: usize, times: f64) {
-        let std_m = |head: &RadioHead| {
-            let clock = model.head_clock(&head.clock);
-            clock.get(of).copied().unwrap_or_default()
-        };
-        for (one, head) in heads.iter().enumerate() {
-            for (other, beside) in heads.iter().enumerate() {
+    /// Adds the covariance of a property of the radio heads' clocks with the standard deviation
+    /// `std`, to the pair of states and with the covariance that `to` returns for a pair of radio
+    /// heads. Radio heads of a clock group share the clock.
+    fn add_of_clocks(
+        &mut self,
+        heads: &(impl Iterator<Item = RadioHead> + Clone),
+        std: impl Fn(&RadioHead) -> f64,
+        to: impl Fn(usize, usize, f64) -> (usize, usize, f64),
+    ) {
+        for (one, head) in heads.clone().enumerate() {
+            for (other, beside) in heads.clone().enumerate() {
                 let group = head.clock.group;
-                let shares = one == other || (group.is_some() && group == beside.clock.group);
-                if shares {
-                    let covariance = times * std_m(head) * std_m(beside);
-                    self.add_to(FIRST_OFFSET + one, FIRST_OFFSET + other, covariance);
+                if one == other || (group.is_some() && group == beside.clock.group) {
+                    let (row, column, covariance) = to(one, other, std(&head) * std(&beside));
+                    self.add_to(row, column, covariance);
                 }
             }
         }
@@ -115,22 +153,50 @@ impl MultipathBias {
             self.add_to(CLOCK, DRIFT, 0.5 * walk * duration_s);
             self.add_to(DRIFT, CLOCK, 0.5 * walk * duration_s);
             self.add_to(DRIFT, DRIFT, walk);
-            for (one, head) in heads.clone().enumerate() {
-                for (other, beside) in heads.clone().enumerate() {
-                    let group = head.clock.group;
-                    if one == other || (group.is_some() && group == beside.clock.group) {
-                        let [_, mine] = model.head_clock(&head.clock);
-                        let [_, theirs] = model.head_clock(&beside.clock);
-                        let covariance = mine * theirs * duration_s;
-                        self.add_to(FIRST_OFFSET + one, FIRST_OFFSET + other, covariance);
-                    }
+            let number = heads.clone().count();
+            let wander = |head: &RadioHead| model.head_clock(&head.clock)[1];
+            // Delay and carrier phase of a radio head derive from the same clock.
+            let both = [HeadState::Offset, HeadState::PhaseOffset];
+            let states = both.iter().take(1 + usize::from(model.uses_carrier_phase));
+            for row in states.clone() {
+                for column in states.clone() {
+                    self.add_of_clocks(heads, wander, |one, other, covariance| {
+                        let place = |of: &HeadState, index| of.number(index, number, model);
+                        (
+                            place(row, one),
+                            place(column, other),
+                            covariance * duration_s,
+                        )
+                    });
                 }
             }
         }
         let walk = model.offset_walk_m_per_sqrt_m.powi(2) * travelled_m.abs();
-        for number in FIRST_OFFSET..count - self.biases {
-            self.add_to(number, number, walk);
+        for (index, _) in heads.clone().enumerate() {
+            self.add_to(FIRST_OFFSET + index, FIRST_OFFSET + index, walk);
         }
+    }
+
+    /// Replaces a range state by an unknown value: mean, variance, no covariances.
+    pub fn reset_range_state(&mut self, number: usize, mean: f64, variance: f64) {
+        let (count, place) = (self.heads.len(), self.biases + number);
+        if let Some(state) = self.heads.get_mut(place) {
+            *state = HeadBias::unused();
+            state.mean_rad = mean;
+            for other in 0..count {
+                for at in [place * count + other, other * count + place] {
+                    if let Some(value) = self.among.get_mut(at) {
+                        *value = 0.0;
+                    }
+                }
+            }
+            self.add_to(number, number, variance);
+        }
+    }
+
+    /// Adds to the variance of a range state: its value jumped by an unknown amount.
+    pub fn add_jump(&mut self, number: usize, variance: f64) {
+        self.add_to(number, number, variance);
     }
 
     /// Returns the variance that the range states add to a range with this state row: their own

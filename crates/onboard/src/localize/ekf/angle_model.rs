@@ -147,7 +147,7 @@ pub(super) struct LineOfSight {
     /// Steps of the array by each state, towards the radio head and to the left of that direction.
     pub steps: [[f64; STATES]; 2],
     /// Change in the bearing by each state.
-    bearing_row: [f64; STATES],
+    pub bearing_row: [f64; STATES],
 }
 
 impl LineOfSight {

@@ -328,7 +328,8 @@ impl EkfConfig {
                 correlation_m: receiver.noise_correlation_distance_m,
             },
             multipath_bias_probability,
-            ranging: (vehicle.ranging.as_ref()).map(|it| RangeModel::new(it, array.position_m)),
+            ranging: (vehicle.ranging.as_ref())
+                .map(|it| RangeModel::new(it, array, site.wavelength_m())),
             gap_s: 5.0 / odometer.rate_hz,
             top_speed_mps: 1.5 * vehicle.top_speed_mps(),
         };

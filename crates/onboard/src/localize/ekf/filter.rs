@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::config::EkfConfig;
 use super::odometer::{SampleInterval, SpeedJumps};
+use super::range::RangeNoise;
 use super::state::{
     ANGLE_TIME_OFFSET, Belief, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
@@ -43,6 +44,8 @@ pub(super) struct Head {
     pub last_update_rad: f64,
     /// ... and the residual after the update.
     pub last_residual: Option<Residual>,
+    /// Number of successive rejected ranges.
+    pub rejected_ranges: u16,
 }
 
 impl Head {
@@ -74,6 +77,8 @@ clone_in_place! {
         pub(super) unread_m: f64,
         /// White fraction of the angles' noise.
         pub(super) white: WhiteNoiseFraction,
+        /// Noise of the ranges relative to the specified one.
+        pub(super) range_noise: RangeNoise,
     }
 }
 
@@ -94,6 +99,7 @@ impl Ekf {
             last_update_s: f64::NEG_INFINITY,
             last_update_rad: f64::NEG_INFINITY,
             last_residual: None,
+            rejected_ranges: 0,
         };
         let mut ekf = Self {
             config,
@@ -110,6 +116,7 @@ impl Ekf {
             speed_jumps: SpeedJumps::default(),
             unread_m: 0.0,
             white: WhiteNoiseFraction::new(config.correlated_noise.share),
+            range_noise: RangeNoise::STATED,
         };
         ekf.update_off_map();
         ekf

@@ -58,6 +58,11 @@ pub(super) struct SampleInterval {
 }
 
 impl SampleInterval {
+    /// Returns the usual interval (s); zero before the first one.
+    pub const fn usual_s(&self) -> f64 {
+        self.usual_s
+    }
+
     /// Returns the part of the time since the previous sample that a new sample describes, in
     /// seconds: all of it, unless samples in between were lost.
     pub fn told_s(&mut self, duration_s: f64) -> f64 {

@@ -91,9 +91,11 @@ impl Ekf {
         self.hear_as(other);
     }
 
-    /// Sets the white fraction of the angles' noise to that of another filter of the same receiver.
+    /// Sets the white fraction of the angles' noise and the noise of the ranges to those of another
+    /// filter of the same receiver.
     pub(in crate::localize) const fn hear_as(&mut self, other: &Self) {
         self.white = other.white;
+        self.range_noise = other.range_noise;
     }
 
     /// Returns a copy that expects the specified noise of the angles.

@@ -86,6 +86,7 @@ impl LikelihoodRatio {
     ) {
         if let (Ok(predicted), Ok(by_nominal)) = (predicted, by_nominal)
             && !(predicted.excluded || by_nominal.excluded)
+            && !(predicted.is_new_sequence || by_nominal.is_new_sequence)
         {
             let ratio = range_density(predicted) / range_density(by_nominal);
             self.0 = (self.0 + ratio.ln()).max(-CERTAIN);

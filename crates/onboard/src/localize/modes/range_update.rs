@@ -6,7 +6,7 @@ use super::likelihood::LikelihoodRatio;
 use crate::localize::ekf::PredictedRange;
 use crate::localize::output::{UpdateReason, UpdateVerdict};
 use crate::radio_head::RadioHead;
-use crate::range::RangeMeasurement;
+use crate::range::{RangeMeasurement, RangeQuantity};
 
 impl ModeFilter {
     /// Updates with a range, for which the nominal filter has the given prediction.
@@ -31,6 +31,10 @@ impl Bank {
             for subset in self.subsets.iter_mut() {
                 if !subset.lacks(number) {
                     subset.ekf.update_range(head, measured);
+                    continue;
+                }
+                // Rates and phases hardly depend on the position of the radio head.
+                if measured.quantity != RangeQuantity::Range {
                     continue;
                 }
                 let Ok(predicted) = subset.ekf.predict_range(head, measured) else {

@@ -1,0 +1,43 @@
+//! Range or one-way delay: `(1 + s) R + c + b` with the distance R to the radio head, the scale
+//! error s, the vehicle clock c (one-way delays only) and the offset b of the radio head.
+
+use super::pseudorange::PredictedRange;
+use crate::localize::bias::{CLOCK, DRIFT, HeadState, RANGE_SCALE};
+use crate::localize::ekf::filter::Ekf;
+use crate::localize::output::UpdateReason;
+use crate::radio_head::RadioHead;
+use crate::range::RangeMeasurement;
+
+impl Ekf {
+    pub(super) fn predict_distance(
+        &self,
+        head: &RadioHead,
+        measured: &RangeMeasurement,
+    ) -> Result<PredictedRange, UpdateReason> {
+        let of_model = self.config.ranging.and_then(|model| model.sigma_m);
+        let sigma_m = measured.sigma.or(of_model).unwrap_or(f64::NAN);
+        let seen = self.sight(head, measured, sigma_m)?;
+        let state_m = |number: usize| self.bias.range_state(number)[0];
+        let distance = self.distance(&seen, 1.0 + state_m(RANGE_SCALE));
+        let offset = HeadState::Offset.number(seen.index, self.heads.len(), seen.model);
+        let terms = [
+            (RANGE_SCALE, seen.sight.range_m),
+            (CLOCK, 1.0),
+            (DRIFT, seen.lag_s),
+            (offset, 1.0),
+        ];
+        let shift_m = state_m(CLOCK) + seen.lag_s * state_m(DRIFT) + state_m(offset);
+        Ok(self.predicted(
+            &seen,
+            measured.quantity,
+            measured.value - (distance.range_m + shift_m),
+            distance.row,
+            terms,
+            sigma_m * sigma_m,
+            [
+                self.range_noise.ratio(),
+                distance.variance + seen.clock_variance(),
+            ],
+        ))
+    }
+}

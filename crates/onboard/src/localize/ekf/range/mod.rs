@@ -1,0 +1,13 @@
+//! Updates with ranges, range rates and carrier phases: one file per kind with prediction,
+//! Jacobian, noise and offset.
+
+mod carrier_phase;
+mod distance;
+mod noise;
+mod pseudorange;
+mod range_rate;
+mod update;
+
+pub(super) use noise::RangeNoise;
+pub(in crate::localize) use pseudorange::PredictedRange;
+pub use update::RangeState;

@@ -1,0 +1,176 @@
+//! Prediction that ranges, carrier phases and range rates share: the line of sight at the time of
+//! the measurement, and the distance with its second-order terms.
+
+use crate::gaussian::Innovation;
+use crate::geometry::Pose;
+use crate::localize::bias::RangeTerms;
+use crate::localize::ekf::angle_model::{ArrayModel, LineOfSight, RoadFrame, locate};
+use crate::localize::ekf::filter::Ekf;
+use crate::localize::ekf::motion::Step;
+use crate::localize::ekf::state::{ALONG, DATUM, STATES};
+use crate::localize::output::UpdateReason;
+use crate::radio_head::RadioHead;
+use crate::range::{RangeMeasurement, RangeModel, RangeQuantity};
+
+/// Prediction and innovation of a measurement.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::localize) struct PredictedRange {
+    pub excluded: bool,
+    pub quantity: RangeQuantity,
+    /// Index of the radio head.
+    pub(super) index: usize,
+    pub(super) row: [f64; STATES],
+    pub(super) terms: RangeTerms,
+    /// Specified variance of the measurement's own noise.
+    pub(super) stated_variance: f64,
+    /// Whether a carrier phase starts a new sequence, because its number of wavelengths is unknown.
+    pub is_new_sequence: bool,
+    /// Innovation in metres; of a range rate in m/s.
+    pub innovation: Innovation,
+}
+
+/// Line of sight to a radio head at the time of a measurement.
+pub(super) struct Sighted<'a> {
+    pub model: &'a RangeModel,
+    pub index: usize,
+    pub excluded: bool,
+    pub head: &'a RadioHead,
+    pub mean: [f64; STATES],
+    pub pose: Pose,
+    pub frame: RoadFrame,
+    pub sight: LineOfSight,
+    /// Time since the newest odometry (s).
+    pub lag_s: f64,
+    ahead_variance: f64,
+    ahead: Option<Step>,
+}
+
+/// Distance to a radio head.
+pub(super) struct Distance {
+    /// Expected distance (m), and its derivative by the state at the newest odometry.
+    pub range_m: f64,
+    pub row: [f64; STATES],
+    /// Variance of the prediction in addition to that of the state (m²).
+    pub variance: f64,
+}
+
+impl Ekf {
+    /// Returns the line of sight for a measurement, or the reason why it is unusable.
+    pub(super) fn sight<'a>(
+        &'a self,
+        head: &RadioHead,
+        measured: &RangeMeasurement,
+        sigma: f64,
+    ) -> Result<Sighted<'a>, UpdateReason> {
+        let model = self.config.ranging.as_ref();
+        let model = model.ok_or(UpdateReason::Unusable)?;
+        let usable = measured.time_s.is_finite()
+            && measured.value.is_finite()
+            && sigma.is_finite()
+            && sigma > 0.0
+            && self.journal.is_none();
+        if !usable {
+            return Err(UpdateReason::Unusable);
+        }
+        let (index, head) = self.head_of(head, measured.time_s)?;
+        // Predict to the time of the measurement.
+        let (_, ahead_variance, ahead) = self.coast(measured.time_s);
+        let mean = *(ahead.as_ref()).map_or(&self.belief.mean, |ahead| &ahead.mean);
+        let (pose, frame) = locate(&mean, 0.0, self.map.as_deref());
+        let position_m = if measured.quantity == RangeQuantity::CarrierPhase {
+            model.phase_position_m
+        } else {
+            model.position_m
+        };
+        let antenna = ArrayModel {
+            position_m,
+            ..self.config.array
+        };
+        let sight = LineOfSight::new(&head.known, pose, &frame, &mean, &antenna)
+            .ok_or(UpdateReason::Unusable)?;
+        let lag_s = if self.odometry.is_some() {
+            (measured.time_s - self.time_s()).max(0.0)
+        } else {
+            0.0
+        };
+        Ok(Sighted {
+            model,
+            index,
+            excluded: head.excluded,
+            head: &head.known,
+            mean,
+            pose,
+            frame,
+            sight,
+            lag_s,
+            ahead_variance,
+            ahead,
+        })
+    }
+
+    /// Returns the expected distance times `scale`.
+    pub(super) fn distance(&self, seen: &Sighted<'_>, scale: f64) -> Distance {
+        let sight = &seen.sight;
+        // A step towards the radio head reduces the distance.
+        let level = scale * sight.level();
+        let mut row = sight.steps[0].map(|step| -level * step);
+        let (north, east) = sight.bearing_rad.sin_cos();
+        (row[DATUM[0]], row[DATUM[1]]) = (level * east, level * north);
+        // Second-order terms: a deviation to the side lengthens the distance.
+        let aside = scale * self.belief.variance_along(&sight.steps[1]) / sight.range_m;
+        let coasted = row[ALONG].powi(2) * seen.ahead_variance;
+        let (row, strayed) = seen.to_newest(row);
+        Distance {
+            range_m: scale * sight.range_m + 0.5 * aside,
+            row,
+            variance: coasted + strayed + 0.5 * aside * aside,
+        }
+    }
+
+    /// Returns the prediction of a measurement with this residual, whose own noise has the specified
+    /// variance times `ratio`.
+    #[expect(clippy::too_many_arguments, reason = "members of the prediction")]
+    pub(super) fn predicted(
+        &self,
+        seen: &Sighted<'_>,
+        quantity: RangeQuantity,
+        residual: f64,
+        row: [f64; STATES],
+        terms: RangeTerms,
+        stated_variance: f64,
+        [ratio, model_variance]: [f64; 2],
+    ) -> PredictedRange {
+        let known = self.belief.variance_along(&row) + self.bias.range_variance(&row, &terms);
+        let measurement_variance = ratio * stated_variance + model_variance;
+        PredictedRange {
+            excluded: seen.excluded,
+            quantity,
+            index: seen.index,
+            row,
+            terms,
+            stated_variance,
+            is_new_sequence: false,
+            innovation: Innovation {
+                residual,
+                variance: known.max(0.0) + measurement_variance,
+                measurement_variance,
+            },
+        }
+    }
+}
+
+impl Sighted<'_> {
+    /// Returns a row by the state at the newest odometry, and the variance of the step since then.
+    pub fn to_newest(&self, row: [f64; STATES]) -> ([f64; STATES], f64) {
+        (self.ahead.as_ref()).map_or((row, 0.0), |ahead| ahead.seen_before(&row))
+    }
+
+    /// Returns the variance of the clocks of vehicle and radio head since the newest odometry (m²).
+    pub fn clock_variance(&self) -> f64 {
+        let (model, lag_s) = (self.model, self.lag_s);
+        let [_, head_wander] = model.head_clock(&self.head.clock);
+        let wander = model.clock_wander_m_per_sqrt_s.powi(2) + head_wander.powi(2);
+        // A drift that walks during the lag.
+        wander * lag_s + model.drift_walk_mps_per_sqrt_s.powi(2) * lag_s.powi(3) / 3.0
+    }
+}

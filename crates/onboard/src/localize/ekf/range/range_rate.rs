@@ -1,0 +1,85 @@
+//! Range rate: `−u·v + d + f` with the direction u to the radio head, the velocity v of the
+//! antenna by the odometry, the drift d of the vehicle clock and the frequency error f of the radio
+//! head.
+
+use super::pseudorange::PredictedRange;
+use crate::localize::bias::{DRIFT, HeadState, RANGE_SCALE};
+use crate::localize::ekf::filter::Ekf;
+use crate::localize::ekf::state::{ALONG, HEADING, SCALE, YAW_RATE_BIAS};
+use crate::localize::output::UpdateReason;
+use crate::radio_head::RadioHead;
+use crate::range::RangeMeasurement;
+
+/// Minimum time between two odometry samples, and over which a rate is measured (s).
+const LEAST_INTERVAL_S: f64 = 1e-4;
+
+impl Ekf {
+    pub(super) fn predict_range_rate(
+        &self,
+        head: &RadioHead,
+        measured: &RangeMeasurement,
+        measured_s: f64,
+    ) -> Result<PredictedRange, UpdateReason> {
+        let sigma_mps = measured.sigma.unwrap_or(f64::NAN);
+        let seen = self.sight(head, measured, sigma_mps)?;
+        let odometry = self.odometry.ok_or(UpdateReason::Unusable)?;
+        if !seen.model.uses_range_rate {
+            return Err(UpdateReason::Unusable);
+        }
+        let (sight, speed_mps) = (&seen.sight, self.speed_mps());
+        let (aside, along) = (sight.bearing_rad - seen.pose.heading_rad).sin_cos();
+        let level = sight.level();
+        let yaw_rate_radps = odometry.yaw_rate_radps.unwrap_or(0.0) - seen.mean[YAW_RATE_BIAS];
+        // Velocity towards the radio head in the plane: of the vehicle, and of its antenna.
+        let swing_m = sight.steps[0][HEADING];
+        let closing_mps = speed_mps * along + yaw_rate_radps * swing_m;
+        // Derivatives: the direction turns, and the elevation changes.
+        let mut row = sight.bearing_row;
+        row[HEADING] -= 1.0;
+        row[ALONG] -= seen.frame.curvature_per_m;
+        for (value, step) in row.iter_mut().zip(sight.steps[0]) {
+            let climb = (1.0 - level * level) / sight.range_m * step;
+            *value = level * speed_mps * aside * *value + climb * closing_mps;
+        }
+        row[SCALE] += level * along * speed_mps / (1.0 + seen.mean[SCALE]);
+        row[YAW_RATE_BIAS] += level * swing_m;
+        let (row, strayed) = seen.to_newest(row);
+        // The odometer measures the mean speed between two samples.
+        let noise = &self.config.noise;
+        let interval_s = (self.sample_interval.usual_s())
+            .max(seen.lag_s)
+            .max(LEAST_INTERVAL_S);
+        let odometer_variance = noise.odometer_m_per_sqrt_m.powi(2) * speed_mps.abs()
+            + noise.odometer_m_per_sqrt_s.powi(2);
+        let speed_variance = self.config.speed_noise_mps.powi(2)
+            + odometer_variance / interval_s
+            + (0.5 * self.config.acceleration_mps2 * interval_s).powi(2);
+        let drift = seen.model.drift_walk_mps_per_sqrt_s.powi(2) * seen.lag_s;
+        // The random walk of both clocks within the interval is noise of the rate.
+        let [_, head_wander] = seen.model.head_clock(&seen.head.clock);
+        let wander = seen.model.clock_wander_m_per_sqrt_s.powi(2) + head_wander.powi(2);
+        let walked = wander / measured_s.max(LEAST_INTERVAL_S);
+        // The radio heads of a burst share the error of the speed.
+        let shared = self.heads.len().max(1) as f64;
+        let model_variance =
+            (level * along).powi(2) * shared * speed_variance + drift + strayed + walked;
+        let rate = HeadState::RateOffset.number(seen.index, self.heads.len(), seen.model);
+        let terms = [
+            (DRIFT, 1.0),
+            (rate, 1.0),
+            (RANGE_SCALE, 0.0),
+            (RANGE_SCALE, 0.0),
+        ];
+        let state_mps = |number: usize| self.bias.range_state(number)[0];
+        let expected_mps = -level * closing_mps + state_mps(DRIFT) + state_mps(rate);
+        Ok(self.predicted(
+            &seen,
+            measured.quantity,
+            measured.value - expected_mps,
+            row,
+            terms,
+            sigma_mps * sigma_mps,
+            [1.0, model_variance],
+        ))
+    }
+}

@@ -1,0 +1,167 @@
+//! Update with a range, range rate or carrier phase: gate, jumps, Kalman update.
+
+use super::pseudorange::PredictedRange;
+use crate::localize::bias::{CLOCK, DRIFT, HeadState, RANGE_SCALE};
+use crate::localize::ekf::filter::Ekf;
+use crate::localize::output::{UpdateReason, UpdateVerdict};
+use crate::radio_head::RadioHead;
+use crate::range::{RangeMeasurement, RangeQuantity};
+
+/// Number of successive rejected ranges of a radio head that are a jump of its offset or of the
+/// vehicle clock, not outliers.
+const JUMP_RANGES: u16 = 8;
+
+/// Estimated range states, each with its standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RangeState {
+    /// Estimated value.
+    pub mean: f64,
+    /// Standard deviation.
+    pub std: f64,
+}
+
+impl Ekf {
+    /// Predicts a range, range rate or carrier phase to a radio head.
+    pub(in crate::localize) fn predict_range(
+        &self,
+        head: &RadioHead,
+        measured: &RangeMeasurement,
+    ) -> Result<PredictedRange, UpdateReason> {
+        match measured.quantity {
+            RangeQuantity::Range => self.predict_distance(head, measured),
+            RangeQuantity::RangeRate { interval_s } => {
+                self.predict_range_rate(head, measured, interval_s)
+            }
+            RangeQuantity::CarrierPhase => self.predict_carrier_phase(head, measured),
+        }
+    }
+
+    /// Updates state and range states with a range, range rate or carrier phase.
+    pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateVerdict {
+        self.update_predicted_range(self.predict_range(head, measured))
+    }
+
+    /// Updates with a predicted measurement.
+    pub(in crate::localize) fn update_predicted_range(
+        &mut self,
+        predicted: Result<PredictedRange, UpdateReason>,
+    ) -> UpdateVerdict {
+        let predicted = match predicted {
+            Ok(predicted) if predicted.excluded => {
+                return self.verdict(UpdateReason::Excluded, None);
+            }
+            Ok(predicted) => predicted,
+            Err(reason) => return self.verdict(reason, None),
+        };
+        if predicted.is_new_sequence {
+            self.begin_sequence(&predicted);
+            return self.verdict(UpdateReason::Consistent, None);
+        }
+        let seen = predicted.innovation;
+        let mahalanobis2 = seen.mahalanobis2();
+        if predicted.quantity == RangeQuantity::Range {
+            let known = seen.variance - seen.measurement_variance;
+            let model =
+                seen.measurement_variance - self.range_noise.ratio() * predicted.stated_variance;
+            self.range_noise.see(
+                seen.residual,
+                (known + model).max(0.0),
+                predicted.stated_variance,
+            );
+        }
+        if mahalanobis2 > self.config.gate {
+            match predicted.quantity {
+                RangeQuantity::Range => self.reject_range(&predicted),
+                // A cycle slip: the phase continues with another number of wavelengths.
+                RangeQuantity::CarrierPhase => self.begin_sequence(&predicted),
+                RangeQuantity::RangeRate { .. } => {}
+            }
+            return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
+        }
+        if predicted.quantity == RangeQuantity::Range
+            && let Some(head) = self.heads.get_mut(predicted.index)
+        {
+            head.rejected_ranges = 0;
+        }
+        self.bias.take_range(
+            &mut self.belief,
+            &predicted.row,
+            &predicted.terms,
+            seen.residual,
+            seen.measurement_variance,
+        );
+        self.keep_bounds();
+        self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// Counts a rejected range. After several successive ones, the offset of the radio head has
+    /// jumped (first path blocked, hardware restarted), or the vehicle's clock if the ranges of the
+    /// other radio heads are rejected too. The variance of the state then includes the jump.
+    fn reject_range(&mut self, predicted: &PredictedRange) {
+        let Some(model) = self.config.ranging else {
+            return;
+        };
+        let count = self.heads.len();
+        let Some(head) = self.heads.get_mut(predicted.index) else {
+            return;
+        };
+        head.rejected_ranges += 1;
+        if head.rejected_ranges < JUMP_RANGES {
+            return;
+        }
+        head.rejected_ranges = 0;
+        let rejected = self.heads.iter().filter(|it| it.rejected_ranges > 1);
+        let rejected = 1 + rejected.count();
+        let jump_variance = predicted.innovation.residual.powi(2);
+        if model.is_one_way && count > 1 && 2 * rejected > count {
+            self.bias.add_jump(CLOCK, jump_variance);
+            self.bias.add_jump(DRIFT, model.drift_std_mps.powi(2));
+            for head in &mut self.heads {
+                head.rejected_ranges = 0;
+            }
+        } else {
+            let offset = HeadState::Offset.number(predicted.index, count, &model);
+            self.bias.add_jump(offset, jump_variance);
+        }
+    }
+
+    /// Predicts the range states with an odometry sample.
+    pub(in crate::localize::ekf) fn advance_ranges(&mut self, travelled_m: f64, duration_s: f64) {
+        if let Some(model) = &self.config.ranging {
+            let heads = self.heads.iter().map(|head| head.known);
+            self.bias
+                .advance_ranges(model, &heads, travelled_m, duration_s);
+        }
+    }
+
+    /// Returns the estimated relative scale error of the ranges; `None` without ranges.
+    pub fn range_scale(&self) -> Option<RangeState> {
+        self.config.ranging.map(|_| self.range_state(RANGE_SCALE))
+    }
+
+    /// Returns the estimated offset of a radio head's ranges (m); `None` without ranges.
+    pub fn range_offset(&self, head: &RadioHead) -> Option<RangeState> {
+        let index = self.heads.iter().position(|mine| mine.is(head))?;
+        let model = self.config.ranging.as_ref()?;
+        let number = HeadState::Offset.number(index, self.heads.len(), model);
+        Some(self.range_state(number))
+    }
+
+    /// Returns the estimated drift of the vehicle's clock, as a rate of the pseudorange (m/s);
+    /// `None` without one-way delays.
+    pub fn clock_drift_mps(&self) -> Option<RangeState> {
+        let model = self.config.ranging.filter(|model| model.is_one_way);
+        model.map(|_| self.range_state(DRIFT))
+    }
+
+    /// Returns the estimated standard deviation of the ranges' noise relative to the specified one.
+    pub fn range_noise_scale(&self) -> f64 {
+        self.range_noise.ratio().sqrt()
+    }
+
+    fn range_state(&self, number: usize) -> RangeState {
+        let [mean, variance] = self.bias.range_state(number);
+        let std = variance.max(0.0).sqrt();
+        RangeState { mean, std }
+    }
+}

@@ -1,0 +1,96 @@
+//! Delay, range rate, carrier phase and power of an SSB by the clock of the receiver.
+
+use nr_ssb::band::{Band, holding};
+use nr_ssb::observables::Observables;
+use nr_ssb::observables::delay::Multipath;
+use nr_ssb::observables::range_rate::RateSource;
+use nr_ssb::{Case, Numerology, SubcarrierSpacing};
+
+use crate::observation::SsbRanging;
+
+/// Duration of an SSB over which its own frequency offset is measured, in symbols.
+const SSB_SYMBOLS: f64 = 4.0;
+
+/// Converter of observables to delays without the position of the SSB in its burst.
+///
+/// A vehicle does not know when a cell transmits, except by its SSBs: delays are relative to the
+/// first one, modulo the period of the bursts, of which the nearest to the previous delay is taken.
+pub(super) struct RangingClock {
+    numerology: Numerology,
+    case: Case,
+    base_rate_hz: f64,
+    period_s: f64,
+    /// Reception time of the first SSB without its position in the burst, and the last delay (s).
+    origin_s: Option<f64>,
+    last_s: f64,
+}
+
+impl RangingClock {
+    /// Creates the converter; `None` for a numerology without SSBs at the base rate.
+    pub fn new(spacing: SubcarrierSpacing, ssb_freq_hz: f64, period_s: f64) -> Option<Self> {
+        let is_possible = |case: &Case| case.spacing() == spacing;
+        let mut by_band = holding(ssb_freq_hz).flat_map(Band::cases);
+        let case = by_band.find(is_possible).unwrap_or(match spacing {
+            SubcarrierSpacing::Khz15 => Case::A,
+            SubcarrierSpacing::Khz30 => Case::C,
+            SubcarrierSpacing::Khz120 => Case::D,
+            SubcarrierSpacing::Khz240 => Case::E,
+        });
+        Some(Self {
+            numerology: Numerology::new(spacing, 256).ok()?,
+            case,
+            base_rate_hz: spacing.base_rate_hz(),
+            period_s,
+            origin_s: None,
+            last_s: 0.0,
+        })
+    }
+
+    /// Returns the ranging of an SSB with these observables; `unreported_gap_s` is the duration of
+    /// missing samples before it.
+    pub fn ranging(
+        &mut self,
+        ssb_index: u8,
+        observables: &Observables,
+        unreported_gap_s: f64,
+    ) -> Option<SsbRanging> {
+        let Observables {
+            delay,
+            phase,
+            range_rate,
+            power,
+            ..
+        } = observables;
+        let symbol = self.case.start_symbol(ssb_index).ok()?;
+        let sent_s = self.numerology.symbol_start(symbol) as f64 / self.base_rate_hz;
+        let received_s = delay.first_path_start / self.base_rate_hz + unreported_gap_s - sent_s;
+        let since_s = received_s - *self.origin_s.get_or_insert(received_s);
+        let periods = ((since_s - self.last_s) / self.period_s).round();
+        self.last_s = since_s - periods * self.period_s;
+        let is_difference = range_rate.source == RateSource::PhaseDifference;
+        let own_s = SSB_SYMBOLS * self.numerology.ssb_symbol_len() as f64 / self.base_rate_hz;
+        Some(SsbRanging {
+            delay_s: self.last_s,
+            delay_sigma_s: delay.sigma_s,
+            is_first_path_uncertain: delay.multipath == Multipath::Uncertain,
+            rate_mps: range_rate.rate_m_s,
+            rate_sigma_mps: range_rate.sigma_m_s,
+            rate_interval_s: if is_difference {
+                range_rate.interval_s
+            } else {
+                own_s
+            },
+            is_rate_of_phases: is_difference,
+            phase_rad: phase.phase_rad,
+            phase_sigma_rad: phase.sigma_rad,
+            ss_rsrp_dbfs: power.ss_rsrp_dbfs,
+            first_path_dbfs: power.first_path_dbfs,
+        })
+    }
+
+    /// Removes the origin, for a stream that restarts.
+    pub const fn reset(&mut self) {
+        self.origin_s = None;
+        self.last_s = 0.0;
+    }
+}

@@ -1,0 +1,104 @@
+//! Clocks of the vehicle and of the radio heads: offsets and random walks, drawn from the nominal
+//! model of the site and of the vehicle's ranging.
+
+use onboard::radio_head::RadioHead;
+use onboard::range::RangeModel;
+use onboard::settings::SPEED_OF_LIGHT_MPS;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+use crate::random::{Purpose, Streams};
+use crate::scenario::Scenario;
+
+/// Index of the vehicle's clock among those of [`Purpose::RangingClock`].
+const VEHICLE: usize = usize::MAX;
+
+/// Clock whose error is a constant and a random walk.
+struct Clock {
+    generator: ChaCha8Rng,
+    error_s: f64,
+    wander_s_per_sqrt_s: f64,
+}
+
+impl Clock {
+    fn new(streams: Streams, index: usize, [offset_m, wander_m]: [f64; 2], scale: f64) -> Self {
+        let mut generator = streams.generator(Purpose::RangingClock, index);
+        let normal: f64 = generator.sample(StandardNormal);
+        Self {
+            error_s: scale * offset_m / SPEED_OF_LIGHT_MPS * normal,
+            wander_s_per_sqrt_s: scale * wander_m / SPEED_OF_LIGHT_MPS,
+            generator,
+        }
+    }
+
+    fn advance(&mut self, duration_s: f64) {
+        let normal: f64 = self.generator.sample(StandardNormal);
+        self.error_s += self.wander_s_per_sqrt_s * duration_s.sqrt() * normal;
+    }
+}
+
+/// Clocks of one run; exact clocks unless the vehicle uses one-way delays.
+pub(super) struct Clocks {
+    vehicle: Option<Clock>,
+    /// Clock of each oscillator, and the oscillator of each radio head.
+    oscillators: Vec<Clock>,
+    of_heads: Vec<usize>,
+    period_s: f64,
+    /// Number of the burst to which the clocks have advanced.
+    number: u64,
+}
+
+impl Clocks {
+    pub fn new(scenario: &Scenario, streams: Streams) -> Self {
+        let (site, vehicle) = (&scenario.site, &scenario.vehicle);
+        let mut made = Self {
+            vehicle: None,
+            oscillators: Vec::new(),
+            of_heads: Vec::new(),
+            period_s: site.ssb.period_s(),
+            number: 0,
+        };
+        let Some(ranging) = vehicle.ranging.filter(|_| vehicle.has_one_way_ranging()) else {
+            return made;
+        };
+        let model = RangeModel::new(&ranging, &vehicle.array, site.wavelength_m());
+        let scale = scenario.iq.clock_error_scale;
+        // The receiver counts from its first SSB: the offset of the vehicle's clock has no effect.
+        let vehicle_m = [0.0, model.clock_wander_m_per_sqrt_s];
+        made.vehicle = Some(Clock::new(streams, VEHICLE, vehicle_m, scale));
+        let heads: Vec<_> = site.radio_heads.iter().map(RadioHead::from).collect();
+        for (index, head) in heads.iter().enumerate() {
+            let group = head.clock.group;
+            let shares = |other: &&RadioHead| group.is_some() && other.clock.group == group;
+            let first = heads.iter().take(index).position(|other| shares(&other));
+            let own = first.and_then(|first| made.of_heads.get(first).copied());
+            made.of_heads.push(own.unwrap_or(made.oscillators.len()));
+            if own.is_none() {
+                let clock_m = model.head_clock(&head.clock);
+                let clock = Clock::new(streams, index, clock_m, scale);
+                made.oscillators.push(clock);
+            }
+        }
+        made
+    }
+
+    /// Advances the clocks to a burst, which is not before the last one.
+    pub fn advance_to(&mut self, number: u64) {
+        while self.number < number {
+            self.number += 1;
+            for clock in self.oscillators.iter_mut().chain(&mut self.vehicle) {
+                clock.advance(self.period_s);
+            }
+        }
+    }
+
+    /// Returns the delay of the SSBs of radio head `index` due to the clocks in seconds: a radio
+    /// head that transmits late, and a vehicle clock that is fast.
+    pub fn delay_s(&self, index: usize) -> f64 {
+        let oscillator = self.of_heads.get(index);
+        let head = oscillator.and_then(|&at| self.oscillators.get(at));
+        let error_s = |clock: &Clock| clock.error_s;
+        head.map_or(0.0, error_s) + self.vehicle.as_ref().map_or(0.0, error_s)
+    }
+}
