@@ -290,3 +290,32 @@ def test_the_ros_node_follows_its_topics(monkeypatch: pytest.MonkeyPatch) -> Non
     seen.callbacks["angles"](SimpleNamespace(data='{"pci": -1}'))
     drives()
     assert len(seen.warned) == 3
+
+
+def test_ranges_correct_a_wrong_odometer() -> None:
+    heads = {1: (-20.0, 12.0, 5.0), 2: (20.0, -10.0, 5.0), 3: (60.0, 14.0, 5.0)}
+    text = "".join(
+        f"[[radio_heads]]\npci = {pci}\nposition_m = {list(place)}\n"
+        for pci, place in heads.items()
+    )
+    site = access_av.Site.from_toml(f'name = "hall"\n{text}')
+    vehicle = access_av.Vehicle.from_toml(
+        'name = "cart"\ndrive = "differential"\n[start]\npose = [0.0, 0.0, 0.0]\n'
+        "[ranging]\nsigma_m = 0.1\nscale_std = 0.0\noffset_std_m = 0.1\n"
+    )
+    live = access_av.Live(site, vehicle)
+    for step in range(1, 200):
+        time_s = 0.1 * step
+        # The odometer measures 3 % too much: 0.9 m after 20 s.
+        live.odometry(time_s, 1.545, distance_m=1.545 * time_s, yaw_rate_radps=0.0)
+        pci = 1 + step % 3
+        x_m, y_m, z_m = heads[pci]
+        range_m = math.hypot(1.5 * time_s - x_m, y_m, z_m)
+        assert live.range(pci, time_s, range_m=range_m) == "consistent"
+    pose = live.status(19.9).pose
+    assert pose is not None
+    assert math.hypot(pose[0] - 1.5 * 19.9, pose[1]) < 0.3
+    with pytest.raises(ValueError, match="one-way"):
+        live.range(1, 20.0, delay_ns=100.0)
+    with pytest.raises(ValueError, match="either"):
+        live.range(1, 20.0)

@@ -4,7 +4,7 @@ use crate::BoxError;
 use crate::estimator::{self, AngleEstimator};
 use crate::geometry::Pose;
 use crate::link_budget::LinkBudget;
-use crate::localize::ekf::EstimatedConstants;
+use crate::localize::ekf::{EstimatedConstants, RangeState};
 use crate::localize::{
     self, AngleMeasurement, AngleUpdate, Ekf, Integrity, IntegrityState, Localizer,
     OdometryVerdict, OutOfSequenceBuffer, PoseEstimate, RangeUpdate, Recovered, UpdateReason,
@@ -681,6 +681,13 @@ impl Pipeline {
         constants.angle_time_offset_s.stated += self.angle_time_offset_s;
         constants.angle_time_offset_s.found += self.angle_time_offset_s;
         Some(constants)
+    }
+
+    /// Returns the estimated offset of the ranges of a radio head (m), if the localizer estimates it.
+    pub fn range_offset(&self, pci: u16, ssb_index: u8) -> Option<RangeState> {
+        let mut heads = self.visibility_model.heads.iter();
+        let head = heads.find(|head| head.sends(pci, ssb_index))?;
+        self.localizer.localizer().ekf()?.range_offset(head)
     }
 
     /// Keeps a journal for smoothing from now on, if the localizer is a single filter; the filters

@@ -4,7 +4,7 @@ use onboard::burst::{Burst, HasSsb, first_burst};
 use onboard::geometry::Pose;
 use onboard::localize::OdometryVerdict;
 use onboard::localize::Recovered;
-use onboard::localize::ekf::EstimatedConstants;
+use onboard::localize::ekf::{EstimatedConstants, RangeState};
 use onboard::monitor::ActiveFaults;
 use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
@@ -267,6 +267,11 @@ impl<'a> Replay<'a> {
     /// [`ReplayError::Custom`].
     pub fn drive_on(&mut self) -> Result<(), ReplayError> {
         self.odometry_until(f64::INFINITY)
+    }
+
+    /// Returns the estimated offset of the ranges of a radio head (m) at the end of the drive.
+    pub(super) fn range_offset(&self, pci: u16, ssb_index: u8) -> Option<RangeState> {
+        self.onboard.range_offset(pci, ssb_index)
     }
 
     /// Processes the remaining odometry and returns the located drive.

@@ -2,6 +2,8 @@
 
 use onboard::Custom;
 use onboard::localize::UpdateReason;
+use onboard::radio_head::RadioHead;
+use onboard::range::RangeModel;
 use onboard::settings::{Check, LocalizerSettings, RangingKind, RangingSettings, Site, Vehicle};
 
 use super::drive::Replay;
@@ -63,7 +65,9 @@ pub fn locate_ranges(
     }
     replay.with_ranges(&log.ranges);
     replay.drive_on()?;
-    for text in inconsistent(site, replay.located()) {
+    let mut texts = inconsistent(site, replay.located());
+    texts.extend(displaced(site, &vehicle, &replay));
+    for text in texts {
         replay.diagnose(Diagnosis {
             text,
             is_of_start: false,
@@ -106,6 +110,38 @@ fn with_ranging(vehicle: &Vehicle, log: &RangeLog) -> Result<Vehicle, ReplayErro
         "ranges need localizer.kind = \"tracker\"",
     )?;
     Ok(vehicle)
+}
+
+/// Number of standard deviations, specified and estimated, by which an offset certainly contradicts
+/// its specification.
+const CERTAIN_SIGMAS: f64 = 3.0;
+
+/// Returns a text for every radio head whose ranges have a larger offset than specified.
+fn displaced(site: &Site, vehicle: &Vehicle, replay: &Replay<'_>) -> Vec<String> {
+    let Some(ranging) = &vehicle.ranging else {
+        return Vec::new();
+    };
+    let model = RangeModel::new(ranging, &vehicle.array, site.wavelength_m());
+    let mut texts = Vec::new();
+    for settings in &site.radio_heads {
+        let head = RadioHead::from(settings);
+        let Some(offset) = replay.range_offset(head.pci, head.ssb_index) else {
+            continue;
+        };
+        let [clock_m, _] = model.head_clock(&head.clock);
+        let stated_m = (model.offset_std_m)
+            .hypot(head.position_std_m)
+            .hypot(clock_m);
+        if offset.mean.abs() > CERTAIN_SIGMAS * (stated_m + offset.std) {
+            texts.push(format!(
+                "the ranges of pci {} ssb_index {} have an offset of {:.2} ± {:.2} m, specified as 0 \
+                 ± {stated_m:.2} m; check position_m of the radio head, and ranging.offset_std_m \
+                 (and clock_offset_std_ns of the radio head)",
+                head.pci, head.ssb_index, offset.mean, offset.std
+            ));
+        }
+    }
+    texts
 }
 
 /// Returns a text for every radio head whose ranges mostly contradict the drive.

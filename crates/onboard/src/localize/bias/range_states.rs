@@ -15,6 +15,10 @@ pub(in crate::localize) const CLOCK: usize = 1;
 pub(in crate::localize) const DRIFT: usize = 2;
 pub(in crate::localize) const FIRST_OFFSET: usize = 3;
 
+/// Random walk of the phase offset over the distance driven (m/√m): multipath and the phase centres
+/// of both antennas change with position and direction by centimetres within metres.
+pub const PHASE_OFFSET_WALK_M_PER_SQRT_M: f64 = 0.005;
+
 /// Derivative of a measurement by its range states: number of the state, and factor.
 pub(in crate::localize) type RangeTerms = [(usize, f64); 4];
 
@@ -171,9 +175,17 @@ impl MultipathBias {
                 }
             }
         }
+        let count = heads.clone().count();
         let walk = model.offset_walk_m_per_sqrt_m.powi(2) * travelled_m.abs();
-        for (index, _) in heads.clone().enumerate() {
-            self.add_to(FIRST_OFFSET + index, FIRST_OFFSET + index, walk);
+        let phase_walk = PHASE_OFFSET_WALK_M_PER_SQRT_M.powi(2) * travelled_m.abs();
+        for index in 0..count {
+            let number = |state: HeadState| state.number(index, count, model);
+            let offset = number(HeadState::Offset);
+            self.add_to(offset, offset, walk);
+            if model.uses_carrier_phase {
+                let offset = number(HeadState::PhaseOffset);
+                self.add_to(offset, offset, phase_walk);
+            }
         }
     }
 

@@ -162,9 +162,7 @@ impl Bank {
         let faults = &settings.fault_probability;
         let nominal = given.nominal();
         let count = heads.len();
-        // Ranges have an offset of each radio head.
-        let is_estimated = nominal.is_with_bias() || nominal.config().ranging.is_some();
-        let is_separable = is_estimated && count >= LEAST_SEPARABLE;
+        let is_separable = nominal.is_with_bias() && count >= LEAST_SEPARABLE;
         Self {
             settings: *settings,
             subsets: Subsets::new(count),

@@ -32,11 +32,13 @@ impl Ekf {
         let yaw_rate_radps = odometry.yaw_rate_radps.unwrap_or(0.0) - seen.mean[YAW_RATE_BIAS];
         // Velocity towards the radio head in the plane: of the vehicle, and of its antenna.
         let swing_m = sight.steps[0][HEADING];
-        let closing_mps = speed_mps * along + yaw_rate_radps * swing_m;
         // Derivatives: the direction turns, and the elevation changes.
         let mut row = sight.bearing_row;
         row[HEADING] -= 1.0;
         row[ALONG] -= seen.frame.curvature_per_m;
+        // Second-order terms: an uncertain direction reduces the mean of its cosine.
+        let bend = 0.5 * self.belief.variance_along(&row) * speed_mps * along;
+        let closing_mps = speed_mps * along - bend + yaw_rate_radps * swing_m;
         for (value, step) in row.iter_mut().zip(sight.steps[0]) {
             let climb = (1.0 - level * level) / sight.range_m * step;
             *value = level * speed_mps * aside * *value + climb * closing_mps;
@@ -61,8 +63,11 @@ impl Ekf {
         let walked = wander / measured_s.max(LEAST_INTERVAL_S);
         // The radio heads of a burst share the error of the speed.
         let shared = self.heads.len().max(1) as f64;
-        let model_variance =
-            (level * along).powi(2) * shared * speed_variance + drift + strayed + walked;
+        let model_variance = (level * along).powi(2) * shared * speed_variance
+            + drift
+            + strayed
+            + walked
+            + 2.0 * (level * bend).powi(2);
         let rate = HeadState::RateOffset.number(seen.index, self.heads.len(), seen.model);
         let terms = [
             (DRIFT, 1.0),
