@@ -40,8 +40,8 @@ SCALE_STD = 0.003
 ODOMETER_M_PER_SQRT_M = 0.01
 GYROSCOPE_RAD_PER_SQRT_S = 0.001
 BIAS_STD_RADPS = 0.001
-# Standard deviation of unknown offsets (m), of the clock drift (m/s) and of its walk with a clock of
-# 1 ns/√s (m/s/√s).
+# Standard deviation of unknown offsets (m), of the clock drift (m/s) and of its walk with a clock
+# of 1 ns/√s (m/s/√s).
 UNKNOWN_OFFSET_M = 100.0
 DRIFT_STD_MPS = METRES_PER_NS * 2000.0
 DRIFT_WALK_MPS_PER_SQRT_S = METRES_PER_NS * 0.1

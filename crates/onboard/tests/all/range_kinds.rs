@@ -402,10 +402,9 @@ fn every_kind_reaches_the_bound() {
                 (sums.bound / sums.count).sqrt(),
                 f64::from(sums.continued) / f64::from(sums.phases.max(1)),
             );
-            // Phases are used after the first seconds only, when their number of wavelengths is
-            // known; the bound uses them from the start. Linearisation at these positions makes
-            // the covariance of two radio heads too small.
-            let [most_ratio, most_nees] = if phase { [1.35, 1.5] } else { [1.1, 1.15] };
+            // Phases are used only after the number of their wavelengths is known; the bound uses
+            // them from the start.
+            let [most_ratio, most_nees] = if phase { [1.5, 1.3] } else { [1.1, 1.15] };
             if ratio > most_ratio || !(0.85..most_nees).contains(&nees) {
                 failed.push((heads, rate, phase, ratio, nees));
             }

@@ -14,7 +14,6 @@ mod clock;
 mod common;
 #[path = "../../../nr-ssb/tests/all/counting/mod.rs"]
 mod counting;
-mod delays;
 mod doors;
 mod gap;
 mod integrity;
