@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn the_receiver_counts_when_asked() {
+    fn the_receiver_energy_is_counted_if_configured() {
         let counted = platform("jetson-agx-xavier")
             .with_overrides([("receiver.counted", Value::Boolean(true))], &Shipped)
             .unwrap();
@@ -371,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn at_the_wall_what_is_above_idle_costs_the_conversion_too() {
+    fn wall_power_includes_conversion_losses() {
         let text = CONTROLLED.replace("soc-rails", "wall");
         let supplied = format!(
             "supply_efficiency = {{ value = 0.8, provenance = \"assumed\", source = \"test\" }}\n{text}"
@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn between_wake_ups_far_apart_the_board_sleeps() {
+    fn the_board_sleeps_between_distant_wake_ups() {
         let text = format!(
             "{CONTROLLED}\n[suspend]\n\
              power_w = {{ value = 0.5, provenance = \"assumed\", source = \"test\", boundary = \"soc-rails\" }}\n\

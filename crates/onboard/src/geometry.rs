@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_cross_between_their_ends_alone() {
+    fn segments_cross_between_their_ends_only() {
         let line =
             |[x0, y0]: [f64; 2], [x1, y1]: [f64; 2]| [Point::new(x0, y0), Point::new(x1, y1)];
         let across = line([0.0, -1.0], [0.0, 1.0]);
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn an_offset_turns_the_shorter_way() {
+    fn an_offset_uses_the_shorter_rotation() {
         let pose = |x_m, heading_rad| Pose {
             x_m,
             y_m: 1.0,

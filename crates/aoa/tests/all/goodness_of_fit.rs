@@ -163,7 +163,7 @@ fn with_echo<const N: usize>(
 }
 
 #[test]
-fn reflections_and_further_sources_are_named() {
+fn reflections_and_additional_sources_are_reported() {
     let array = Array::<4>::half_wavelength();
     let trials = 400;
     for echo_db in [-3.0, -6.0, -9.0, -12.0] {
@@ -205,7 +205,7 @@ fn reflections_and_further_sources_are_named() {
 }
 
 #[test]
-fn the_reason_is_the_cause() {
+fn the_reported_reason_is_correct() {
     let array = Array::<4>::half_wavelength();
     let mut random = Random::new(67);
     let mut most_frequent = |snr_db: f64, snapshots: usize| {
@@ -244,7 +244,7 @@ fn the_reason_is_the_cause() {
 }
 
 #[test]
-fn two_sources_of_any_array_are_as_good_as_they_say() {
+fn two_sources_of_any_array_agree_with_their_standard_deviations() {
     let array = ArbitraryArray::<8>::circular(0.7).unwrap();
     for (elevations, correlated) in [
         ([0.3, 0.3], false),

@@ -519,7 +519,7 @@ mod tests {
     }
 
     #[test]
-    fn tones_are_measured_and_removed_and_noise_is_left_as_it_is() {
+    fn tones_are_measured_and_removed_and_noise_is_unchanged() {
         let clean: Vec<_> = (1..3).map(|seed| noise(seed, 40_000)).collect();
         let mut canceller = ToneCanceller::new(2);
         canceller.detect(&clean, 0);

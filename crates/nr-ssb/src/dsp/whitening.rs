@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn independent_antennas_are_left_and_others_made_so() {
+    fn independent_antennas_are_unchanged_and_correlated_ones_whitened() {
         let noise: Vec<_> = (1..4).map(waveform).collect();
         let slices: Vec<&[Complex32]> = noise.iter().map(Vec::as_slice).collect();
         assert!(whitening(&slices).is_none());
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_and_copies_are_no_reason_to_fail() {
+    fn silent_and_identical_channels_cause_no_failure() {
         let (silence, wave) = (vec![Complex32::ZERO; 4096], waveform(3));
         assert!(whitening(&[&silence, &silence]).is_none());
         let _ = whitening(&[&wave, &silence]);

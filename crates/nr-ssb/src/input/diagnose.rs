@@ -147,7 +147,7 @@ mod tests {
     use crate::numeric::noise::noise;
 
     #[test]
-    fn every_fault_is_named_and_healthy_channels_have_none() {
+    fn every_fault_is_reported_and_healthy_channels_have_none() {
         let healthy = noise(1, 4000);
         let mut broken = noise(2, 4000);
         broken[7].re = f32::NAN;

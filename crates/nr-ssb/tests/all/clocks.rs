@@ -157,7 +157,7 @@ fn every_clock_period_spacing_and_level_is_tracked() {
 }
 
 #[test]
-fn sleep_is_bridged_by_what_was_learned() {
+fn the_estimated_drift_bridges_a_sleep() {
     for asleep_s in [0.5, 2.0, 10.0, 60.0] {
         let mut tally = Tally::default();
         for ppm in [0.5, -2.0, 7.0, 20.0] {
@@ -186,7 +186,7 @@ fn sleep_is_bridged_by_what_was_learned() {
 
 /// An SSB within the range is identified correctly or not at all.
 #[test]
-fn an_ssb_off_its_place_is_named_rightly_or_not_at_all() {
+fn a_displaced_ssb_is_identified_correctly_or_not_at_all() {
     let mut named = [0_u32; 25];
     let trials = 12;
     for trial in 0..trials {

@@ -66,7 +66,7 @@ fn one_ssb_in_20_ms_is_decoded_by_one_antenna_at_minus_3_db() {
 /// probability of 0.33. A tenfold rate is detected here with a probability of 0.98. The example
 /// `false_cells` simulates enough searches to test 1e-3.
 #[test]
-fn noise_makes_no_cell() {
+fn noise_causes_no_cell() {
     let mut all = noise_only::Tally::default();
     for (antennas, searches) in [(1, 300), (4, 100)] {
         all.add(noise_only::search_noise(antennas, 0..searches));

@@ -134,7 +134,7 @@ fn rates_that_are_no_multiple_are_converted() {
 }
 
 #[test]
-fn bad_input_is_named() {
+fn invalid_input_is_reported() {
     let spacing = SubcarrierSpacing::Khz15;
     let rate = |rate_hz| FrontEnd::new(rate_hz, 0.0, 15e3, 1).err();
     for rate_hz in [f64::NAN, f64::INFINITY, -7.68e6, 0.0, 1e300, 5.123_457e6] {

@@ -151,7 +151,7 @@ fn every_stage_of_the_pbch_and_back() {
 }
 
 #[test]
-fn the_index_of_the_dmrs_is_that_of_its_burst_set() {
+fn the_dmrs_index_depends_on_the_burst_set_size() {
     for index in 0..8 {
         for half_frame in [false, true] {
             let four = (index & 3) + 4 * u8::from(half_frame);

@@ -77,7 +77,7 @@ fn an_ssb_between_the_raster_points_is_found() {
 /// The centre of a recording may be any frequency. At 50 dB, noise changes the frequency offset by
 /// less than 1 Hz, so that the error is that of the method.
 #[test]
-fn a_centre_between_all_rasters_gives_the_right_frequency_and_offset() {
+fn a_centre_off_all_rasters_gives_correct_frequency_and_offset() {
     use SubcarrierSpacing::{Khz15, Khz30};
     let mut rng = air::rng(5);
     // On the synchronization raster (the first of each band), and 5, 10 kHz or 15 kHz next to it.
@@ -118,7 +118,7 @@ fn a_centre_between_all_rasters_gives_the_right_frequency_and_offset() {
 /// With an offset far above the spacing of the raster, the cell is still detected, at a frequency
 /// whose phases between symbols agree with the received ones.
 #[test]
-fn an_oscillator_of_20_ppm_hides_no_cell() {
+fn a_cell_with_an_oscillator_error_of_20_ppm_is_detected() {
     let mut rng = air::rng(6);
     for spacing in [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30] {
         for ssb_freq_hz in [3_600.96e6, 3_625.175e6, 3_465.626e6, 3_615.599e6] {
@@ -204,7 +204,7 @@ fn a_weak_cell_off_the_raster_is_found_next_to_a_strong_one_on_it() {
 
 /// Detection limits of a cell on and off the raster, with one SSB in 3 ms on one antenna.
 #[test]
-fn off_the_raster_a_cell_may_be_nearly_as_weak() {
+fn detection_limits_on_and_off_the_raster_are_similar() {
     let trials = 25;
     let mut last = [0; 2];
     for snr_db in [-6.0, -4.0] {
@@ -235,7 +235,7 @@ fn off_the_raster_a_cell_may_be_nearly_as_weak() {
 }
 
 #[test]
-fn noise_holds_no_cell_anywhere() {
+fn noise_contains_no_cell_at_any_frequency() {
     let mut samples = air::silence(2, 46_080);
     air::add_noise(&mut samples, 0.0, &mut air::rng(9));
     let finds = scan(&air::slices(&samples), RATE_HZ, Some(3.5e9)).unwrap();
@@ -243,7 +243,7 @@ fn noise_holds_no_cell_anywhere() {
 }
 
 #[test]
-fn a_band_narrower_than_an_ssb_holds_none() {
+fn a_band_narrower_than_an_ssb_contains_no_cell() {
     let samples = air::silence(1, 10_000);
     let finds = scan_off_raster(&air::slices(&samples), 1.92e6, None, &[]).unwrap();
     assert!(finds.is_empty());
@@ -251,7 +251,7 @@ fn a_band_narrower_than_an_ssb_holds_none() {
 
 #[test]
 #[ignore = "needs the recordings (ACCESS_AV_DATA)"]
-fn recordings_that_hide_their_centre_give_the_same_cells() {
+fn recordings_without_centre_frequency_give_equal_cells() {
     for recording in recordings::annotated() {
         let name = &recording.name;
         let first = &recording.annotations[0];

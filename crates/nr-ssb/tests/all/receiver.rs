@@ -94,7 +94,7 @@ fn every_ssb_of_a_stream_is_received_once_with_its_channel() {
 }
 
 #[test]
-fn settings_that_cannot_be_are_refused() {
+fn invalid_settings_are_rejected() {
     let config = ReceiverConfig::new(3.6e9, SPACING, 2);
     for (name, wrong) in [
         (

@@ -86,7 +86,7 @@ fn disturb_pbch(samples: &mut [Vec<nr_ssb::Complex32>], start: f64, seed: u64) {
 }
 
 #[test]
-fn four_periods_decode_where_one_does_not() {
+fn four_periods_decode_below_the_limit_of_one() {
     for period_frames in [1_u16, 2, 4] {
         let mut decoded = [0, 0];
         for seed in 0..10 {

@@ -58,7 +58,7 @@ fn cycles(seed: u64, rng: &mut ChaCha8Rng) -> f64 {
 }
 
 #[test]
-fn a_search_finds_what_it_finds_without_tones_and_reports_them() {
+fn a_search_with_tones_equals_one_without_and_reports_them() {
     for (antennas, snr_db, trials) in [(1, 20.0, 8), (4, -9.0, 4)] {
         let mut searcher = Searcher::new(SearchConfig::new(SPACING, antennas)).unwrap();
         for seed in 0..trials {
@@ -99,7 +99,7 @@ fn squared_error(cell: &Cell, gains: [Complex64; 2]) -> f64 {
 }
 
 #[test]
-fn phases_between_antennas_are_as_without_tones() {
+fn tones_do_not_change_the_phases_between_antennas() {
     let mut searcher = Searcher::new(SearchConfig::new(SPACING, 2)).unwrap();
     // Squared errors without a tone, with one of −10 dB and with one of 15 dB.
     let mut squares = [0.0; 3];

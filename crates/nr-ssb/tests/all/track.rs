@@ -121,7 +121,7 @@ fn noise_variance_and_blocks_keep_the_scale_of_a_resource_element() {
 }
 
 #[test]
-fn a_moved_cell_is_tracked_at_its_new_position_and_a_vanished_one_is_reported() {
+fn a_moved_cell_is_tracked_and_a_lost_one_is_reported() {
     let (mut cell, config, samples) = scene(60, 5.0);
     let mut tracker = Tracker::<4>::new(&config, &first(&config, &samples)).unwrap();
     let expected = cell.ssb_start(1);

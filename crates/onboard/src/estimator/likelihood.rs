@@ -37,7 +37,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gaussian_comes_back() {
+    fn a_gaussian_likelihood_gives_its_parameters() {
         for (mean, sigma) in [(0.3, 0.05), (3.1, 0.1), (-2.0, 0.2)] {
             let log = grid(|angle| {
                 let off = (angle - mean + PI).rem_euclid(TAU) - PI;
@@ -50,7 +50,7 @@ mod tests {
     }
 
     #[test]
-    fn two_peaks_are_broad_and_nothing_is_nothing() {
+    fn two_peaks_are_broad_and_a_flat_likelihood_has_no_information() {
         let two = grid(|angle| {
             if (angle.abs() - 1.0).abs() < 0.01 {
                 0.0

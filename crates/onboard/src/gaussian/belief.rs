@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn a_state_switched_off_stays_off() {
+    fn a_disabled_state_remains_disabled() {
         let mut belief = Gaussian::independent([0.0, 3.0], [1.0, 0.0]);
         belief.update(5.0, &[1.0, 1.0], 0.1);
         assert_eq!(belief.mean[1], 3.0);

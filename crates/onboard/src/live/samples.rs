@@ -35,7 +35,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn full_scale_is_one_and_a_half_sample_is_left_out() {
+    fn full_scale_is_one_and_a_partial_sample_is_omitted() {
         let mut samples = Vec::new();
         ci8(&[-128, 64, 1], &mut samples);
         ci16(&[16384, -32768, 1], &mut samples);

@@ -456,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn without_arrivals_a_step_back_takes_a_run_too() {
+    fn without_arrivals_a_step_back_requires_several_messages() {
         let mut check = TimeCheck::default();
         for number in 0..100 {
             assert!(
@@ -478,7 +478,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_units_are_named_and_never_become_a_time_base() {
+    fn wrong_units_are_reported_and_never_become_a_time_base() {
         for unit in TimeUnit::ALL {
             // Since the computer was switched on, and since 1970.
             for epoch_s in [3.0, 1.7e9] {

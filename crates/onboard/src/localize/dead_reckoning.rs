@@ -15,9 +15,9 @@ use crate::settings::HeadingBetween;
 /// No measurement corrects the position, so that heading errors accumulate in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeadReckoning {
-    /// Time of the current pose ...
+    /// Time of the current pose (s).
     time_s: f64,
-    /// ... and the odometer's distance at that time.
+    /// Distance of the odometer at the time of the current pose (m).
     distance_m: f64,
     odometry: Option<OdometrySample>,
     pose: Pose,
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn angle_that_is_no_number_changes_nothing() {
+    fn a_nan_angle_changes_nothing() {
         let mut localizer = DeadReckoning::new(Pose::default(), HeadingBetween::Held, 0.0);
         let head = RadioHead {
             pci: 1,

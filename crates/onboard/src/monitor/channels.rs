@@ -113,7 +113,7 @@ pub struct ChannelMonitor {
 }
 
 impl ChannelMonitor {
-    /// For the array of a vehicle at a site, with this number of radio heads.
+    /// Creates the monitor for the array of a vehicle at a site with this number of radio heads.
     pub fn new(site: &Site, vehicle: &Vehicle, heads: usize) -> Self {
         let elements = usize::from(vehicle.array.elements);
         let mut gains = [Complex64::ONE; MAX_ELEMENTS];

@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn scatter_of_any_power_has_no_direction() {
+    fn scatter_of_any_power_is_not_a_second_source() {
         for scatter in [0.0, 0.1, 0.3, 0.6, 1.0, 3.0] {
             assert_eq!(changes(0.0, scatter), [], "{scatter}");
         }

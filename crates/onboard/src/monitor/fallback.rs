@@ -44,7 +44,7 @@ pub struct Fallback {
 }
 
 impl Fallback {
-    /// For a vehicle at a site.
+    /// Creates the filter for a vehicle at a site.
     pub fn new(site: &Site, vehicle: &Vehicle) -> Self {
         Self {
             site: site.clone(),

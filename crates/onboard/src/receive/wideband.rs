@@ -421,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn scatter_that_varies_over_the_band_is_averaged_out_and_owned_up_to() {
+    fn scatter_over_the_band_is_averaged_and_reported() {
         let trials = 300;
         // A mean square of n Gaussian errors has a relative standard deviation of √(2/n); the bound
         // is four of them.
@@ -447,7 +447,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_channel_is_left_alone() {
+    fn a_flat_channel_is_unchanged() {
         let mut rng = ChaCha8Rng::seed_from_u64(8);
         for trial in 0..2000 {
             // Noise alone, a weak line of sight, strong scatter without delays.

@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn the_other_way_round_it_is_the_same_road() {
+    fn the_reversed_road_is_equal() {
         let (road, back) = (winding(), winding().reversed());
         for step in 0..=40 {
             let along_m = f64::from(step) * road.length_m() / 40.0;
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn goes_on_straight_beyond_its_ends() {
+    fn the_road_continues_straight_beyond_its_ends() {
         let beyond = paper().pose(310.0);
         let end = paper().pose(300.0);
         assert!((beyond.point().distance_m(end.point()) - 10.0).abs() < 1e-9);
@@ -366,7 +366,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn projecting_undoes_offsetting(along_m in 0.0..205.0_f64, lateral_m in -4.0..4.0_f64) {
+        fn projection_inverts_the_offset(along_m in 0.0..205.0_f64, lateral_m in -4.0..4.0_f64) {
             let road = winding();
             let place = road.pose(along_m).offset_left(lateral_m).point();
             let back = road.project_near(place, along_m, 30.0);

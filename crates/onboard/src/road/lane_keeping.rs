@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn backwards_it_is_the_reversed_process() {
+    fn the_reversed_process_is_equal() {
         let variances = KEEPING.stationary();
         let (ahead, back) = (KEEPING.transition(11.0), KEEPING.transition(-11.0));
         for i in 0..2 {
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn two_together_have_the_moments_of_both() {
+    fn the_joint_estimate_has_the_moments_of_both() {
         let survey = LaneKeeping {
             rms_m: 0.02,
             wavelength_m: 20.0,

@@ -129,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_hour_is_as_many_epochs_as_are_independent() {
+    fn the_risk_per_hour_counts_independent_epochs() {
         let mut settings = IntegritySettings {
             risk_per_hour: 1e-3,
             error_correlation_s: 36.0,
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_that_the_risk_cannot_bear_are_refused_by_key() {
+    fn unmonitored_faults_above_the_risk_are_rejected_by_key() {
         let check = Check { file: "cart.toml" };
         let mut settings = IntegritySettings::default();
         assert!(settings.check(check).is_ok());

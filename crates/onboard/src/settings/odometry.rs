@@ -18,7 +18,7 @@ pub enum DriveKind {
     Differential,
 }
 
-/// `[odometer]`
+/// `[odometer]`: wheel odometer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct OdometerSettings {

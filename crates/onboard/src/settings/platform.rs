@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn power_of_the_busy_board_is_what_was_measured_at_the_wall() {
+    fn busy_board_power_equals_the_wall_measurement() {
         let engine = Platform::from_library("jetson-agx-xavier-engine", &Shipped).unwrap();
         let mut compared = 0;
         for mode in &engine.modes {

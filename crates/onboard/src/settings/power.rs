@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::figure::{Extent, Figure, Quantity};
 use super::receiver::EstimatorMethod;
 
-/// `[idle]`
+/// `[idle]`: power of the idle board.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct IdleSettings {
@@ -19,7 +19,7 @@ pub struct IdleSettings {
     pub power_w: Option<Figure>,
 }
 
-/// `[receiver]`
+/// `[receiver]`: power of the receiver.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReceiverPower {
@@ -100,7 +100,7 @@ pub struct SuspendSettings {
     pub transition_ms: Quantity,
 }
 
-/// `[[modes]]`
+/// `[[modes]]`: a power mode.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PowerMode {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::check::Check;
 use super::error::SettingsError;
 
-/// `[wake_up]`
+/// `[wake_up]`: policy that decides when an angle is estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "policy", rename_all = "kebab-case")]
 pub enum WakeUpSettings {

@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn faster_than_the_ssbs_means_every_ssb() {
+    fn an_interval_below_the_ssb_period_uses_every_ssb() {
         assert_eq!(aoa_estimates(0.001, 0.0), 4018);
     }
 }

@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn integral_is_clamped_only_when_asked() {
+    fn integral_is_clamped_only_if_configured() {
         let run = |integral_clamp| {
             let settings = PidSettings {
                 integral_clamp,

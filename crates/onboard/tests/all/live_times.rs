@@ -283,7 +283,7 @@ fn clocks_that_differ_from_the_start_are_reported_and_the_pose_is_not_localized(
 }
 
 #[test]
-fn wrong_units_are_named() {
+fn wrong_units_are_reported() {
     for (factor, unit) in [
         (1e3, "milliseconds"),
         (1e6, "microseconds"),

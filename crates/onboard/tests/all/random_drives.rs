@@ -137,7 +137,7 @@ fn drive(seed: u64) {
 }
 
 #[test]
-fn nothing_is_lost_and_nothing_leaps() {
+fn random_drives_have_finite_and_continuous_results() {
     for seed in 0..DRIVES {
         drive(seed);
     }

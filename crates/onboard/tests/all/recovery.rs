@@ -130,7 +130,7 @@ fn drive(told: Pose) -> (f64, bool) {
 }
 
 #[test]
-fn a_wrong_start_is_noticed_and_left() {
+fn a_wrong_start_is_detected_and_corrected() {
     let (right_m, recovered) = drive(Pose::default());
     assert!(!recovered && right_m < 0.3, "{right_m}");
     for (x_m, y_m, heading_rad) in [

@@ -323,7 +323,7 @@ fn a_vehicle_receives_only_the_radio_heads_on_its_list() {
 }
 
 #[test]
-fn defaults_are_a_vehicle_that_drives() {
+fn default_vehicle_settings_are_valid() {
     let plain = vehicle("name = 'plain'").unwrap();
     assert_eq!(plain.receiver.pilots, Pilots::Ssb);
     assert_eq!(plain.estimator.method, EstimatorMethod::MaximumLikelihood);

@@ -61,7 +61,7 @@ fn angle(time_s: f64, phase_rad: f64, phase_sigma_rad: f64) -> AngleMeasurement 
 }
 
 #[test]
-fn bad_angles_are_named_and_leave_the_state() {
+fn invalid_angles_are_reported_and_do_not_change_the_state() {
     let (mut tracker, head) = tracker();
     let before = tracker.clone();
     let stranger = RadioHead { pci: 999, ..head };
@@ -131,7 +131,7 @@ fn an_unverified_angle_is_weighted_by_its_likelihood() {
 }
 
 #[test]
-fn bad_odometry_is_named_and_leaves_the_state() {
+fn invalid_odometry_is_reported_and_does_not_change_the_state() {
     let (mut tracker, _) = tracker();
     let before = tracker.clone();
     for (sample, verdict) in [
@@ -146,7 +146,7 @@ fn bad_odometry_is_named_and_leaves_the_state() {
 }
 
 #[test]
-fn beyond_the_end_of_the_map_it_drives_on_and_comes_back() {
+fn a_vehicle_leaves_the_map_and_returns() {
     let length_m = road().length_m();
     let (mut tracker, _) = tracker();
     let (mut beyond, mut before) = (0, [0.0; 2]);
@@ -186,7 +186,7 @@ fn beyond_the_end_of_the_map_it_drives_on_and_comes_back() {
 }
 
 #[test]
-fn a_gap_loses_time_and_a_jump_loses_certainty() {
+fn a_gap_is_bridged_and_a_jump_increases_the_covariance() {
     let (mut gap, _) = tracker();
     assert!(matches!(
         gap.odometry(&sample(2.1, 8.4)),

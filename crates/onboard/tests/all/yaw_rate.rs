@@ -40,7 +40,7 @@ fn tracker(map: bool, position_std_m: f64) -> Ekf {
 }
 
 #[test]
-fn in_a_bend_it_corrects_the_odometer() {
+fn a_gyroscope_corrects_the_odometer_in_a_bend() {
     let (road, mut tracker) = (road(), tracker(true, 0.05));
     let (mut read_m, mut along_m) = (0.0, 0.0);
     for number in 0..800 {
@@ -97,7 +97,7 @@ fn the_turn_while_samples_are_lost_is_not_known() {
 }
 
 #[test]
-fn where_a_bend_begins_and_ends_is_where_the_vehicle_is() {
+fn ends_of_a_bend_determine_the_position() {
     for ahead_m in [-1.5, 1.5] {
         let (road, mut tracker) = (road(), tracker(true, 1.0));
         for number in 0..800 {

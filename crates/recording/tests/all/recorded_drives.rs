@@ -31,7 +31,7 @@ fn sample(time_s: f64) -> OdometrySample {
 }
 
 #[test]
-fn odometry_csv_comes_back_to_the_bit() {
+fn odometry_csv_round_trips_bit_by_bit() {
     let file = common::scratch("odometry").join("odo.csv");
     let mut samples: Vec<_> = (0..50).map(|k| sample(f64::from(k) * 0.02)).collect();
     write_odometry_csv(&file, &samples).unwrap();
@@ -225,7 +225,7 @@ fn compress(file: &Path, compression: Compression) {
 }
 
 #[test]
-fn compressed_mcap_is_read_alike() {
+fn compressed_mcap_is_read_equally() {
     let dir = common::scratch("odometry-mcap-compressed");
     let plain = dir.join("plain.mcap");
     write_mcap(&plain, &["/odom"], 0.02);
@@ -308,7 +308,7 @@ fn mcap_files_without_the_one_topic_are_refused() {
 }
 
 #[test]
-fn angle_logs_come_back_and_bad_lines_are_left_out() {
+fn angle_logs_round_trip_and_invalid_lines_are_omitted() {
     let file = common::scratch("angles").join("angles.csv");
     let angle = |time_s: f64| LoggedAngle {
         ssb: SensedSsb {
@@ -462,7 +462,7 @@ fn an_mcap_file_that_was_not_closed_is_read_up_to_its_last_chunk() {
 }
 
 #[test]
-fn tum_has_eight_fields_and_comes_back() {
+fn tum_has_eight_fields_and_round_trips() {
     let file = common::scratch("tum").join("drive.tum");
     let poses: Vec<_> = (0..40)
         .map(|k| TimedPose {

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::de::value::{Error as Unknown, StrDeserializer};
 use serde::{Deserialize, Serialize};
 
-/// `[channel]`
+/// `[channel]`: radio channel between the radio heads and the vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ChannelSettings {

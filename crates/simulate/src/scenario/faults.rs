@@ -4,7 +4,7 @@ use onboard::settings::{Check, SettingsError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// `[[faults]]`
+/// `[[faults]]`: a simulated fault.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FaultSettings {

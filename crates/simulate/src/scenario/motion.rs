@@ -4,7 +4,7 @@ use onboard::settings::RoadSettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// `[motion]`
+/// `[motion]`: path, stops and speed of the vehicle.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MotionSettings {

@@ -53,7 +53,7 @@ pub struct Plant {
     pub prices: Prices,
 }
 
-/// `[fleet]`
+/// `[fleet]`: size and use of the fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fleet {

@@ -396,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn far_off_it_says_nothing() {
+    fn a_distant_outlier_contains_no_information() {
         let innovation = Innovation {
             residual: 0.9,
             variance: 0.05,

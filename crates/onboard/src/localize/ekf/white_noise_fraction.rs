@@ -101,7 +101,7 @@ mod tests {
     /// counts as 16. Outliers are uniformly distributed within 3 rad; some of their
     /// differences are within the limit, with a third of its square.
     #[test]
-    fn what_does_not_stay_is_found() {
+    fn the_white_fraction_is_estimated() {
         let within_cut = (2.0 * MOST).sqrt() * STD_RAD / 3.0;
         for outliers in [0.0, 0.03] {
             for (share, kept) in [(0.0, 0.0), (0.5, 0.82), (0.8, 0.98)] {

@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn the_exponential_is_the_library_s() {
+    fn the_exponential_equals_the_standard_library() {
         for step in 0..70_000 {
             let x = -0.01 * f64::from(step);
             assert!((exp_of_negative(x) / x.exp() - 1.0).abs() < 2e-7, "{x}");

@@ -179,7 +179,7 @@ mod tests {
 
     /// Means over many drives, each with a relative standard deviation of a tenth.
     #[test]
-    fn outliers_are_noise_by_their_tails_alone() {
+    fn outliers_increase_the_noise_by_their_tails_only() {
         let drives = 100_u8;
         let [mut with_tails, mut core] = [0.0; 2];
         for outliers in [0.0, 0.04] {
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn louder_angles_show_and_a_bias_does_not() {
+    fn noisier_angles_are_detected_and_a_bias_is_not() {
         assert_eq!(after(0.5, 0.05, 2.0), 1.0);
         // Differences of 0.4 rad, with an expected 0.14 rad: 8 times the variance.
         let ratio = after(0.5, 0.2, 2.0);

@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn a_leap_is_found_at_once_and_a_small_bias_in_time() {
+    fn a_large_bias_is_detected_immediately_and_a_small_one_later() {
         let mut leap = HeadTest::default();
         for _ in 0..100 {
             leap.push(&innovation(0.0));
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn two_outliers_on_end_are_no_fault() {
+    fn two_successive_outliers_are_not_a_fault() {
         let mut test = HeadTest::default();
         for _ in 0..100 {
             test.push(&innovation(0.05));

@@ -85,7 +85,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     #[test]
-    fn hold_for_messages_with_a_right_checksum_alone() {
+    fn parity_checks_hold_only_for_correct_checksums() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for _ in 0..100 {
             let payload = rng.random();

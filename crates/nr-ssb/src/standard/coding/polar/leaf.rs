@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_word_is_offered_once_with_its_correlation() {
+    fn every_codeword_is_listed_once_with_its_correlation() {
         let alpha: Vec<f32> = (0..32).map(|i| (i as f32 * 1.7).sin()).collect();
         for (rows, len, count) in [
             // Two rows that form cosets, three Walsh functions, the all-ones word.
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn codes_of_too_many_words_are_none() {
+    fn codes_with_too_many_words_are_rejected() {
         assert_eq!(Leaf::new(0xFF, 8), None);
         assert_eq!(Leaf::new(0x40, 8), None);
     }

@@ -79,7 +79,7 @@ fn channel(entered: &[Entered], channel: usize) -> Vec<Path> {
 }
 
 #[test]
-fn survivors_are_those_of_the_book() {
+fn survivors_equal_those_of_the_textbook_decoder() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     for list_size in [1, 2, 3, 8, 32] {
         let mut decoder = ListDecoder::new(list_size).unwrap();

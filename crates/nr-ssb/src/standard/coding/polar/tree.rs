@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nodes_are_what_their_channels_say() {
+    fn nodes_of_the_decoding_tree_have_the_expected_types() {
         let leaf = |rows, len| Node::Leaf(Leaf::new(rows, len).unwrap());
         assert_eq!(Node::at(0, 512), Node::Split);
         assert_eq!(Node::at(0, 128), Node::Rate0);
