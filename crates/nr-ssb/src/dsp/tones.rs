@@ -543,7 +543,8 @@ mod tests {
             let of = |tone: &&Tone| (tone.frequency_hz - cycles).abs() < 1e-5;
             let tone = found.iter().find(of).unwrap();
             let expected = 20.0 * f64::from(amplitude).log10();
-            // Noise in one of 2048 × 16 × 2 samples adds to the weakest, at 10 dB below the noise, 1e-4.
+            // The noise in 2048 × 16 × 2 samples changes the power of the weakest tone, 10 dB below
+            // the noise, by 1e-4.
             assert!((tone.power_dbfs - expected).abs() < 0.2, "{tone:?}");
         }
         canceller.subtract(&mut disturbed, 0);

@@ -157,7 +157,7 @@ fn an_oscillator_20_ppm_off_is_found_within_three_bursts_of_the_longest_period()
         let mut receiver = WindowReceiver::<2>::new(config).unwrap();
         let mut beams = Vec::new();
         for number in 0..5 {
-            // Awake around the bursts.
+            // The receiver is on around the bursts only.
             let begin = cell.delay + f64::from(number) * period;
             let mut samples = silence(2, (0.006 * rate_hz) as usize);
             let burst = Cell {

@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_constant_time_passes_from_the_last_estimate_on() {
+    fn a_constant_interval_starts_at_the_last_estimate() {
         let mut due = Due::constant(0.08, 0.0);
         assert!(due.listens(0.0), "there was no estimate yet");
         due.estimated(0.02);

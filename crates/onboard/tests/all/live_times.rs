@@ -323,7 +323,7 @@ fn angles_ahead_of_the_odometry_or_received_twice_are_rejected() {
         assert!(drive.live.angle(&angle).is_err(), "{time_s}");
     }
     assert_eq!(drive.live.status(drive.now_s()).unwrap(), before);
-    // Twice in a burst, and after it.
+    // The angle is received twice in its burst, and again after it.
     let angle = AngleObservation {
         kind: MeasurementKind::Angle,
         pci: 2,

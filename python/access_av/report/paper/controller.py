@@ -114,7 +114,7 @@ def ours(study: Study) -> str:
         "Energy / J",
         "Worst error / m",
         "RMS / m",
-        "RMS less by / m (95 %)",
+        "RMS error reduction / m (95 %)",
         "Ours",
     )
     return f"<p>{escape(summary.ours_text(study))}</p>" + table(head, rows)
