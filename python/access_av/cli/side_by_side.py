@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from access_av import _core
+    from access_av.run.pairs import ErrorSamples
     from access_av.study.compare import Compared
     from access_av.tables.results_directory import ResultsDirectory
 
@@ -74,8 +75,12 @@ def side_by_side(
     seed: int,
     threads: int | None,
     plug_ins: Mapping[str, Mapping[str, Any]] | None = None,
+    baseline: ErrorSamples | None = None,
 ) -> list[Compared]:
-    """Simulates the variants in equal environments; empty for a single variant."""
+    """Simulates the variants in equal environments; empty for a single variant.
+
+    ``baseline``: drives of the first variant, if it was simulated before.
+    """
     from access_av.study.compare import compare
 
     if len(scenarios) == 1:
@@ -89,6 +94,7 @@ def side_by_side(
             threads=threads,
             progress=tick,
             plug_ins=plug_ins,
+            baseline=baseline,
         )
 
 

@@ -94,7 +94,8 @@ def study(
     directory.write_text("places.csv", found.places.write_csv(float_precision=4))
     directory.write_json("study.json", found.summary())
     asked = percentile or [50.0, found.percent]
-    beside = side_by_side(scenarios, asked, found.nominal.runs, seed, threads)
+    nominal = found.nominal
+    beside = side_by_side(scenarios, asked, nominal.runs, seed, threads, baseline=nominal)
     write_compared(beside, directory)
     combined = combinations(vary or ())
     directory.write_text("report.html", render_study(found, compared_section(beside, combined)))

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 from access_av import _core
 from access_av.errors import InputError
+from access_av.run.pairs import UNCHANGED
 from access_av.run.service_levels import INDEPENDENT_S
 from access_av.run.simulation import simulate
 from access_av.settings import as_dict
 from access_av.study import economy
-from access_av.study.measures import measures
-from access_av.study.operate import operate
+from access_av.study.measures import MOST_SETS, measures
+from access_av.study.operate import likely_blocks, operate
 from access_av.study.places import by_place, radio_head_sides, worst_places
-from access_av.study.points import operations
 from access_av.study.remedies import remedies
 from access_av.study.study_result import Study
 from access_av.study.targets import Targets
@@ -34,8 +34,6 @@ WOKEN_SHARE = 0.25
 FEWEST, MOST = 4, 24
 # Shares of these drives for each measure, each operation, and poor line of sight.
 SHARES = (0.65, 0.4, 0.2)
-# Drives per operation that are needed beyond screening, for the progress before they are known.
-LIKELY_FINALISTS = 8
 
 
 def study_plant(
@@ -85,43 +83,50 @@ def study_plant(
     scenario = plant.scenario()
     if scenario.vehicle.alert_limit_m is None:
         raise InputError(
-            f"{named}: vehicle.integrity: off, or not possible with this localizer; a study drives "
-            'nothing unguarded: take it out, with localizer.kind = "tracker"'
+            f"{named}: vehicle.integrity: a study needs the integrity monitor. It is off, or the "
+            "localizer has none: remove `vehicle.integrity.enabled = false`, and set "
+            '`vehicle.localizer.kind = "tracker"`'
         )
     targets, (_, percent) = Targets.of(plant), plant.target
-    present = 0
     fleet = as_dict(plant)["fleet"]
     usual = _runs(scenario) if runs is None else runs
     full = min(2 * usual, max(usual, _sure(scenario, percent))) if runs is None else runs
     pairs, few, fewest = (min(full, max(2, round(share * usual))) for share in SHARES)
-    done, after = 0, 0
+    # Completed runs, planned runs in total, and planned runs of later parts.
+    done, planned, after = 0, 0, 0
+    known: dict[tuple[str, int], Driven] = {}
 
     def plan(left: int) -> None:
         """Sets the number of remaining runs of the present part of the study."""
-        nonlocal present
-        present = left
+        nonlocal planned
+        planned = done + left + after
 
     def driven(name: str, variant: _core.Scenario, count: int, of_seed: int = seed) -> Driven:
+        """Simulates a scenario, or returns earlier runs of equal scenario and seed."""
         nonlocal done
 
         def tell(now: int, _: int) -> None:
             if progress is not None:
-                progress(done + now, done + max(present, count) + after)
+                progress(done + now, max(planned, done + count))
 
-        made = drive(name, variant, count, of_seed, threads, tell)
+        key = (variant.to_json(), of_seed)
+        if key not in known or known[key].runs < count:
+            known[key] = drive(name, variant, count, of_seed, threads, tell)
         done += count
-        return made
+        return known[key].first(count).named(name)
 
     # Nominal channel, then poor line of sight, operations and measures.
-    present = full
-    of_operations = few * (len(operations(scenario)) + LIKELY_FINALISTS)
+    of_operations = few * likely_blocks(scenario)
     after = fewest + of_operations
-    nominal = driven("unchanged", scenario, full)
+    plan(full)
+    nominal = driven(UNCHANGED, scenario, full)
     needs_measures = force_remedies or not targets.judgement(nominal).holds
     changes = remedies(scenario, fleet["vehicles"]) if needs_measures else []
-    present, after = fewest, of_operations + pairs * len(changes)
+    of_measures = pairs * (len(changes) + MOST_SETS) if changes else 0
+    after = of_operations + of_measures
+    plan(fewest)
     poor_los = driven("poor line of sight", plant.poor_scenario(), fewest)
-    after = pairs * len(changes)
+    after = of_measures
     recommendation = operate(plant, targets, nominal, few, seed, driven, plan)
     prices = economy.Prices.of(plant)
     after = 0

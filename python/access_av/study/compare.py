@@ -160,6 +160,7 @@ def compare(
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
     plug_ins: Mapping[str, Mapping[str, Any]] | None = None,
+    baseline: ErrorSamples | None = None,
 ) -> list[Compared]:
     """Simulates variants in equal environments; the first one is the baseline.
 
@@ -169,9 +170,13 @@ def compare(
         Variants by label.
     percents
         Compared percentiles of the error.
+    baseline
+        Runs of the first variant, if it was simulated before with equal runs and seed.
     """
-    total, found = runs * len(scenarios), list[ErrorSamples]()
-    for number, (label, scenario) in enumerate(scenarios.items()):
+    known = [] if baseline is None else [baseline]
+    left = dict(list(scenarios.items())[len(known) :])
+    total, found = runs * len(left), list[ErrorSamples](known)
+    for number, (label, scenario) in enumerate(left.items()):
 
         def tell(done: int, _: int, before: int = number * runs) -> None:
             if progress is not None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from access_av.study import economy
 from access_av.study.points import (
+    MODE_KEY,
     Operation,
     Point,
     front,
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 # Operations that are simulated in every power mode with two seeds: the one that screening
 # recommends, the vehicle's own, and their rivals.
 MOST_FINALISTS = 3
-# Maximum number of blocks of runs per seed until both seeds recommend the same point.
+# Maximum number of blocks of runs per seed until the recommendations of both seeds agree.
 MOST_BLOCKS = 2
 # Offset of the seed of each further block of runs.
 SEED_STEP = 1000
@@ -127,9 +128,19 @@ class _Finalist:
     scenario: _core.Scenario
     blocks: list[Driven]
 
+    def driven_mode(self, own: int) -> int:
+        """Power mode of the runs: the vehicle's own if the group contains it."""
+        modes = [it.number for it in self.modes]
+        return own if own in modes else modes[0]
+
     def points(self, blocks: list[Driven], targets: Targets) -> list[Point]:
         driven = Driven.joined(blocks)
         return [point(driven, self.operation, it, targets, simulated=True) for it in self.modes]
+
+
+def likely_blocks(scenario: _core.Scenario) -> int:
+    """Number of blocks of runs of :func:`operate` if one block per seed is enough."""
+    return len(operations(scenario)) + 2 * MOST_FINALISTS * len(mode_groups(scenario))
 
 
 def operate(
@@ -145,7 +156,7 @@ def operate(
 
     Every operation is screened in the vehicle's own power mode. The recommended one and its rivals
     are then simulated in every power mode, with two seeds, until both recommend the same point or
-    :data:`MOST_BLOCKS` blocks of runs are simulated.
+    equivalent ones, or :data:`MOST_BLOCKS` blocks of runs are simulated.
 
     Parameters
     ----------
@@ -163,6 +174,7 @@ def operate(
         Called with the number of remaining runs.
     """
     scenario = plant.scenario()
+    own = own_mode(scenario)
     screened = _screened(scenario, targets, nominal, runs, seed, simulate, plan)
     finalists = [
         _Finalist(it, modes, changed, [])
@@ -170,22 +182,29 @@ def operate(
         for changed in [scenario.with_overrides(dict(it.settings))]
         for modes in mode_groups(changed)
     ]
-    by_seed: list[list[Point]] = [[], []]
+    found = Recommendation(screened, front(screened), None, [], ())
     for block in range(MOST_BLOCKS):
-        plan(2 * runs * len(finalists))
         for number, it in enumerate(finalists):
             label = f"{it.operation.name}, mode {it.modes[0].number}"
-            in_mode = it.scenario.with_overrides({"vehicle.platform.mode": it.modes[0].number})
+            in_mode = it.scenario.with_overrides({MODE_KEY: it.driven_mode(own)})
             for which in range(2):
+                plan(runs * (2 * (len(finalists) - number) - which))
                 seed_of_block = seed + (2 * block + which) * SEED_STEP
                 it.blocks.append(simulate(label, in_mode, runs, seed_of_block))
-            plan(2 * runs * (len(finalists) - number - 1))
-        by_seed = [
-            [one for it in finalists for one in it.points(it.blocks[which::2], targets)]
-            for which in range(2)
-        ]
-        if len({_name(it) for it in by_seed}) == 1:
+        found = _recommendation(plant, targets, screened, finalists)
+        if found.agreement is not Agreement.UNDECIDED:
             break
+    return found
+
+
+def _recommendation(
+    plant: _core.Plant, targets: Targets, screened: list[Point], finalists: list[_Finalist]
+) -> Recommendation:
+    """Returns the recommendation of all blocks, with those of each seed."""
+    by_seed = [
+        [one for it in finalists for one in it.points(it.blocks[which::2], targets)]
+        for which in range(2)
+    ]
     pooled = [one for it in finalists for one in it.points(it.blocks, targets)]
     known = {one.operation.name for one in pooled}
     every = [*pooled, *(it for it in screened if it.operation.name not in known)]
@@ -211,9 +230,9 @@ def _screened(
 ) -> list[Point]:
     """Simulates every operation in the vehicle's power mode; returns the energies in all modes."""
     found = []
-    every = operations(scenario)
-    for number, it in enumerate(every):
-        plan(runs * (len(every) - number))
+    blocks = likely_blocks(scenario)
+    for number, it in enumerate(operations(scenario)):
+        plan(runs * (blocks - number))
         changed = scenario.with_overrides(dict(it.settings)) if it.settings else scenario
         driven = simulate(it.name, changed, runs, seed) if it.settings else nominal.first(runs)
         for modes in mode_groups(changed):

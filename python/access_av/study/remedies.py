@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from access_av import _core
+    from access_av.radio.placement import Plan
 
 # Standard deviations after the remedies.
 SURVEYED_STD_M = 0.02  # m, in x and y: total station or RTK-GNSS
@@ -62,14 +63,15 @@ def remedies(scenario: _core.Scenario, vehicles: int) -> list[Remedy]:
         Number of vehicles.
     """
     site, vehicle = (as_dict(part) for part in (scenario.site, scenario.vehicle))
+    planned = plan(scenario)
     found = [
         _remember(vehicle),
         _more_ssbs(site),
         _calibrate(vehicle, vehicles),
         _survey(site),
         _odometer(vehicle, vehicles),
-        _move(scenario, site),
-        _mast(scenario),
+        _move(scenario, site, planned),
+        _mast(planned),
     ]
     return [remedy for remedy in found if remedy is not None]
 
@@ -139,12 +141,12 @@ def _odometer(vehicle: Mapping[str, Any], vehicles: int) -> Remedy | None:
     return Remedy("a better odometer", "half the odometer’s errors", settings, "odometer", vehicles)
 
 
-def _move(scenario: _core.Scenario, site: Mapping[str, Any]) -> Remedy | None:
+def _move(scenario: _core.Scenario, site: Mapping[str, Any], planned: Plan) -> Remedy | None:
     """Returns the radio head whose move to the best position near the weakest one helps most."""
     heads = site["radio_heads"]
     if len(heads) < 2:
         return None
-    place = plan(scenario).ranking.row(0, named=True)
+    place = planned.ranking.row(0, named=True)
     position_m = [place["x_m"], place["y_m"], place["z_m"]]
 
     def p90_m(index: int) -> float:
@@ -158,8 +160,7 @@ def _move(scenario: _core.Scenario, site: Mapping[str, Any]) -> Remedy | None:
     return Remedy("move a radio head", what, settings, "move_radio_head", 1)
 
 
-def _mast(scenario: _core.Scenario) -> Remedy | None:
-    planned = plan(scenario)
+def _mast(planned: Plan) -> Remedy | None:
     heads = as_dict(planned.scenario.site)["radio_heads"]
     heads[-1] |= {
         key: heads[0][key] for key in ("position_std_m", "eirp_std_db") if heads[0].get(key)
