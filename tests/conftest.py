@@ -30,7 +30,8 @@ SLOW = {
     *("test_headline", "test_unknowns", "test_cli", "test_columns"),
     *("test_node", "test_radio", "test_aarch64", "test_live", "test_off_the_road"),
     *("test_fault_campaign", "test_manifold"),
-    *("test_study", "test_plant_guide"),
+    *("test_study", "test_study_tables", "test_study_page", "test_study_inputs"),
+    *("test_compared", "test_plant_guide"),
     *("test_labels", "test_notebook", "test_plug_in_files", "test_recomputed"),
     "test_sensitivity",
     *("test_results", "test_rerun", "test_study_file"),
@@ -94,6 +95,25 @@ def quick_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setattr("access_av.tables.results_directory.RESULTS", results)
         paper_results.run(["every-ssb", "gate"], runs=3, seed=5, out=directory)
     return results
+
+
+@pytest.fixture(scope="session")
+def short_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of the command for the short plant, with all measures and one variant."""
+    from access_av.cli.main import main
+    from short_plant import PLANT
+
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "short.toml").write_text(PLANT, "utf-8")
+    command = ["access-av", "study", str(folder / "short.toml"), "--runs", "4"]
+    more = ["--force-remedies", "--sweep", "site.rician_k_db=3", "--out", str(folder / "out")]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("access_av.tables.results_directory.RESULTS", folder / "results")
+        patch.setattr(sys, "argv", [*command, *more])
+        with pytest.raises(SystemExit) as stopped:
+            main()
+    assert not stopped.value.code
+    return folder / "out"
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from access_av.study.points import (
     mode_groups,
     operations,
     own_mode,
-    point,
+    points,
     recommended,
 )
 from access_av.study.trips import Driven
@@ -135,7 +135,7 @@ class _Finalist:
 
     def points(self, blocks: list[Driven], targets: Targets) -> list[Point]:
         driven = Driven.joined(blocks)
-        return [point(driven, self.operation, it, targets, simulated=True) for it in self.modes]
+        return points(driven, self.operation, self.modes, targets, simulated=True)
 
 
 def likely_blocks(scenario: _core.Scenario) -> int:
@@ -237,7 +237,7 @@ def _screened(
         driven = simulate(it.name, changed, runs, seed) if it.settings else nominal.first(runs)
         for modes in mode_groups(changed):
             own = own_mode(changed) in [mode.number for mode in modes]
-            found += [point(driven, it, mode, targets, simulated=own) for mode in modes]
+            found += points(driven, it, modes, targets, simulated=own)
     return found
 
 

@@ -166,31 +166,38 @@ def own_mode(scenario: _core.Scenario) -> int:
     return int(as_dict(scenario.vehicle)["platform"]["mode"])
 
 
-def point(
+def points(
     driven: Driven,
     operation: Operation,
-    mode: PowerMode,
+    modes: Sequence[PowerMode],
     targets: Targets,
     *,
     simulated: bool,
-) -> Point:
-    """Returns the operating point of an operation in a power mode, with its energy."""
-    in_mode = driven.scenario.with_overrides({MODE_KEY: mode.number})
-    platform = Platform.load(platform_name(in_mode.vehicle))
-    energy = driven.in_scenario(in_mode).energy(platform)
-    if energy is None:  # such modes are in no group
-        raise RuntimeError(f"mode {mode.number} has no figure of energy")
-    return Point(
-        driven=driven,
-        operation=operation,
-        mode=mode.number,
-        mode_name=mode.name,
-        simulated=simulated,
-        energy=energy,
-        idle_w=idle_w(platform, mode.number),
-        error_m=driven.percentile(targets.each[0].percent).value,
-        judgement=targets.judgement(driven),
-    )
+) -> list[Point]:
+    """Returns the operating points of an operation in power modes with identical runs."""
+    error_m = driven.percentile(targets.each[0].percent).value
+    judgement = targets.judgement(driven)
+    platform = Platform.load(platform_name(driven.scenario.vehicle))
+    found = []
+    for mode in modes:
+        in_mode = driven.scenario.with_overrides({MODE_KEY: mode.number})
+        energy = driven.in_scenario(in_mode).energy(platform)
+        if energy is None:  # such modes are in no group
+            raise RuntimeError(f"mode {mode.number} has no figure of energy")
+        found.append(
+            Point(
+                driven=driven,
+                operation=operation,
+                mode=mode.number,
+                mode_name=mode.name,
+                simulated=simulated,
+                energy=energy,
+                idle_w=idle_w(platform, mode.number),
+                error_m=error_m,
+                judgement=judgement,
+            )
+        )
+    return found
 
 
 def idle_w(platform: Platform, number: int) -> dict[str, float] | None:

@@ -1,0 +1,102 @@
+"""Comparison of variants, and the verdicts of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from access_av.run.pairs import ErrorSamples
+from access_av.statistics.paired import paired_difference
+from access_av.study.compare import beside_first
+from access_av.study.compare import table as compared_table
+from access_av.study.verdicts import Effect, Judgement
+from access_av.tables.columns.tables import TABLES
+
+
+def errors_of(name: str, errors_m: np.ndarray) -> ErrorSamples:
+    """Ten drives of 100 s."""
+    return ErrorSamples(name=name, errors_m=errors_m, duration_s=100.0)
+
+
+def test_a_lost_drive_is_stated_first_in_its_row() -> None:
+    random = np.random.default_rng(5)
+    baseline = np.abs(random.normal(0.0, 0.1, (10, 1000)))
+    one_lost, late, short = baseline.copy(), baseline.copy(), baseline.copy()
+    one_lost[3, 600:] = 40.0
+    late[:, :300] = np.inf  # the search for the first position
+    short[:, 500:540] = 40.0  # 4 s
+    never = baseline.copy()
+    never[0] = np.inf
+    unknown = baseline.copy()
+    unknown[5:7, 100:] = np.inf
+    held = {
+        "baseline": baseline, "lost": one_lost, "late": late, "short": short, "never": never,
+        "unknown": unknown, "same": baseline.copy(),
+    }  # fmt: skip
+    found = beside_first([errors_of(*it) for it in held.items()], [50.0])
+    rows = {it.driven.name: it.in_words() for it in found}
+    assert [it.driven.lost_runs for it in found] == [0, 1, 0, 0, 1, 2, 0]
+    assert rows["baseline"] == "baseline"
+    assert rows["same"] == "identical to the baseline"
+    assert rows["lost"].startswith("LOST in 1 of 10 drives; ")
+    assert rows["unknown"].startswith("LOST in 2 of 10 drives; ")
+    table = compared_table(found)
+    assert table["lost_runs"].to_list() == [0, 1, 0, 0, 1, 2, 0]
+    assert tuple(table.columns) == TABLES["compared"].columns
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(0.5, "better: -0.0"), (2.0, "worse: +0.0"), (1.001, "no difference")]
+)
+def test_a_difference_is_that_of_variant_and_baseline(factor: float, words: str) -> None:
+    random = np.random.default_rng(6)
+    baseline = np.abs(random.normal(0.0, 0.1, (10, 1000)))
+    other = factor * baseline if factor != 1.001 else np.abs(random.normal(0.0, 0.1, (10, 1000)))
+    _, found = beside_first([errors_of("a", baseline), errors_of("b", other)], [50.0])
+    assert found.delta_m is not None
+    expected = np.median(other) - np.median(baseline)
+    assert found.delta_m[0][0] == pytest.approx(expected, abs=1e-3)
+    assert found.in_words().startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("delta_m", "effect"),
+    [
+        ((-0.2, -0.3, -0.1), Effect.HELPS),
+        ((-0.2, -0.3, 0.1), Effect.UNCERTAIN),
+        ((0.2, 0.1, 0.3), Effect.HARMS),
+    ],
+)
+def test_verdicts_are_enums_with_words_of_their_own(
+    delta_m: tuple[float, float, float], effect: Effect
+) -> None:
+    assert Effect.of(delta_m) is effect
+    for each in (*Effect, *Judgement):
+        assert each.words != each.name
+        assert each.badge in ("yes", "fit", "no")
+
+
+def test_paired_intervals_hold_the_difference_as_often_as_they_say() -> None:
+    """The runs differ more than the variants."""
+    rng = np.random.default_rng(5)
+    held = 0
+    trials = 100
+    for _ in range(trials):
+        scale = np.exp(0.4 * rng.standard_normal((20, 1)))
+        first = scale * np.abs(rng.standard_normal((20, 60)))
+        second = 0.8 * scale * np.abs(rng.standard_normal((20, 60)))
+        _, low, high = paired_difference(second, first, 50.0)
+        # The median of a mixture scales by the same factor, so that the difference is a fifth of
+        # the first median.
+        held += low <= -0.2 * MEDIAN <= high
+    # 95 of 100, minus three standard deviations of the count, minus 5 for the small number of runs.
+    assert held >= 83
+
+
+def _median() -> float:
+    rng = np.random.default_rng(6)
+    scale = np.exp(0.4 * rng.standard_normal(1_000_000))
+    return float(np.median(scale * np.abs(rng.standard_normal(1_000_000))))
+
+
+MEDIAN = _median()
