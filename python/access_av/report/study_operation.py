@@ -70,9 +70,9 @@ def _agreement(study: Study) -> str:
             return "Two seeds recommend the same point."
         case Agreement.EQUIVALENT:
             return (
-                f"Two seeds recommend {named}; the difference does not matter: the errors are "
-                f"equal with 95 % confidence, and the energy of the fleet’s day differs by less "
-                f"than {MATTERS_SHARE:.0%}."
+                f"Two seeds recommend {named}. These points are equivalent: the 95 % interval of "
+                "the error difference contains 0, and the energy of the fleet’s day differs by "
+                f"less than {MATTERS_SHARE:.0%}."
             )
         case Agreement.UNDECIDED:
             return (
@@ -107,8 +107,8 @@ def _rivals(study: Study) -> str:
     )  # fmt: skip
     return (
         "<h3>Rivals of the recommended point</h3><p>Differences: rival − recommended, in pairs of "
-        "drives. Equivalent: the errors are equal with 95 % confidence, and the energy of the "
-        f"fleet’s day, idle included, differs by less than {MATTERS_SHARE:.0%}.</p>"
+        "drives. Equivalent: the interval of the error difference contains 0, and the energy of "
+        f"the fleet’s day, idle included, differs by less than {MATTERS_SHARE:.0%}.</p>"
         + table(head, rows, numbers=range(2, 7))
     )
 

@@ -69,7 +69,7 @@ class Rival:
     def is_equivalent(self) -> bool:
         """Whether neither the difference in error nor that in energy matters.
 
-        The error is equal with 95 % confidence, and the energy differs by less than
+        The 95 % interval of the error difference contains 0, and the energy differs by less than
         :data:`MATTERS_SHARE` of the fleet's day.
         """
         _, low, high = self.delta_m
