@@ -66,4 +66,4 @@ def test_its_commands_and_its_python_run(
     done = subprocess.run(
         [sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=True
     )
-    assert "the time the vehicle knows its position" in done.stdout
+    assert "of the position errors are within" in done.stdout

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,9 +23,15 @@ if TYPE_CHECKING:
 def test_the_same_seed_gives_the_same_study_of_a_plant_and_of_its_file(tmp_path: Path) -> None:
     plant = Plant.from_toml(LAST_METRES)
     (tmp_path / "short.toml").write_text(plant.to_toml(), "utf-8")
-    first = study_plant(plant, runs=2, seed=3, threads=1).summary()
+    found = study_plant(plant, runs=2, seed=3, threads=1)
+    first = found.summary()
     again = study_plant(tmp_path / "short.toml", runs=2, seed=3, threads=2).summary()
     assert first == again
+    # A lost drive is the first statement after the verdict.
+    errors_m = found.nominal.errors_m.copy()
+    errors_m[0] = 40.0
+    lost = replace(found, nominal=replace(found.nominal, errors_m=errors_m))
+    assert ": LOST in 1 of 2 drives; 90 % of the position errors are within 40.00 m" in lost.verdict
 
 
 def test_modes_that_change_the_wake_up_are_driven_apart() -> None:
@@ -73,6 +80,8 @@ def test_an_error_is_explained_by_the_stretch_on_which_it_arose() -> None:
         target_error_m=pl.when(pl.col("along_m") == 120.5).then(2.0).otherwise(0.1)
     )
     assert worst_places(here, plant)[0].why.startswith("no radio head is in reach and in sight (“")
+    lost = here.with_columns(pl.col("target_error_m") * 10.0)
+    assert worst_places(lost, plant)[0].why.startswith("lost drives determine the percentile here")
     good = places_of([1.0] * 300, [2] * 300)
     assert "carried over" not in worst_places(good, plant)[0].why
 

@@ -11,6 +11,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.run.error_bound import VISIBLE_SNR_DB, along_route
+from access_av.run.pairs import LOST_M
 from access_av.settings import as_dict
 
 if TYPE_CHECKING:
@@ -156,12 +157,20 @@ def worst_places(places: pl.DataFrame, plant: _core.Plant) -> list[WorstPlace]:
                     x_m=row["x_m"],
                     y_m=row["y_m"],
                     error_m=row["target_error_m"],
-                    why=_why(row, places, written),
+                    why=_cause(row, places, written),
                 )
             )
         if len(found) == MOST_PLACES:
             break
     return found
+
+
+def _cause(row: Mapping[str, Any], places: pl.DataFrame, plant: Mapping[str, Any]) -> str:
+    """Returns the cause of a large error as text; lost drives come first."""
+    why = _why(row, places, plant)
+    if row["target_error_m"] <= LOST_M:
+        return why
+    return f"lost drives determine the percentile here (error above {LOST_M:g} m); {why}"
 
 
 def _why(row: Mapping[str, Any], places: pl.DataFrame, plant: Mapping[str, Any]) -> str:

@@ -137,16 +137,19 @@ class Study(Result):
     def in_words(self, driven: Driven) -> str:
         """Returns lost runs and the target's percentile with its interval as text."""
         found = driven.percentile(self.percent)
-        lost = f"LOST in {driven.lost_runs} of {driven.runs} drives, " if driven.lost_runs else ""
-        return f"{lost}within {found.value:.2f} m ({found.interval} m, {driven.runs} drives)"
+        lost = f"LOST in {driven.lost_runs} of {driven.runs} drives; " if driven.lost_runs else ""
+        return (
+            f"{lost}{self.percent:g} % of the position errors are within {found.value:.2f} m "
+            f"({found.interval} m, {driven.runs} drives)"
+        )
 
     @property
     def verdict(self) -> str:
         """The verdict on all targets with the nominal channel, and with poor line of sight."""
         nominal = self.judged(self.nominal).words
         text = (
-            f"{nominal[0].upper()}{nominal[1:]}: for {self.percent:g} % of the time the vehicle "
-            f"knows its position {self.in_words(self.nominal)}; {self.error_m:g} m is required."
+            f"{nominal[0].upper()}{nominal[1:]}: {self.in_words(self.nominal)}; "
+            f"{self.error_m:g} m is required."
         )
         if missed := [it for it in self.results(self.nominal)[1:] if not it.judgement.holds]:
             named = ", ".join(
@@ -155,7 +158,7 @@ class Study(Result):
             )
             text += f" Stretches that miss their targets: {named}."
         return (
-            f"{text} With poor line of sight: {self.judged(self.poor_los).words}, "
+            f"{text} With poor line of sight: {self.judged(self.poor_los).words}: "
             f"{self.in_words(self.poor_los)}."
         )
 
