@@ -150,8 +150,8 @@ def _verdict(study: Study) -> str:
             )
         )
     head = (
-        "Target", "Lost drives", "Required", "Percentile", "Interval", "Within", "Interval of it",
-        "Verdict",
+        "Target", "Lost drives", "Required", "Percentile", "95 % interval", "Share within",
+        "95 % interval", "Verdict",
     )  # fmt: skip
     written = as_dict(study.plant)
     channel = written["poor_channel"]["model"]
@@ -219,7 +219,7 @@ def _where(study: Study) -> str:
     ]
     side_head = ("Radio head", "nearest point of the road", "distance and side of the road")
     return section(
-        "Where is it not?",
+        "Where is the error too large?",
         f"Colour of the road: {study.percent:g} % percentile of the error within 5 m; "
         f"{kept:.0%} of the road meet the target of the whole trip. Triangles: radio heads; "
         "squares: stops; diamonds: targets of positions and stretches; grey lines: walls; numbers: "

@@ -58,7 +58,7 @@ def road_map(study: Study) -> Spec:
         color=alt.Color(
             "class_:N",
             scale=alt.Scale(domain=_classes(study.error_m), range=list(COLOURS)),
-            legend=alt.Legend(title=None),
+            legend=alt.Legend(title=None, columns=2),
         ),
         tooltip=[
             alt.Tooltip("along_m:Q", title="along the road / m", format=".0f"),
@@ -89,6 +89,8 @@ def road_map(study: Study) -> Spec:
         said = [alt.Tooltip("name:N"), alt.Tooltip("along_m:Q", title="along the road / m")]
         layers.append(frame.put(symbol, tooltip=said))
         shown = rows.filter(pl.col("name").is_in(list(named)))
+        if rows is targets and not stops.is_empty():  # one name for a stop and its target
+            shown = shown.join(stops, on=["name", "x_m", "y_m"], how="anti")
         if not shown.is_empty():
             text = alt.Chart(shown).mark_text(fontSize=11, dy=16 if rows is stops else -14)
             layers.append(frame.put(text, text="name:N"))
