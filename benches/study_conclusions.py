@@ -2,11 +2,12 @@
 
     access-av study yard --out results/yard
     python benches/study_conclusions.py results/yard
-    python benches/study_conclusions.py results/yard --runs 200 --pairs 0
+    python benches/study_conclusions.py results/yard --runs 50 --pairs 0
 
-Verdicts: each target is judged again by the new runs. Recommendation: error and energy of
-``recommended.toml`` are compared with the ends that the study states. Measures: the difference that
-the study states is compared with the 95 % interval of new pairs of runs.
+Verdicts (``--runs``): each target is judged again by new runs. Recommendation (``--pairs``): error
+and energy of ``recommended.toml`` are compared with the ends that the study states. Measures
+(``--pairs``): the difference that the study states is compared with the 95 % interval of new pairs
+of runs.
 """
 
 from __future__ import annotations
@@ -35,8 +36,10 @@ def main() -> None:
     """Prints a row for each conclusion; exit code 1 if the new runs contradict one."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("results", nargs="+", type=Path, help="directories of `access-av study`")
-    parser.add_argument("--runs", type=int, default=60, help="new runs of plant and recommendation")
-    parser.add_argument("--pairs", type=int, default=60, help="new pairs of runs of each measure")
+    parser.add_argument("--runs", type=int, default=200, help="new runs of the plant")
+    parser.add_argument(
+        "--pairs", type=int, default=60, help="new runs of the recommendation and of each measure"
+    )
     asked = parser.parse_args()
     agreed = [
         each for folder in asked.results for each in _compared(folder, asked.runs, asked.pairs)
@@ -52,9 +55,9 @@ def _compared(folder: Path, runs: int, pairs: int) -> list[bool]:
     print(f"{plant.name}: {runs} new runs, {pairs} new pairs of each measure, seed {seed}")
     base = drive("unchanged", plant.scenario(), max(runs, pairs), seed)
     agreed = _targets(folder, plant, base)
-    if said["recommended"] is not None and runs:
-        agreed += _recommended(folder, said["recommended"], percent, runs, seed)
     if pairs:
+        if said["recommended"] is not None:
+            agreed += _recommended(folder, said["recommended"], percent, pairs, seed)
         before = base.first(pairs)
         agreed += [_measure(plant, it, before, percent, seed) for it in said["remedies"]]
     return agreed

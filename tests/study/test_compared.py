@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
+from access_av.cli.side_by_side import show_compared
+from access_av.report.compared import compared_section
 from access_av.run.pairs import ErrorSamples
 from access_av.statistics.paired import paired_difference
 from access_av.study.compare import beside_first
@@ -18,7 +22,10 @@ def errors_of(name: str, errors_m: np.ndarray) -> ErrorSamples:
     return ErrorSamples(name=name, errors_m=errors_m, duration_s=100.0)
 
 
-def test_a_lost_drive_is_stated_first_in_its_row() -> None:
+def test_a_lost_drive_is_stated_first_in_its_row(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
     random = np.random.default_rng(5)
     baseline = np.abs(random.normal(0.0, 0.1, (10, 1000)))
     one_lost, late, short = baseline.copy(), baseline.copy(), baseline.copy()
@@ -34,19 +41,27 @@ def test_a_lost_drive_is_stated_first_in_its_row() -> None:
         "unknown": unknown, "same": baseline.copy(),
     }  # fmt: skip
     found = beside_first([errors_of(*it) for it in held.items()], [50.0])
-    rows = {it.driven.name: it.in_words() for it in found}
+    rows = {it.driven.name: (it.lost_in_words(), it.difference_in_words()) for it in found}
     assert [it.driven.lost_runs for it in found] == [0, 1, 0, 0, 1, 2, 0]
-    assert rows["baseline"] == "baseline"
-    assert rows["same"] == "identical to the baseline"
-    assert rows["lost"].startswith("LOST in 1 of 10 drives; ")
-    assert rows["unknown"].startswith("LOST in 2 of 10 drives; ")
+    assert rows["baseline"] == ("0 of 10", "baseline")
+    assert rows["same"] == ("0 of 10", "identical to the baseline")
+    assert [rows[it][0] for it in ("lost", "unknown")] == ["LOST in 1 of 10", "LOST in 2 of 10"]
+    # It stands before all figures, in the terminal and in reports.
+    show_compared(found)
+    [printed] = [it for it in capsys.readouterr().out.splitlines() if it.split()[:1] == ["lost"]]
+    assert printed.split()[:6] == ["lost", "LOST", "in", "1", "of", "10"]
+    page = compared_section(found)
+    cells = [re.findall(r"<td[^>]*>(.*?)</td>", it, re.DOTALL) for it in page.split("<tr>")]
+    [second] = [it[1] for it in cells if it[:1] == ["lost"]]
+    assert "LOST in 1 of 10" in second
     table = compared_table(found)
     assert table["lost_runs"].to_list() == [0, 1, 0, 0, 1, 2, 0]
     assert tuple(table.columns) == TABLES["compared"].columns
 
 
 @pytest.mark.parametrize(
-    ("factor", "words"), [(0.5, "better: -0.0"), (2.0, "worse: +0.0"), (1.001, "no difference")]
+    ("factor", "words"),
+    [(0.5, "better: -0.0"), (2.0, "worse: +0.0"), (1.001, "no significant")],
 )
 def test_a_difference_is_that_of_variant_and_baseline(factor: float, words: str) -> None:
     random = np.random.default_rng(6)
@@ -56,7 +71,7 @@ def test_a_difference_is_that_of_variant_and_baseline(factor: float, words: str)
     assert found.delta_m is not None
     expected = np.median(other) - np.median(baseline)
     assert found.delta_m[0][0] == pytest.approx(expected, abs=1e-3)
-    assert found.in_words().startswith(words)
+    assert found.difference_in_words().startswith(words)
 
 
 @pytest.mark.parametrize(

@@ -99,19 +99,20 @@ def radio_heads(heads: Iterable[dict[str, Any]]) -> Shown:
 
 
 def compared(found: Sequence[Compared]) -> Shown:
-    """Returns the percentiles of each variant, and the paired difference to the first one."""
+    """Returns lost runs and percentiles of each variant, and the difference to the first one."""
     percents = found[0].percents
     rows = [
         (
             it.driven.name,
+            Badge(it.lost_in_words(), "no") if it.driven.lost_runs else it.lost_in_words(),
             *(f"{it.driven.percentile(percent).value:.3f}" for percent in percents),
             it.reliability(),
             "–" if it.driven.energy_j is None else f"{it.driven.energy_j:.2f}",
-            it.in_words(),
+            it.difference_in_words(),
         )
         for it in found
     ]
-    last = len(percents) + 3
-    head = ("variant", *(f"p{it:g} / m" for it in percents), "reliability", "energy / J",
+    last = len(percents) + 4
+    head = ("variant", "lost", *(f"p{it:g} / m" for it in percents), "reliability", "energy / J",
             f"difference of p{percents[-1]:g}")  # fmt: skip
-    return Shown(head, rows, (0, last - 2, last))
+    return Shown(head, rows, (0, 1, last - 2, last))

@@ -48,7 +48,7 @@ class Difference(Result):
     def __str__(self) -> str:
         if self.identical:
             return f"{self.percent:g} % error: identical in {self.runs} runs"
-        verdict = "no difference with 95 % confidence"
+        verdict = "no significant difference"
         if self.is_significant:
             verdict = "larger" if self.delta_m > 0.0 else "smaller"
         return (

@@ -45,12 +45,10 @@ class Compared:
     delta_m: Sequence[tuple[float, float, float]] | None
     identical: bool = False
 
-    def in_words(self, place: int = -1) -> str:
-        """Returns lost runs and difference of a percentile to the baseline as text."""
+    def lost_in_words(self) -> str:
+        """Returns the number of lost runs as text, the first statement of a row."""
         driven = self.driven
-        lost = f"LOST in {driven.lost_runs} of {driven.runs} {driven.rows}"
-        difference = self._difference(place)
-        return f"{lost}; {difference}" if driven.lost_runs else difference
+        return f"{'LOST in ' if driven.lost_runs else ''}{driven.lost_runs} of {driven.runs}"
 
     def reliability(self) -> str:
         """Returns shares of the states, and errors above the level in state ``ok``, as text."""
@@ -67,19 +65,20 @@ class Compared:
         beyond = self.driven.exceedances
         return f"{text}; {beyond} errors beyond the level while ok" if beyond else text
 
-    def _difference(self, place: int) -> str:
+    def difference_in_words(self, place: int = -1) -> str:
+        """Returns the difference of a percentile to the baseline as text."""
         if self.delta_m is None:
             return "baseline"
         if self.identical:
             return "identical to the baseline"
         delta, low, high = self.delta_m[place]
         if math.isinf(low):
-            return f"{delta:+.3f} m; of one of the {self.driven.rows} there is no interval"
+            return f"{delta:+.3f} m; no interval: it needs two or more {self.driven.rows}"
         if math.isnan(delta):
-            return "no difference can be given: the baseline has no finite percentile"
+            return "no difference: the baseline has no finite percentile"
         interval = f"{delta:+.3f} m (95 %: {low:+.3f} to {high:+.3f} m)"
         if low <= 0.0 <= high:
-            return f"no difference with 95 % confidence: {interval}"
+            return f"no significant difference: {interval}"
         return f"{'better' if delta < 0.0 else 'worse'}: {interval}"
 
 
