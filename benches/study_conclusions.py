@@ -23,7 +23,7 @@ import polars as pl
 import access_av
 from access_av.study.targets import Targets
 from access_av.study.trips import drive
-from access_av.study.verdicts import Judgement
+from access_av.verdicts import Judgement
 
 if TYPE_CHECKING:
     from access_av.study.trips import Driven
