@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import access_av
-from short_plant import PLANT
+from short_plant import LAST_METRES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def test_a_study_is_saved_and_loaded_unchanged(tmp_path: Path) -> None:
     file = tmp_path / "short.toml"
-    file.write_text(PLANT, encoding="utf-8")
+    file.write_text(LAST_METRES, encoding="utf-8")
     found = access_av.study_plant(str(file), runs=2)
     saved = found.save(tmp_path / "study.zip")
     loaded = access_av.Study.load(saved)
