@@ -120,6 +120,11 @@ pub fn angle_time_offset(given: &Drive<'_>) -> Result<Option<AngleTimeOffset>, R
             best = tried;
         }
     }
+    // A likelihood that rises to the end of the search range has no maximum within it: on a straight
+    // road from standstill, an earlier time is a shorter distance with fewer independent angles.
+    if best.0.abs() >= MOST_S {
+        return Ok(None);
+    }
     let around_s = [best.0 - GRID_S, best.0 + GRID_S];
     let found_s = highest(around_s, &mut likelihood)?;
     if found_s.abs() < MIN_ANGLE_TIME_OFFSET_S {
@@ -186,7 +191,93 @@ fn highest(
 
 #[cfg(test)]
 mod tests {
+    use std::borrow::Cow;
+
+    use onboard::geometry::wrap_angle;
+    use onboard::localize::{AngleMeasurement, MeasurementKind};
+    use onboard::observation::{OdometrySample, SensedSsb};
+    use onboard::radio_head::RadioHead;
+    use onboard::settings::{Shipped, Site, TomlFile as _, Vehicle};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
     use super::*;
+    use crate::odometry::OdometryLog;
+    use crate::replay::innovations::plain_filter;
+    use crate::replay::stated::as_stated;
+
+    /// Standard deviation of the angles (rad).
+    const SIGMA_RAD: f64 = 0.1;
+
+    /// Interval of odometry and angles (s).
+    const PERIOD_S: f64 = 0.02;
+
+    /// Estimates the time offset of a drive that begins at standstill on a straight road, with
+    /// angles of the same clock (s).
+    fn estimated(seed: u64, duration_s: f64) -> f64 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let site = Site::from_library("yard", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("tugger", &Shipped).unwrap();
+        let (site, mut vehicle) = as_stated(&site, &vehicle);
+        vehicle.start.pose = Some(site.build_road().unwrap().unwrap().pose(0.0));
+        let heads = RadioHead::heard(&site, &vehicle);
+        // Predicts exact angles.
+        let mut exact = plain_filter(&site, &vehicle).unwrap();
+        let (mut odometry, mut angles) = (OdometryLog::default(), vec![]);
+        let mut distance_m = 0.0;
+        for step in 0..(duration_s / PERIOD_S) as u32 {
+            let time_s = PERIOD_S * f64::from(step);
+            let speed_mps = (0.5 * time_s).min(4.0);
+            distance_m += PERIOD_S * speed_mps;
+            let sample = OdometrySample {
+                time_s,
+                distance_m,
+                speed_mps,
+                yaw_rate_radps: None,
+            };
+            exact.odometry(&sample);
+            odometry.samples.push(sample);
+            for head in &heads {
+                let mut measured = AngleMeasurement {
+                    kind: MeasurementKind::Angle,
+                    time_s,
+                    phase_rad: 0.0,
+                    phase_sigma_rad: SIGMA_RAD,
+                    angle_rad: f64::NAN,
+                    snr_db: 20.0,
+                    resolved: true,
+                };
+                let predicted_rad = -exact.innovation(head, &measured).unwrap().residual;
+                let noise: f64 = random.sample(StandardNormal);
+                measured.phase_rad = wrap_angle(predicted_rad + SIGMA_RAD * noise);
+                let ssb = SensedSsb {
+                    pci: head.pci,
+                    ssb_index: head.ssb_index,
+                    time_s,
+                    snr_db: 20.0,
+                };
+                angles.push(LoggedAngle { ssb, measured });
+            }
+        }
+        let drive = Drive {
+            site: Cow::Owned(site),
+            vehicle: Cow::Owned(vehicle),
+            odometry: Cow::Owned(odometry),
+            angles: Cow::Owned(angles),
+        };
+        angle_time_offset(&drive)
+            .unwrap()
+            .map_or(0.0, |it| it.found_s)
+    }
+
+    #[test]
+    fn angles_of_the_clock_of_the_odometry_are_not_shifted() {
+        for (seed, duration_s) in [(1, 15.0), (2, 20.0), (3, 30.0)] {
+            let found_s = estimated(seed, duration_s);
+            assert!(found_s == 0.0, "{duration_s} s: {found_s} s");
+        }
+    }
 
     #[test]
     fn the_maximum_is_found() {
