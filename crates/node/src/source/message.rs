@@ -40,7 +40,7 @@ struct Angle {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Range {
+struct Distance {
     time_s: f64,
     pci: u16,
     #[serde(default)]
@@ -161,7 +161,7 @@ const fn angle(message: &Angle) -> Input {
     })
 }
 
-fn range(message: &Range) -> Result<Input, String> {
+fn range(message: &Distance) -> Result<Input, String> {
     let (value, sigma) = match (message.range_m, message.delay_ns) {
         (Some(range_m), None) if message.delay_sigma_ns.is_none() => {
             (RangeValue::RangeM(range_m), message.sigma_m)

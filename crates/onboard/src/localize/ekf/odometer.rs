@@ -59,7 +59,7 @@ pub(super) struct SampleInterval {
 
 impl SampleInterval {
     /// Returns the usual interval (s); zero before the first one.
-    pub const fn usual_s(&self) -> f64 {
+    pub const fn usual_s(self) -> f64 {
         self.usual_s
     }
 
