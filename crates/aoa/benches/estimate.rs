@@ -81,6 +81,17 @@ fn batch_f64(bencher: Bencher, method: Method) {
 }
 
 #[divan::bench(args = METHODS)]
+fn batch_untested_f64(bencher: Bencher, method: Method) {
+    let array = Array::<4>::half_wavelength();
+    let data = samples(ITEMS);
+    let batch = Batch::<f64, 4>::new(&data, 20).unwrap();
+    let mut estimates = vec![aoa::UntestedEstimate::default(); ITEMS];
+    bencher
+        .counter(ItemsCount::new(ITEMS))
+        .bench_local(move || batch.estimate_untested(method, &array, black_box(&mut estimates)));
+}
+
+#[divan::bench(args = METHODS)]
 fn batch_f32(bencher: Bencher, method: Method) {
     let data: Vec<_> = samples(ITEMS)
         .iter()

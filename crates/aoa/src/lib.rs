@@ -64,6 +64,9 @@
 //! includes their effect, as far as the residual reveals it. One error is not detectable in a
 //! single estimate: a reflection from almost the direction of the source (within about a twentieth
 //! of the beam width at 20 dB) is received as one plane wave from an intermediate direction.
+//!
+//! Users of angle, noise and SNR only can omit the test: [`Batch::estimate_untested`],
+//! [`estimate_untested`], [`maximum_likelihood_pilots_untested`].
 
 // Loops over vector registers must be inlined into the function that is compiled for the processor.
 #![allow(clippy::inline_always)]
@@ -93,8 +96,8 @@ pub use error::Error;
 pub use estimate::batch::{Batch, BatchError};
 pub use estimate::choice::Method;
 pub use estimate::direction_finder::DirectionFinder;
-pub use estimate::one::estimate;
-pub use estimate::pilots::maximum_likelihood_pilots;
+pub use estimate::one::{estimate, estimate_untested};
+pub use estimate::pilots::{maximum_likelihood_pilots, maximum_likelihood_pilots_untested};
 pub use estimate::pseudo_spectrum::PseudoSpectrum;
 pub use estimate::several::{estimate_several, estimate_several_smoothed};
 pub use estimate::smoothing::Smoothing;
@@ -104,7 +107,7 @@ pub use kernel::real::Real;
 pub use linalg::matrix::Matrix;
 pub use list::List;
 pub use num_complex::Complex64;
-pub use result::angle::{AngleEstimate, AngleEstimates};
+pub use result::angle::{AngleEstimate, AngleEstimates, UntestedEstimate};
 pub use result::azimuth_elevation::DirectionEstimate;
 pub use result::goodness_of_fit::GoodnessOfFit;
 pub use result::verdict::{Reason, Verdict};

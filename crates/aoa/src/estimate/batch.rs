@@ -10,7 +10,8 @@ use crate::array::linear::Array;
 use crate::covariance::sample::Covariance;
 use crate::error::Error;
 use crate::kernel::real::Real;
-use crate::result::angle::AngleEstimate;
+use crate::result::angle::{AngleEstimate, UntestedEstimate};
+use crate::result::direction::Output;
 
 /// Number of items that are estimated together: large enough to hide instruction latency, and small
 /// enough for the data to stay in the cache.
@@ -112,17 +113,7 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
         estimates: &mut [AngleEstimate],
     ) -> Result<(), BatchError> {
         if sources == 1 && smoothing.subarray.is_none() {
-            let side_by_side = SideBySide {
-                method,
-                array,
-                forward_backward: smoothing.forward_backward,
-                snapshots: self.snapshots,
-            };
-            return if self.len() * 8 > BLOCK {
-                self.in_blocks::<BLOCK>(side_by_side, estimates)
-            } else {
-                self.in_blocks::<1>(side_by_side, estimates)
-            };
+            return self.estimate_one(method, array, smoothing.forward_backward, estimates);
         }
         let ideal = array.with_calibration(Calibration::IDENTITY);
         let places = estimates.chunks_exact_mut(sources.max(1));
@@ -135,15 +126,49 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
         Ok(())
     }
 
+    /// Estimates one source in every item without the goodness of fit. The shorter of batch and
+    /// output determines the number of items. The values equal those of [`estimate`](Self::estimate).
+    ///
+    /// # Errors
+    /// Errors of [`estimate`](crate::estimate()) with the index of the first affected item.
+    pub fn estimate_untested(
+        self,
+        method: Method,
+        array: &Array<N>,
+        estimates: &mut [UntestedEstimate],
+    ) -> Result<(), BatchError> {
+        self.estimate_one(method, array, false, estimates)
+    }
+
+    fn estimate_one<O: Output>(
+        self,
+        method: Method,
+        array: &Array<N>,
+        forward_backward: bool,
+        estimates: &mut [O],
+    ) -> Result<(), BatchError> {
+        let side_by_side = SideBySide {
+            method,
+            array,
+            forward_backward,
+            snapshots: self.snapshots,
+        };
+        if self.len() * 8 > BLOCK {
+            self.in_blocks::<O, BLOCK>(side_by_side, estimates)
+        } else {
+            self.in_blocks::<O, 1>(side_by_side, estimates)
+        }
+    }
+
     /// Estimates one source per item, `W` items at a time.
-    fn in_blocks<const W: usize>(
+    fn in_blocks<O: Output, const W: usize>(
         self,
         side_by_side: SideBySide<'_, N>,
-        estimates: &mut [AngleEstimate],
+        estimates: &mut [O],
     ) -> Result<(), BatchError> {
         let parts = self.split(W).zip(estimates.chunks_mut(W));
         for (index, (part, places)) in parts.enumerate() {
-            let outcome = side_by_side.of_samples::<T, W>(part.samples, places);
+            let outcome = side_by_side.of_samples::<T, O, W>(part.samples, places);
             outcome.map_err(|(item, error)| BatchError {
                 item: index * W + item,
                 error,

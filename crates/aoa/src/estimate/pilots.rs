@@ -9,9 +9,9 @@ use crate::covariance::sample::Covariance;
 use crate::error::Error;
 use crate::linalg::hermitians::Hermitians;
 use crate::method::maximum_likelihood;
-use crate::result::angle::AngleEstimate;
-use crate::result::direction::{Found, describe, threshold_doubt};
-use crate::result::goodness_of_fit::Model;
+use crate::result::angle::{AngleEstimate, UntestedEstimate};
+use crate::result::direction::{Found, Output, describe, threshold_doubt};
+use crate::result::goodness_of_fit::{Model, Tested};
 use crate::spectrum::side_by_side::Spectra;
 
 /// Returns the maximum likelihood angle from despread pilots.
@@ -35,6 +35,26 @@ pub fn maximum_likelihood_pilots<const N: usize>(
     noise_variance: Option<f64>,
     array: &Array<N>,
 ) -> Result<AngleEstimate, Error> {
+    pilots(blocks, noise_variance, array)
+}
+
+/// Returns the angle of [`maximum_likelihood_pilots`] without the goodness of fit.
+///
+/// # Errors
+/// Errors of [`maximum_likelihood_pilots`].
+pub fn maximum_likelihood_pilots_untested<const N: usize>(
+    blocks: &[[Complex64; N]],
+    noise_variance: Option<f64>,
+    array: &Array<N>,
+) -> Result<UntestedEstimate, Error> {
+    pilots(blocks, noise_variance, array)
+}
+
+fn pilots<O: Output, const N: usize>(
+    blocks: &[[Complex64; N]],
+    noise_variance: Option<f64>,
+    array: &Array<N>,
+) -> Result<O, Error> {
     let covariance = Covariance::from_snapshots(blocks)?
         .calibrated(array)
         .validated()?;
@@ -51,7 +71,12 @@ pub fn maximum_likelihood_pilots<const N: usize>(
     let snr = maximum_likelihood::snr::<N>(beam, noise);
     let tests = Model::one::<N>(blocks.len(), noise_variance.is_some()).tests();
     let needed = tests.needed_snr(bound::resolvable_snr::<N>(blocks.len()));
-    let left = Residuals::of::<false, N>(&single, &place).item(0);
+    let tested = if O::IS_TESTED {
+        let left = Residuals::of::<false, N>(&single, &place).item(0);
+        tests.of(&left, noise, power)
+    } else {
+        Tested::NOTHING
+    };
     Ok(describe(
         &Found {
             phase_rad: place.phase_rad[0],
@@ -59,7 +84,7 @@ pub fn maximum_likelihood_pilots<const N: usize>(
                 * tests.variance_factor(snr, needed).sqrt(),
             snr,
             tests,
-            tested: tests.of(&left, noise, power),
+            tested,
             doubt: threshold_doubt(snr, needed).or(tests.noise_doubt()),
         },
         array,

@@ -134,7 +134,7 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
         .map_or(Tested::NOTHING, |(left, noise)| {
             tests.of(&left, noise, power)
         });
-    let mut estimates = [None; M];
+    let mut estimates: [Option<AngleEstimate>; M] = [None; M];
     for (k, place) in estimates[..sources].iter_mut().enumerate() {
         let (phase, sigma) = (phases[k], sigmas[k]);
         let close = (0..sources).any(|other| {

@@ -17,9 +17,8 @@ use crate::linalg::hermitians::Hermitians;
 use crate::linalg::matrix::Matrix;
 use crate::method::maximum_likelihood::{residual_power, snr};
 use crate::method::{esprit, music, root_music};
-use crate::result::angle::AngleEstimate;
 use crate::result::direction::{
-    direction, geometric_doubt, no_more_than_ignorance, threshold_doubt, verdict,
+    Described, Output, direction, geometric_doubt, no_more_than_ignorance, threshold_doubt,
 };
 use crate::result::goodness_of_fit::{Model, Tested};
 use crate::simd::instructions::dispatch;
@@ -40,10 +39,10 @@ impl<const N: usize> SideBySide<'_, N> {
     ///
     /// # Errors
     /// Index and error of the first invalid item.
-    pub(super) fn of_samples<T: Real, const W: usize>(
+    pub(super) fn of_samples<T: Real, O: Output, const W: usize>(
         &self,
         samples: &[Complex<T>],
-        estimates: &mut [AngleEstimate],
+        estimates: &mut [O],
     ) -> Result<(), (usize, Error)> {
         let items = samples.chunks_exact(N * self.snapshots).take(W);
         let estimates = &mut estimates[..items.len()];
@@ -61,14 +60,14 @@ impl<const N: usize> SideBySide<'_, N> {
         self.of_covariances(&covariances, estimates)
     }
 
-    fn of_covariances<const W: usize>(
+    fn of_covariances<O: Output, const W: usize>(
         &self,
         covariances: &Hermitians<N, W>,
-        estimates: &mut [AngleEstimate],
+        estimates: &mut [O],
     ) -> Result<(), (usize, Error)> {
         dispatch!(
-            self.of_covariances_generic::<false, W>(covariances, estimates),
-            self.of_covariances_generic::<true, W>(covariances, estimates),
+            self.of_covariances_generic::<O, false, W>(covariances, estimates),
+            self.of_covariances_generic::<O, true, W>(covariances, estimates),
             self.of_covariances_avx2(covariances, estimates),
             self.of_covariances_avx512(covariances, estimates)
         )
@@ -76,29 +75,29 @@ impl<const N: usize> SideBySide<'_, N> {
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma")]
-    fn of_covariances_avx2<const W: usize>(
+    fn of_covariances_avx2<O: Output, const W: usize>(
         &self,
         covariances: &Hermitians<N, W>,
-        estimates: &mut [AngleEstimate],
+        estimates: &mut [O],
     ) -> Result<(), (usize, Error)> {
-        self.of_covariances_generic::<true, W>(covariances, estimates)
+        self.of_covariances_generic::<O, true, W>(covariances, estimates)
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma,avx512f")]
-    fn of_covariances_avx512<const W: usize>(
+    fn of_covariances_avx512<O: Output, const W: usize>(
         &self,
         covariances: &Hermitians<N, W>,
-        estimates: &mut [AngleEstimate],
+        estimates: &mut [O],
     ) -> Result<(), (usize, Error)> {
-        self.of_covariances_generic::<true, W>(covariances, estimates)
+        self.of_covariances_generic::<O, true, W>(covariances, estimates)
     }
 
     #[inline(always)]
-    fn of_covariances_generic<const FUSED: bool, const W: usize>(
+    fn of_covariances_generic<O: Output, const FUSED: bool, const W: usize>(
         &self,
         covariances: &Hermitians<N, W>,
-        estimates: &mut [AngleEstimate],
+        estimates: &mut [O],
     ) -> Result<(), (usize, Error)> {
         let spectra = Spectra::of_matrices(covariances);
         spectra.check(estimates.len())?;
@@ -119,19 +118,19 @@ impl<const N: usize> SideBySide<'_, N> {
                 _ => music::places::<FUSED, N, W>(&principal),
             }
         };
-        let residuals = Residuals::of::<FUSED, N>(covariances, &places);
-        self.describe::<FUSED, W>(&spectra, &places, &residuals, estimates);
+        let residuals = O::IS_TESTED.then(|| Residuals::of::<FUSED, N>(covariances, &places));
+        self.describe::<O, FUSED, W>(&spectra, &places, residuals.as_ref(), estimates);
         Ok(())
     }
 
     /// Computes SNR, standard deviations and verdict of sources at the given positions.
     #[inline(always)]
-    fn describe<const FUSED: bool, const W: usize>(
+    fn describe<O: Output, const FUSED: bool, const W: usize>(
         &self,
         spectra: &Spectra<N, W>,
         places: &Places<W>,
-        residuals: &Residuals<W>,
-        estimates: &mut [AngleEstimate],
+        residuals: Option<&Residuals<W>>,
+        estimates: &mut [O],
     ) {
         let phases = &places.phase_rad;
         let end_fire = self.array.phase_at_end_fire_rad();
@@ -145,7 +144,7 @@ impl<const N: usize> SideBySide<'_, N> {
         let per_snapshot = excess * excess / (2.0 * self.snapshots as f64 * aperture::<N>());
         let (mut snrs, mut snr_db) = ([0.0; W], [0.0; W]);
         let (mut noise_sigma, mut phase_sigma) = ([0.0; W], [0.0; W]);
-        let (mut coherent, mut noise, mut inflation) = ([0.0; W], [0.0; W], [0.0; W]);
+        let (mut coherent, mut noise, mut inflation) = ([1.0; W], [1.0; W], [1.0; W]);
         let (mut angle, mut sigma) = ([0.0; W], [0.0; W]);
         for w in 0..W {
             let beam = values[w] * (1.0 / N as f64);
@@ -156,9 +155,11 @@ impl<const N: usize> SideBySide<'_, N> {
             let variance = times_plus::<FUSED>(inverse * (1.0 / N as f64), inverse, inverse);
             let variance = variance * (per_snapshot * tests.variance_factor(snr, needed));
             noise_sigma[w] = no_more_than_ignorance(variance.sqrt());
-            let tested = tests.of(&residuals.item(w), power, spectra.re[0][w]);
-            (coherent[w], noise[w]) = (tested.coherent, tested.noise);
-            inflation[w] = tested.inflation;
+            if let Some(residuals) = residuals {
+                let tested = tests.of(&residuals.item(w), power, spectra.re[0][w]);
+                (coherent[w], noise[w]) = (tested.coherent, tested.noise);
+                inflation[w] = tested.inflation;
+            }
             snrs[w] = snr;
         }
         for w in 0..W {
@@ -173,26 +174,28 @@ impl<const N: usize> SideBySide<'_, N> {
                 noise: noise[w],
                 inflation: inflation[w],
             };
-            let doubt = threshold_doubt(snrs[w], needed).or(tests.noise_doubt());
-            let geometric = geometric_doubt(phases[w], noise_sigma[w], end_fire);
-            *estimate = AngleEstimate {
+            let described = Described {
                 phase_rad: phases[w],
                 phase_sigma_rad: phase_sigma[w],
                 phase_noise_sigma_rad: noise_sigma[w],
                 angle_rad: angle[w],
                 sigma_rad: sigma[w],
                 snr_db: snr_db[w],
-                fit: tests.fit(&tested),
-                verdict: verdict(doubt, geometric, tests.misfit(tested.ratios())),
+                doubt: threshold_doubt(snrs[w], needed).or(tests.noise_doubt()),
+                geometric: geometric_doubt(phases[w], noise_sigma[w], end_fire),
             };
+            *estimate = O::new(&described, &tests, &tested);
         }
     }
 
     /// Estimates one source from a single covariance of calibrated channels.
-    pub(super) fn of_covariance(&self, covariance: &Matrix<N>) -> Result<AngleEstimate, Error> {
+    pub(super) fn of_covariance<O: Output + Default>(
+        &self,
+        covariance: &Matrix<N>,
+    ) -> Result<O, Error> {
         let mut single = Hermitians::<N, 1>::ZERO;
         single.set(0, covariance);
-        let mut estimate = [AngleEstimate::default()];
+        let mut estimate = [O::default()];
         self.of_covariances(&single, &mut estimate)
             .map_err(|(_, error)| error)?;
         let [only] = estimate;

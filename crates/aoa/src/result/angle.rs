@@ -67,6 +67,48 @@ impl AngleEstimate {
     }
 }
 
+/// Estimated direction with its uncertainty due to noise, without the goodness of fit, whose
+/// computation takes more time than the rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UntestedEstimate {
+    /// Electrical angle in (-pi, pi], as in [`AngleEstimate::phase_rad`].
+    pub phase_rad: f64,
+    /// Standard deviation of `phase_rad` due to noise only, for the method at the estimated SNR.
+    pub phase_noise_sigma_rad: f64,
+    /// Angle from the array's axis in rad, 0 to pi.
+    pub angle_rad: f64,
+    /// Standard deviation of `angle_rad` in rad due to noise only.
+    pub sigma_rad: f64,
+    /// Estimated SNR per antenna and snapshot. The whole residual counts as noise.
+    pub snr_db: f64,
+    /// Whether the estimate is resolved with respect to noise and geometry. A low SNR due to a
+    /// misfit is [`Reason::ThresholdSnr`] or [`Reason::TooFewSnapshots`].
+    pub verdict: Verdict,
+}
+
+impl UntestedEstimate {
+    /// Whether the verdict is [`Verdict::Resolved`]. The result equals that of
+    /// [`AngleEstimate::is_resolved`].
+    pub fn is_resolved(&self) -> bool {
+        self.verdict == Verdict::Resolved
+    }
+}
+
+/// Estimate without information: any direction, unresolved.
+impl Default for UntestedEstimate {
+    fn default() -> Self {
+        let none = AngleEstimate::default();
+        Self {
+            phase_rad: none.phase_rad,
+            phase_noise_sigma_rad: none.phase_noise_sigma_rad,
+            angle_rad: none.angle_rad,
+            sigma_rad: none.sigma_rad,
+            snr_db: none.snr_db,
+            verdict: none.verdict,
+        }
+    }
+}
+
 /// Estimate without information: any direction, unresolved.
 impl Default for AngleEstimate {
     fn default() -> Self {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::angle::AngleEstimate;
+use super::angle::{AngleEstimate, UntestedEstimate};
 use super::goodness_of_fit::{Tested, Tests};
 use super::verdict::{Reason, Verdict};
 use crate::array::linear::Array;
@@ -20,7 +20,7 @@ pub(crate) struct Found {
 }
 
 /// Converts an electrical angle to an estimate with angle, standard deviation and verdict.
-pub(crate) fn describe<const N: usize>(found: &Found, array: &Array<N>) -> AngleEstimate {
+pub(crate) fn describe<O: Output, const N: usize>(found: &Found, array: &Array<N>) -> O {
     let end_fire = array.phase_at_end_fire_rad();
     let Found {
         phase_rad,
@@ -31,16 +31,71 @@ pub(crate) fn describe<const N: usize>(found: &Found, array: &Array<N>) -> Angle
     let noise_sigma = no_more_than_ignorance(found.noise_sigma_rad);
     let sigma = noise_sigma * tested.inflation.sqrt();
     let (phase_sigma_rad, angle_rad, sigma_rad) = direction::<false>(phase_rad, sigma, end_fire);
-    let geometric = geometric_doubt(phase_rad, noise_sigma, end_fire);
-    AngleEstimate {
+    let described = Described {
         phase_rad,
         phase_sigma_rad,
         phase_noise_sigma_rad: noise_sigma,
         angle_rad,
         sigma_rad,
         snr_db: 10.0 * log10::<false>(found.snr),
-        fit: tests.fit(&tested),
-        verdict: verdict(found.doubt, geometric, tests.misfit(tested.ratios())),
+        doubt: found.doubt,
+        geometric: geometric_doubt(phase_rad, noise_sigma, end_fire),
+    };
+    O::new(&described, &tests, &tested)
+}
+
+/// Values of an estimate, and the reasons for an unreliable one except misfit.
+pub(crate) struct Described {
+    pub(crate) phase_rad: f64,
+    pub(crate) phase_sigma_rad: f64,
+    pub(crate) phase_noise_sigma_rad: f64,
+    pub(crate) angle_rad: f64,
+    pub(crate) sigma_rad: f64,
+    pub(crate) snr_db: f64,
+    pub(crate) doubt: Option<Reason>,
+    pub(crate) geometric: Option<Reason>,
+}
+
+/// Estimate with or without goodness of fit.
+pub(crate) trait Output {
+    /// Whether the goodness of fit is computed. If not, `tested` is [`Tested::NOTHING`].
+    const IS_TESTED: bool;
+
+    fn new(described: &Described, tests: &Tests, tested: &Tested) -> Self;
+}
+
+impl Output for AngleEstimate {
+    const IS_TESTED: bool = true;
+
+    #[inline(always)]
+    fn new(described: &Described, tests: &Tests, tested: &Tested) -> Self {
+        let misfit = tests.misfit(tested.ratios());
+        Self {
+            phase_rad: described.phase_rad,
+            phase_sigma_rad: described.phase_sigma_rad,
+            phase_noise_sigma_rad: described.phase_noise_sigma_rad,
+            angle_rad: described.angle_rad,
+            sigma_rad: described.sigma_rad,
+            snr_db: described.snr_db,
+            fit: tests.fit(tested),
+            verdict: verdict(described.doubt, described.geometric, misfit),
+        }
+    }
+}
+
+impl Output for UntestedEstimate {
+    const IS_TESTED: bool = false;
+
+    #[inline(always)]
+    fn new(described: &Described, _: &Tests, _: &Tested) -> Self {
+        Self {
+            phase_rad: described.phase_rad,
+            phase_noise_sigma_rad: described.phase_noise_sigma_rad,
+            angle_rad: described.angle_rad,
+            sigma_rad: described.sigma_rad,
+            snr_db: described.snr_db,
+            verdict: verdict(described.doubt, described.geometric, None),
+        }
     }
 }
 

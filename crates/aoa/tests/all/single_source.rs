@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 use crate::common::{METHODS, Random, exact, oracle};
 use aoa::{
     AngleEstimate, Array, Batch, Complex64, Covariance, Method, PseudoSpectrum, Reason, Smoothing,
-    Verdict, bound, estimate, estimate_several_smoothed,
+    UntestedEstimate, Verdict, bound, estimate, estimate_several_smoothed, estimate_untested,
+    maximum_likelihood_pilots, maximum_likelihood_pilots_untested,
 };
 
 #[test]
@@ -273,6 +274,68 @@ fn a_batch_equals_single_calls() {
     check::<3>();
     check::<4>();
     check::<8>();
+}
+
+#[test]
+fn estimates_without_goodness_of_fit_have_equal_values() {
+    let array = Array::<4>::half_wavelength();
+    let mut random = Random::new(31);
+    let count = 12;
+    let mut samples = Vec::new();
+    let mut blocks = Vec::new();
+    for item in 0..90 {
+        // Every third item has a reflection, so that the model does not fit.
+        let mut truth = vec![(random.uniform(0.1, 3.0), f64::from(item % 4) * 8.0 - 6.0)];
+        if item % 3 == 0 {
+            truth.push((random.uniform(0.1, 3.0), truth[0].1 - 3.0));
+        }
+        let snapshots = random.snapshots(&array, &truth, count);
+        for n in 0..4 {
+            samples.extend(snapshots.iter().map(|snapshot| snapshot[n]));
+        }
+        blocks.push(snapshots);
+    }
+    let equal = |untested: &UntestedEstimate, tested: &AngleEstimate| {
+        assert_eq!(untested.phase_rad, tested.phase_rad);
+        assert_eq!(untested.phase_noise_sigma_rad, tested.phase_noise_sigma_rad);
+        assert_eq!(untested.angle_rad, tested.angle_rad);
+        assert_eq!(untested.snr_db, tested.snr_db);
+        assert_eq!(untested.is_resolved(), tested.is_resolved());
+        if tested.fit.misfit().is_none() {
+            assert_eq!(untested.sigma_rad, tested.sigma_rad);
+            assert_eq!(untested.verdict, tested.verdict);
+        }
+        tested.fit.misfit().is_some()
+    };
+    for method in METHODS {
+        let batch = Batch::<f64, 4>::new(&samples, count).unwrap();
+        let mut tested = vec![AngleEstimate::default(); blocks.len()];
+        let mut untested = vec![UntestedEstimate::default(); blocks.len()];
+        batch
+            .estimate(method, &array, Smoothing::default(), 1, &mut tested)
+            .unwrap();
+        batch
+            .estimate_untested(method, &array, &mut untested)
+            .unwrap();
+        let pairs = untested.iter().zip(&tested);
+        let misfits = pairs
+            .filter(|(untested, tested)| equal(untested, tested))
+            .count();
+        assert!((10..80).contains(&misfits), "{method:?}: {misfits}");
+        let covariance = Covariance::from_snapshots(&blocks[0]).unwrap();
+        let single = estimate(method, &covariance, &array).unwrap();
+        equal(
+            &estimate_untested(method, &covariance, &array).unwrap(),
+            &single,
+        );
+    }
+    for noise_variance in [None, Some(1.0)] {
+        for blocks in &blocks {
+            let tested = maximum_likelihood_pilots(blocks, noise_variance, &array).unwrap();
+            let untested = maximum_likelihood_pilots_untested(blocks, noise_variance, &array);
+            equal(&untested.unwrap(), &tested);
+        }
+    }
 }
 
 #[test]

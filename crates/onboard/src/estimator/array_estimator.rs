@@ -68,11 +68,13 @@ impl<const N: usize> AngleEstimator for ArrayEstimator<N> {
         observation: &SsbObservation,
     ) -> Result<Option<EstimatedAngle>, BoxError> {
         let snapshots = observation.snapshots::<N>();
-        let estimate = if observation.noise_variance.is_some() {
-            aoa::maximum_likelihood_pilots(snapshots, observation.noise_variance, &self.array)
+        // The goodness of fit is not used.
+        let estimate = if let Some(noise_variance) = observation.noise_variance {
+            aoa::maximum_likelihood_pilots_untested(snapshots, Some(noise_variance), &self.array)
         } else {
-            Covariance::from_snapshots(snapshots)
-                .and_then(|covariance| aoa::estimate(self.method, &covariance, &self.array))
+            Covariance::from_snapshots(snapshots).and_then(|covariance| {
+                aoa::estimate_untested(self.method, &covariance, &self.array)
+            })
         };
         Ok(estimate.ok().map(|estimate| EstimatedAngle::Angle {
             phase_rad: self.on_grid(estimate.phase_rad),
