@@ -108,6 +108,56 @@ def test_samples_before_and_after_a_gap_make_no_ssb(tmp_path: Path) -> None:
     assert decoded == pytest.approx(expected, abs=1)
 
 
+@pytest.mark.parametrize(
+    ("later_s", "whole"), [(0.0, 3), (0.01, 3), (5.0, 2)], ids=["contiguous", "late stamp", "gap"]
+)
+def test_dates_separate_captures(tmp_path: Path, later_s: float, whole: int) -> None:
+    """Two captures without `core:global_index`; the cut is in the middle of the first SSB."""
+    half = burst(3)
+    [first] = [it for it in cells_of(write(tmp_path / "one", half, [(0, SSB_HZ)])) if it.sfn]
+    cut = round(first.sample_start) + 548
+    file = write(tmp_path / "two", np.concatenate([half] * 3), [(0, SSB_HZ), (cut, SSB_HZ)])
+    meta = json.loads(file.read_text())
+    for capture, time_s in zip(meta["captures"], (0.0, cut / RATE_HZ + later_s), strict=True):
+        capture["core:datetime"] = f"2026-05-01T12:00:{time_s:09.6f}Z"
+    file.write_text(json.dumps(meta))
+    assert len(found(file)) == whole
+
+
+def test_a_drive_needs_gaps_of_known_duration(access_av: Cli, tmp_path: Path) -> None:
+    samples = np.vstack([np.concatenate([burst(3)] * 2)] * 2).T.copy()
+    site, vehicle = tmp_path / "site.toml", tmp_path / "vehicle.toml"
+    site.write_text('name = "hall"\n[[radio_heads]]\npci = 3\nposition_m = [5.0, 0.0, 3.0]\n')
+    vehicle.write_text('name = "robot"\n[array]\nelements = 2\n')
+    file = write(tmp_path / "cut", samples, [(0, SSB_HZ), (len(samples) // 2, SSB_HZ)])
+    meta = json.loads(file.read_text())
+    meta["global"]["core:num_channels"] = 2
+    for second, says in ((9, "must be known to a millisecond"), (-9, "earlier than the end")):
+        for capture, time_s in zip(meta["captures"], (20, 20 + second), strict=True):
+            capture["core:datetime"] = f"2026-05-01T12:00:{time_s:02d}Z"
+        file.write_text(json.dumps(meta))
+        options = ["--site", site, "--vehicle", vehicle, "--out", tmp_path / "o"]
+        done = access_av("angles", file, *options)
+        assert done.code == 2
+        said = " ".join(done.err.split())
+        assert "captures[1].core:datetime" in said
+        assert says in said
+
+
+@pytest.mark.parametrize("ratio", [0.5, 2.0])
+def test_a_wrong_sample_rate_is_named(access_av: Cli, tmp_path: Path, ratio: float) -> None:
+    sent = nr.build_burst(5, ssb_indices=[0], ssb_freq_hz=SSB_HZ, sample_rate_hz=2 * RATE_HZ)
+    noise = np.random.default_rng(1).normal(scale=6e-3, size=(sent.size, 2)) @ [1, 1j]
+    file = write(tmp_path / "rate", (sent + noise).astype(np.complex64), [(0, SSB_HZ)])
+    meta = json.loads(file.read_text())
+    meta["global"]["core:sample_rate"] = 2 * RATE_HZ * ratio
+    file.write_text(json.dumps(meta))
+    done = access_av("scan", file, "--json")
+    said = " ".join(done.err.split())
+    assert f"at the specified sample rate of {2 * RATE_HZ * ratio:.0f} Hz" in said
+    assert f"but at {2 * RATE_HZ:.0f} Hz: correct the sample rate" in said
+
+
 def test_a_drive_has_one_centre_frequency(access_av: Cli, tmp_path: Path) -> None:
     samples = np.concatenate([burst(3), burst(3)])
     file = write(tmp_path / "retuned", samples, [(0, SSB_HZ), (samples.size // 2, OTHER_HZ)])

@@ -49,6 +49,7 @@ pub use odometry_csv::{read_odometry_csv, read_wheel_odometry_csv, write_odometr
 pub use odometry_file::{OdometryChoice, read_odometry};
 pub use range_log::{LoggedRange, RangeLog, is_range_log, read_range_log};
 pub use sigmf::{
-    Annotation, Capture, Datatype, Recording, RecordingWarning, RecordingWriter, WriterSettings,
+    Annotation, Capture, Datatype, Recording, RecordingWarning, RecordingWriter, Segment,
+    WriterSettings,
 };
 pub use tum::{TimedPose, read_tum, tum_text, write_tum};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use num_complex::Complex32;
-use recording::{Capture, Recording, RecordingError};
+use recording::{Recording, RecordingError, Segment};
 
 use crate::gate::RxWindow;
 use crate::inbox::{Block, Inbox, Input};
@@ -16,9 +16,10 @@ const BLOCK_S: f64 = 1e-3;
 /// burst of SSBs is within half a frame (5 ms).
 const WINDOW_S: f64 = 10e-3;
 
-/// Recording as blocks in order of time; gaps between captures give no blocks.
+/// Recording as blocks in order of time; gaps between segments give no blocks.
 pub struct Blocks {
     recording: Recording,
+    segments: Vec<Segment>,
     rate_hz: f64,
     start_s: f64,
     /// Maximum duration of a block in seconds.
@@ -35,6 +36,7 @@ impl Blocks {
             start_s,
             block_s,
             at: 0,
+            segments: recording.segments(),
             recording,
         }
     }
@@ -53,19 +55,21 @@ impl Blocks {
         self.start_s + self.index(sample) as f64 / self.rate_hz
     }
 
-    /// Returns the index of a sample of the file including missing samples.
-    fn index(&self, sample: u64) -> u64 {
-        let captures = &self.recording.metadata().captures;
-        let capture = captures.iter().rfind(|it| it.sample_start <= sample);
-        capture.map_or(sample, |it| global_index(it) + (sample - it.sample_start))
+    /// Returns the segment that contains a sample of the file.
+    fn segment(&self, sample: u64) -> Option<&Segment> {
+        self.segments.iter().rfind(|it| it.start <= sample)
     }
 
-    /// Returns the end of the capture that contains the next sample.
-    fn capture_end(&self) -> u64 {
-        let captures = self.recording.metadata().captures.iter();
-        let starts = captures.map(|it| it.sample_start);
-        let next = starts.filter(|start| *start > self.at).min();
-        next.unwrap_or(u64::MAX).min(self.recording.length())
+    /// Returns the index of a sample of the file including missing samples.
+    fn index(&self, sample: u64) -> u64 {
+        self.segment(sample)
+            .map_or(sample, |it| it.number_of(sample))
+    }
+
+    /// Returns the end of the segment that contains the next sample.
+    fn segment_end(&self) -> u64 {
+        let end = self.segment(self.at).map(|it| it.start + it.length);
+        end.unwrap_or(self.recording.length())
     }
 
     /// Skips the samples that were received before `time_s` and returns their number.
@@ -76,7 +80,7 @@ impl Blocks {
             if missing <= 0.0 {
                 break;
             }
-            self.at += (missing as u64).min(self.capture_end() - self.at);
+            self.at += (missing as u64).min(self.segment_end() - self.at);
         }
         self.at - first
     }
@@ -90,17 +94,11 @@ impl Blocks {
             return Ok(None);
         };
         let block = ((self.block_s * self.rate_hz) as u64).max(1);
-        let count = block.min(self.capture_end() - self.at);
+        let count = block.min(self.segment_end() - self.at);
         self.recording.read(self.at, count as usize, into)?;
         self.at += count;
         Ok(Some(time_s))
     }
-}
-
-fn global_index(capture: &Capture) -> u64 {
-    let stated = capture.other.get("core:global_index");
-    let stated = stated.and_then(serde_json::Value::as_u64);
-    stated.unwrap_or(capture.sample_start)
 }
 
 /// Plays a recording in real time until it ends or the node stops. Samples that the gate does not require are

@@ -82,7 +82,7 @@ impl Sources {
             } = samples
             {
                 let recording = Recording::open_unverified(recording)?;
-                recording.check_one_frequency()?;
+                recording.check_drive()?;
                 let centre_hz = recording.centre_frequency_hz().with_context(|| {
                     let file = recording.data_file().display();
                     format!("{file}: no capture states core:frequency; without it the SSB is not to be found")

@@ -1,5 +1,6 @@
 //! Reception of a recording block by block. If the recorder was off between the bursts, the
-//! recording has one capture per segment with its position in time in `core:global_index`.
+//! recording has one capture per segment with its position in time in `core:global_index` or
+//! `core:datetime`.
 
 use nr_ssb::receiver::ReceiverError;
 use num_complex::Complex32;
@@ -12,16 +13,6 @@ use crate::sigmf::Recording;
 
 /// Duration of samples that are read at once in seconds.
 const BLOCK_S: f64 = 0.02;
-
-/// Contiguous segment of samples.
-struct Stretch {
-    /// Index of the first sample in the file.
-    from: u64,
-    /// Index after the last sample in the file.
-    to: u64,
-    /// Number of the first sample since the receiver began to count.
-    global_index: u64,
-}
 
 /// Missing samples that the recording does not report, detected from the times of the SSBs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,7 +55,7 @@ pub fn receive_recording(
         let error = ReceiveError::Antennas { found, elements };
         return Err(failed(error.into()));
     }
-    recording.check_one_frequency()?;
+    recording.check_drive()?;
     let rate_hz = recording.sample_rate_hz();
     // Without a centre frequency in the recording, the receiver is assumed to be tuned to the SSB.
     let centre_hz = recording.centre_frequency_hz();
@@ -89,12 +80,12 @@ pub fn receive_recording(
         }
         Ok::<(), ReplayError>(())
     };
-    for stretch in stretches(recording) {
-        let mut at = stretch.from;
-        while at < stretch.to {
-            let count = block.min(stretch.to - at);
+    for segment in recording.segments() {
+        let (mut at, end) = (segment.start, segment.start + segment.length);
+        while at < end {
+            let count = block.min(end - at);
             recording.read(at, count as usize, &mut raw)?;
-            let sample = stretch.global_index + (at - stretch.from);
+            let sample = segment.number_of(at);
             let antennas: Vec<&[Complex32]> = raw.iter().map(Vec::as_slice).collect();
             let time_s = start_time_s + sample as f64 / rate_hz;
             stream.push(time_s, &antennas).map_err(&failed)?;
@@ -105,33 +96,4 @@ pub fn receive_recording(
     stream.break_off().map_err(&failed)?;
     hear(&mut stream)?;
     Ok(gaps)
-}
-fn stretches(recording: &Recording) -> Vec<Stretch> {
-    let captures = &recording.metadata().captures;
-    let mut stretches: Vec<Stretch> = Vec::new();
-    for capture in captures {
-        let global_index = capture.global_index().unwrap_or(capture.sample_start);
-        if let Some(last) = stretches.last_mut() {
-            last.to = capture.sample_start;
-            // A capture that continues the previous one is not a gap.
-            if global_index == last.global_index + (last.to - last.from) {
-                last.to = recording.length();
-                continue;
-            }
-        }
-        let (from, to) = (capture.sample_start, recording.length());
-        stretches.push(Stretch {
-            from,
-            to,
-            global_index,
-        });
-    }
-    if stretches.is_empty() {
-        stretches.push(Stretch {
-            from: 0,
-            to: recording.length(),
-            global_index: 0,
-        });
-    }
-    stretches
 }

@@ -43,6 +43,13 @@ pub enum ChannelFault {
     Tone(Tone),
     /// I and Q are exchanged: SSBs are found only after their exchange.
     IqExchanged,
+    /// SSBs are found only with another sample rate, so that the specified one is probably wrong.
+    SampleRate {
+        /// Specified sample rate in Hz.
+        specified_hz: f64,
+        /// Sample rate with which SSBs are found, in Hz.
+        likely_hz: f64,
+    },
 }
 
 impl ChannelFault {
@@ -50,7 +57,10 @@ impl ChannelFault {
     pub const fn channel(&self) -> Option<usize> {
         match self {
             Self::Samples { channel, .. } => Some(*channel),
-            Self::Exchanged { .. } | Self::Tone(_) | Self::IqExchanged => None,
+            Self::Exchanged { .. }
+            | Self::Tone(_)
+            | Self::IqExchanged
+            | Self::SampleRate { .. } => None,
         }
     }
 }
@@ -76,6 +86,16 @@ impl fmt::Display for ChannelFault {
                 return f.write_str(
                     "I and Q are exchanged (the spectrum is mirrored): SSBs were found with them \
                      exchanged back, and none otherwise",
+                );
+            }
+            Self::SampleRate {
+                specified_hz,
+                likely_hz,
+            } => {
+                return write!(
+                    f,
+                    "no SSB is decoded at the specified sample rate of {specified_hz} Hz, but at {likely_hz} Hz: \
+                     correct the sample rate"
                 );
             }
             Self::Samples { channel, fault } => (channel, fault),

@@ -52,6 +52,31 @@ pub struct Scan {
 /// [`ScanError`] if the recording cannot be read or searched. A recording without an SSB is not an
 /// error.
 pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, ScanError> {
+    scan_band(source, settings, Band::Whole)
+}
+
+/// Finds the SSBs at the given frequency or on the synchronization raster, which takes a fraction of the time.
+pub(super) fn scan_on_raster(
+    source: &mut dyn IqSource,
+    settings: &ScanSettings,
+) -> Result<Scan, ScanError> {
+    scan_band(source, settings, Band::Raster)
+}
+
+/// Frequencies of a search without a given SSB frequency.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Band {
+    /// Synchronization raster in the first 20 ms.
+    Raster,
+    /// Raster, and all other frequencies.
+    Whole,
+}
+
+fn scan_band(
+    source: &mut dyn IqSource,
+    settings: &ScanSettings,
+    band: Band,
+) -> Result<Scan, ScanError> {
     let file = source.name();
     let front_end_failed = |source| ScanError::FrontEnd {
         file: file.clone(),
@@ -98,6 +123,7 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
             centre_hz: Some(centre_hz).filter(|hz| *hz > 0.0),
             spacing: settings.spacing,
             sound_channel: sound.unwrap_or(0),
+            band,
         };
         search.places(source, &mut found.searched)?
     };
@@ -174,6 +200,7 @@ struct BandSearch {
     spacing: Option<SubcarrierSpacing>,
     /// Index of a channel without a fault.
     sound_channel: usize,
+    band: Band,
 }
 
 impl BandSearch {
@@ -214,6 +241,10 @@ impl BandSearch {
                 Some(hz) => raster::scan_raster(&slices, rate_hz, hz).map_err(failed)?,
                 None => Vec::new(),
             };
+            if self.band == Band::Raster {
+                finds.retain(|find| self.spacing.is_none_or(|it| it == find.spacing));
+                return Ok(finds.iter().map(Place::from).collect());
+            }
             let one = slices.get(self.sound_channel).copied().unwrap_or_default();
             let one = [&one[..off_raster.min(one.len())]];
             finds.extend(

@@ -6,7 +6,7 @@ use num_complex::Complex32;
 use super::diagnosis::{ChannelFault, add_tone};
 use super::error::ScanError;
 use super::iq_source::IqSource;
-use super::scanner::{Scan, ScanSettings, scan};
+use super::scanner::{Scan, ScanSettings, scan, scan_on_raster};
 use crate::error::RecordingError;
 use crate::sigmf::{Recording, Segment, check_centre_hz};
 
@@ -16,9 +16,13 @@ const SHORTEST_S: f64 = 17e-6;
 /// than one SSB of any spacing.
 const EXTENDED_S: f64 = 1e-3;
 
+/// Ratios of the true to the specified sample rate that are tested if no PBCH is decoded: a decimation by two that was
+/// specified but not applied, or the reverse.
+const RATE_RATIOS: [f64; 2] = [0.5, 2.0];
+
 /// Finds every SSB of a recording in order of time, at the centre frequency of its capture. After a gap, SSBs are
 /// searched for at the frequencies where they were found before the gap. If no PBCH is decoded, the search is repeated
-/// with I and Q exchanged.
+/// with I and Q exchanged, and then on the synchronization raster with half and twice the sample rate.
 ///
 /// # Errors
 /// Errors of [`scan`]; [`ScanError::Recording`] for a centre frequency outside 5G NR, or for one
@@ -51,6 +55,7 @@ pub fn scan_recording(
             recording: &mut *recording,
             segment,
             exchanged: false,
+            rate_ratio: 1.0,
         };
         let before = known
             .iter()
@@ -96,9 +101,37 @@ fn scan_either_way(
         if source.exchanged {
             part.ssbs = exchanged.ssbs;
             part.faults.push(ChannelFault::IqExchanged);
+        } else {
+            part.faults.extend(likely_rate(source, settings)?);
         }
     }
     Ok(part)
+}
+
+/// Returns the sample rate with which a PBCH is decoded, if it is half or twice the specified one.
+fn likely_rate(
+    source: &mut SegmentSource<'_>,
+    settings: &ScanSettings,
+) -> Result<Option<ChannelFault>, ScanError> {
+    let specified_hz = source.sample_rate_hz();
+    for ratio in RATE_RATIOS {
+        source.rate_ratio = ratio;
+        let found = scan_on_raster(source, settings);
+        let likely_hz = source.sample_rate_hz();
+        source.rate_ratio = 1.0;
+        match found {
+            Ok(found) if has_message(&found) => {
+                return Ok(Some(ChannelFault::SampleRate {
+                    specified_hz,
+                    likely_hz,
+                }));
+            }
+            // A rate that cannot be received is not the true one.
+            Ok(_) | Err(ScanError::FrontEnd { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(None)
 }
 
 /// Frequencies of the SSBs in an earlier segment of the same centre frequency.
@@ -166,6 +199,8 @@ struct SegmentSource<'a> {
     segment: Segment,
     /// Whether I and Q are exchanged.
     exchanged: bool,
+    /// Factor on the specified sample rate.
+    rate_ratio: f64,
 }
 
 impl IqSource for SegmentSource<'_> {
@@ -187,7 +222,7 @@ impl IqSource for SegmentSource<'_> {
     }
 
     fn sample_rate_hz(&self) -> f64 {
-        self.recording.sample_rate_hz()
+        self.rate_ratio * self.recording.sample_rate_hz()
     }
 
     fn centre_frequency_hz(&self) -> Option<f64> {

@@ -92,10 +92,14 @@ pub struct Capture {
 }
 
 impl Capture {
-    /// Index of the first sample since the start of the receiver (`core:global_index`). `None`: no gap precedes the
-    /// capture.
+    /// Index of the first sample since the start of the receiver (`core:global_index`).
     pub fn global_index(&self) -> Option<u64> {
         self.other.get("core:global_index").and_then(Value::as_u64)
+    }
+
+    /// Date of the first sample as written (`core:datetime`).
+    pub fn datetime(&self) -> Option<&str> {
+        self.other.get("core:datetime").and_then(Value::as_str)
     }
 }
 
@@ -161,30 +165,6 @@ impl Metadata {
         })?;
         metadata.check(file)?;
         Ok(metadata)
-    }
-
-    /// Checks that the numbers of the captures' first samples since the start of the receiver do
-    /// not go back.
-    fn check_global_indices(&self, file: &Path) -> Result<(), RecordingError> {
-        let mut last: Option<(u64, u64)> = None;
-        for (index, capture) in self.captures.iter().enumerate() {
-            let Some(number) = capture.global_index() else {
-                continue;
-            };
-            let start = capture.sample_start;
-            if let Some((last_start, last_number)) = last {
-                let least = last_number.saturating_add(start.saturating_sub(last_start));
-                if number < least {
-                    let allowed = format!(
-                        "it must be at least {least}, by the captures and samples before it"
-                    );
-                    let key = format!("captures[{index}].core:global_index");
-                    return Err(RecordingError::value(file, key, number, allowed));
-                }
-            }
-            last = Some((start, number));
-        }
-        Ok(())
     }
 
     pub(super) fn check(&self, file: &Path) -> Result<(), RecordingError> {
@@ -281,7 +261,6 @@ impl Metadata {
                 ));
             }
         }
-        self.check_global_indices(file)?;
         Ok(())
     }
 }

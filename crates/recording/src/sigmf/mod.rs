@@ -15,12 +15,14 @@
 
 mod archive;
 mod checksum;
+mod date;
 mod frequency;
 mod metadata;
 mod reader;
 mod sample_format;
 mod samples;
 mod segment;
+mod timeline;
 mod writer;
 
 pub use frequency::check_centre_hz;

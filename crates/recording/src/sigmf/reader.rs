@@ -14,12 +14,15 @@ use super::metadata::{self, Annotation, Capture, Global, Metadata};
 use super::sample_format;
 use super::samples::Datatype;
 use super::segment::{self, Segment};
+use super::timeline::{self, Position};
 use crate::error::RecordingError;
 use crate::file as files;
 use crate::foreign::format_of;
 
 /// Number of bytes read from a file at once.
 const BLOCK_BYTES: usize = 1 << 18;
+/// Maximum resolution of dates that determine gaps of a drive (s): at most 1 cm driven at 10 m/s.
+const MAX_RESOLUTION_S: f64 = 1e-3;
 
 /// Suspicious property of a recording that does not prevent reading.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,6 +74,7 @@ struct DataFile {
 #[derive(Debug)]
 pub struct Recording {
     metadata: Metadata,
+    positions: Vec<Position>,
     datatype: Datatype,
     /// One file with interleaved channels, or one file per channel.
     files: Vec<DataFile>,
@@ -117,7 +121,8 @@ impl Recording {
                 ));
             }
         }
-        let mut recording = Self::new(metadata, datatype, vec![data], length);
+        let positions = positions(&metadata, &meta_file)?;
+        let mut recording = Self::new((metadata, positions), datatype, vec![data], length);
         if let Some(likely) = recording.other_datatype()? {
             let allowed = format!("the samples are probably `{}`", likely.name());
             let stated = format!("`{}`", datatype.name());
@@ -181,7 +186,9 @@ impl Recording {
             }
             files.push(data);
         }
-        let mut recording = Self::new(metadata, Datatype::Cf32Le, files, length.unwrap_or(0));
+        let positions = positions(&metadata, first)?;
+        let described = (metadata, positions);
+        let mut recording = Self::new(described, Datatype::Cf32Le, files, length.unwrap_or(0));
         if let Some(likely) = recording.other_datatype()? {
             let allowed = format!(
                 "raw files must be `cf32_le`; for {0}, write a .sigmf-meta file with core:datatype {0}",
@@ -193,7 +200,12 @@ impl Recording {
         Ok(recording)
     }
 
-    fn new(metadata: Metadata, datatype: Datatype, files: Vec<DataFile>, length: u64) -> Self {
+    fn new(
+        (metadata, positions): (Metadata, Vec<Position>),
+        datatype: Datatype,
+        files: Vec<DataFile>,
+        length: u64,
+    ) -> Self {
         let mut warnings = Vec::new();
         for (annotation, it) in metadata.annotations.iter().enumerate() {
             if it.sample_start.saturating_add(it.sample_count.unwrap_or(1)) > length {
@@ -209,6 +221,7 @@ impl Recording {
         }
         Self {
             metadata,
+            positions,
             datatype,
             files,
             length,
@@ -251,15 +264,27 @@ impl Recording {
 
     /// Returns the segments of the recording in order, each with one centre frequency and without a gap.
     pub fn segments(&self) -> Vec<Segment> {
-        segment::segments(&self.metadata.captures, self.length)
+        segment::segments(&self.metadata.captures, &self.positions, self.length)
     }
 
-    /// Checks that the recording has one centre frequency, as a drive requires.
+    /// Checks that the recording has one centre frequency and gaps of known duration, as a drive requires.
     ///
     /// # Errors
-    /// [`RecordingError::Value`] with the first capture of another frequency.
-    pub fn check_one_frequency(&self) -> Result<(), RecordingError> {
+    /// [`RecordingError::Value`] with the first capture of another frequency, or after an inaccurate gap.
+    pub fn check_drive(&self) -> Result<(), RecordingError> {
         let segments = self.segments();
+        let coarse = |it: &&Segment| it.gap_resolution_s.is_some_and(|it| it > MAX_RESOLUTION_S);
+        if let Some(after) = segments.iter().find(coarse) {
+            let capture = self.metadata.captures.get(after.capture);
+            let date = capture.and_then(Capture::datetime).unwrap_or_default();
+            return Err(RecordingError::value(
+                self.data_file(),
+                format!("captures[{}].core:datetime", after.capture),
+                date,
+                "a gap precedes this capture, and its duration must be known to a millisecond; write more digits, or \
+                 core:global_index",
+            ));
+        }
         let Some(first) = segments.first() else {
             return Ok(());
         };
@@ -423,6 +448,17 @@ impl Place<'_> {
         }
         Ok(())
     }
+}
+
+/// Returns the position of every capture in the stream of the receiver.
+///
+/// # Errors
+/// [`RecordingError`] with the index or date that contradicts the previous captures.
+fn positions(metadata: &Metadata, file: &Path) -> Result<Vec<Position>, RecordingError> {
+    timeline::positions(&metadata.captures, metadata.global.sample_rate_hz).map_err(|it| {
+        let key = format!("captures[{}].{}", it.capture, it.key);
+        RecordingError::value(file, key, it.found, it.allowed)
+    })
 }
 
 /// Metadata and data of a recording.

@@ -1,6 +1,7 @@
 //! Segments of a recording with one centre frequency and without a gap.
 
 use super::metadata::Capture;
+use super::timeline::Position;
 
 /// Maximum difference of equal frequencies (Hz).
 const SAME_HZ: f64 = 0.5;
@@ -16,9 +17,20 @@ pub struct Segment {
     pub centre_frequency_hz: Option<f64>,
     /// Index of the first capture of the segment.
     pub capture: usize,
+    /// Number of the first sample since the start of the receiver.
+    pub number: u64,
+    /// Resolution of the dates (s) that determine the gap before the segment; `None` if `core:global_index` determines
+    /// it, or without a gap.
+    pub gap_resolution_s: Option<f64>,
 }
 
 impl Segment {
+    /// Returns the number of a sample of the file since the start of the receiver.
+    pub fn number_of(&self, sample: u64) -> u64 {
+        self.number
+            .saturating_add(sample.saturating_sub(self.start))
+    }
+
     /// Whether another segment has the same centre frequency.
     pub fn has_frequency_of(&self, other: &Self) -> bool {
         match (self.centre_frequency_hz, other.centre_frequency_hz) {
@@ -29,33 +41,33 @@ impl Segment {
 }
 
 /// Returns the segments of a recording of `length` samples in order. A capture without a frequency continues the
-/// previous segment. A `core:global_index` that differs from the number of samples since the previous one is a gap.
-pub fn segments(captures: &[Capture], length: u64) -> Vec<Segment> {
+/// previous segment. A capture whose position differs from the end of the previous samples begins after a gap.
+pub fn segments(captures: &[Capture], positions: &[Position], length: u64) -> Vec<Segment> {
     let first_hz = captures.iter().find_map(|it| it.frequency_hz);
+    let begin = captures.first().zip(positions.first());
     let mut segments = vec![Segment {
         start: 0,
         length,
         centre_frequency_hz: first_hz,
         capture: 0,
+        number: begin.map_or(0, |(it, at)| at.number.saturating_sub(it.sample_start)),
+        gap_resolution_s: None,
     }];
-    // Sample of the last capture, and its global index.
-    let mut counted = (0, 0);
-    for (index, capture) in captures.iter().enumerate() {
+    for (index, (capture, position)) in captures.iter().zip(positions).enumerate().skip(1) {
         let start = capture.sample_start.min(length);
-        let expected = u64::saturating_add(counted.1, start.saturating_sub(counted.0));
-        let global_index = capture.global_index().unwrap_or(expected);
-        let is_gap = index > 0 && global_index != expected;
-        counted = (start, global_index);
         let Some(last) = segments.last_mut() else {
             continue;
         };
+        let expected = last.number_of(start);
         let next = Segment {
             start,
             length: length - start,
             centre_frequency_hz: capture.frequency_hz.or(last.centre_frequency_hz),
             capture: index,
+            number: position.number,
+            gap_resolution_s: position.gap_resolution_s,
         };
-        if !is_gap && next.has_frequency_of(last) {
+        if position.number == expected && next.has_frequency_of(last) {
             continue;
         }
         last.length = start - last.start;
@@ -67,7 +79,12 @@ pub fn segments(captures: &[Capture], length: u64) -> Vec<Segment> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::timeline::positions;
     use super::*;
+
+    fn segments_of_100(captures: &[Capture]) -> Vec<Segment> {
+        segments(captures, &positions(captures, 1e6).unwrap(), 100)
+    }
 
     #[test]
     fn segments_begin_where_the_frequency_changes() {
@@ -77,7 +94,7 @@ mod tests {
             ..Capture::default()
         };
         let found = |captures: &[Capture]| -> Vec<(u64, u64, Option<f64>)> {
-            let segments = segments(captures, 100).into_iter();
+            let segments = segments_of_100(captures).into_iter();
             segments
                 .map(|it| (it.start, it.length, it.centre_frequency_hz))
                 .collect()
@@ -113,7 +130,7 @@ mod tests {
             }
         };
         let found = |captures: &[Capture]| -> Vec<(u64, u64, usize)> {
-            let segments = segments(captures, 100).into_iter();
+            let segments = segments_of_100(captures).into_iter();
             segments
                 .map(|it| (it.start, it.length, it.capture))
                 .collect()
