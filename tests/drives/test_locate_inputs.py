@@ -142,6 +142,29 @@ def test_an_odometer_that_counts_upwards_in_reverse_is_named(
     assert any("distances count upwards in reverse" in it for it in drive.diagnoses), drive.remarks
 
 
+@pytest.mark.parametrize("every", [1, 4], ids=["20 Hz", "5 Hz"])
+def test_a_reversal_without_a_sampled_standstill_is_named(tmp_path: Path, every: int) -> None:
+    """The direction changes between two samples of an odometer that counts upwards."""
+
+    def speed_mps(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where((time_s > 25.0) & (time_s < 29.0), -0.4, 0.5)
+
+    whole = robot(50.0, speed_mps=speed_mps)
+    assert not any("upwards" in it for it in whole.locate(tmp_path).diagnoses)
+    counted = whole.odometry.with_columns(
+        distance_m=(SPEED.abs() * 0.05).cum_sum(), speed_mps=SPEED.abs()
+    )
+    whole.odometry = counted.gather_every(every)
+    drive = whole.locate(tmp_path)
+    [named] = [it for it in drive.diagnoses if "distances count upwards in reverse" in it]
+    found_s = re.search(r"from ([\d.]+) to ([\d.]+) s", named)
+    assert found_s is not None
+    # The angles of half a second determine a change of direction.
+    assert float(found_s[1]) == pytest.approx(25.0, abs=0.75)
+    assert float(found_s[2]) == pytest.approx(29.0, abs=0.75)
+    assert not drive.is_reliable
+
+
 @pytest.fixture(scope="module")
 def located(tmp_path_factory: pytest.TempPathFactory) -> tuple[Robot, drives.Drive]:
     whole = robot(40.0)

@@ -11,6 +11,9 @@ use crate::odometry::OdometryLog;
 const MIN_INSIDE: f64 = 0.5;
 /// Minimum fraction of the angles within the time of the odometry for an accepted unit.
 const EXPLAINED: f64 = 0.9;
+/// Minimum duration of the angles as a fraction of the drive for an accepted unit. In a unit that is too long, all times
+/// are near 0; a log of odometry that ends early is shorter than the angles, too.
+const MIN_SPAN: f64 = 0.1;
 
 /// Checks that the times of odometry and angles are in seconds.
 ///
@@ -77,12 +80,10 @@ fn unit_of_angles(odometry: &OdometryLog, angles: &[LoggedAngle]) -> Option<(Tim
         return None;
     }
     let [first_s, last_s] = odometry.interval_s()?;
-    // In a unit that is too long, all times are near 0. Therefore, the angles must also cover the
-    // drive.
     let spans = |unit: &TimeUnit| {
         let first = times().fold(f64::INFINITY, f64::min) / unit.per_second();
         let last = times().fold(f64::NEG_INFINITY, f64::max) / unit.per_second();
-        last - first > 0.01 * (last_s - first_s)
+        last - first > MIN_SPAN * (last_s - first_s)
     };
     let explains = |unit: &TimeUnit| inside(unit.per_second()) >= EXPLAINED && spans(unit);
     let unit = TimeUnit::ALL.into_iter().find(explains)?;
