@@ -173,13 +173,27 @@ def test_maps_of_another_place_or_system_are_rejected(
 
 
 @pytest.mark.parametrize(
-    "crs", [None, {}, {"type": "link", "properties": {"href": "x.prj"}}, {"type": "name"}, 4326]
+    "crs", [{}, {"type": "link", "properties": {"href": "x.prj"}}, {"type": "name"}, 4326]
 )
 def test_a_reference_system_that_is_not_named_is_rejected(tmp_path: Path, crs: Any) -> None:
     file = tmp_path / "road.geojson"
     held = {"type": "LineString", "coordinates": LINE, "crs": crs}
     file.write_text(json.dumps(held), "utf-8")
     with pytest.raises(InputError, match="names no reference system"):
+        read(file, None, Options())
+
+
+def test_a_null_reference_system_is_that_of_rfc_7946(tmp_path: Path) -> None:
+    """GeoJSON of 2008 permits ``null``; RFC 7946 has longitude and latitude only."""
+    file = tmp_path / "road.geojson"
+    held = {"type": "LineString", "coordinates": LINE}
+    file.write_text(json.dumps(held), "utf-8")
+    without = read(file, None, Options())
+    file.write_text(json.dumps({**held, "crs": None}), "utf-8")
+    assert read(file, None, Options()) == without
+    grid = {"type": "LineString", "coordinates": [[691000, 5334000], [691100, 5334000]]}
+    file.write_text(json.dumps({**grid, "crs": None}), "utf-8")
+    with pytest.raises(InputError, match="longitude"):
         read(file, None, Options())
 
 
@@ -480,6 +494,21 @@ def test_a_pci_is_a_whole_number_or_left_out(tmp_path: Path, pci: str, found: An
             csv_file.read_heads(file)
     else:
         assert csv_file.read_heads(file).heads[0].pci == found
+
+
+def test_radio_heads_with_one_pci_are_warned_of(
+    access_av: Callable[..., Any], tmp_path: Path
+) -> None:
+    heads = tmp_path / "heads.csv"
+    rows = ["name,x_m,y_m,z_m,pci", "A,0,0,6,21", "B,9,0,6,22", "C,30,0,6,21", "D,40,0,6,"]
+    heads.write_text("\n".join(rows), "utf-8")
+    _, done = new(access_av, tmp_path, "--heads-file", heads)
+    said = " ".join(done.err.split())
+    assert f"{heads}: 2 radio heads have PCI 21: 'A', 'C'; correct the PCI" in said
+    assert "PCI 22" not in said
+    heads.write_text("\n".join(rows[:3]), "utf-8")
+    _, done = new(access_av, tmp_path, "--heads-file", heads)
+    assert "radio heads have PCI" not in done.err
 
 
 @pytest.mark.parametrize("data", [b"", b"  0\nSECTION\n", b"0\n", bytes(range(256)) * 8, b"AC1032"])

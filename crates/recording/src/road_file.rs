@@ -166,9 +166,9 @@ enum System {
     Metres,
 }
 
-/// Returns the reference system of the member `crs` (GeoJSON 2008); degrees without one.
+/// Returns the reference system of the member `crs` (GeoJSON 2008); degrees without one, or with `null`.
 fn system(json: &Value) -> Result<System, Defect> {
-    let Some(crs) = json.get("crs") else {
+    let Some(crs) = json.get("crs").filter(|it| !it.is_null()) else {
         return Ok(System::Degrees);
     };
     let unknown = |what: &str| {
@@ -344,6 +344,9 @@ mod tests {
             let other = metres.replace("EPSG:25832", name);
             assert_eq!(from_geojson(&other).unwrap(), points);
         }
+        // RFC 7946 has no other system; GeoJSON of 2008 permits null.
+        let null = text.replacen("\"type\"", r#""crs":null,"type""#, 1);
+        assert_eq!(from_geojson(&null).unwrap(), points);
         let point = r#"{"type":"Point","coordinates":[8,60]}"#;
         assert_eq!(from_geojson(point).unwrap_err().0, "geometry");
     }

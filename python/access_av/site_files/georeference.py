@@ -128,14 +128,17 @@ def _apart_m(a: Origin, b: Origin) -> float:
 
 
 def name_of(held: Any, where: str) -> str | None:
-    """Returns the name of the reference system in ``crs`` (GeoJSON 2008); ``None`` without one.
+    """Returns the name of the reference system in ``crs`` (GeoJSON 2008).
+
+    ``None`` without ``crs``, and for ``null``: GeoJSON of RFC 7946 has longitude and latitude only.
+    Coordinates beyond their limits are rejected later.
 
     Raises
     ------
     InputError
         If ``crs`` contains no name.
     """
-    if not isinstance(held, dict) or "crs" not in held:
+    if not isinstance(held, dict) or held.get("crs") is None:
         return None
     crs = held["crs"]
     properties = crs.get("properties") if isinstance(crs, dict) else None

@@ -16,6 +16,7 @@ from access_av.site_files import csv_file, dxf, geojson
 from access_av.site_files.drawn import Drawn, Head, checked, numbered
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from access_av.site_files.georeference import Origin
@@ -79,7 +80,24 @@ def read(
             "heights of their antennas above the ground into position_m"
         )
         drawn = replace(drawn, notes=[*drawn.notes, note])
+    notes = _shared_cells(drawn.heads, str(heads or road))
+    drawn = replace(drawn, notes=[*drawn.notes, *notes])
     return checked(drawn, str(road), str(heads or road), str(walls))
+
+
+def _shared_cells(heads: Sequence[Head], file: str) -> Iterator[str]:
+    """Notes on physical cell identities that several radio heads have."""
+    names: dict[int, list[str]] = {}
+    for index, head in enumerate(heads):
+        if head.pci is not None:
+            names.setdefault(head.pci, []).append(repr(head.name or f"head {index + 1}"))
+    for pci, sharing in names.items():
+        if len(sharing) > 1:
+            listed = ", ".join(sharing[:4]) + (", ..." if len(sharing) > 4 else "")
+            yield (
+                f"{file}: {len(sharing)} radio heads have PCI {pci}: {listed}; correct the PCI, "
+                "or, if they belong to one cell, write the ssb_index of each of them"
+            )
 
 
 class _Files:
