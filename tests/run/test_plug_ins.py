@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import itertools
+import random
 import re
 import runpy
 import sys
@@ -338,6 +340,88 @@ def test_a_function_that_keeps_state_is_rejected() -> None:
         with pytest.raises(TypeError, match=said):
             access_av.simulate(SHORT, policy=function)
     assert driven(2, policy=reading) == driven(1, policy=reading)
+
+
+class OfClass:
+    """A policy whose state is an attribute of its class."""
+
+    count = 0
+    seen: list[float] = []  # noqa: RUF012
+
+    def __call__(self, situation: Any) -> bool:
+        type(self).count += 1
+        return self.count % 2 == 0
+
+
+class OfList(OfClass):
+    def __call__(self, situation: Any) -> bool:
+        self.seen.append(situation.time_s)
+        return len(self.seen) % 2 == 0
+
+
+GENERATOR = np.random.default_rng(1)
+NUMBERS = itertools.count()
+ARRAY = np.zeros(3)
+
+
+def drawing(situation: Any) -> bool:
+    return bool(GENERATOR.random() < 0.5)
+
+
+def drawing_globally(situation: Any) -> bool:
+    return bool(np.random.random() < 0.5)  # noqa: NPY002
+
+
+def drawing_by_random(situation: Any) -> bool:
+    return random.random() < 0.5
+
+
+def numbering(situation: Any) -> bool:
+    return next(NUMBERS) % 2 == 0
+
+
+def with_attribute(situation: Any) -> bool:
+    with_attribute.count = getattr(with_attribute, "count", 0) + 1  # type: ignore[attr-defined]
+    return with_attribute.count % 2 == 0  # type: ignore[attr-defined]
+
+
+def in_an_array(situation: Any) -> bool:
+    np.add(ARRAY, 1.0, out=ARRAY)
+    return bool(ARRAY[0] % 2 == 0)
+
+
+def by_another_function(situation: Any) -> bool:
+    return in_an_array(situation)
+
+
+@pytest.mark.parametrize(
+    ("policy", "named"),
+    [
+        (OfClass, "OfClass.count"),
+        (OfList, "OfClass.seen"),
+        (lambda: OfClass(), "OfClass.count"),
+        (drawing, "GENERATOR"),
+        (drawing_globally, "generator of numpy.random"),
+        (drawing_by_random, "generator of the module random"),
+        (numbering, "NUMBERS"),
+        (in_an_array, "ARRAY"),
+        (by_another_function, "ARRAY"),
+    ],
+)
+def test_state_between_runs_is_warned_of(policy: Any, named: str) -> None:
+    with pytest.warns(UserWarning, match=f"the policy keeps state between runs.*{named}"):
+        access_av.simulate(SHORT, runs=2, policy=policy)
+
+
+def test_an_attribute_that_a_function_adds_to_itself_is_warned_of() -> None:
+    with pytest.warns(UserWarning, match=r"has changed with_attribute\.count"):
+        access_av.simulate(SHORT, runs=2, policy=with_attribute)
+
+
+def test_plug_ins_without_shared_state_cause_no_warning() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        access_av.simulate(SHORT, runs=2, policy=EveryMetre, estimator=Smoothed)
 
 
 class Standing:

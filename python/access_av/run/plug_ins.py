@@ -90,7 +90,7 @@ def factory(plug_in: Any, role: str) -> Factory | None:
     """
     if plug_in is None:
         return None
-    function = _function(plug_in)
+    function = unwrapped(plug_in)
     is_class = isinstance(function, type)
     if not is_class and not isinstance(function, FUNCTIONS):
         raise TypeError(_shared(plug_in, role))
@@ -113,7 +113,7 @@ def factory(plug_in: Any, role: str) -> Factory | None:
     )
 
 
-def _function(plug_in: Any) -> Any:
+def unwrapped(plug_in: Any) -> Any:
     """Returns the class or function inside ``functools.partial`` objects."""
     while isinstance(plug_in, functools.partial):
         plug_in = plug_in.func

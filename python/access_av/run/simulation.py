@@ -19,6 +19,7 @@ from access_av.run import service_levels
 from access_av.run.operation import Operation
 from access_av.run.pairs import ErrorSamples
 from access_av.run.plug_ins import factory
+from access_av.run.shared_state import SharedState
 from access_av.statistics.consistency import Consistency, horizontal_error_m
 from access_av.statistics.integrity import Integrity
 from access_av.statistics.percentiles import Percentile, column
@@ -309,6 +310,8 @@ def simulate(
     -----
     ImplausibleSettingsWarning
         The localizer does not support the site: dead reckoning with several radio heads.
+    UserWarning
+        Runs have changed a value that outlives them and that a plug-in reads.
 
     Examples
     --------
@@ -320,6 +323,9 @@ def simulate(
         scenario = Scenario.load(str(scenario))
     if localizer is None:
         _warn_of_localizer(scenario)
+    plug_ins = {"estimator": estimator, "policy": policy, "localizer": localizer}
+    factories = {role: factory(plug_in, role) for role, plug_in in plug_ins.items()}
+    shared = SharedState(plug_ins)
     found = _core.simulate(
         scenario,
         runs,
@@ -329,11 +335,13 @@ def simulate(
         threads=threads,
         keep_trajectories=keep_trajectories,
         errors_every=errors_every,
-        estimator=factory(estimator, "estimator"),
-        policy=factory(policy, "policy"),
-        localizer=factory(localizer, "localizer"),
+        estimator=factories["estimator"],
+        policy=factories["policy"],
+        localizer=factories["localizer"],
         progress=progress,
     )
+    if runs > 1:
+        shared.warn_of_changes(stacklevel=2)
     return Simulation.of(found, scenario, seed)
 
 
