@@ -137,7 +137,7 @@ def test_a_drive_needs_gaps_of_known_duration(access_av: Cli, tmp_path: Path) ->
             capture["core:datetime"] = f"2026-05-01T12:00:{time_s:02d}Z"
         file.write_text(json.dumps(meta))
         options = ["--site", site, "--vehicle", vehicle, "--out", tmp_path / "o"]
-        done = access_av("angles", file, *options)
+        done = access_av("record", "angles", file, *options)
         assert done.code == 2
         said = " ".join(done.err.split())
         assert "captures[1].core:datetime" in said
@@ -152,7 +152,7 @@ def test_a_wrong_sample_rate_is_named(access_av: Cli, tmp_path: Path, ratio: flo
     meta = json.loads(file.read_text())
     meta["global"]["core:sample_rate"] = 2 * RATE_HZ * ratio
     file.write_text(json.dumps(meta))
-    done = access_av("scan", file, "--json")
+    done = access_av("record", "scan", file, "--json")
     said = " ".join(done.err.split())
     assert f"at the specified sample rate of {2 * RATE_HZ * ratio:.0f} Hz" in said
     assert f"but at {2 * RATE_HZ:.0f} Hz: correct the sample rate" in said
