@@ -1,4 +1,4 @@
-"""Command ``balance``: cost, energy and carbon of a fleet with two localization systems."""
+"""Command ``design balance``: cost, energy and carbon of a fleet with two localization systems."""
 
 from __future__ import annotations
 

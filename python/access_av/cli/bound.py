@@ -1,4 +1,4 @@
-"""Command ``bound``: error bound of a placement of radio heads."""
+"""Command ``design bound``: error bound of a placement of radio heads."""
 
 from __future__ import annotations
 

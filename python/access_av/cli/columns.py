@@ -1,4 +1,4 @@
-"""Command ``columns``: description of the columns of each table."""
+"""Command ``file columns``: description of the columns of each table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands ``designs`` and ``choose``: comparison of configurations of a scenario."""
+"""Commands ``design sweep`` and ``design select``: comparison of configurations of a scenario."""
 
 from __future__ import annotations
 

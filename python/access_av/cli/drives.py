@@ -1,4 +1,4 @@
-"""Commands that synthesize and locate recorded drives: ``synth``, ``locate``."""
+"""Commands that synthesize and locate recorded drives: ``record synth``, ``record locate``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Command ``integrity``: protection levels under injected faults and wrong settings."""
+"""Command ``design integrity``: protection levels under injected faults and wrong settings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands ``profile`` and ``power``: time, energy and power of onboard computers."""
+"""Commands ``design profile`` and ``design power``: time, energy and power of onboard computers."""
 
 from __future__ import annotations
 

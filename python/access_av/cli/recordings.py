@@ -1,4 +1,4 @@
-"""Commands that evaluate recordings of samples: ``scan``, ``aoa``, ``angles``."""
+"""Commands that evaluate recordings of samples: ``record scan``, ``record aoa``, ``record angles``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Command ``survey``: site and vehicle parameters estimated from ordinary drives."""
+"""Command ``record survey``: site and vehicle parameters estimated from ordinary drives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Command ``tune``: optimization of a wake-up policy for a scenario."""
+"""Command ``design tune``: optimization of a wake-up policy for a scenario."""
 
 from __future__ import annotations
 
