@@ -1,4 +1,4 @@
-"""Command ``paper codesign``: comparison with the paper's adaptive point, including the receiver."""
+"""Command ``paper codesign``: comparison with the paper's adaptive point, receiver included."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands that evaluate recordings of samples: ``record scan``, ``record aoa``, ``record angles``."""
+"""Commands that evaluate samples: ``record scan``, ``record aoa``, ``record angles``."""
 
 from __future__ import annotations
 
