@@ -49,7 +49,7 @@ pub fn repeats(travelled_m: f64) -> bool {
 }
 
 /// Returns the independent fraction of the short-lived error.
-pub(super) fn share(travelled_m: f64) -> f64 {
+pub fn share(travelled_m: f64) -> f64 {
     (travelled_m / SOON_M).clamp(LEAST_SHARE, 1.0)
 }
 

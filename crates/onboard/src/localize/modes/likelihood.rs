@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::gaussian::with_outliers;
+use crate::localize::bias::share;
 use crate::localize::ekf::{Ekf, PredictedMeasurement, PredictedRange};
 use crate::localize::output::UpdateReason;
 use crate::observation::AngleMeasurement;
@@ -171,10 +172,11 @@ fn first_variance(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
 }
 
 /// Returns the fraction of an angle that is independent of the previous one of its radio head. A
-/// filter that estimates a time-correlated bias predicts the dependent part.
+/// filter that estimates a time-correlated bias predicts the dependent part, except the short-lived
+/// error. The filter's gain is reduced by the same fraction.
 fn information_fraction(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
     if predicted.hypotheses.is_some() {
-        return 1.0;
+        return share(predicted.moved.0.abs());
     }
     first_variance(ekf, predicted) / predicted.innovation.measurement_variance
 }

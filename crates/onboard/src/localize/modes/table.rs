@@ -185,6 +185,7 @@ pub(in crate::localize) mod trip {
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;
+    use std::sync::Arc;
 
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -194,8 +195,10 @@ mod tests {
     use super::trip::{SIGMA_RAD, angle, trip, trip_with_bias};
     use super::*;
     use crate::localize::ekf::state::{ALONG, DATUM};
-    use crate::observation::OdometrySample;
-    use crate::settings::IntegritySettings;
+    use crate::localize::output::InitialPose;
+    use crate::observation::{AngleMeasurement, OdometrySample};
+    use crate::radio_head::RadioHead;
+    use crate::settings::{IntegritySettings, Shipped, Site, TomlFile, Vehicle};
 
     /// Deviation of the simulated environment from the nominal model.
     #[derive(Default)]
@@ -464,5 +467,58 @@ mod tests {
         let [[xx, ..], [_, yy, _], _] = bank.leader().pose(59.9).covariance.unwrap();
         assert!(off_m(bank.leader()) < 4.0 * (xx + yy).sqrt());
         assert!(off_m(bank.leader()) < off_m(bank.nominal()));
+    }
+
+    /// Angles with independent errors at 50 Hz, along a straight far from the radio heads, contain
+    /// almost no information on slip. By Ville's inequality, correct odds exceed four times the prior
+    /// in at most a quarter of the runs; odds that count dependent angles exceeded it 260 times.
+    #[test]
+    fn frequent_angles_of_a_sound_odometer_are_no_evidence_for_slip() {
+        const SCATTER_RAD: f64 = 0.03;
+        const ACCELERATION_MPS2: f64 = 0.5;
+        let mut site = Site::from_library("yard", &Shipped).unwrap();
+        site.rician_k_db = 20.0;
+        let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+        let heads = RadioHead::heard(&site, &vehicle);
+        let road = site.build_road().unwrap().unwrap();
+        let start = InitialPose {
+            pose: road.pose(0.0),
+            position_std_m: 0.3,
+            heading_std_rad: 0.03,
+        };
+        let config = EkfConfig::new(&site, &vehicle);
+        let settings = IntegritySettings::default();
+        let prior = settings.fault_probability.odometer;
+        for seed in 1..=3 {
+            let ekf = Ekf::new(config, Some(Arc::new(road.clone())), &heads, &start);
+            let mut bank = Bank::new(&ekf, &heads, &settings, 0.0);
+            let mut noise = ChaCha8Rng::seed_from_u64(seed);
+            let mut most: f64 = 0.0;
+            for step in 0..500 {
+                let time_s = 0.02 * f64::from(step);
+                let speed_mps = (ACCELERATION_MPS2 * time_s).min(4.0);
+                let distance_m = speed_mps * (time_s - 0.5 * speed_mps / ACCELERATION_MPS2);
+                bank.odometry(&OdometrySample {
+                    time_s,
+                    distance_m,
+                    speed_mps,
+                    yaw_rate_radps: None,
+                });
+                let truth = road.pose(distance_m);
+                for head in &heads {
+                    let bearing_rad = truth.point().bearing_rad(head.position) - truth.heading_rad;
+                    let ahead = bearing_rad.cos() * truth.point().distance_m(head.position)
+                        / head.distance_m(truth.point(), config.array.position_m[2]);
+                    let scatter_rad = SCATTER_RAD * noise.sample::<f64, _>(StandardNormal);
+                    let measured = AngleMeasurement {
+                        phase_sigma_rad: 0.001,
+                        ..angle(time_s, PI * ahead + scatter_rad)
+                    };
+                    bank.update(head, &measured);
+                }
+                most = most.max(bank.mode(ModeId::Slip).unwrap().0);
+            }
+            assert!(most < 4.0 * prior, "{seed}: {most}");
+        }
     }
 }
