@@ -65,8 +65,9 @@ class Fault:
     harmless: bool = False
     # Output that is interrupted: its recovery counts, and gaps of the others do.
     sink: str = ""
-    # Whether a report is required.
+    # Whether a report is required, and the maximum time until then (s).
     reported: bool = True
+    report_s: float = 2.0
     # Width of the interval from which the begin is drawn (s).
     spread_s: float = 1.0
     # Minimum number of repetitions, as a multiple of the campaign's.

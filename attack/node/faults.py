@@ -10,6 +10,8 @@ from attack.node.fault import Fault
 ODOMETRY = r"odomet|speed|distance"
 TIME = r"odomet|time|clock"
 CHANNEL = r"channel|antenna|array"
+# Maximum time to the report of a fault of the signal: 20 SSBs of a radio head (s).
+SSBS_S = 20 * 0.02
 
 FAULTS = (
     Fault("none", "", reported=False, harmless=True, lasts_s=5.0),
@@ -248,12 +250,39 @@ FAULTS = (
         reported=False,
         harmless=True,
     ),
-    Fault("one channel without signal", CHANNEL, 4.0, samples=samples.dead_channel, by_event=True),
-    Fault("one channel of noise", CHANNEL, 4.0, samples=samples.noisy_channel),
     Fault(
-        "two channels exchanged", CHANNEL, 4.0, samples=samples.exchanged_channels, by_event=True
+        "one channel without signal",
+        CHANNEL,
+        4.0,
+        samples=samples.dead_channel,
+        by_event=True,
+        report_s=SSBS_S,
     ),
-    Fault("one channel inverted", CHANNEL, 4.0, samples=samples.inverted_channel, by_event=True),
+    Fault("one channel of noise", CHANNEL, 4.0, samples=samples.noisy_channel, report_s=SSBS_S),
+    Fault(
+        "two channels exchanged",
+        CHANNEL,
+        4.0,
+        samples=samples.exchanged_channels,
+        by_event=True,
+        report_s=SSBS_S,
+    ),
+    Fault(
+        "one channel inverted",
+        CHANNEL,
+        4.0,
+        samples=samples.inverted_channel,
+        by_event=True,
+        report_s=SSBS_S,
+    ),
+    Fault(
+        "PCI of a second radio head in the samples",
+        "PCI",
+        4.0,
+        samples=samples.duplicate_pci,
+        by_event=True,
+        report_s=SSBS_S,
+    ),
     Fault(
         "samples absent for 6 s", "samples|SSB|angle", 6.0, withheld=lambda _: True, reception_s=1.0
     ),

@@ -11,7 +11,7 @@ import math
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import zmq
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Samples = NDArray[np.int16]
-    SampleChange = Callable[[Samples, np.random.Generator], None]
+    SampleChange = Callable[["Part", np.random.Generator], None]
 
 __all__ = ["Drive", "odometry_of"]
 
@@ -44,6 +44,31 @@ OVERRIDES = {
 }
 # Duration of a recorded drive (s).
 DURATION_S = 16.0
+# PCI that a second radio head repeats, and the position of that radio head (m): about as far from
+# the vehicle as the radio head of the site, in a direction that differs by 70°.
+DUPLICATE_PCI = 12
+DUPLICATE_M = (-120.0, 250.0, 7.0)
+# Wavelength (m) and antenna spacing (wavelengths) of the drive.
+WAVELENGTH_M = 299.792458 / 3500.0
+SPACING = 0.5
+
+
+class Ssb(NamedTuple):
+    """SSB of a part of a recording, and the vehicle's true pose."""
+
+    pci: int
+    first: int
+    count: int
+    x_m: float
+    y_m: float
+    heading_rad: float
+
+
+class Part(NamedTuple):
+    """Samples `[sample, channel, I/Q]` of a part of a recording, and its SSBs."""
+
+    samples: Samples
+    ssbs: list[Ssb]
 
 
 class Trajectory:
@@ -67,32 +92,65 @@ def record(folder: Path, duration_s: float = DURATION_S) -> Path:
     return folder
 
 
-def dead_channel(samples: Samples, random: np.random.Generator) -> None:
+def dead_channel(part: Part, random: np.random.Generator) -> None:
     """Writes zeros to one channel."""
-    samples[:, random.integers(samples.shape[1])] = 0
+    part.samples[:, random.integers(part.samples.shape[1])] = 0
 
 
-def noisy_channel(samples: Samples, random: np.random.Generator) -> None:
+def noisy_channel(part: Part, random: np.random.Generator) -> None:
     """Replaces one channel by noise of the same power, as a broken cable does."""
-    channel = samples[:, random.integers(samples.shape[1])]
+    channel = part.samples[:, random.integers(part.samples.shape[1])]
     power = float(np.mean(channel.astype(np.float32) ** 2))
     channel[:] = np.rint(random.normal(0.0, power**0.5, channel.shape)).astype(np.int16)
 
 
-def exchanged_channels(samples: Samples, random: np.random.Generator) -> None:
+def exchanged_channels(part: Part, random: np.random.Generator) -> None:
     """Exchanges two channels."""
-    one, other = random.choice(samples.shape[1], 2, replace=False)
-    samples[:, [one, other]] = samples[:, [other, one]]
+    one, other = random.choice(part.samples.shape[1], 2, replace=False)
+    part.samples[:, [one, other]] = part.samples[:, [other, one]]
 
 
-def inverted_channel(samples: Samples, random: np.random.Generator) -> None:
+def inverted_channel(part: Part, random: np.random.Generator) -> None:
     """Inverts the sign of one channel."""
-    channel = samples[:, random.integers(samples.shape[1])]
+    channel = part.samples[:, random.integers(part.samples.shape[1])]
     np.negative(np.maximum(channel, -32767), out=channel)
 
 
+def duplicate_pci(part: Part, random: np.random.Generator) -> None:
+    """Adds a second radio head that sends the SSB of another one, with the same power.
+
+    The signal of one antenna is the transmitted signal. The second radio head adds it to every
+    antenna with the phase of its distance and its direction.
+    """
+    ratio = 10.0 ** (random.uniform(-1.0, 1.0) / 20.0)
+    for ssb in (it for it in part.ssbs if it.pci == DUPLICATE_PCI):
+        offset_m = np.array(DUPLICATE_M) - (ssb.x_m, ssb.y_m, 1.8)
+        distance_m = float(np.linalg.norm(offset_m))
+        forward = (math.cos(ssb.heading_rad), math.sin(ssb.heading_rad), 0.0)
+        along_m = SPACING * WAVELENGTH_M * float(np.dot(offset_m, forward)) / distance_m
+        antennas = np.arange(part.samples.shape[1])
+        turns = (along_m * antennas - distance_m) / WAVELENGTH_M
+        block = part.samples[ssb.first : ssb.first + ssb.count]
+        received = block[:, :, 0] + 1j * block[:, :, 1]
+        received = received + ratio * np.outer(received[:, 0], np.exp(2j * np.pi * turns))
+        pairs = np.stack([received.real, received.imag], axis=2)
+        block[:] = np.clip(np.rint(pairs), -32768, 32767).astype(np.int16)
+
+
+def _ssbs(meta: dict[str, Any], begin: int, end: int) -> list[Ssb]:
+    """SSBs whose samples are within `[begin, end)`, relative to `begin`."""
+    found = []
+    for it in meta["annotations"]:
+        first, count = it["core:sample_start"], it["core:sample_count"]
+        truth = it["access_av:truth"]
+        if begin <= first and first + count <= end:
+            pose = (truth["x_m"], truth["y_m"], truth["heading_rad"])
+            found.append(Ssb(it["nr:ssb"]["pci"], first - begin, count, *pose))
+    return found
+
+
 def changed(
-    recorded: Path, folder: Path, window: tuple[float, float], change: Callable[[Samples], None]
+    recorded: Path, folder: Path, window: tuple[float, float], change: Callable[[Part], None]
 ) -> None:
     """Writes a copy of a recording whose samples are changed within a window of drive time (s)."""
     drive = Drive(recorded)
@@ -103,10 +161,11 @@ def changed(
         for (first, index), end in zip(drive.captures, drive.ends, strict=True)
         if begin_s <= index / drive.rate_hz < end_s
     ]
-    if inside:
-        change(samples[inside[0][0] : inside[-1][1]])
-    samples.tofile(folder / "iq.sigmf-data")
     meta = json.loads((recorded / "iq.sigmf-meta").read_text(encoding="utf-8"))
+    if inside:
+        begin, end = inside[0][0], inside[-1][1]
+        change(Part(samples[begin:end], _ssbs(meta, begin, end)))
+    samples.tofile(folder / "iq.sigmf-data")
     meta["global"].pop("core:sha512", None)
     (folder / "iq.sigmf-meta").write_text(json.dumps(meta), encoding="utf-8")
 

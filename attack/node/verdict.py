@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from attack.node.recorder import Arrival
     from attack.node.run import Recorded
 
-# Required maxima: time to report (s), `ok` beyond the level (s), time to recovery (s).
-REPORT_S = 2.0
+# Required maxima: `ok` beyond the level (s), time to recovery (s).
 WRONG_OK_S = 1.0
 RECOVERY_S = 5.0
 # Maximum gap of an output that has no fault (s).
@@ -215,7 +214,7 @@ def judge(run: Recorded) -> Verdict:
         verdict.report_s, verdict.reported_by = _report(run, since_s)
         if verdict.report_s is None:
             violate("not reported")
-        elif verdict.report_s > REPORT_S + TOLERANCE_S:
+        elif verdict.report_s > fault.report_s + TOLERANCE_S:
             violate(f"reported after {verdict.report_s:.1f} s")
     elif fault.harmless and fault.change is fault.begin is None:
         seconds, text = _report(run, begin_s)
