@@ -1,25 +1,25 @@
 """A day of driving at maximum speed: tests for memory leaks and consistent counters.
 
-    python examples/live/day.py [--node PROGRAM] [--hours 24]
+    python examples/live/day.py [--node PROGRAM] [--hours 24] [--faults]
 
 A drive of the scenario `yard` is repeated as newline JSON on standard input, with angles and
-odometry. Each repetition starts without a pose. The program prints the memory over the hours, the
-numbers of received and dropped messages, and the size of the MCAP files. Each MCAP file is read and
-must be complete.
+odometry. Each repetition starts without a pose. With `--faults`, one drive per hour has a fault
+(`day_faults.py`). The program prints the memory over the hours, the numbers of received, rejected
+and dropped messages, and the size of the MCAP files. Each MCAP file is read and must be complete.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
-import json
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from day_faults import FAULTS, line_of, with_fault
 from live import ROOT, SCENARIO
 from mcap.reader import make_reader
 from measure import Node, resident_mib
@@ -31,32 +31,42 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-def messages_of(folder: Path) -> list[tuple[float, str]]:
-    """Angles and odometry in order of time: the time, and the rest of the line."""
-    told: list[tuple[float, dict[str, Any]]] = []
-    for odometry in odometry_of(folder):
-        told.append((odometry.pop("time_s"), {"type": "odometry", **odometry}))
+def messages_of(folder: Path) -> list[dict[str, Any]]:
+    """Returns the angle and odometry messages of a drive, in order of time."""
+    messages: list[dict[str, Any]] = [{"type": "odometry", **it} for it in odometry_of(folder)]
     with (folder / "angles.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(line for line in file if not line.startswith("#")):
             angle: dict[str, Any] = {"type": "angle", "pci": int(row["pci"])}
             angle["ssb_index"] = int(row["ssb_index"])
             angle["resolved"] = row["resolved"] == "1"
-            for key in ("phase_rad", "phase_sigma_rad", "snr_db"):
+            for key in ("time_s", "phase_rad", "phase_sigma_rad", "snr_db"):
                 angle[key] = float(row[key])
-            told.append((float(row["time_s"]), angle))
-    told.sort(key=lambda it: it[0])
-    return [(time_s, json.dumps(message)[1:]) for time_s, message in told]
+            messages.append(angle)
+    messages.sort(key=lambda it: float(it["time_s"]))
+    return messages
 
 
-def hours_of(lap: list[tuple[float, str]], hours: float) -> Iterator[tuple[str, int]]:
-    """Yields the text and the number of messages of each repetition, for the given hours."""
-    begins_s = 0.0
+class Text(NamedTuple):
+    """Text of a drive, its number of messages, and how many of them must be rejected."""
+
+    text: str
+    messages: int
+    rejected: int
+
+
+def hours_of(lap: list[dict[str, Any]], hours: float, has_faults: bool) -> Iterator[Text]:
+    """Yields the repetitions of a drive for the given hours."""
+    begins_s, faults = 0.0, 0
     while begins_s < 3600.0 * hours:
-        lines = [f'{{"time_s":{begins_s + time_s:.9f},{rest}\n' for time_s, rest in lap]
+        sent, invalid, rejected = list[dict[str, Any] | str](lap), 0, 0
+        if has_faults and begins_s >= 3600.0 * faults:
+            fault = FAULTS[faults % len(FAULTS)]
+            sent, invalid, rejected = with_fault(lap, fault), fault.invalid, fault.rejected
+            faults += 1
         # The search for a pose requires odometry of a driven distance.
-        lines.insert(0, '{"type":"reset"}\n')
-        yield "".join(lines), len(lines)
-        begins_s += lap[-1][0] + 0.02
+        lines = ['{"type":"reset"}\n', *(line_of(it, begins_s) for it in sent)]
+        yield Text("".join(lines), len(lines) - invalid, rejected)
+        begins_s += lap[-1]["time_s"] + 0.02
 
 
 def main() -> int:
@@ -64,6 +74,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--node", default=str(ROOT / "target/release/access-av-node"))
     parser.add_argument("--hours", type=float, default=24.0)
+    parser.add_argument("--faults", action="store_true", help="one drive per hour has a fault")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         folder, files = Path(scratch), Path(scratch) / "mcap"
@@ -79,10 +90,11 @@ def main() -> int:
         options = [*nominal, str(settings)]
         node = Node(arguments.node, options, stdin=subprocess.PIPE)
         assert node.process.stdin is not None
-        sent, memory_mib, began = 0, [], time.monotonic()
-        for text, count in hours_of(lap, arguments.hours):
-            node.process.stdin.write(text)
-            sent += count
+        sent, rejected, memory_mib, began = 0, 0, [], time.monotonic()
+        for drive in hours_of(lap, arguments.hours, arguments.faults):
+            node.process.stdin.write(drive.text)
+            sent += drive.messages
+            rejected += drive.rejected
             memory_mib.append(resident_mib(node.process.pid))
         node.process.stdin.flush()
         while (told := node.state())["sources"][0]["items"] < sent:
@@ -103,6 +115,8 @@ def main() -> int:
     quarter = max(1, len(memory_mib) // 4)
     print(f"{drive_s / 3600:.2f} h of driving, {len(memory_mib) - 1} drives, in {took_s:.0f} s")
     print(f"messages: {sent} sent, {told['sources'][0]['items']} taken, {told['dropped']} dropped")
+    defects = told["sources"][0]["defects"]
+    print(f"rejected: {defects}, expected: {rejected}")
     print(
         f"memory: {memory_mib[quarter - 1]:.1f} MiB after a quarter, {memory_mib[-1]:.1f} at the "
         f"end, {max(memory_mib):.1f} at most"
@@ -112,7 +126,7 @@ def main() -> int:
     lost = sum(told["dropped"].values()) + sent - told["sources"][0]["items"]
     # One status message per second of the drive.
     whole = abs(read["/diagnostics"] - drive_s) <= 2 + 2 * len(memory_mib)
-    return 0 if lost == 0 and whole else 1
+    return 0 if lost == 0 and whole and defects == rejected else 1
 
 
 if __name__ == "__main__":
