@@ -23,11 +23,16 @@ pub const INTERRUPTION_S: f64 = 0.25;
 pub const CATCH_UP_S: f64 = 0.2;
 /// Minimum decrease of the delay, in seconds, that shows that samples arrive faster than in real time.
 pub const CAUGHT_UP_S: f64 = 0.01;
-/// Minimum relative difference between the configured and the measured sample rate that indicates a
-/// wrong rate.
+/// Minimum relative difference between the configured and the measured sample rate in each window
+/// of [`RATE_WINDOW_S`].
 const WRONG_RATE: f64 = 0.01;
-/// Number of consecutive windows that must indicate a wrong rate.
+/// Length of the windows that measure the sample rate, in seconds.
+const RATE_WINDOW_S: f64 = 0.5;
+/// Minimum number of consecutive windows with a rate that is wrong in the same direction.
 const WINDOWS: u32 = 3;
+/// Minimum total change of the minimum delay in these windows, in seconds: a loaded computer changes
+/// it by less.
+const WRONG_RATE_S: f64 = 0.03;
 
 /// Finding from a window of arrivals.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +57,7 @@ pub struct ArrivalClock {
     counted: u64,
     offset_s: f64,
     window: Option<Window>,
-    wrong: u32,
+    rate: RateMonitor,
     last_arrival_s: Option<f64>,
     interruption: Option<Interruption>,
 }
@@ -84,7 +89,7 @@ impl ArrivalClock {
             counted: 0,
             offset_s: 0.0,
             window: None,
-            wrong: 0,
+            rate: RateMonitor::NONE,
             last_arrival_s: None,
             interruption: None,
         }
@@ -112,7 +117,7 @@ impl ArrivalClock {
         let finding = if now_s - last_s >= INTERRUPTION_S && delay_s >= INTERRUPTION_S {
             let before_s = self.interruption.map_or(0.0, |it| it.lost_s);
             self.offset_s += delay_s;
-            self.window = None;
+            (self.window, self.rate) = (None, RateMonitor::NONE);
             self.interruption = Some(Interruption {
                 decided_s: now_s + CATCH_UP_S,
                 lost_s: before_s + delay_s,
@@ -149,38 +154,85 @@ impl ArrivalClock {
 
     /// Updates the minimum delay of a window, and corrects the offset at its end.
     fn watch(&mut self, delay_s: f64, now_s: f64) -> Option<Finding> {
-        let window = self.window.get_or_insert(Window {
-            began_s: now_s,
-            least_delay_s: delay_s,
+        let wrong_rate = self.rate.see(delay_s + self.offset_s, now_s);
+        let window = self.window.get_or_insert(Window::new(delay_s, now_s));
+        let missing = (window.see(delay_s, now_s, WINDOW_S)).and_then(|(least_s, lasted_s)| {
+            self.window = None;
+            self.correct(least_s, lasted_s)
         });
-        window.least_delay_s = window.least_delay_s.min(delay_s);
-        let (lasted_s, least_s) = (now_s - window.began_s, window.least_delay_s);
-        if lasted_s < WINDOW_S {
-            return None;
-        }
-        self.window = None;
-        self.correct(least_s, lasted_s)
+        wrong_rate.map(Finding::WrongRate).or(missing)
     }
 
     fn correct(&mut self, least_s: f64, lasted_s: f64) -> Option<Finding> {
         if least_s.abs() <= STEP_S {
             let most_s = DRIFT * lasted_s;
             self.offset_s += least_s.clamp(-most_s, most_s);
-            self.wrong = 0;
             return None;
         }
         self.offset_s += least_s;
-        let excess = -least_s / lasted_s;
-        self.wrong = if excess.abs() > WRONG_RATE {
-            self.wrong + 1
-        } else {
-            0
-        };
-        if self.wrong >= WINDOWS {
-            self.wrong = 0;
-            return Some(Finding::WrongRate(excess));
-        }
         (least_s >= INTERRUPTION_S).then_some(Finding::Missing(least_s))
+    }
+}
+
+impl Window {
+    const fn new(delay_s: f64, now_s: f64) -> Self {
+        Self {
+            began_s: now_s,
+            least_delay_s: delay_s,
+        }
+    }
+
+    /// Adds a delay. Returns the minimum delay and the duration at the end of the window.
+    fn see(&mut self, delay_s: f64, now_s: f64, length_s: f64) -> Option<(f64, f64)> {
+        self.least_delay_s = self.least_delay_s.min(delay_s);
+        let lasted_s = now_s - self.began_s;
+        (lasted_s >= length_s).then_some((self.least_delay_s, lasted_s))
+    }
+}
+
+/// Monitor of the sample rate: the minimum delay grows if samples are missing regularly or the rate
+/// is lower than configured, and decreases if the rate is higher.
+#[derive(Debug, Clone, Copy)]
+struct RateMonitor {
+    window: Option<Window>,
+    /// Minimum delay of the previous window, relative to counted samples, in seconds.
+    before_s: Option<f64>,
+    /// Number, duration and change of the delay of the consecutive windows with a wrong rate.
+    count: u32,
+    lasted_s: f64,
+    growth_s: f64,
+}
+
+impl RateMonitor {
+    const NONE: Self = Self {
+        window: None,
+        before_s: None,
+        count: 0,
+        lasted_s: 0.0,
+        growth_s: 0.0,
+    };
+
+    /// Adds a delay relative to counted samples. Returns the measured rate divided by the
+    /// configured one, minus one, if it is wrong.
+    fn see(&mut self, delay_s: f64, now_s: f64) -> Option<f64> {
+        let window = self.window.get_or_insert(Window::new(delay_s, now_s));
+        let (least_s, lasted_s) = window.see(delay_s, now_s, RATE_WINDOW_S)?;
+        self.window = None;
+        let growth_s = least_s - self.before_s.replace(least_s)?;
+        if growth_s.abs() <= WRONG_RATE * lasted_s || growth_s * self.growth_s < 0.0 {
+            (self.count, self.lasted_s, self.growth_s) = (0, 0.0, 0.0);
+        }
+        if growth_s.abs() > WRONG_RATE * lasted_s {
+            self.count += 1;
+            self.lasted_s += lasted_s;
+            self.growth_s += growth_s;
+        }
+        if self.count < WINDOWS || self.growth_s.abs() < WRONG_RATE_S {
+            return None;
+        }
+        let excess = -self.growth_s / self.lasted_s;
+        *self = Self::NONE;
+        Some(excess)
     }
 }
 
@@ -342,6 +394,51 @@ mod tests {
             Finding::Missing(_) => None,
         });
         assert!((named.unwrap() - 1.0).abs() < 0.05, "{found:?}");
+    }
+
+    /// Blocks of 1 ms with delays of up to 20 ms. From 3 s on, `lost_s` of the samples are missing
+    /// at every multiple of `period_s`. Returns the time of the first report of a wrong rate (s).
+    fn reported_s(lost_s: f64, period_s: f64, phase_s: f64) -> Option<(f64, f64)> {
+        let mut clock = ArrivalClock::new(RATE_HZ);
+        (0..10_000).find_map(|number| {
+            let sent_s = f64::from(number) * 1e-3;
+            let since_s = sent_s - 3.0 - phase_s;
+            if since_s >= 0.0 && since_s % period_s < lost_s {
+                return None;
+            }
+            let delay_s = 1e-3 * f64::from(number * 7 % 20);
+            let finding = clock.block(BLOCK, 50.0 + sent_s + delay_s).1?;
+            match finding {
+                Finding::WrongRate(excess) => Some((since_s, excess)),
+                Finding::Missing(_) => None,
+            }
+        })
+    }
+
+    #[test]
+    fn samples_that_are_lost_regularly_are_reported_within_two_seconds() {
+        for phase in 0..10 {
+            let phase_s = 0.05 * f64::from(phase);
+            let (since_s, excess) = reported_s(0.03, 0.5, phase_s).unwrap();
+            assert!(since_s > 0.0 && since_s <= 2.1, "{phase_s}: {since_s}");
+            assert!((excess + 0.06).abs() < 0.01, "{excess}");
+        }
+        assert_eq!(reported_s(0.002, 0.5, 0.1), None);
+    }
+
+    #[test]
+    fn delays_that_vary_are_no_wrong_rate() {
+        // The delay varies by 0.2 s with a period of 1.7 s.
+        let mut clock = ArrivalClock::new(RATE_HZ);
+        let found: Vec<Finding> = (0..20_000)
+            .filter_map(|number| {
+                let sent_s = f64::from(number) * 1e-3;
+                let turns = std::f64::consts::TAU * sent_s / 1.7;
+                let delay_s = 0.1 * (1.0 - turns.cos());
+                clock.block(BLOCK, 50.0 + sent_s + delay_s).1
+            })
+            .collect();
+        assert!(found.is_empty(), "{found:?}");
     }
 
     #[test]
