@@ -470,8 +470,8 @@ mod tests {
     }
 
     /// Angles with independent errors at 50 Hz, along a straight far from the radio heads, contain
-    /// almost no information on slip. By Ville's inequality, correct odds exceed four times the prior
-    /// in at most a quarter of the runs; odds that count dependent angles exceeded it 260 times.
+    /// almost no information on slip. Correct odds exceed four times the prior in at most a quarter
+    /// of the runs (Ville's inequality). Odds that count dependent angles exceeded it 260 times.
     #[test]
     fn frequent_angles_of_a_sound_odometer_are_no_evidence_for_slip() {
         const SCATTER_RAD: f64 = 0.03;
