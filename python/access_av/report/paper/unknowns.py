@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 DIMENSIONS = (*OPEN_WORLD, *OPEN_CONTROLLER, GATE)
 # Minimum shown total index.
 LEAST_TOTAL = 0.05
+# Minimum width (px) of the chart of indices with numbers; below it they would overlap.
+NUMBERS_PX = 500
+SOBOL_CAPTION = (
+    "Total Sobol index of each claim's margin. Narrow screens show the numbers in tooltips only."
+)
 
 
 def unknowns(study: Study, specs: dict[str, Spec]) -> str:
@@ -45,7 +50,7 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
         f"{LEAST_TOTAL:.0%} are left empty; “unexplained” is the share of the variance that the "
         "expansion does not explain.</p>"
         + f"<p>{escape(_width_text(found))}</p>"
-        + figure("sobol", "Total Sobol index of each claim's margin.", "Sensitivity of the claims")
+        + figure("sobol", SOBOL_CAPTION, "Sensitivity of the claims")
         + figure(
             "share",
             "Bars are 95 % intervals over environments.",
@@ -98,7 +103,8 @@ def _index_chart(found: Unknowns) -> Spec:
             legend=alt.Legend(title="total index"),
         )
     )
-    numbers = base.mark_text(fontSize=10).encode(
+    visible = alt.ExprRef(f"width < {NUMBERS_PX} ? 0 : 1")
+    numbers = base.mark_text(fontSize=10, opacity=visible).encode(
         text=alt.Text("total:Q", format=".2f"),
         color=alt.condition("datum.total > 0.5", alt.value("white"), alt.value("#16202c")),
     )
