@@ -304,6 +304,7 @@ def test_ranges_correct_a_wrong_odometer() -> None:
         "[ranging]\nsigma_m = 0.1\nscale_std = 0.0\noffset_std_m = 0.1\n"
     )
     live = access_av.Live(site, vehicle)
+    live.odometry(0.0, 1.545, distance_m=0.0, yaw_rate_radps=0.0)
     for step in range(1, 200):
         time_s = 0.1 * step
         # The odometer measures 3 % too much: 0.9 m after 20 s.
