@@ -84,7 +84,8 @@ def _recommended(
     folder: Path, stated: dict[str, Any], percent: float, runs: int, seed: int
 ) -> list[bool]:
     """Whether error and energy are between the stated ends."""
-    driven = drive("recommended", access_av.Scenario.load(folder / "recommended.toml"), runs, seed)
+    scenario = access_av.Scenario.load(str(folder / "recommended.toml"))
+    driven = drive("recommended", scenario, runs, seed)
     found, energy_j = driven.percentile(percent), driven.energy_j
     low_m, high_m = stated["target_error_low_m"], stated["target_error_high_m"]
     low_j, high_j = stated["trip_j"]["low"], stated["trip_j"]["high"]
