@@ -19,32 +19,32 @@ if TYPE_CHECKING:
 # Arguments that give each command a short run time; the options in them are not drawn.
 QUICK: dict[str, list[str]] = {
     "run": ["short.toml"],
-    "evaluate": ["--scenario", "papier"],
-    "search": ["--platform", "jetson"],
-    "fit": ["--platform", "jetson"],
-    "explore": ["--results", "nowhere"],
-    "bound": ["short.toml"],
-    "scan": ["iq.sigmf-meta", "--ssb-freq-hz", "3.5e9", "--scs-khz", "15"],
-    "aoa": ["iq.sigmf-meta"],
-    "synth": ["short.toml", "--duration-s", "0.1", "--out", "made"],
-    "locate": [
+    "paper evaluate": ["--scenario", "papier"],
+    "paper search-controllers": ["--platform", "jetson"],
+    "paper fit": ["--platform", "jetson"],
+    "paper explore": ["--results", "nowhere"],
+    "design bound": ["short.toml"],
+    "record scan": ["iq.sigmf-meta", "--ssb-freq-hz", "3.5e9", "--scs-khz", "15"],
+    "record aoa": ["iq.sigmf-meta"],
+    "record synth": ["short.toml", "--duration-s", "0.1", "--out", "made"],
+    "record locate": [
         "--recording", "angles.csv", "--odometry", "odometry.csv", "--site", "site.toml",
         "--vehicle", "vehicle.toml",
     ],
-    "profile": ["--sysfs-root", "sysfs"],
-    "designs": ["short.toml", "--space", "space.toml", "--runs", "1"],
-    "choose": ["."],
-    "balance": [],
-    "codesign": ["--interpretation", "keine"],
-    "integrity": ["short.toml", "--fault", "keiner"],
-    "plan": ["short.toml", "--masts", "masts.csv"],
-    "import-paths": [
+    "design profile": ["--sysfs-root", "sysfs"],
+    "design sweep": ["short.toml", "--space", "space.toml", "--runs", "1"],
+    "design select": ["."],
+    "design balance": [],
+    "paper codesign": ["--interpretation", "keine"],
+    "design integrity": ["short.toml", "--fault", "keiner"],
+    "design plan": ["short.toml", "--masts", "masts.csv"],
+    "design import-paths": [
         "paths.csv", "--site", "site.toml", "--carrier-mhz", "3500", "--out", "paths.npz",
     ],
-    "survey": ["drive", "--site", "site.toml", "--vehicle", "vehicle.toml"],
-    "tune": ["short.toml", "--designs", "2", "--runs", "1", "--max-rms-m", "1"],
-    "interpretations": [],
-    "columns": [],
+    "record survey": ["drive", "--site", "site.toml", "--vehicle", "vehicle.toml"],
+    "design tune": ["short.toml", "--designs", "2", "--runs", "1", "--max-rms-m", "1"],
+    "paper interpretations": [],
+    "file columns": [],
 }  # fmt: skip
 
 
@@ -54,10 +54,11 @@ def options(command: str) -> list[Any]:
     from access_av.cli.main import app
 
     found: Any = typer.main.get_command(app)
-    parameters = found.commands[command].params
+    for word in command.split():
+        found = found.commands[word]
     return [
         it
-        for it in parameters
+        for it in found.params
         if it.opts[0].startswith("--") and not it.is_flag and it.opts[0] not in QUICK[command]
     ]
 
@@ -71,7 +72,7 @@ def arguments(random: Random, case: Case) -> list[str]:
     case.write("paths.csv", PATHS)
     case.write("space.toml", SPACE)
     command = random.choice(list(QUICK))
-    words = [command, *QUICK[command]]
+    words = [*command.split(), *QUICK[command]]
     known = options(command)
     for option in random.sample(known, min(len(known), random.choice((1, 1, 2, 3)))):
         words += [option.opts[0], _value(random, option)]

@@ -63,14 +63,16 @@ def settings_text(random: Random, case: Case) -> list[str]:
     """A settings file with changed bytes."""
     what = random.choice(list(KINDS))
     text = mutate.toml(settings(what, random.choice(_names(what))))
-    return case.access_av(what, "check", case.write("x.toml", mutate.data(random, text.encode())))
+    return case.access_av(
+        "file", "check", "--kind", what, case.write("x.toml", mutate.data(random, text.encode()))
+    )
 
 
 def settings_table(random: Random, case: Case) -> list[str]:
     """A settings file with changed values."""
     what = random.choice(list(KINDS))
     changed = mutate.table(random, settings(what, random.choice(_names(what))))
-    return case.access_av(what, "check", case.write("x.toml", changed))
+    return case.access_av("file", "check", "--kind", what, case.write("x.toml", changed))
 
 
 def short_scenario(random: Random) -> dict[str, Any]:
