@@ -516,7 +516,7 @@ mod tests {
                     };
                     bank.update(head, &measured);
                 }
-                most = most.max(bank.mode(ModeId::Slip).unwrap().0);
+                most = most.max(bank.mode(SelectedHypothesis::WheelSlip).unwrap().0);
             }
             assert!(most < 4.0 * prior, "{seed}: {most}");
         }
