@@ -57,7 +57,12 @@ impl RangeMeasurement {
 
     /// Creates a pseudorange by a carrier phase in radians, which decreases by 2π per wavelength of
     /// distance.
-    pub const fn carrier_phase(time_s: f64, phase_rad: f64, sigma_rad: f64, wavelength_m: f64) -> Self {
+    pub const fn carrier_phase(
+        time_s: f64,
+        phase_rad: f64,
+        sigma_rad: f64,
+        wavelength_m: f64,
+    ) -> Self {
         let metres_per_rad = wavelength_m / std::f64::consts::TAU;
         Self {
             time_s,
