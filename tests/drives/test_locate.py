@@ -373,9 +373,10 @@ def test_the_report_shows_what_was_found(access_av: Cli, tmp_path: Path) -> None
 
 def test_the_files_of_the_docs_can_be_used(access_av: Cli, tmp_path: Path) -> None:
     page = (ROOT / "docs/locate.md").read_text(encoding="utf-8")
-    head, hall, road, vehicle = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    head, ranging, hall, road, vehicle = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     assert Site.from_toml('name = "hall"\n' + head).to_json()
     assert Site.from_toml(hall).to_json()
+    assert Vehicle.from_toml('name = "robot"\n' + ranging).to_json()
     (tmp_path / "road.csv").write_text("x_m,y_m\n0,0\n50,0\n90,20\n")
     line = '{"type": "LineString", "coordinates": [[8.0, 60.0], [8.001, 60.0], [8.002, 60.001]]}'
     (tmp_path / "road.geojson").write_text(line)

@@ -63,7 +63,7 @@ class Run:
             f'state_file = "state.json"\n[output.json]\naddress = "-"\n',
             encoding="utf-8",
         )
-        self.messages = [(time_s, json.loads("{" + rest)) for time_s, rest in messages_of(drive)]
+        self.messages = [(float(it["time_s"]), it) for it in messages_of(drive)]
         self.truth = np.loadtxt(drive / "truth.tum")
         self.records: list[tuple[float, Message]] = []
         # Differences between odometry time stamp and drive time that were sent.

@@ -8,7 +8,6 @@ and of the carrier phases of each radio head.
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -17,6 +16,7 @@ import numpy as np
 import polars as pl
 
 from access_av.run.error_bound import SPEED_OF_LIGHT_MPS, along_route
+from access_av.settings import as_dict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -135,7 +135,7 @@ class _Drive:
 
     @classmethod
     def of(cls, scenario: _core.Scenario) -> _Drive:
-        site, vehicle = (json.loads(it.to_json()) for it in (scenario.site, scenario.vehicle))
+        site, vehicle = as_dict(scenario.site), as_dict(scenario.vehicle)
         route = along_route(scenario)
         array = vehicle["array"]
         number = array["elements"]

@@ -109,7 +109,7 @@ def study_plant(
             if progress is not None:
                 progress(done + now, max(planned, done + count))
 
-        key = (variant.to_json(), of_seed)
+        key = (variant.to_toml(), of_seed)
         if key not in known or known[key].runs < count:
             known[key] = drive(name, variant, count, of_seed, threads, tell)
         done += count
