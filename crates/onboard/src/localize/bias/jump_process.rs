@@ -43,11 +43,6 @@ pub(super) fn kept(travelled_m: f64) -> f64 {
     (-travelled_m / VALUE_M).exp()
 }
 
-/// Whether the bias is more probably unchanged than new after a distance.
-pub fn repeats(travelled_m: f64) -> bool {
-    kept(travelled_m) > 0.5
-}
-
 /// Returns the independent fraction of the short-lived error.
 pub fn share(travelled_m: f64) -> f64 {
     (travelled_m / SOON_M).clamp(LEAST_SHARE, 1.0)
@@ -219,18 +214,21 @@ impl JumpProcess {
         }
     }
 
-    /// Returns the variance (rad²) of an independent angle with the expected information about the
-    /// state, after a distance since the previous angle of the radio head, for a given variance of
-    /// the prediction.
-    pub fn variance(&self, travelled_m: f64, predicted_levels: f64) -> f64 {
-        let levels = self
-            .predicted_levels(travelled_m)
-            .into_iter()
-            .zip(VARIANCES);
-        let told: f64 = levels
-            .map(|(level, variance)| level / (predicted_levels + 2.0 * variance))
-            .sum();
-        (told.recip() - predicted_levels).max(0.0)
+    /// Returns the expected `E 1/S` (1/rad²) of an angle for a retained and for a new bias, each
+    /// weighted by its probability, a distance after the previous angle of the radio head. `seen` is
+    /// the variance of the innovation without bias; `known` as in [`Self::weigh`].
+    pub fn expected_gains(&self, travelled_m: f64, seen: f64, known: f64) -> [f64; 2] {
+        let stays = kept(travelled_m);
+        let repetition = share(travelled_m).recip();
+        let levels = self.predicted_levels(travelled_m).into_iter();
+        let gains = levels.zip(VARIANCES).map(|(level, value)| {
+            let once = seen + value * repetition;
+            [
+                level * stays / (once + known),
+                level * (1.0 - stays) / (once + value),
+            ]
+        });
+        gains.fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]])
     }
 }
 

@@ -173,12 +173,27 @@ impl MultipathBias {
         })
     }
 
-    /// Returns the expected variance that biases add to an angle; see [`JumpProcess::variance`].
-    pub fn variance(&self, head: usize, travelled_m: f64, predicted_levels: f64) -> f64 {
-        let error = self.bias(head);
-        error.map_or(0.0, |error| {
-            error.size.variance(travelled_m, predicted_levels)
-        })
+    /// Returns the variance (rad²) of an independent angle that is expected to reduce the state's
+    /// variance along `row` as much as an angle of a radio head with the noise `variance`; infinite
+    /// if the angle would only repeat the bias.
+    pub fn equivalent_variance(
+        &self,
+        belief: &Belief,
+        head: usize,
+        travelled_m: f64,
+        row: &[f64; STATES],
+        variance: f64,
+    ) -> f64 {
+        let Some(error) = self.bias(head) else {
+            return variance;
+        };
+        let alone = belief.variance_along(row);
+        let with_bias = alone + error.along(row);
+        let known = 2.0 * error.along(row) + self.covariance(head, head);
+        let [kept, anew] =
+            (error.size).expected_gains(travelled_m, alone + variance, known.max(-alone));
+        let reduction = kept * with_bias * with_bias + anew * alone * alone;
+        (alone * alone / reduction - alone).max(variance)
     }
 
     pub(super) fn covariance(&self, one: usize, other: usize) -> f64 {
@@ -623,7 +638,7 @@ mod tests {
             take(&mut errors, &mut belief, 0, 0.1, error_rad);
         }
         assert!(!errors.is_large(0));
-        let small = errors.variance(0, 2.0, 1e-4);
+        let small = errors.equivalent_variance(&belief, 0, 2.0, &row(), OWN_VARIANCE);
         assert!(small < 0.05 * 0.05, "{small}");
         for predict_measurement in 0..60 {
             let error_rad = 0.8 + 0.3 * f64::from(predict_measurement % 3 - 1);
@@ -632,6 +647,34 @@ mod tests {
         assert!(errors.is_large(0));
         // These angles hardly change the state.
         assert!(belief.mean[0].abs() < 3e-3, "{}", belief.mean[0]);
+    }
+
+    #[test]
+    fn the_expected_reduction_of_the_variance_is_that_of_the_update() {
+        // Most angles repeat the bias of the previous one.
+        const STEP_M: f64 = 0.08;
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let (mut expected, mut obtained) = (0.0, 0.0);
+        for _ in 0..20 {
+            let (mut errors, mut belief) = (MultipathBias::new(1, EVEN), unknown());
+            let mut drawn = Drawn {
+                level: VARIANCES[0].sqrt(),
+                value_rad: 0.0,
+            };
+            for number in 0..300 {
+                let error = drawn.after(STEP_M, &mut random);
+                let before = belief.covariance[0][0];
+                let variance = errors.equivalent_variance(&belief, 0, STEP_M, &row(), OWN_VARIANCE);
+                take(&mut errors, &mut belief, 0, STEP_M, error);
+                // The first metres determine the level.
+                if number >= 50 {
+                    expected += before * before / (before + variance);
+                    obtained += before - belief.covariance[0][0];
+                }
+            }
+        }
+        let ratio = expected / obtained;
+        assert!((0.5..2.0).contains(&ratio), "{ratio}");
     }
 
     #[test]

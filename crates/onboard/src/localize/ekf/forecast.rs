@@ -11,7 +11,6 @@ use crate::gaussian::smoother::Journal;
 use crate::gaussian::{
     Innovation, Matrix, dot, identity, principal_variances, product, transformed,
 };
-use crate::localize::bias;
 use crate::localize::output::PoseEstimate;
 use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
@@ -161,16 +160,17 @@ impl Ekf {
         let angle_model = AngleModel::of_kind(kind, head, pose, &frame, &belief.mean, array)?;
         let travelled_m = self.driven_m + ahead_m - known.last_update_m;
         let own = (self.config.noise_scale() * thermal(angle_model.range_m)).sqrt();
-        let mut variance = self
+        let variance = self
             .correlated_noise()
             .variance(own, f64::INFINITY, (travelled_m, 0.0))
             + self.config.shared_variance(travelled_m, &angle_model);
-        let predicted = belief.variance_along(&angle_model.row) + variance;
-        let by_bias = self.bias.variance(number, travelled_m, predicted);
-        if bias::repeats(travelled_m) && by_bias > variance {
+        // The biases are correlated with the state of the filter, not with that after other angles.
+        let bias = &self.bias;
+        let (row, way_m) = (&angle_model.row, travelled_m.abs());
+        let variance = bias.equivalent_variance(&self.belief, number, way_m, row, variance);
+        if !variance.is_finite() {
             return None;
         }
-        variance += by_bias;
         let mut updated = *belief;
         updated.update(0.0, &angle_model.row, variance);
         Some(updated)
