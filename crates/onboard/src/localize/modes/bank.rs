@@ -12,7 +12,7 @@
 //! After the exclusion of a radio head, filters without its angles replace the previous ones,
 //! including those without one further radio head.
 
-use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP};
+use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP, information_fraction};
 use super::noise_scale::NoiseScale;
 use super::subsets::{CLEARED, DETECTED, HeadTest, RECOVERY_S, Subsets, exclude};
 use super::table::{Carry, Mode, TABLE};
@@ -116,7 +116,7 @@ impl ModeFilter {
     ) {
         let predicted = self.ekf.predict_measurement(head, measured);
         if measured.resolved {
-            self.ratio.update((&self.ekf, &predicted), nominal);
+            (self.ratio).update((&self.ekf, &predicted), nominal, information_fraction);
         }
         self.ekf.update_predicted(predicted, measured);
     }

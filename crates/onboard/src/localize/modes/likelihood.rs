@@ -35,6 +35,9 @@ pub(in crate::localize) const CERTAIN: f64 = 15.0;
 /// measurement is an outlier.
 pub(super) const SPEED_JUMP: f64 = 6.0;
 
+/// A filter and its prediction of an angle.
+pub(super) type Prediction<'a> = (&'a Ekf, &'a Result<PredictedMeasurement, UpdateReason>);
+
 /// Logarithm of the likelihood ratio of a mode to the nominal one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LikelihoodRatio(f64);
@@ -66,8 +69,9 @@ impl LikelihoodRatio {
     /// Updates with an angle, given the predictions of the mode's filter and of the nominal filter.
     pub fn update(
         &mut self,
-        (ekf, predicted): (&Ekf, &Result<PredictedMeasurement, UpdateReason>),
-        (nominal, by_nominal): (&Ekf, &Result<PredictedMeasurement, UpdateReason>),
+        (ekf, predicted): Prediction,
+        (nominal, by_nominal): Prediction,
+        information_fraction: fn(&Ekf, &PredictedMeasurement) -> f64,
     ) {
         if let (Ok(predicted), Ok(by_nominal)) = (predicted, by_nominal)
             && !(predicted.excluded || by_nominal.excluded)
@@ -174,9 +178,19 @@ fn first_variance(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
 /// Returns the fraction of an angle that is independent of the previous one of its radio head. A
 /// filter that estimates a time-correlated bias predicts the dependent part, except the short-lived
 /// error. The filter's gain is reduced by the same fraction.
-fn information_fraction(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
+pub(super) fn information_fraction(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
     if predicted.hypotheses.is_some() {
         return share(predicted.moved.0.abs());
+    }
+    conditional_fraction(ekf, predicted)
+}
+
+/// Returns the fraction of an angle that is independent given the estimated biases: all of it, if
+/// the filter estimates them. The short-lived error is not reduced. For short sequential tests with
+/// a threshold that is measured for it.
+pub(super) fn conditional_fraction(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
+    if predicted.hypotheses.is_some() {
+        return 1.0;
     }
     first_variance(ekf, predicted) / predicted.innovation.measurement_variance
 }

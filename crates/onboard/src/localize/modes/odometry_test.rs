@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::likelihood::LikelihoodRatio;
+use super::likelihood::{LikelihoodRatio, conditional_fraction};
 use crate::localize::ekf::Ekf;
 use crate::localize::out_of_sequence::AngleUpdate;
 use crate::observation::OdometrySample;
@@ -57,7 +57,8 @@ impl OdometryTest {
             self.advance_to(measured.time_s);
             let [driven, free] =
                 [&self.driven, &self.free].map(|ekf| ekf.predict_measurement(head, measured));
-            (self.ratio).update((&self.free, &free), (&self.driven, &driven));
+            let (free_by, driven_by) = ((&self.free, &free), (&self.driven, &driven));
+            (self.ratio).update(free_by, driven_by, conditional_fraction);
             self.driven.update_predicted(driven, measured);
             self.free.update_predicted(free, measured);
         }
