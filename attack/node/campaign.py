@@ -151,6 +151,8 @@ def main(arguments: list[str]) -> int:
     options.add_argument("--keep", type=Path, help="folder that keeps the files of each run")
     chosen = options.parse_args(arguments)
     faults = [it for it in FAULTS if chosen.only is None or chosen.only in it.name]
+    if not faults:
+        options.error(f"--only {chosen.only}: no fault has this text in its name")
     if chosen.first:
         os.nice(FIRST_NICE)
     skipped = [] if has_small_disk() else [it for it in faults if "disk" in it.outputs]

@@ -290,6 +290,7 @@ impl GaussianSum {
     /// Updates every hypothesis with an angle. The verdict is that of the most probable one.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         let mut first = UpdateVerdict::unused(UpdateReason::Unusable);
+        let mut is_used = false;
         let log_likelihood = if self.is_as_stated {
             log_likelihood_as_stated
         } else {
@@ -297,11 +298,15 @@ impl GaussianSum {
         };
         for (rank, hypothesis) in self.hypotheses.iter_mut().enumerate() {
             let predicted = hypothesis.ekf.predict_measurement(head, measured);
+            is_used |= predicted.is_ok();
             hypothesis.log_likelihood += log_likelihood(&hypothesis.ekf, &predicted);
             let verdict = hypothesis.ekf.update_predicted(predicted, measured);
             if rank == 0 {
                 first = verdict;
             }
+        }
+        if !is_used {
+            return first;
         }
         self.prune();
         // All hypotheses use the noise of the best one, because they share one receiver; otherwise

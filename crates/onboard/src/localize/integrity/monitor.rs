@@ -224,7 +224,6 @@ impl IntegrityMonitor {
     /// distance, and takes over once no test contradicts it. Until then, or until the first bank is
     /// free of contradictions, the state is not `ok`. The result of a search with possibly faulty
     /// angles is confirmed in the same way.
-    /// been at fault is confirmed the same way.
     fn recover(&mut self) {
         let (now_s, patience_s) = (self.now_s, RECOVERY_S);
         let lost = self.bank.is_lost();
