@@ -6,23 +6,23 @@ tests are in ``attack/``, those of Ctrl-C in ``test_interrupt.py``.
 ====  ==============================================  ==============================================
 kind  defect                                          test
 ====  ==============================================  ==============================================
-1     a tracker kilometres off                        test_a_short_wander_does_not_lead_far_away
+1     a tracker kilometres off                        test_a_random_walk_has_a_limited_error
 2     negative variances                              test_covariances_are_positive
 3     NaN in tables                                   test_tables_hold_no_nan
-4     impossible start times and answers              test_start_times_that_cannot_be, test_plug_ins
+4     impossible start times and answers              test_invalid_start_times, test_plug_ins
 5     finite nonsense                                 test_numbers_beyond_physics
 6     drives of any size                              test_drives_too_large
 7     threads, runs and seeds of any size             test_counts_too_large, test_threads_…
 8     very many radio heads                           test_too_many_radio_heads
 9     files without end                               test_files_without_end
-10    loops that do not end                           test_what_would_never_end
-11    tracebacks                                      test_truths_that_are_none, test_aoa_truth, …
-12    names that are paths                            test_names_that_are_no_names
-13    names that are markup                           test_names_that_are_no_names
+10    loops that do not end                           test_cyclic_and_deeply_nested_files
+11    tracebacks                                      test_invalid_truths, test_aoa_truth, …
+12    names that are paths                            test_invalid_names
+13    names that are markup                           test_invalid_names
 14    escape sequences to the terminal                test_no_escape_sequence_reaches_the_terminal
 15    names that are HTML                             test_names_that_are_html
 16    Ctrl-C                                          test_interrupt
-17    ``results/latest`` that cannot be made          test_latest_that_cannot_be_made
+17    ``results/latest`` that cannot be made          test_latest_link_that_cannot_be_created
 18    two runs in one folder                          test_two_runs_in_one_folder
 19    a full disk                                     test_a_full_disk
 20    keys that are not named                         test_errors_name_the_key
@@ -80,7 +80,7 @@ def refused(done: Finished, *named: str) -> None:
         assert part in done.err
 
 
-def test_a_short_wander_does_not_lead_far_away() -> None:
+def test_a_random_walk_has_a_limited_error() -> None:
     scenario = access_av.Scenario.from_toml(
         """
         name = "wander"
@@ -122,7 +122,7 @@ def test_covariances_are_positive(seed: int) -> None:
     assert ((xx * yy - xy * xy) / (xx * yy)).min() >= -1e-12  # type: ignore[operator]
 
 
-def test_a_heading_that_is_given_exactly_has_a_positive_variance() -> None:
+def test_an_exact_initial_heading_has_a_positive_variance() -> None:
     # In a bend, heading and position are correlated, and rounding made the variance negative.
     scenario = access_av.Scenario.load("yard").with_overrides(
         {
@@ -152,7 +152,7 @@ def test_tables_hold_no_nan(name: str) -> None:
 
 
 @pytest.mark.parametrize("start_s", ["-1e9", "1e9", "nan", "inf"])
-def test_start_times_that_cannot_be(access_av: Cli, drive: Path, start_s: str) -> None:
+def test_invalid_start_times(access_av: Cli, drive: Path, start_s: str) -> None:
     done = access_av(
         "record", "locate", "--recording", drive / "iq.sigmf-meta",
         "--odometry", drive / "odometry.csv",
@@ -201,7 +201,7 @@ def test_drives_too_large(key: str, value: Any) -> None:
         access_av.Scenario.load("paper").with_overrides({key: value})
 
 
-def test_what_is_too_large_can_be_meant(access_av: Cli, tmp_path: Path) -> None:
+def test_large_runs_can_be_permitted(access_av: Cli, tmp_path: Path) -> None:
     file = tmp_path / "long.toml"
     file.write_text('extends = "paper"\nmotion.stops = [{ at_m = 100.0, dwell_s = 8e4 }]\n')
     refused(access_av("file", "check", "--kind", "scenario", file), "22", "allow_large", "stops")
@@ -244,7 +244,7 @@ print(most - before)
 """
 
 
-def test_threads_that_no_core_is_for() -> None:
+def test_more_threads_than_cores() -> None:
     done = subprocess.run(
         [sys.executable, "-c", THREADS], capture_output=True, text=True, check=True
     )
@@ -296,7 +296,7 @@ def test_files_without_end(access_av: Cli, drive: Path, tmp_path: Path) -> None:
         refused(access_av("record", "locate", *flat, "--out", tmp_path / "out"), "regular file")
 
 
-def test_what_would_never_end(access_av: Cli, tmp_path: Path) -> None:
+def test_cyclic_and_deeply_nested_files(access_av: Cli, tmp_path: Path) -> None:
     one, other = tmp_path / "one.toml", tmp_path / "other.toml"
     one.write_text(f'extends = "{other}"\n')
     other.write_text(f'extends = "{one}"\n')
@@ -325,7 +325,7 @@ TUM = b"0.0 0 0 0 0 0 0 1\n0.3 0.1 0 0 0 0 0 1\n"
     ],
     ids=["words", "utf-16", "utf-16-without-mark", "nan", "no-turn", "empty", "bom-and-comment"],
 )
-def test_truths_that_are_none(
+def test_invalid_truths(
     access_av: Cli, drive: Path, tmp_path: Path, truth: bytes, code: int
 ) -> None:
     file = tmp_path / "truth.tum"
@@ -392,7 +392,7 @@ def shell(*words: object, **environment: str) -> subprocess.CompletedProcess[byt
     )
 
 
-def test_a_folder_whose_name_is_no_text(tmp_path: Path) -> None:
+def test_a_folder_whose_name_is_not_valid_text(tmp_path: Path) -> None:
     folder = os.fsencode(tmp_path) + b"/\xff\xfe"
     done = subprocess.run(
         [
@@ -414,7 +414,7 @@ def test_a_folder_whose_name_is_no_text(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["../../../x", "[/]", "[red]", "a/b", "", "x" * 65, "\x1b[2J"])
-def test_names_that_are_no_names(name: str) -> None:
+def test_invalid_names(name: str) -> None:
     with pytest.raises(access_av.SettingsError, match="name"):
         access_av.Scenario.load("paper").with_overrides({"name": name})
 
@@ -441,7 +441,7 @@ def access_av_scenario(overrides: dict[str, Any]) -> access_av.Scenario:
     return access_av.Scenario.load("paper").with_overrides(overrides)
 
 
-def test_latest_that_cannot_be_made(access_av: Cli, tmp_path: Path) -> None:
+def test_latest_link_that_cannot_be_created(access_av: Cli, tmp_path: Path) -> None:
     (tmp_path / "results/latest").mkdir(parents=True)
     (tmp_path / "results/latest/kept").write_text("")
     with pytest.warns(UserWarning, match="latest"):
@@ -497,7 +497,7 @@ def test_a_full_disk(tmp_path: Path, words: tuple[str, ...]) -> None:
     assert not list(tmp_path.rglob("*.partial"))
 
 
-def test_a_folder_that_may_not_be_written(access_av: Cli, tmp_path: Path) -> None:
+def test_a_folder_without_write_permission(access_av: Cli, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     refused(access_av("run", "paper", "--out", tmp_path / "file/out"), "file")
     refused(access_av("design", "bound", "yard", "--out", "/proc/none"), "/proc/none")
@@ -506,7 +506,7 @@ def test_a_folder_that_may_not_be_written(access_av: Cli, tmp_path: Path) -> Non
     )
 
 
-def test_standard_output_that_takes_nothing() -> None:
+def test_closed_standard_output() -> None:
     with open("/dev/full", "w") as full:  # noqa: PTH123
         done = subprocess.run(
             [sys.executable, "-m", "access_av", "file", "show", "--kind", "scenario", "paper"],

@@ -75,7 +75,7 @@ def test_a_synthesized_drive_is_located(access_av: Cli, drive: Path, tmp_path: P
     assert json.loads((tmp_path / "manifest.json").read_text())["angles"] == angles.height
 
 
-def test_mcap_is_what_ros_tools_expect(access_av: Cli, drive: Path, tmp_path: Path) -> None:
+def test_mcap_agrees_with_ros_tools(access_av: Cli, drive: Path, tmp_path: Path) -> None:
     assert access_av(*arguments(drive, tmp_path)).code == 0
     with (tmp_path / "drive.mcap").open("rb") as file:
         reader = make_reader(file)
@@ -128,7 +128,7 @@ for found in (tum, mcap):
     assert found == pytest.approx([ours, ours], abs=1e-6)
 
 
-def test_mcap_odometry_and_bad_items_are_taken_in(
+def test_mcap_odometry_with_invalid_items_is_read(
     access_av: Cli, drive: Path, tmp_path: Path
 ) -> None:
     # Use the located poses in MCAP as odometry.
@@ -205,7 +205,7 @@ def test_a_drive_that_cannot_be_located_has_a_reason(
     assert access_av(*given).code == 2
 
 
-def test_synth_refuses_what_it_cannot_send(access_av: Cli, tmp_path: Path) -> None:
+def test_synth_rejects_unsupported_scenarios(access_av: Cli, tmp_path: Path) -> None:
     assert (
         access_av("record", "synth", "paper", "--out", tmp_path, "--datatype", "cf64_le").code == 2
     )
@@ -258,7 +258,9 @@ def test_the_start_may_be_given_with_the_command(
         assert "--start" in done.err
 
 
-def test_one_radio_head_cannot_find_it(access_av: Cli, drive: Path, tmp_path: Path) -> None:
+def test_one_radio_head_does_not_determine_the_position(
+    access_av: Cli, drive: Path, tmp_path: Path
+) -> None:
     vehicle = tmp_path / "vehicle.toml"
     text = without_start((drive / "vehicle.toml").read_text())
     vehicle.write_text(text.replace("[receiver]", "[receiver]\npci_allow_list = [1]"))
@@ -330,7 +332,7 @@ def test_odometry_is_used_unchanged(tmp_path: Path, by: str) -> None:
     assert told.rms_error_m(told.locate(tmp_path)) == pytest.approx(as_rows, abs=0.01)
 
 
-def test_a_track_that_is_wider_than_stated_is_found(tmp_path: Path) -> None:
+def test_a_wider_track_than_specified_is_estimated(tmp_path: Path) -> None:
     told = robot()
     turned = (told.odometry["yaw_rate_radps"] / RATE_HZ).cum_sum()
     told.odometry = told.odometry.select(

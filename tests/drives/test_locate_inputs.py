@@ -89,7 +89,7 @@ JUMPS = {
 
 
 @pytest.mark.parametrize("kind", JUMPS)
-def test_counters_that_jump_give_no_speed(tmp_path: Path, kind: str) -> None:
+def test_counter_jumps_cause_no_speed(tmp_path: Path, kind: str) -> None:
     change, count = JUMPS[kind]
     whole = robot(45.0)
     whole.odometry = whole.odometry.drop("speed_mps")
@@ -105,7 +105,7 @@ def test_counters_that_jump_give_no_speed(tmp_path: Path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("wheel", ["left_m", "right_m"])
-def test_a_wheel_that_jumps_turns_nothing(tmp_path: Path, wheel: str) -> None:
+def test_a_jump_of_a_wheel_counter_causes_no_turn(tmp_path: Path, wheel: str) -> None:
     whole = robot(45.0)
     wheels(whole)
     as_given = whole.locate(tmp_path)
@@ -221,7 +221,7 @@ def test_a_truth_with_impossible_positions_is_rejected(
         (pl.col("y_m"), pl.col("x_m"), "turned by 1.5.*with y reversed before"),
     ],
 )
-def test_a_truth_in_another_frame_nearby_is_named(
+def test_a_truth_in_another_frame_nearby_is_reported(
     located: tuple[Robot, drives.Drive], x_m: pl.Expr, y_m: pl.Expr, says: str
 ) -> None:
     whole, drive = located
@@ -240,7 +240,9 @@ def test_a_truth_in_another_frame_nearby_is_named(
         (b"0 1e256 2 0 0 0 0 1\n", "x and y must be within 1e8 m"),
     ],
 )
-def test_files_that_are_no_trajectory_are_named(tmp_path: Path, content: bytes, says: str) -> None:
+def test_files_other_than_trajectories_are_rejected(
+    tmp_path: Path, content: bytes, says: str
+) -> None:
     file = tmp_path / "truth.tum"
     file.write_bytes(content)
     with pytest.raises(RecordingError, match=says):
@@ -305,7 +307,7 @@ def test_angles_are_sorted_and_repeated_ones_are_left_out(tmp_path: Path) -> Non
     assert drive.poses.equals(as_given.poses)
 
 
-def test_one_row_of_odometry_is_named_as_the_cause(tmp_path: Path) -> None:
+def test_a_single_row_of_odometry_is_reported_as_the_cause(tmp_path: Path) -> None:
     whole = robot(10.0)
     whole.odometry = whole.odometry.head(1)
     with pytest.raises(
@@ -344,7 +346,7 @@ def test_a_truth_of_a_part_of_the_drive_is_reported(access_av: Cli, tmp_path: Pa
     assert "over 75% of the drive" in " ".join(done.out.split())
 
 
-def test_a_drive_that_is_unavailable_is_not_relied_on(tmp_path: Path) -> None:
+def test_an_unavailable_drive_is_not_reliable(tmp_path: Path) -> None:
     """Contradictory radio heads cause an exit code, independent of the diagnosis."""
     whole = robot(40.0)
     rng = pl.Series([math.tau * ((k * 0.618) % 1.0) for k in range(whole.angles.height)])

@@ -58,7 +58,7 @@ def logged(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_head_and_an_array_that_are_elsewhere_are_found(logged: Path) -> None:
+def test_displaced_radio_head_and_array_are_estimated(logged: Path) -> None:
     found = survey(
         str(logged / "0/site.toml"), str(logged / "0/vehicle.toml"), [logged / "0", logged / "1"]
     )
@@ -84,7 +84,7 @@ def test_a_head_and_an_array_that_are_elsewhere_are_found(logged: Path) -> None:
     assert found.origin.version == __version__
 
 
-def test_what_it_writes_locates_better(
+def test_the_surveyed_files_reduce_the_error(
     access_av: Callable[..., Finished], logged: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
@@ -108,7 +108,7 @@ def test_what_it_writes_locates_better(
     assert rms_m(str(out / "site.toml")) < 0.5 * rms_m(str(plan))
 
 
-def test_what_cannot_be_surveyed_is_named(logged: Path, tmp_path: Path) -> None:
+def test_parameters_that_cannot_be_surveyed_are_reported(logged: Path, tmp_path: Path) -> None:
     plan, vehicle = str(logged / "0/site.toml"), str(logged / "0/vehicle.toml")
     with pytest.raises(InputError, match=r"neither odometry.csv nor odometry.mcap"):
         survey(plan, vehicle, [tmp_path])

@@ -59,7 +59,7 @@ def p90_m(names: list[str]) -> float:
     return float(np.quantile(_core.Bound(equipped).along_route()["bound_m"], 0.9))
 
 
-def test_the_best_mast_is_the_best_of_all() -> None:
+def test_the_first_mast_is_the_best_candidate() -> None:
     found = plan(SHORT, MASTS)
     alone = {name: p90_m([name]) for name in MASTS["name"]}
     assert found.chosen == [min(alone, key=alone.__getitem__)]
@@ -71,7 +71,7 @@ def test_the_best_mast_is_the_best_of_all() -> None:
     assert two.after_m < found.after_m < found.before_m
 
 
-def test_new_radio_heads_send_when_others_are_silent() -> None:
+def test_new_radio_heads_use_free_ssb_indices() -> None:
     heads = json.loads(SHORT.site.to_json())["radio_heads"]
     two = SHORT.with_overrides({"site.radio_heads": heads[:2]})
     equipped = json.loads(plan(two, MASTS, add=2).scenario.site.to_json())["radio_heads"]
@@ -108,7 +108,9 @@ def test_a_site_at_the_highest_level_has_no_next_one() -> None:
     assert next_level(best, plan(best)) is None
 
 
-def test_the_command_plans_and_refuses(tmp_path: Path, access_av: Callable[..., Finished]) -> None:
+def test_the_command_plans_and_rejects_invalid_input(
+    tmp_path: Path, access_av: Callable[..., Finished]
+) -> None:
     masts = tmp_path / "masts.csv"
     MASTS.write_csv(masts)
     (tmp_path / "short.toml").write_text(SHORT.to_toml())
@@ -204,7 +206,7 @@ def test_an_interrupted_integrity_campaign_is_continued(
         assert max(map(len, lines[1:-1])) <= wide
 
 
-def test_cases_of_an_integrity_campaign_stand_side_by_side(
+def test_cases_of_an_integrity_campaign_are_compared(
     tmp_path: Path, access_av: Callable[..., Finished]
 ) -> None:
     (tmp_path / "short.toml").write_text(SHORT.to_toml())
@@ -255,7 +257,7 @@ def test_hypotheses_are_of_three_sizes_and_can_be_driven(tmp_path: Path) -> None
     assert [case.mismatch for case in cases] == chosen
 
 
-def test_the_level_grows_as_less_risk_is_asked(tmp_path: Path) -> None:
+def test_the_protection_level_increases_with_a_smaller_risk(tmp_path: Path) -> None:
     cases = drive(
         Campaign(ResultCache(tmp_path)),
         SHORT,
@@ -282,7 +284,7 @@ def test_the_level_grows_as_less_risk_is_asked(tmp_path: Path) -> None:
         ("risk_per_hour", "0", "between 0.000000001 and 1"),
     ],
 )
-def test_faults_that_the_risk_cannot_bear_are_refused(
+def test_unmonitored_faults_above_the_risk_are_rejected(
     access_av: Callable[..., Finished], key: str, value: str, told: str
 ) -> None:
     less_risk = ["--set", "vehicle.integrity.risk_per_hour=0.3"]
@@ -293,7 +295,7 @@ def test_faults_that_the_risk_cannot_bear_are_refused(
     assert told in done.err
 
 
-def test_every_mismatch_can_be_driven(tmp_path: Path) -> None:
+def test_every_mismatch_can_be_simulated(tmp_path: Path) -> None:
     known = mismatches(SHORT)
     kept = Campaign(ResultCache(tmp_path))
     assert {"none", "all heads 2 m off", "three heads hidden"} <= known.keys()

@@ -62,7 +62,7 @@ def test_without_sigma_the_bound_is_used_and_reported_once() -> None:
     assert 0.8 < sigmas[0] / sigmas[1] < 1.25  # type: ignore[operator]
 
 
-def test_a_likelihood_is_as_good_as_its_maximum() -> None:
+def test_a_likelihood_is_as_accurate_as_its_maximum() -> None:
     phases = np.arange(-np.pi, np.pi, 2.0 * np.pi / 720)
     steering = np.exp(1j * np.outer(phases, np.arange(4)))
 
@@ -86,7 +86,7 @@ def test_a_likelihood_is_as_good_as_its_maximum() -> None:
         (np.zeros(3), "log-likelihood"),
     ],
 )
-def test_estimates_that_cannot_be_are_refused(returned: Any, named: str) -> None:
+def test_invalid_estimates_are_rejected(returned: Any, named: str) -> None:
     with pytest.raises(ValueError, match=named) as raised:
         access_av.simulate(SHORT, estimator=lambda _: returned)
     if hasattr(raised.value, "__notes__"):
@@ -130,7 +130,7 @@ def test_the_energy_of_a_plug_in_estimator_is_its_own_specification() -> None:
         ({"energy_per_execution_j": 1.0, "time_per_execution_s": 1.0}, "both"),
     ],
 )
-def test_costs_that_cannot_be_are_refused(stated: dict[str, Any], named: str) -> None:
+def test_invalid_costs_are_rejected(stated: dict[str, Any], named: str) -> None:
     with pytest.raises(ValueError, match=named):
         access_av.simulate(SHORT, estimator=lambda: Stating(**stated))
 
@@ -146,7 +146,7 @@ def test_an_unknown_method_names_the_platform_key_to_set() -> None:
     assert access_av.simulate(stated).runs["energy_j"].item() is None
 
 
-def test_no_angle_is_no_error() -> None:
+def test_no_angle_causes_no_error() -> None:
     result = access_av.simulate(SHORT, keep_trajectories=True, estimator=lambda _: None)
     assert result.aoa_estimates is not None
     assert set(result.aoa_estimates["reason"]) == {"unusable"}
@@ -157,18 +157,18 @@ def raising(*_: Any) -> Any:
 
 
 @pytest.mark.parametrize("place", ["estimator", "policy", "localizer"])
-def test_exceptions_come_out_as_they_went_in(place: str) -> None:
+def test_exceptions_are_passed_unchanged(place: str) -> None:
     with pytest.raises(KeyError, match="mine"):
         access_av.simulate(SHORT, **{place: raising})  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("returned", [None, 3, [True], "yes", [1.0, 2.0]])
-def test_answers_of_a_policy_that_cannot_be_are_refused(returned: Any) -> None:
+def test_invalid_answers_of_a_policy_are_rejected(returned: Any) -> None:
     with pytest.raises(ValueError, match="policy returned"):
         access_av.simulate(SHORT, policy=lambda _: returned)
 
 
-def test_a_policy_sees_the_situation_and_decides() -> None:
+def test_a_policy_receives_the_situation() -> None:
     seen: list[Any] = []
 
     class Policy:
@@ -467,7 +467,7 @@ def test_a_plug_in_localizer_replaces_the_built_in_one() -> None:
         ((1.0, 2.0, 0.0, -np.eye(3)), "negative"),
     ],
 )
-def test_poses_that_cannot_be_are_refused(pose: Any, named: str) -> None:
+def test_invalid_poses_are_rejected(pose: Any, named: str) -> None:
     with pytest.raises(ValueError, match=named):
         access_av.simulate(SHORT, localizer=with_pose(pose))
 
@@ -507,7 +507,7 @@ def test_settings_are_copied_compared_hashed_and_pickled(make: Callable[..., Any
     assert one != make.load("yard" if make is not access_av.Vehicle else "tugger")  # type: ignore[attr-defined]
 
 
-def test_what_is_learned_stays_above_its_ceiling() -> None:
+def test_the_learned_estimator_does_not_exceed_the_bayes_bound() -> None:
     learn = SimpleNamespace(**runpy.run_path(str(ROOT / "examples/learned/learn.py")))
     random = np.random.default_rng(3)
     network = learn.Network(random)

@@ -214,7 +214,7 @@ def as_integers(samples: np.ndarray, full_scale: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("full_scale", [60.0, 2000.0, 32767.0])
-def test_the_wrong_datatype_is_named(tmp_path: Path, full_scale: float) -> None:
+def test_a_wrong_datatype_is_reported(tmp_path: Path, full_scale: float) -> None:
     integers = as_integers(burst(1), full_scale)
     file = write(tmp_path / "integers", integers, [(0, SSB_HZ)])
     with pytest.raises(RecordingError, match=r"core:datatype.*probably `ci16_le`"):
@@ -278,7 +278,7 @@ def test_metadata_that_contradict_themselves_are_rejected(tmp_path: Path, kind: 
         ("b.sigmf", b"hello" * 300, "it is damaged, or not a tar file"),
     ],
 )
-def test_files_that_are_no_recording_are_named(
+def test_files_other_than_recordings_are_rejected(
     tmp_path: Path, name: str, content: bytes, says: str
 ) -> None:
     file = tmp_path / name

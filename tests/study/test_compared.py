@@ -82,7 +82,7 @@ def test_a_difference_is_that_of_variant_and_baseline(factor: float, words: str)
         ((0.2, 0.1, 0.3), Effect.HARMS),
     ],
 )
-def test_verdicts_are_enums_with_words_of_their_own(
+def test_verdicts_are_enums_with_separate_wording(
     delta_m: tuple[float, float, float], effect: Effect
 ) -> None:
     assert Effect.of(delta_m) is effect

@@ -112,7 +112,7 @@ def test_the_cheapest_set_that_meets_the_target_is_found(
         ({200: [0.2] * 4, 500: [0.2] * 4, 1000: [0.2] * 4}, Agreement.EQUIVALENT, None),
     ],
 )
-def test_seeds_agree_or_the_difference_is_judged(
+def test_seeds_agree_or_the_difference_is_evaluated(
     real: Driven, levels: dict[int, list[float]], agreement: Agreement, chosen: str | None
 ) -> None:
     bursts = {200: 30, 500: 12, 1000: 6}
@@ -139,7 +139,7 @@ def test_seeds_agree_or_the_difference_is_judged(
     assert {it.point.mode for it in found.rivals} >= set(range(8)) - {found.point.mode}
 
 
-def test_a_target_of_a_stretch_is_judged_there_only(real: Driven) -> None:
+def test_a_target_of_a_road_section_is_evaluated_there_only(real: Driven) -> None:
     plant = PLANT.with_overrides(
         {
             "targets": [

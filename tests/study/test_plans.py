@@ -41,7 +41,7 @@ def new(access_av: Callable[..., Any], tmp_path: Path, *options: Any) -> tuple[d
 
 
 @pytest.mark.parametrize(("road", "unit", "unit_m", "down"), DRAWINGS)
-def test_drawings_give_the_same_plant_or_name_what_they_leave_out(
+def test_drawings_give_equal_plants_or_report_omitted_entities(
     access_av: Callable[..., Any],
     tmp_path: Path,
     road: Callable[[Drawing], plans.Points],
@@ -354,7 +354,7 @@ def test_damaged_entities_that_the_reader_removes_are_counted(
     assert all(word in " ".join(drawn.skipped) for word in ("INSERT", "SPLINE"))
 
 
-def test_flat_radio_heads_are_warned_of(
+def test_radio_heads_without_height_cause_a_warning(
     empty: Drawing, access_av: Callable[..., Any], tmp_path: Path
 ) -> None:
     empty.model.add_point((5, 5), dxfattribs={"layer": "HEADS"})
@@ -486,7 +486,7 @@ def test_tables_that_cannot_be_read_are_named_with_the_line(
 @pytest.mark.parametrize(
     ("pci", "found"), [("21", 21), ("21.0", 21), ("", None), ("21.7", "21.7"), ("nan", "nan")]
 )
-def test_a_pci_is_a_whole_number_or_left_out(tmp_path: Path, pci: str, found: Any) -> None:
+def test_a_pci_is_an_integer_or_omitted(tmp_path: Path, pci: str, found: Any) -> None:
     file = tmp_path / "heads.csv"
     file.write_text(f"name,x_m,y_m,z_m,pci\nA,0,0,6,{pci}\nB,9,0,6,22\n", "utf-8")
     if isinstance(found, str):
@@ -512,7 +512,7 @@ def test_radio_heads_with_one_pci_are_warned_of(
 
 
 @pytest.mark.parametrize("data", [b"", b"  0\nSECTION\n", b"0\n", bytes(range(256)) * 8, b"AC1032"])
-def test_files_that_are_no_drawings_are_named(tmp_path: Path, data: bytes) -> None:
+def test_files_other_than_drawings_are_rejected(tmp_path: Path, data: bytes) -> None:
     pytest.importorskip("ezdxf", reason="the extra `cad` is not installed")
     file = tmp_path / "plant.dxf"
     file.write_bytes(data)
@@ -520,7 +520,7 @@ def test_files_that_are_no_drawings_are_named(tmp_path: Path, data: bytes) -> No
         dxf.read(file, road_layer="ROAD", scale_m=1.0)
 
 
-def test_whole_numbers_beyond_all_floats_are_rejected(tmp_path: Path) -> None:
+def test_integers_beyond_the_float_range_are_rejected(tmp_path: Path) -> None:
     file = tmp_path / "road.geojson"
     file.write_text(f'{{"type": "LineString", "coordinates": [[{10**400}, 1], [2, 3]]}}', "utf-8")
     with pytest.raises(InputError, match="finite numbers are needed"):

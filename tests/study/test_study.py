@@ -34,7 +34,7 @@ def test_the_same_seed_gives_the_same_study_of_a_plant_and_of_its_file(tmp_path:
     assert ": LOST in 1 of 2 drives; 90 % of the position errors are within 40.00 m" in lost.verdict
 
 
-def test_modes_that_change_the_wake_up_are_driven_apart() -> None:
+def test_modes_with_different_wake_ups_are_simulated_separately() -> None:
     scenario = Plant.from_toml(PLANT).scenario()
     groups = [[it.number for it in group] for group in mode_groups(scenario)]
     assert [1, 2, 3] in groups
@@ -67,7 +67,7 @@ def places_of(dilution_m: list[float | None], visible: list[int]) -> pl.DataFram
     )
 
 
-def test_an_error_is_explained_by_the_stretch_on_which_it_arose() -> None:
+def test_an_error_is_explained_by_the_road_section_where_it_arose() -> None:
     wall = 'name = "hall 3"\npoints_m = [[100.0, 5.0], [140.0, 5.0]]'
     text = PLANT.replace("[[targets]]", f"[[site.walls]]\n{wall}\n[[targets]]", 1)
     plant = Plant.from_toml(text.replace("[10.0, 20.0, 8.0]", "[120.0, 20.0, 8.0]"))

@@ -36,7 +36,7 @@ def test_a_template_value_is_unverified_until_it_is_changed() -> None:
         ({"prices.electricity_per_kwh": 25.0}, "25 cents are 0.25"),
     ],
 )
-def test_values_in_another_unit_are_doubted(settings: dict[str, Any], words: str) -> None:
+def test_values_in_another_unit_cause_a_warning(settings: dict[str, Any], words: str) -> None:
     plant = Plant.from_toml(PLANT)
     assert not any(words in str(it) for it in plant.warnings())
     assert any(words in str(it) for it in plant.with_overrides(settings).warnings())
@@ -99,9 +99,7 @@ def test_the_command_names_invalid_input(access_av: Callable[..., Any], tmp_path
 
 
 @pytest.mark.parametrize("more", [(), ("--json",)], ids=["text", "json"])
-def test_whoever_closes_the_pipe_still_gets_the_files(
-    tmp_path: Path, more: tuple[str, ...]
-) -> None:
+def test_a_closed_pipe_does_not_prevent_the_files(tmp_path: Path, more: tuple[str, ...]) -> None:
     (tmp_path / "short.toml").write_text(LAST_METRES, "utf-8")
     reading, writing = os.pipe()
     os.close(reading)

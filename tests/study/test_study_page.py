@@ -96,7 +96,9 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {name: folder / name / "report.html" for name in commands}
 
 
-def test_nothing_of_the_pages_overlaps_or_is_cut(results: Path, pages: dict[str, Path]) -> None:
+def test_page_elements_do_not_overlap_and_are_not_cut(
+    results: Path, pages: dict[str, Path]
+) -> None:
     if (program := layout.chromium()) is None:
         pytest.skip("no chromium to measure the page with")
     papers = set()
@@ -134,7 +136,7 @@ def test_every_operating_point_is_numbered_without_overlap(results: Path) -> Non
             assert layout.label_faults(browser, "ways", spec, width) == []
 
 
-def test_a_drive_is_played_and_whoever_wants_less_motion_has_the_slider(results: Path) -> None:
+def test_a_drive_is_animated_unless_reduced_motion_is_preferred(results: Path) -> None:
     if (program := layout.chromium()) is None:
         pytest.skip("no chromium to play it with")
     told, at_s = "document.querySelector('#map .role-title').textContent", "input[name=at_s]"

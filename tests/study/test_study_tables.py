@@ -68,7 +68,7 @@ def test_percentiles_and_shares_are_those_of_the_errors(
     assert said["verdict"] in page
 
 
-def test_remedies_are_driven_in_the_same_worlds(
+def test_remedies_are_simulated_in_equal_environments(
     results: Path, said: dict[str, Any], page: str
 ) -> None:
     prices = {"survey the radio heads": (2, 20.0), "calibrate the antennas": (6, 150.0 * 0.92)}
@@ -138,7 +138,7 @@ def test_the_energy_of_a_trip_follows_from_the_platform_and_its_drives(results: 
     assert points["listening_value_j"][0] == pytest.approx(energy[1])
 
 
-def test_no_point_of_the_front_is_beaten(results: Path) -> None:
+def test_no_point_of_the_front_is_dominated(results: Path) -> None:
     points = pl.read_parquet(results / "points.parquet").with_columns(
         energy_j=pl.sum_horizontal(f"{it}_value_j" for it in ("estimates", "listening", "idle"))
     )
@@ -225,7 +225,7 @@ def test_places_are_those_of_the_road(results: Path, said: dict[str, Any], page:
     )
 
 
-def test_variants_stand_side_by_side(results: Path, page: str) -> None:
+def test_variants_are_compared(results: Path, page: str) -> None:
     compared = pl.read_parquet(results / "compared.parquet").filter(percent=90.0)
     assert compared["variant"].to_list() == ["unchanged", "site.rician_k_db = 3"]
     first, second = compared["percentile_m"]
@@ -277,7 +277,7 @@ def judged(within: Any, duration_s: float, percent: float) -> str:
 ORDER = ["met", "probably_met", "probably_missed", "missed"]
 
 
-def test_each_target_is_judged_on_its_stretch_and_all_by_the_worst(
+def test_each_target_is_evaluated_on_its_section_and_all_by_the_worst(
     results: Path, said: dict[str, Any], page: str
 ) -> None:
     route = along_route(Plant.from_toml(PLANT).scenario())
@@ -333,7 +333,7 @@ def test_reliability_is_counted_from_the_drives(
     assert "alert limit 0.4 m (twice the target’s 0.2 m)" in page
 
 
-def test_the_recommended_point_is_entered_as_a_file_that_run_accepts(
+def test_run_accepts_the_recommended_point(
     results: Path, said: dict[str, Any], access_av: Callable[..., Any], tmp_path: Path
 ) -> None:
     file = results / "recommended.toml"
@@ -364,7 +364,7 @@ def test_the_recommended_point_is_entered_as_a_file_that_run_accepts(
     assert counts == drives["aoa_estimates"].to_list()
 
 
-def test_rivals_are_compared_in_pairs_and_equivalent_ones_named(
+def test_rivals_are_compared_in_pairs_and_equivalence_is_reported(
     results: Path, said: dict[str, Any], page: str
 ) -> None:
     points = pl.read_parquet(results / "points.parquet").with_columns(

@@ -48,7 +48,7 @@ def antennas(directory: Path) -> np.ndarray:
     return np.ascontiguousarray(raw.view(np.complex64).reshape(-1, 4).T)
 
 
-def test_samples_as_they_come_make_the_poses_of_locate(drive: Path) -> None:
+def test_live_samples_give_the_poses_of_locate(drive: Path) -> None:
     site, vehicle = nominal(drive)
     recording, odometry_file = drive / "iq.sigmf-meta", drive / "odometry.csv"
     located = access_av.locate(site, odometry_file, recording, vehicle=vehicle)
@@ -109,7 +109,7 @@ def test_unreported_gaps_do_not_reduce_the_accuracy(drive: Path) -> None:
     assert math.dist(poses[0][:2], poses[1][:2]) < 0.02
 
 
-def test_what_cannot_be_is_refused_and_changes_nothing(drive: Path) -> None:
+def test_invalid_input_is_rejected_without_a_change(drive: Path) -> None:
     site, vehicle = nominal(drive)
     with pytest.raises(ValueError, match="both"):
         access_av.Live(site, vehicle, rate_hz=RATE_HZ)

@@ -247,7 +247,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn holds_its_capacity_and_not_more() {
+    fn a_list_contains_at_most_its_capacity() {
         let mut observation = SsbObservation::new(3);
         for _ in 0..MAX_SNAPSHOTS {
             assert!(observation.push(&[Complex64::ONE; 3]));

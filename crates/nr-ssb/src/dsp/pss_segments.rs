@@ -413,7 +413,7 @@ mod tests {
 
     /// Detects each PSS at its position, in noise 10 dB below it, anywhere in the tiles.
     #[test]
-    fn a_pss_is_seen_where_it_is() {
+    fn a_pss_is_detected_at_its_position() {
         let mut filter = SegmentFilter::new(1);
         let mut state = 1_u64;
         let mut uniform = || {

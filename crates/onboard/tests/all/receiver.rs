@@ -153,7 +153,7 @@ fn a_beam_that_vanishes_and_returns_is_received_again() {
 }
 
 #[test]
-fn while_all_beams_that_are_known_come_none_is_searched_for() {
+fn no_search_while_all_known_beams_are_received() {
     let mut air = Air::new(SubcarrierSpacing::Khz30, 3.0, 8.0, 1);
     let all: Vec<u8> = (0..8).collect();
     let mut receiver = air.receiver_of(&all);
@@ -177,7 +177,7 @@ fn while_all_beams_that_are_known_come_none_is_searched_for() {
 }
 
 #[test]
-fn a_beam_that_is_hidden_for_a_moment_is_not_searched_for() {
+fn a_briefly_hidden_beam_causes_no_search() {
     let mut air = Air::new(SubcarrierSpacing::Khz30, -5.0, 8.0, 2);
     let mut receiver = air.receiver();
     let all: Vec<u8> = (0..8).collect();

@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn the_maximum_is_found() {
+    fn the_maximum_of_the_likelihood_is_found() {
         let mut of = |x: f64| Ok(-(x - 0.123).powi(2));
         let found = highest([-0.5, 0.5], &mut of).unwrap();
         assert!((found - 0.123).abs() < FINEST_S);

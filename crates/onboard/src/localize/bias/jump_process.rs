@@ -237,7 +237,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_value_as_good_as_forgotten_has_moments() {
+    fn an_almost_forgotten_bias_has_finite_moments() {
         let weights = [1e-230, 2e-230, 1e-230, 0.0];
         let (mean, variance) = moments(&weights, &[1.0, 2.0, 3.0, 9.0]);
         assert!((mean - 2.0).abs() < 1e-12 && (variance - 0.5).abs() < 1e-12);

@@ -678,7 +678,7 @@ mod tests {
     }
 
     #[test]
-    fn who_stands_learns_nothing() {
+    fn standstill_contains_no_information() {
         let (mut errors, mut belief) = (MultipathBias::new(1, EVEN), unknown());
         for _ in 0..30 {
             take(&mut errors, &mut belief, 0, 0.1, 0.02);

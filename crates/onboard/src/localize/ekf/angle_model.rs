@@ -553,7 +553,7 @@ mod tests {
     }
 
     #[test]
-    fn a_head_ahead_is_at_pi_and_one_abeam_at_zero() {
+    fn phases_of_radio_heads_ahead_and_abeam() {
         let frame = on_circle(0.0, 0.0, 0.0, 0.0).1;
         let see = |head: RadioHead| {
             AngleModel::new(&head, Pose::default(), &frame, &mean(0.0, 0.0), &ARRAY).unwrap()
@@ -567,7 +567,7 @@ mod tests {
     }
 
     #[test]
-    fn scatter_leaves_a_tenth_over_k_and_a_little() {
+    fn scatter_variance_equals_its_approximation() {
         let (row, aperture) = (ARRAY.measurand, ARRAY.measurand.mean_aperture());
         assert!((row.scatter_variance(1000.0, aperture) * 10.0 * 1000.0 - 1.0).abs() < 4e-4);
         // Mean of two million estimates at K = 10 in an independent simulation: 1.0346(11).

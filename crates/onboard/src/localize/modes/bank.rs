@@ -625,7 +625,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_faulty_source_is_named() {
+    fn only_the_faulty_source_is_reported() {
         let odds = 9.2;
         let (sound, _) = after(0.0, &[]);
         assert_eq!(sound.faulty_head(odds), None);

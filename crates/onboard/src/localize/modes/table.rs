@@ -268,7 +268,7 @@ mod tests {
     const EXACT: fn(usize, f64) -> f64 = |_, _| 0.0;
 
     #[test]
-    fn the_nominal_mode_leads_where_all_is_as_stated() {
+    fn the_nominal_mode_is_selected_without_a_fault() {
         let (bank, off_m) = drive(&World::default(), 60.0, EXACT);
         assert!(bank.selected() == SelectedHypothesis::Nominal && off_m(bank.leader()) < 0.3);
         let modes = TABLE.iter().filter_map(|it| bank.mode(it.id));
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn an_uncalibrated_array_leads_and_is_no_fault() {
+    fn an_uncalibrated_array_is_selected_and_not_a_fault() {
         let turned_rad = 0.02;
         let world = World {
             turned_rad,
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_displaced_site_leads_and_is_a_fault() {
+    fn a_displaced_site_is_selected_and_is_a_fault() {
         let moved_m = [1.2, -1.6];
         let world = World {
             moved_m,
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn noisier_angles_lead_and_are_no_fault() {
+    fn noisier_angles_are_selected_and_not_a_fault() {
         let noise = 3.0;
         let world = World {
             noise,
