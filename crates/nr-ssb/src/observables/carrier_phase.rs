@@ -14,7 +14,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::standard::band::{Band, holding};
+use crate::standard::band::likely_case;
 use crate::standard::numerology::{Case, Numerology, SubcarrierSpacing};
 use crate::transmit::ofdm::symbol_phase;
 
@@ -49,16 +49,8 @@ impl CarrierResets {
     /// contains the frequency; a wrong one of the two patterns at 30 kHz adds a constant to the phase
     /// of every beam.
     pub(crate) fn new(spacing: SubcarrierSpacing, ssb_freq_hz: f64) -> Self {
-        let is_possible = |case: &Case| case.spacing() == spacing;
-        let mut by_band = holding(ssb_freq_hz).flat_map(Band::cases);
-        let case = by_band.find(is_possible).unwrap_or(match spacing {
-            SubcarrierSpacing::Khz15 => Case::A,
-            SubcarrierSpacing::Khz30 => Case::C,
-            SubcarrierSpacing::Khz120 => Case::D,
-            SubcarrierSpacing::Khz240 => Case::E,
-        });
         Self {
-            case,
+            case: likely_case(spacing, ssb_freq_hz),
             numerology: Numerology::new(spacing, 256).ok(),
             ssb_freq_hz,
         }

@@ -1,6 +1,6 @@
 //! Delay, range rate, carrier phase and power of an SSB by the clock of the receiver.
 
-use nr_ssb::band::{Band, holding};
+use nr_ssb::band::likely_case;
 use nr_ssb::observables::Observables;
 use nr_ssb::observables::delay::Multipath;
 use nr_ssb::observables::range_rate::RateSource;
@@ -28,17 +28,9 @@ pub(super) struct RangingClock {
 impl RangingClock {
     /// Creates the converter; `None` for a numerology without SSBs at the base rate.
     pub fn new(spacing: SubcarrierSpacing, ssb_freq_hz: f64, period_s: f64) -> Option<Self> {
-        let is_possible = |case: &Case| case.spacing() == spacing;
-        let mut by_band = holding(ssb_freq_hz).flat_map(Band::cases);
-        let case = by_band.find(is_possible).unwrap_or(match spacing {
-            SubcarrierSpacing::Khz15 => Case::A,
-            SubcarrierSpacing::Khz30 => Case::C,
-            SubcarrierSpacing::Khz120 => Case::D,
-            SubcarrierSpacing::Khz240 => Case::E,
-        });
         Some(Self {
             numerology: Numerology::new(spacing, 256).ok()?,
-            case,
+            case: likely_case(spacing, ssb_freq_hz),
             base_rate_hz: spacing.base_rate_hz(),
             period_s,
             origin_s: None,

@@ -16,6 +16,26 @@ pub fn holding(frequency_hz: f64) -> impl Iterator<Item = &'static Band> {
     all().iter().filter(holds)
 }
 
+/// Returns the SSB pattern of the first band that contains `frequency_hz` and has this spacing, or
+/// of the spacing alone if there is none. At 30 kHz, the bands have two patterns.
+///
+/// ```
+/// use nr_ssb::{Case, SubcarrierSpacing::Khz30, band::likely_case};
+/// // n5 has pattern B, n78 pattern C.
+/// assert_eq!(likely_case(Khz30, 0.88e9), Case::B);
+/// assert_eq!(likely_case(Khz30, 3.5e9), Case::C);
+/// ```
+pub fn likely_case(spacing: SubcarrierSpacing, frequency_hz: f64) -> Case {
+    let mut by_band = holding(frequency_hz).flat_map(Band::cases);
+    let by_spacing = match spacing {
+        SubcarrierSpacing::Khz15 => Case::A,
+        SubcarrierSpacing::Khz30 => Case::C,
+        SubcarrierSpacing::Khz120 => Case::D,
+        SubcarrierSpacing::Khz240 => Case::E,
+    };
+    (by_band.find(|case| case.spacing() == spacing)).unwrap_or(by_spacing)
+}
+
 /// Burst set size at a frequency and subcarrier spacing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LikelyLmax {

@@ -4,5 +4,5 @@ mod lookup;
 mod operating_band;
 mod table;
 
-pub use lookup::{LikelyLmax, all, holding, likely_lmax};
+pub use lookup::{LikelyLmax, all, holding, likely_case, likely_lmax};
 pub use operating_band::{Band, Spectrum};
