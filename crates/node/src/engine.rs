@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use onboard::live::{LiveError, Outcome, SavedState, StreamConfig, TimeCheck};
-use onboard::localize::{OdometryVerdict, UpdateReason};
+use onboard::localize::{OdometryResult, UpdateReason};
 use onboard::monitor::ActiveFaults;
 use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
@@ -340,11 +340,11 @@ impl Engine {
         self.live.set_arrival(self.arrival_s(came));
         self.resume_earlier(sample)?;
         match self.live.odometry(sample) {
-            Ok(OdometryVerdict::DistanceJump { jump_m }) => {
+            Ok(OdometryResult::DistanceJump { jump_m }) => {
                 let text = format!("distance_m jumps by {jump_m:.4e} m; the speed is used instead");
                 self.event(Level::Warn, "odometry", text);
             }
-            Ok(OdometryVerdict::YawRateRefused { radps }) => {
+            Ok(OdometryResult::YawRateRefused { radps }) => {
                 let text = format!(
                     "yaw_rate_radps is {radps:.4e}, above vehicle.top_yaw_rate_radps; it is not used; check its unit"
                 );

@@ -6,9 +6,8 @@ use crate::geometry::Pose;
 use crate::link_budget::LinkBudget;
 use crate::localize::ekf::{EstimatedConstants, RangeState};
 use crate::localize::{
-    self, AngleMeasurement, AngleUpdate, Ekf, Integrity, IntegrityState, Localizer,
-    OdometryVerdict, OutOfSequenceBuffer, PoseEstimate, RangeUpdate, Recovered, UpdateReason,
-    UpdateVerdict,
+    self, AngleMeasurement, AngleUpdate, Ekf, Integrity, IntegrityState, Localizer, OdometryResult,
+    OutOfSequenceBuffer, PoseEstimate, RangeUpdate, Recovered, UpdateReason, UpdateResult,
 };
 use crate::manifold::Measurand;
 use crate::monitor::{ActiveFaults, Change, Fallback, Monitors};
@@ -164,7 +163,7 @@ pub struct AngleResult {
     /// Angle; `None` if the snapshots contain none.
     pub measured: Option<AngleMeasurement>,
     /// Verdict of the localizer.
-    pub verdict: UpdateVerdict,
+    pub verdict: UpdateResult,
     /// Wake-up time at this SSB, in seconds.
     pub wake_up_time_s: f64,
 }
@@ -283,7 +282,7 @@ impl Pipeline {
     pub fn odometry(
         &mut self,
         sample: &OdometrySample,
-    ) -> Result<Result<OdometryVerdict, OdometryDefect>, BoxError> {
+    ) -> Result<Result<OdometryResult, OdometryDefect>, BoxError> {
         if !sample.is_finite() {
             return Ok(Err(OdometryDefect::NotFinite));
         }
@@ -446,7 +445,7 @@ impl Pipeline {
         pci: u16,
         ssb_index: u8,
         measured: &RangeMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
+    ) -> Result<UpdateResult, BoxError> {
         let VisibilityModel {
             heads, excluded, ..
         } = &self.visibility_model;
@@ -457,7 +456,7 @@ impl Pipeline {
             } else {
                 UpdateReason::UnknownRadioHead
             };
-            return Ok(UpdateVerdict::unused(reason));
+            return Ok(UpdateResult::unused(reason));
         };
         self.localizer.update_range(head, measured)
     }
@@ -601,7 +600,7 @@ impl Pipeline {
             self.ranges.push(RangeUpdate {
                 head,
                 measured,
-                verdict: UpdateVerdict::unused(UpdateReason::Unusable),
+                verdict: UpdateResult::unused(UpdateReason::Unusable),
             });
         }
     }
@@ -622,7 +621,7 @@ impl Pipeline {
             None if excluded.iter().any(|head| sends(&head)) => UpdateReason::Excluded,
             None => UpdateReason::UnknownRadioHead,
         };
-        let verdict = UpdateVerdict::unused(reason);
+        let verdict = UpdateResult::unused(reason);
         if let (Some(&head), Some(measured)) = (head, measured) {
             self.burst.push(AngleUpdate {
                 number: self.aoa_estimates.len(),

@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use simulate::channel::Paths;
-use simulate::channel::tr38901::{Drop, Environment, Place, draw_drops};
+use simulate::channel::tr38901::{Drop, Environment, LinkGeometry, draw_drops};
 use simulate::scenario::ChannelModel;
 
 use crate::settings::SettingsError;
@@ -61,9 +61,9 @@ pub fn channel_drops(
             "distances, heights and the carrier must be finite and not negative",
         ));
     }
-    let places: Vec<Place> = level_m
+    let places: Vec<LinkGeometry> = level_m
         .iter()
-        .map(|&level_m| Place {
+        .map(|&level_m| LinkGeometry {
             level_m,
             head_m: head_height_m,
             array_m: array_height_m,

@@ -8,7 +8,7 @@ use onboard::live::{
     AngleObservation, Continuity, HeadStatus as CoreHead, Live as Core, LiveError,
     Outcome as CoreOutcome, RangeObservation, RangeValue, Status as CoreStatus, StreamConfig,
 };
-use onboard::localize::{OdometryVerdict, SelectedHypothesis};
+use onboard::localize::{OdometryResult, SelectedHypothesis};
 use onboard::observation::{MeasurementKind, OdometrySample};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -378,7 +378,7 @@ impl Live {
         });
         Ok(!matches!(
             verdict.map_err(live_error)?,
-            OdometryVerdict::DistanceJump { .. } | OdometryVerdict::YawRateRefused { .. }
+            OdometryResult::DistanceJump { .. } | OdometryResult::YawRateRefused { .. }
         ))
     }
 

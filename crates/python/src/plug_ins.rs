@@ -9,8 +9,8 @@ use onboard::BoxError;
 use onboard::energy::EstimateCost;
 use onboard::estimator::{AngleEstimator, EstimatedAngle};
 use onboard::geometry::Pose;
-use onboard::localize::OdometryVerdict;
-use onboard::localize::{AngleMeasurement, Localizer, PoseEstimate, UpdateReason, UpdateVerdict};
+use onboard::localize::OdometryResult;
+use onboard::localize::{AngleMeasurement, Localizer, PoseEstimate, UpdateReason, UpdateResult};
 use onboard::manifold::Measurand;
 use onboard::observation::{OdometrySample, SensedSsb as CoreSensed, SsbObservation};
 use onboard::radio_head::RadioHead as CoreHead;
@@ -418,7 +418,7 @@ pub fn made_for_run(
 }
 
 impl Localizer for PythonLocalizer {
-    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
+    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryResult, BoxError> {
         let arguments = (
             sample.time_s,
             sample.distance_m,
@@ -430,17 +430,17 @@ impl Localizer for PythonLocalizer {
             let called = self.0.bind(py).call_method1("odometry", arguments);
             called.map(drop).map_err(|error| at(py, error, &what))
         })?;
-        Ok(OdometryVerdict::Accepted)
+        Ok(OdometryResult::Accepted)
     }
 
     fn update(
         &mut self,
         head: &CoreHead,
         measured: &AngleMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
+    ) -> Result<UpdateResult, BoxError> {
         // The method `angle` is defined for angles at the vehicle.
         if measured.kind.is_at_head() {
-            return Ok(UpdateVerdict::unused(UpdateReason::Unusable));
+            return Ok(UpdateResult::unused(UpdateReason::Unusable));
         }
         let accepted = Python::attach(|py| {
             let what = format!("in localizer.angle, at {} s", measured.time_s);
@@ -466,9 +466,9 @@ impl Localizer for PythonLocalizer {
         } else {
             UpdateReason::Outlier
         };
-        Ok(UpdateVerdict {
+        Ok(UpdateResult {
             accepted,
-            ..UpdateVerdict::unused(reason)
+            ..UpdateResult::unused(reason)
         })
     }
 

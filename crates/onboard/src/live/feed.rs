@@ -22,15 +22,15 @@ use super::time_check::TimeCheck;
 use crate::BoxError;
 use crate::burst::{Burst, HasSsb};
 use crate::energy::{Energy, EnergyModel};
+use crate::expected_angle::ExpectedAngle;
 use crate::geometry::{Pose, wrap_angle};
-use crate::localize::{AngleMeasurement, MeasurementKind, OdometryVerdict, UpdateReason};
+use crate::localize::{AngleMeasurement, MeasurementKind, OdometryResult, UpdateReason};
 use crate::monitor::Confirmation;
 use crate::observation::{BURST_S, OdometrySample, SensedSsb};
 use crate::pipeline::{Custom, OdometryDefect, Pipeline};
 use crate::radio_head::RadioHead;
 use crate::receive::ReceiverConfig;
 use crate::settings::{Boundary, Extent, Platform, Site, Vehicle};
-use crate::sight::Sight;
 
 /// Maximum number of stored outcomes.
 const OUTCOMES: usize = 256;
@@ -86,7 +86,7 @@ pub struct Live {
     vehicle: Vehicle,
     onboard: Pipeline,
     has_own_localizer: bool,
-    sight: Sight,
+    expected_angle: ExpectedAngle,
     stream: Option<SampleStream>,
     /// Angles of an incomplete burst.
     angles: Vec<(SensedSsb, AngleMeasurement)>,
@@ -138,7 +138,7 @@ impl Live {
         let stream = stream.map(|config| SampleStream::new(config, receiver()));
         let heads = RadioHead::heard(site, &vehicle);
         Ok(Self {
-            sight: Sight::new(&vehicle),
+            expected_angle: ExpectedAngle::new(&vehicle),
             stream: stream.transpose()?,
             angles: Vec::with_capacity(ANGLES),
             outcomes: VecDeque::with_capacity(OUTCOMES),
@@ -263,7 +263,7 @@ impl Live {
     /// # Errors
     /// [`LiveError::Time`] for an implausible time, [`LiveError::Odometry`] for a value that is not
     /// finite.
-    pub fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, LiveError> {
+    pub fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryResult, LiveError> {
         let is_infinite = |value: f64| value.is_infinite();
         if !sample.speed_mps.is_finite()
             || is_infinite(sample.distance_m)
@@ -371,7 +371,9 @@ impl Live {
             phase_rad: angle.phase_rad,
             phase_sigma_rad: sigma_rad,
             angle_rad: match angle.kind {
-                MeasurementKind::Angle => self.sight.measurand().angle_rad(angle.phase_rad),
+                MeasurementKind::Angle => {
+                    self.expected_angle.measurand().angle_rad(angle.phase_rad)
+                }
                 MeasurementKind::AngleAtHead => wrap_angle(angle.phase_rad),
             },
             snr_db,
@@ -519,7 +521,7 @@ impl Live {
                 .zip(angle_result.measured)
                 .map(|(it, measured)| {
                     let (kind, value_rad) = (measured.kind, measured.phase_rad);
-                    (self.sight).residual_rad(kind, after.pose, &it.head, value_rad)
+                    (self.expected_angle).residual_rad(kind, after.pose, &it.head, value_rad)
                 })
                 .filter(|it| it.is_finite());
             if verdict.accepted {

@@ -3,7 +3,7 @@
 
 use super::localizer::{Localizer, copy_into};
 use super::output::PoseEstimate;
-use super::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
+use super::output::{OdometryResult, UpdateReason, UpdateResult};
 use crate::BoxError;
 use crate::geometry::{Point, Pose, wrap_angle};
 use crate::observation::{AngleMeasurement, MeasurementKind, OdometrySample};
@@ -67,7 +67,7 @@ impl DeadReckoning {
     }
 
     /// Updates the heading with an angle of arrival.
-    fn take_heading(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+    fn take_heading(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateResult {
         // Equation 3: AoIS = tan⁻¹(Δy/Δx), from the estimated position to the radio head.
         let aois_rad = self.pose.point().bearing_rad(head.position);
         // A uniform linear array is ambiguous between left and right; the estimated pose resolves
@@ -96,9 +96,9 @@ impl DeadReckoning {
         } else {
             UpdateReason::Unusable
         };
-        UpdateVerdict {
+        UpdateResult {
             accepted: usable,
-            ..UpdateVerdict::unused(reason)
+            ..UpdateResult::unused(reason)
         }
     }
 
@@ -115,13 +115,13 @@ impl DeadReckoning {
 }
 
 impl Localizer for DeadReckoning {
-    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
+    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryResult, BoxError> {
         let verdict = match self.odometry.replace(*sample) {
             None => {
                 self.distance_m = sample.distance_m;
-                OdometryVerdict::First
+                OdometryResult::First
             }
-            Some(_) => OdometryVerdict::Accepted,
+            Some(_) => OdometryResult::Accepted,
         };
         self.advance_to(sample.time_s);
         Ok(verdict)
@@ -131,12 +131,12 @@ impl Localizer for DeadReckoning {
         &mut self,
         head: &RadioHead,
         measured: &AngleMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
+    ) -> Result<UpdateResult, BoxError> {
         self.advance_to(measured.time_s);
         // An angle measured at the radio head does not depend on the heading.
         Ok(match measured.kind {
             MeasurementKind::Angle => self.take_heading(head, measured),
-            MeasurementKind::AngleAtHead => UpdateVerdict::unused(UpdateReason::Unusable),
+            MeasurementKind::AngleAtHead => UpdateResult::unused(UpdateReason::Unusable),
         })
     }
 

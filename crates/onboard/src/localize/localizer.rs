@@ -4,7 +4,7 @@ use std::any::Any;
 
 use super::ekf::Ekf;
 use super::output::PoseEstimate;
-use super::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
+use super::output::{OdometryResult, UpdateReason, UpdateResult};
 use crate::BoxError;
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
@@ -32,7 +32,7 @@ pub trait Localizer: Any + Send {
     ///
     /// # Errors
     /// Errors of the localizer; an error ends the drive.
-    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError>;
+    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryResult, BoxError>;
 
     /// Updates with an angle to a radio head.
     ///
@@ -42,7 +42,7 @@ pub trait Localizer: Any + Send {
         &mut self,
         head: &RadioHead,
         measured: &AngleMeasurement,
-    ) -> Result<UpdateVerdict, BoxError>;
+    ) -> Result<UpdateResult, BoxError>;
 
     /// Updates with a range to a radio head, if ranges are supported.
     ///
@@ -52,9 +52,9 @@ pub trait Localizer: Any + Send {
         &mut self,
         head: &RadioHead,
         measured: &RangeMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
+    ) -> Result<UpdateResult, BoxError> {
         let _ = (head, measured);
-        Ok(UpdateVerdict::unused(UpdateReason::Unusable))
+        Ok(UpdateResult::unused(UpdateReason::Unusable))
     }
 
     /// Returns the estimated pose at `time_s`, which is not before the newest odometry.
@@ -114,7 +114,7 @@ pub fn copy_into<L: Localizer + Clone>(
 
 /// Filter without search and monitoring.
 impl Localizer for Ekf {
-    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
+    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryResult, BoxError> {
         Ok(Self::odometry(self, sample))
     }
 
@@ -122,7 +122,7 @@ impl Localizer for Ekf {
         &mut self,
         head: &RadioHead,
         measured: &AngleMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
+    ) -> Result<UpdateResult, BoxError> {
         Ok(Self::update(self, head, measured))
     }
 
@@ -130,7 +130,7 @@ impl Localizer for Ekf {
         &mut self,
         head: &RadioHead,
         measured: &RangeMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
+    ) -> Result<UpdateResult, BoxError> {
         Ok(Self::update_range(self, head, measured))
     }
 

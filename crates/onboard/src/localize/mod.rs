@@ -24,6 +24,6 @@ pub use ekf::Ekf;
 pub use localizer::{Localizer, Recovered, copy_into};
 pub use out_of_sequence::{AngleUpdate, HISTORY_S, OutOfSequenceBuffer, RangeUpdate};
 pub use output::{
-    InitialPose, Integrity, IntegrityState, OdometryVerdict, PoseEstimate, SelectedHypothesis,
-    UpdateReason, UpdateVerdict,
+    InitialPose, Integrity, IntegrityState, OdometryResult, PoseEstimate, SelectedHypothesis,
+    UpdateReason, UpdateResult,
 };

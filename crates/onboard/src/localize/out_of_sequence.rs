@@ -9,7 +9,7 @@
 use std::collections::VecDeque;
 
 use super::localizer::Localizer;
-use super::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
+use super::output::{OdometryResult, UpdateReason, UpdateResult};
 use crate::BoxError;
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
@@ -57,7 +57,7 @@ pub struct AngleUpdate {
     /// Measured angle.
     pub measured: AngleMeasurement,
     /// Result of the update.
-    pub verdict: UpdateVerdict,
+    pub verdict: UpdateResult,
 }
 
 /// Range, range rate or carrier phase, and the result of its update.
@@ -68,7 +68,7 @@ pub struct RangeUpdate {
     /// Measured value.
     pub measured: RangeMeasurement,
     /// Result of the update.
-    pub verdict: UpdateVerdict,
+    pub verdict: UpdateResult,
 }
 
 /// Measurement with a result, of a burst.
@@ -76,7 +76,7 @@ trait Update {
     fn time_s(&self) -> f64;
     /// Returns the input, with its index in its burst while the burst is processed.
     fn event(&self, number: Option<usize>) -> Event;
-    fn set(&mut self, verdict: UpdateVerdict);
+    fn set(&mut self, verdict: UpdateResult);
 }
 
 impl Update for AngleUpdate {
@@ -88,7 +88,7 @@ impl Update for AngleUpdate {
         Event::Angle(self.head, self.measured, number)
     }
 
-    fn set(&mut self, verdict: UpdateVerdict) {
+    fn set(&mut self, verdict: UpdateResult) {
         self.verdict = verdict;
     }
 }
@@ -102,7 +102,7 @@ impl Update for RangeUpdate {
         Event::Range(self.head, self.measured, number)
     }
 
-    fn set(&mut self, verdict: UpdateVerdict) {
+    fn set(&mut self, verdict: UpdateResult) {
         self.verdict = verdict;
     }
 }
@@ -165,7 +165,7 @@ impl OutOfSequenceBuffer {
     ///
     /// # Errors
     /// Errors of the localizer.
-    pub fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
+    pub fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryResult, BoxError> {
         let verdict = self.localizer.odometry(sample)?;
         self.remember(Event::Odometry(*sample));
         Ok(verdict)
@@ -216,11 +216,11 @@ impl OutOfSequenceBuffer {
         &mut self,
         head: &RadioHead,
         measured: &RangeMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
+    ) -> Result<UpdateResult, BoxError> {
         let mut update = [RangeUpdate {
             head: *head,
             measured: *measured,
-            verdict: UpdateVerdict::unused(UpdateReason::Unusable),
+            verdict: UpdateResult::unused(UpdateReason::Unusable),
         }];
         if measured.time_s.is_finite() {
             self.update_ranges(&mut update)?;
@@ -230,7 +230,7 @@ impl OutOfSequenceBuffer {
     }
 
     /// Passes an input to the localizer and returns the result of a measurement.
-    fn process(&mut self, event: &Event) -> Result<Option<UpdateVerdict>, BoxError> {
+    fn process(&mut self, event: &Event) -> Result<Option<UpdateResult>, BoxError> {
         match event {
             Event::Odometry(sample) => self.localizer.odometry(sample).map(|_| None),
             Event::Angle(head, measured, _) => self.localizer.update(head, measured).map(Some),
@@ -247,7 +247,7 @@ impl OutOfSequenceBuffer {
             } else {
                 UpdateReason::TooLate
             };
-            update.set(UpdateVerdict::unused(reason));
+            update.set(UpdateResult::unused(reason));
         }
         let copies = self.kept.iter().take(self.copies);
         let oldest_s = (copies.clone().next()).map_or(f64::INFINITY, |copy| copy.time_s);

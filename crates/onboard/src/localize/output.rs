@@ -175,7 +175,7 @@ impl Integrity {
 
 /// Result of an update with an angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct UpdateVerdict {
+pub struct UpdateResult {
     /// Whether the angle changed the pose.
     pub accepted: bool,
     /// Reason for acceptance or rejection.
@@ -186,7 +186,7 @@ pub struct UpdateVerdict {
     pub threshold: Option<f64>,
 }
 
-impl UpdateVerdict {
+impl UpdateResult {
     /// Creates the verdict on an angle without an innovation.
     pub const fn unused(reason: UpdateReason) -> Self {
         Self {
@@ -233,7 +233,7 @@ impl UpdateReason {
 
 /// Result of the processing of an odometry sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum OdometryVerdict {
+pub enum OdometryResult {
     /// The sample was used.
     Accepted,
     /// First sample: it defines the origin of the distance.
@@ -275,7 +275,7 @@ pub enum OdometryVerdict {
     NotFinite,
 }
 
-impl OdometryVerdict {
+impl OdometryResult {
     /// Whether the sample changed the state.
     pub const fn accepted(&self) -> bool {
         !matches!(

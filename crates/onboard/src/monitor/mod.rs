@@ -21,12 +21,12 @@ pub use fallback::Fallback;
 pub use fault::{ActiveFault, ActiveFaults, Fault, FaultSource};
 pub use motion::MotionMonitor;
 
+use crate::expected_angle::ExpectedAngle;
 use crate::geometry::Pose;
 use crate::localize::modes::OdometryTest;
 use crate::localize::{AngleUpdate, Ekf, UpdateReason};
 use crate::observation::{OdometrySample, SsbObservation};
 use crate::settings::{Site, Vehicle};
-use crate::sight::Sight;
 
 /// A change of the localizer that a fault of the odometry requires.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,7 +62,7 @@ impl Monitors {
     pub fn new(site: &Site, vehicle: &Vehicle, heads: usize) -> Self {
         Self {
             contradiction: Contradiction::default(),
-            motion: MotionMonitor::new(Sight::new(vehicle), heads),
+            motion: MotionMonitor::new(ExpectedAngle::new(vehicle), heads),
             constancy: Constancy::default(),
             test: None,
             channels: ChannelMonitor::new(site, vehicle, heads),

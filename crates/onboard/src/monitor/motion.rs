@@ -10,11 +10,11 @@
 //! * Motion: the likelihood of the odometry is compared with that of a standing vehicle and of reversed motion, by a
 //!   cumulative sum for each radio head (Page 1954). The sum over the radio heads without the largest is tested.
 
+use crate::expected_angle::ExpectedAngle;
 use crate::geometry::{Pose, wrap_angle};
 use crate::localize::AngleUpdate;
 use crate::observation::{MeasurementKind, OdometrySample};
 use crate::radio_head::RadioHead;
-use crate::sight::Sight;
 
 use super::fault::Fault;
 
@@ -110,7 +110,7 @@ struct Burst {
 /// Compares the motion by the odometry with the angles.
 #[derive(Debug)]
 pub struct MotionMonitor {
-    sight: Sight,
+    expected_angle: ExpectedAngle,
     references: Vec<Reference>,
     last: Option<OdometrySample>,
     yaw_rad: f64,
@@ -125,9 +125,9 @@ pub struct MotionMonitor {
 
 impl MotionMonitor {
     /// A monitor for this number of radio heads.
-    pub fn new(sight: Sight, heads: usize) -> Self {
+    pub fn new(expected_angle: ExpectedAngle, heads: usize) -> Self {
         Self {
-            sight,
+            expected_angle,
             references: Vec::with_capacity(heads),
             last: None,
             yaw_rad: 0.0,
@@ -281,7 +281,7 @@ impl MotionMonitor {
         let change_rad = |moved_m: f64, turn_rad: f64| {
             let pose = reference.pose.along_chord(moved_m, turn_rad);
             let residual_rad =
-                (self.sight).residual_rad(seen.kind, pose, &seen.head, seen.value_rad);
+                (self.expected_angle).residual_rad(seen.kind, pose, &seen.head, seen.value_rad);
             wrap_angle(residual_rad - reference.residual_rad)
         };
         let mut next = reference;
@@ -354,9 +354,12 @@ impl MotionMonitor {
             pose: seen.pose,
             distance_m: seen.distance_m,
             yaw_rad: seen.yaw_rad,
-            residual_rad: self
-                .sight
-                .residual_rad(seen.kind, seen.pose, &seen.head, seen.value_rad),
+            residual_rad: self.expected_angle.residual_rad(
+                seen.kind,
+                seen.pose,
+                &seen.head,
+                seen.value_rad,
+            ),
             variance: seen.variance,
             evidence: [0.0; 2],
             jumped_s: None,

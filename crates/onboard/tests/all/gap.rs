@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use onboard::localize::Ekf;
 use onboard::localize::ekf::EkfConfig;
-use onboard::localize::{InitialPose, OdometryVerdict};
+use onboard::localize::{InitialPose, OdometryResult};
 use onboard::observation::OdometrySample;
 use onboard::road::Gap;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
@@ -55,19 +55,19 @@ fn sample(number: u32) -> OdometrySample {
 #[test]
 fn the_gap_is_reported_and_increases_the_covariance_until_the_lane_is_followed_again() {
     let (mut tracker, gap) = tracker(60.0, 0.0, 0.1);
-    assert_eq!(tracker.odometry(&sample(0)), OdometryVerdict::First);
+    assert_eq!(tracker.odometry(&sample(0)), OdometryResult::First);
     let lane_m2 = tracker.config().lane_keeping.stationary()[0];
     let (mut told_m, mut before) = (Vec::new(), 0.0);
     for number in 1..(150 * 50 / 4) {
         let verdict = tracker.odometry(&sample(number));
         let along_m = 60.0 + 0.08 * f64::from(number);
         let [larger, smaller] = tracker.pose(0.02 * f64::from(number)).principal_variances();
-        if verdict == OdometryVerdict::Accepted {
+        if verdict == OdometryResult::Accepted {
             // Across the road, the standard deviation is at most that of the lane keeping.
             assert!(smaller < (1.0 + 1e-9) * lane_m2, "{along_m} {smaller}");
         } else {
             let Gap { from_m, to_m } = gap;
-            assert_eq!(verdict, OdometryVerdict::InMapGap { from_m, to_m });
+            assert_eq!(verdict, OdometryResult::InMapGap { from_m, to_m });
             if !told_m.is_empty() {
                 assert!(larger > before, "{along_m}");
             }

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use onboard::geometry::Pose;
 use onboard::localize::{
     AngleMeasurement, AngleUpdate, MeasurementKind, OutOfSequenceBuffer, UpdateReason,
-    UpdateVerdict, built_in,
+    UpdateResult, built_in,
 };
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
@@ -108,7 +108,7 @@ fn drive(seed: u64) {
                 number: burst.len(),
                 head: *head,
                 measured,
-                verdict: UpdateVerdict::unused(UpdateReason::Unusable),
+                verdict: UpdateResult::unused(UpdateReason::Unusable),
             });
         }
         localizer.update(&mut burst).unwrap();

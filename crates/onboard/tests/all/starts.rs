@@ -39,33 +39,33 @@ heading_std_rad = 0.05
 correlated_noise_fraction = 0.25
 ";
 
-/// A place with radio heads, and a closed path in it: an oval of two straights and two half circles.
+/// An environment with radio heads, and a closed path in it: an oval of two straights and two half circles.
 #[expect(clippy::struct_field_names, reason = "every name ends with its unit")]
-struct Place {
+struct Environment {
     heads_m: &'static [[f64; 2]],
     straight_m: f64,
     radius_m: f64,
 }
 
-const HALL: Place = Place {
+const HALL: Environment = Environment {
     heads_m: &[[-25.0, -15.0], [25.0, -15.0], [25.0, 15.0], [-25.0, 15.0]],
     straight_m: 20.0,
     radius_m: 6.0,
 };
 
-const ONE_SIDED: Place = Place {
+const ONE_SIDED: Environment = Environment {
     heads_m: &[[-25.0, 15.0], [0.0, 17.0], [25.0, 15.0]],
     straight_m: 20.0,
     radius_m: 6.0,
 };
 
-const CORRIDOR: Place = Place {
+const CORRIDOR: Environment = Environment {
     heads_m: &[[-55.0, -2.0], [-20.0, 2.5], [20.0, -2.5], [55.0, 2.0]],
     straight_m: 100.0,
     radius_m: 1.2,
 };
 
-impl Place {
+impl Environment {
     /// Pose after a distance along the path, counter-clockwise from the middle of the lower straight.
     fn pose(&self, way_m: f64) -> Pose {
         let half_m = 0.5 * self.straight_m;
@@ -123,15 +123,15 @@ struct Driven {
 }
 
 /// Drives with the given start, or an unknown one.
-fn drive(place: &Place, seed: u64, given: Option<fn(Pose) -> Pose>) -> Driven {
+fn drive(environment: &Environment, seed: u64, given: Option<fn(Pose) -> Pose>) -> Driven {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let site = place.site();
+    let site = environment.site();
     let mut vehicle = Vehicle::from_toml(VEHICLE, "cart", &Shipped).unwrap();
     vehicle.start.known = given.is_some();
     let heads = RadioHead::heard(&site, &vehicle);
-    let lap_m = 2.0 * (place.straight_m + PI * place.radius_m);
+    let lap_m = 2.0 * (environment.straight_m + PI * environment.radius_m);
     let start_m = rng.random::<f64>() * lap_m;
-    let truth = place.pose(start_m);
+    let truth = environment.pose(start_m);
     let mut normal = move || -> [f64; 2] { [rng.sample(StandardNormal), rng.random()] };
     let near = Pose {
         x_m: truth.x_m + 0.3 * normal()[0],
@@ -147,7 +147,7 @@ fn drive(place: &Place, seed: u64, given: Option<fn(Pose) -> Pose>) -> Driven {
     for step in 1..=(DRIVE_S / STEP_S) as u32 {
         let time_s = STEP_S * f64::from(step);
         way_m += SPEED_MPS * STEP_S;
-        let pose = place.pose(way_m);
+        let pose = environment.pose(way_m);
         read_m += scale * SPEED_MPS * STEP_S + 0.01 * (SPEED_MPS * STEP_S).sqrt() * normal()[0];
         let turned_rad = (pose.heading_rad - before.heading_rad + PI).rem_euclid(TAU) - PI;
         before = pose;
@@ -247,7 +247,7 @@ fn table_of_starts() {
     let seeds: u64 = std::env::var("STARTS_SEEDS").map_or(2, |it| it.parse().unwrap());
     let [only, at] =
         ["STARTS_ONLY", "STARTS_PLACE"].map(|it| std::env::var(it).unwrap_or_default());
-    for (name, place) in [
+    for (name, environment) in [
         ("hall", &HALL),
         ("one-sided", &ONE_SIDED),
         ("corridor", &CORRIDOR),
@@ -263,7 +263,7 @@ fn table_of_starts() {
                     unavailable,
                     wrong_s,
                     located_s,
-                } = drive(place, seed, *given);
+                } = drive(environment, seed, *given);
                 println!(
                     "{name:10} {what:9} {seed} RMS {rms_m:6.2} m, ok {:5.1} %, unavailable {:5.1} %, wrong {wrong_s:5.2} s, located {located_s:5.1} s",
                     100.0 * ok,
@@ -276,12 +276,12 @@ fn table_of_starts() {
 
 #[test]
 fn a_correct_start_stays_available() {
-    for (name, place) in [
+    for (name, environment) in [
         ("hall", &HALL),
         ("one-sided", &ONE_SIDED),
         ("corridor", &CORRIDOR),
     ] {
-        let driven = drive(place, 0, Some(|it| it));
+        let driven = drive(environment, 0, Some(|it| it));
         assert!(
             driven.ok >= 0.9 && driven.unavailable == 0.0,
             "{name}: {driven:?}"
@@ -293,14 +293,14 @@ fn a_correct_start_stays_available() {
 #[test]
 fn a_wrong_start_costs_seconds() {
     // Seed 2 of the one-sided place begins on the lower straight, outside the bounding box of the radio heads.
-    for (name, place, seed) in [
+    for (name, environment, seed) in [
         ("hall", &HALL, 0),
         ("hall", &HALL, 1),
         ("one-sided", &ONE_SIDED, 0),
         ("one-sided", &ONE_SIDED, 2),
     ] {
         for (what, given) in STARTS.iter().skip(1) {
-            let driven = drive(place, seed, *given);
+            let driven = drive(environment, seed, *given);
             assert!(
                 driven.located_s <= 30.0 && driven.wrong_s <= 1.0,
                 "{name}, {what}, seed {seed}: {driven:?}"

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use onboard::geometry::Pose;
 use onboard::localize::ekf::EkfConfig;
 use onboard::localize::{AngleMeasurement, Ekf, MeasurementKind, UpdateReason};
-use onboard::localize::{InitialPose, OdometryVerdict};
+use onboard::localize::{InitialPose, OdometryResult};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::road::Road;
@@ -31,10 +31,10 @@ fn tracker() -> (Ekf, RadioHead) {
     // A filter that estimates biases explains an outlier by a large one.
     config.multipath_bias_probability = 0.0;
     let mut tracker = Ekf::new(config, Some(Arc::new(road())), &heads, &start);
-    assert_eq!(tracker.odometry(&sample(0.0, 0.0)), OdometryVerdict::First);
+    assert_eq!(tracker.odometry(&sample(0.0, 0.0)), OdometryResult::First);
     assert_eq!(
         tracker.odometry(&sample(0.1, 0.4)),
-        OdometryVerdict::Accepted
+        OdometryResult::Accepted
     );
     (tracker, heads[0])
 }
@@ -135,10 +135,10 @@ fn invalid_odometry_is_reported_and_does_not_change_the_state() {
     let (mut tracker, _) = tracker();
     let before = tracker.clone();
     for (sample, verdict) in [
-        (sample(0.1, 0.4), OdometryVerdict::Duplicate),
-        (sample(0.05, 0.3), OdometryVerdict::TimeBackwards),
-        (sample(f64::NAN, 0.5), OdometryVerdict::NotFinite),
-        (sample(0.2, f64::INFINITY), OdometryVerdict::NotFinite),
+        (sample(0.1, 0.4), OdometryResult::Duplicate),
+        (sample(0.05, 0.3), OdometryResult::TimeBackwards),
+        (sample(f64::NAN, 0.5), OdometryResult::NotFinite),
+        (sample(0.2, f64::INFINITY), OdometryResult::NotFinite),
     ] {
         assert_eq!(tracker.odometry(&sample), verdict);
         assert_eq!(tracker, before);
@@ -158,7 +158,7 @@ fn a_vehicle_leaves_the_map_and_returns() {
         let place_m = 4.0 * (turn_s - (time_s - turn_s).abs());
         let verdict = tracker.odometry(&sample(time_s, place_m));
         assert!(verdict.accepted(), "{verdict:?}");
-        if let OdometryVerdict::BeyondMap { by_m } = verdict {
+        if let OdometryResult::BeyondMap { by_m } = verdict {
             beyond += 1;
             assert!(
                 (by_m - (place_m - length_m)).abs() < 1.0,
@@ -190,7 +190,7 @@ fn a_gap_is_bridged_and_a_jump_increases_the_covariance() {
     let (mut gap, _) = tracker();
     assert!(matches!(
         gap.odometry(&sample(2.1, 8.4)),
-        OdometryVerdict::AfterGap { .. }
+        OdometryResult::AfterGap { .. }
     ));
     let at_m = gap.pose(2.1).pose.x_m;
     assert!((at_m - 8.4).abs() < 0.05, "{at_m}");
@@ -198,7 +198,7 @@ fn a_gap_is_bridged_and_a_jump_increases_the_covariance() {
     let (mut jump, _) = tracker();
     assert!(matches!(
         jump.odometry(&sample(2.1, 5000.0)),
-        OdometryVerdict::DistanceJump { .. }
+        OdometryResult::DistanceJump { .. }
     ));
     // The counter is invalid, the speed is valid: 2 s at 4 m/s.
     assert!((jump.pose(2.1).pose.x_m - 8.4).abs() < 0.05);

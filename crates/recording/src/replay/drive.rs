@@ -2,7 +2,7 @@
 
 use onboard::burst::{Burst, HasSsb, first_burst};
 use onboard::geometry::Pose;
-use onboard::localize::OdometryVerdict;
+use onboard::localize::OdometryResult;
 use onboard::localize::Recovered;
 use onboard::localize::ekf::{EstimatedConstants, RangeState};
 use onboard::monitor::ActiveFaults;
@@ -345,7 +345,7 @@ impl<'a> Replay<'a> {
             self.ranges_before(at_s)?;
             let verdict = self.onboard.odometry(sample);
             match verdict.map_err(ReplayError::Custom)? {
-                Ok(OdometryVerdict::DistanceJump { jump_m }) => self.remark(
+                Ok(OdometryResult::DistanceJump { jump_m }) => self.remark(
                     at_s,
                     format!(
                         "odometry at {at_s} s: the distance jumps by {} m, the speed was \
@@ -353,7 +353,7 @@ impl<'a> Replay<'a> {
                         number(jump_m)
                     ),
                 ),
-                Ok(OdometryVerdict::YawRateRefused { radps }) => self.remark(
+                Ok(OdometryResult::YawRateRefused { radps }) => self.remark(
                     at_s,
                     format!(
                         "odometry at {at_s} s: no vehicle turns by {} rad/s, its yaw rate was \
@@ -361,7 +361,7 @@ impl<'a> Replay<'a> {
                         number(radps)
                     ),
                 ),
-                Ok(OdometryVerdict::BeyondMap { by_m }) => {
+                Ok(OdometryResult::BeyondMap { by_m }) => {
                     if !self.beyond_map {
                         let text = format!(
                             "odometry at {at_s} s: {by_m:.1} m beyond the end of the road, \
@@ -371,7 +371,7 @@ impl<'a> Replay<'a> {
                     }
                     self.beyond_map = true;
                 }
-                Ok(OdometryVerdict::InMapGap { from_m, to_m }) => {
+                Ok(OdometryResult::InMapGap { from_m, to_m }) => {
                     self.beyond_map = false;
                     if !self.gaps_m.contains(&from_m) {
                         let text = format!(

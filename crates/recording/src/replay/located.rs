@@ -5,7 +5,7 @@ use std::collections::btree_map::Entry;
 
 use onboard::AngleResult;
 use onboard::localize::ekf::EstimatedConstants;
-use onboard::localize::{PoseEstimate, UpdateVerdict};
+use onboard::localize::{PoseEstimate, UpdateResult};
 
 use crate::range_log::LoggedRange;
 
@@ -33,7 +33,7 @@ pub struct LocatedRange {
     /// The range.
     pub range: LoggedRange,
     /// Verdict of the localizer.
-    pub verdict: UpdateVerdict,
+    pub verdict: UpdateResult,
 }
 
 /// Remark on one item of the input.

@@ -100,21 +100,21 @@ fn scan_band(
         ..Scan::default()
     };
     let mut votes = ExchangeVotes::default();
-    let places = if let Some(hz) = settings.ssb_freq_hz {
-        let places = given_places(rate_hz, hz, settings.spacing);
+    let candidates = if let Some(hz) = settings.ssb_freq_hz {
+        let candidates = given_candidates(rate_hz, hz, settings.spacing);
         let duration_s = source.length() as f64 / rate_hz;
         found
             .searched
-            .extend(places.iter().map(|place| SearchScope {
-                spacing: place.spacing,
+            .extend(candidates.iter().map(|candidate| SearchScope {
+                spacing: candidate.spacing,
                 places: Places::Given {
                     ssb_freq_hz: hz,
-                    cfo_hz: cfo_range_hz(settings, place),
+                    cfo_hz: cfo_range_hz(settings, candidate),
                 },
                 duration_s,
                 channels: slices.len(),
             }));
-        places
+        candidates
     } else {
         let faults = found.faults.iter();
         let faulty: Vec<usize> = faults.filter_map(ChannelFault::channel).collect();
@@ -128,20 +128,20 @@ fn scan_band(
         search.places(source, &mut found.searched)?
     };
     // Divide the false-alarm probability among the searched positions.
-    let false_alarm = FALSE_ALARM / places.len() as f64;
-    for place in places {
+    let false_alarm = FALSE_ALARM / candidates.len() as f64;
+    for candidate in candidates {
         let mut search = SsbSearch::new(SsbSearchConfig {
             name: file.clone(),
             // A centre frequency of 0 Hz means an unknown one; a given SSB frequency is absolute.
             absolute: centre_hz > 0.0 || settings.ssb_freq_hz.is_some(),
             array: settings.array.clone(),
             false_alarm,
-            cfo_range_hz: cfo_range_hz(settings, &place),
+            cfo_range_hz: cfo_range_hz(settings, &candidate),
             ..SsbSearchConfig::new(
                 rate_hz,
                 centre_hz,
-                place.ssb_freq_hz,
-                place.spacing,
+                candidate.ssb_freq_hz,
+                candidate.spacing,
                 source.channels(),
             )
         })?;
@@ -170,27 +170,31 @@ fn scan_band(
 
 /// Frequency and subcarrier spacing of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Place {
+struct SsbCandidate {
     ssb_freq_hz: f64,
     spacing: SubcarrierSpacing,
 }
 
-fn given_places(rate_hz: f64, ssb_freq_hz: f64, spacing: Option<SubcarrierSpacing>) -> Vec<Place> {
+fn given_candidates(
+    rate_hz: f64,
+    ssb_freq_hz: f64,
+    spacing: Option<SubcarrierSpacing>,
+) -> Vec<SsbCandidate> {
     // A given spacing may cause an error; an assumed one is omitted if it is impossible.
     let guessed = SubcarrierSpacing::of_range(ssb_freq_hz).into_iter();
     let possible = guessed.filter(|one| spacing.is_none() && one.base_rate_hz() <= rate_hz);
-    let place = |spacing| Place {
+    let candidate = |spacing| SsbCandidate {
         ssb_freq_hz,
         spacing,
     };
-    spacing.into_iter().chain(possible).map(place).collect()
+    spacing.into_iter().chain(possible).map(candidate).collect()
 }
 
 /// Returns the maximum carrier frequency offset of the search in either direction (Hz).
-fn cfo_range_hz(settings: &ScanSettings, place: &Place) -> f64 {
+fn cfo_range_hz(settings: &ScanSettings, candidate: &SsbCandidate) -> f64 {
     let given = settings.cfo_ppm.filter(|_| settings.ssb_freq_hz.is_some());
-    given.map_or(0.5 * place.spacing.hz(), |ppm| {
-        1e-6 * ppm * place.ssb_freq_hz
+    given.map_or(0.5 * candidate.spacing.hz(), |ppm| {
+        1e-6 * ppm * candidate.ssb_freq_hz
     })
 }
 
@@ -210,7 +214,7 @@ impl BandSearch {
         &self,
         source: &mut dyn IqSource,
         searched: &mut Vec<SearchScope>,
-    ) -> Result<Vec<Place>, ScanError> {
+    ) -> Result<Vec<SsbCandidate>, ScanError> {
         let rate_hz = source.sample_rate_hz();
         let file = source.name();
         let failed = |error| match error {
@@ -226,12 +230,12 @@ impl BandSearch {
         };
         let mut antennas = Vec::new();
         let mut looked_at = 0;
-        let mut places = Vec::new();
+        let mut candidates = Vec::new();
         for window_s in WINDOWS_S {
             let samples = |duration_s: f64| source.length().min((duration_s * rate_hz) as u64);
             let count = samples(window_s) as usize;
             let off_raster = samples(OFF_RASTER_BUDGET / (rate_hz * rate_hz)) as usize;
-            if count == looked_at || !places.is_empty() {
+            if count == looked_at || !candidates.is_empty() {
                 break;
             }
             looked_at = count;
@@ -243,7 +247,7 @@ impl BandSearch {
             };
             if self.band == Band::Raster {
                 finds.retain(|find| self.spacing.is_none_or(|it| it == find.spacing));
-                return Ok(finds.iter().map(Place::from).collect());
+                return Ok(finds.iter().map(SsbCandidate::from).collect());
             }
             let one = slices.get(self.sound_channel).copied().unwrap_or_default();
             let one = [&one[..off_raster.min(one.len())]];
@@ -251,10 +255,10 @@ impl BandSearch {
                 raster::scan_off_raster(&one, rate_hz, self.centre_hz, &finds).map_err(failed)?,
             );
             finds.retain(|find| self.spacing.is_none_or(|it| it == find.spacing));
-            places = finds.iter().map(Place::from).collect();
+            candidates = finds.iter().map(SsbCandidate::from).collect();
             *searched = self.scopes(rate_hz, [count, one[0].len()], slices.len());
         }
-        Ok(places)
+        Ok(candidates)
     }
 
     /// Returns the scopes of a search of the given numbers of samples on the raster and outside it.
@@ -289,7 +293,7 @@ impl BandSearch {
     }
 }
 
-impl From<&raster::RasterFind> for Place {
+impl From<&raster::RasterFind> for SsbCandidate {
     fn from(find: &raster::RasterFind) -> Self {
         Self {
             ssb_freq_hz: find.point.ssb_freq_hz,

@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use onboard::AngleResult;
 use onboard::geometry::Pose;
 use onboard::localize::{
-    AngleMeasurement, MeasurementKind, PoseEstimate, UpdateReason, UpdateVerdict,
+    AngleMeasurement, MeasurementKind, PoseEstimate, UpdateReason, UpdateResult,
 };
 use onboard::observation::{OdometrySample, SensedSsb};
 use recording::mcap::{Frames, Twist};
@@ -370,7 +370,7 @@ fn angles_are_read_from_the_verdicts_of_mcap_and_those_without_an_angle_passed_o
         AngleResult {
             ssb,
             measured,
-            verdict: UpdateVerdict::unused(UpdateReason::Outlier),
+            verdict: UpdateResult::unused(UpdateReason::Outlier),
             wake_up_time_s: 0.02,
         }
     };

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use onboard::estimator::{AngleEstimator, EstimatedAngle, built_in};
 use onboard::geometry::{Pose, wrap_angle};
-use onboard::localize::OdometryVerdict;
+use onboard::localize::OdometryResult;
 use onboard::localize::{
-    AngleMeasurement, Localizer, PoseEstimate, UpdateReason, UpdateVerdict, copy_into,
+    AngleMeasurement, Localizer, PoseEstimate, UpdateReason, UpdateResult, copy_into,
 };
 use onboard::observation::{OdometrySample, SensedSsb, SsbObservation};
 use onboard::radio_head::RadioHead;
@@ -40,24 +40,24 @@ struct StraightOn {
 }
 
 impl Localizer for StraightOn {
-    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
+    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryResult, BoxError> {
         assert!(sample.time_s > self.now_s, "odometry comes in order");
         self.driven_m = sample.distance_m;
         self.now_s = sample.time_s;
-        Ok(OdometryVerdict::Accepted)
+        Ok(OdometryResult::Accepted)
     }
 
     fn update(
         &mut self,
         _: &RadioHead,
         measured: &AngleMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
+    ) -> Result<UpdateResult, BoxError> {
         assert!(measured.time_s >= self.now_s, "late ones are put in order");
         self.angles += 1;
         if self.angles > self.patience {
             return Err(format!("the {}th angle was too many", self.angles).into());
         }
-        Ok(UpdateVerdict::unused(UpdateReason::Excluded))
+        Ok(UpdateResult::unused(UpdateReason::Excluded))
     }
 
     fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {

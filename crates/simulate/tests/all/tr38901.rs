@@ -9,7 +9,7 @@ use onboard::geometry::{Point, Pose};
 use onboard::road::{Road, Segment};
 use onboard::settings::{ArraySettings, Site, Vehicle};
 use rand::RngExt;
-use simulate::channel::tr38901::{Drop, Environment, Place, draw_drops};
+use simulate::channel::tr38901::{Drop, Environment, LinkGeometry, draw_drops};
 use simulate::channel::{Link, Propagation, Tr38901Propagation};
 use simulate::random::{Purpose, Streams};
 use simulate::scenario::{BlockageSettings, ChannelModel, ChannelSettings};
@@ -25,7 +25,7 @@ fn environment(model: &str) -> Environment {
 }
 
 /// Returns the horizontal distances of `benches/tr38901_oracle.py`.
-fn places(model: &str) -> Vec<Place> {
+fn places(model: &str) -> Vec<LinkGeometry> {
     let (head_m, array_m, least_m, most_m) = match model {
         "umi" => (10.0, 1.5, 20.0, 120.0),
         "inf-sl" => (1.5, 1.5, 5.0, 60.0),
@@ -34,7 +34,7 @@ fn places(model: &str) -> Vec<Place> {
         _ => (8.0, 1.5, 1.0, 15.0),
     };
     let mut rng = Streams::new(3, 0).generator(Purpose::Start, 0);
-    let place = |_| Place {
+    let place = |_| LinkGeometry {
         level_m: least_m + (most_m - least_m) * rng.random::<f64>(),
         head_m,
         array_m,
@@ -280,7 +280,7 @@ fn oracle_nlos_rejection_removes_ssbs_without_line_of_sight() {
         for along_m in (800..1200).map(f64::from) {
             let sight = sight(along_m);
             let [here, of_all] = [&mut told, &mut all].map(|it| it.next_gain_db(&sight));
-            let place = Place {
+            let place = LinkGeometry {
                 level_m: sight.distance_m,
                 head_m: 10.0,
                 array_m: 1.5,

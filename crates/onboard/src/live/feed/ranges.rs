@@ -3,7 +3,7 @@
 use super::{Live, finite};
 use crate::live::LiveError;
 use crate::localize::UpdateReason;
-use crate::localize::UpdateVerdict;
+use crate::localize::UpdateResult;
 use crate::range::{METRES_PER_NS, RangeMeasurement};
 
 /// Maximum magnitude of a range (m): above it, its unit is wrong.
@@ -43,7 +43,7 @@ impl Live {
     /// [`LiveError::Value`] for an invalid value, or a kind that differs from `ranging.kind` of the
     /// vehicle; [`LiveError::Time`] and [`LiveError::AngleAhead`] for an implausible time;
     /// [`LiveError::Custom`].
-    pub fn range(&mut self, range: &RangeObservation) -> Result<UpdateVerdict, LiveError> {
+    pub fn range(&mut self, range: &RangeObservation) -> Result<UpdateResult, LiveError> {
         let (what, value, metres) = match range.value {
             RangeValue::RangeM(range_m) => ("a range in m", range_m, 1.0),
             RangeValue::DelayNs(delay_ns) => ("a delay in ns", delay_ns, METRES_PER_NS),

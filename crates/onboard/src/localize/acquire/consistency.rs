@@ -1,7 +1,7 @@
 //! Consistency of the innovations of most radio heads with the filter.
 
 use crate::clone_in_place::clone_in_place;
-use crate::localize::output::{UpdateReason, UpdateVerdict};
+use crate::localize::output::{UpdateReason, UpdateResult};
 use crate::radio_head::RadioHead;
 
 /// Weight of the newest angle of a radio head.
@@ -65,7 +65,7 @@ impl ConsistencyMonitor {
 
     /// Adds the result of an angle with `noise_scale` times its specified variance. Angles without
     /// an innovation are ignored.
-    pub fn see(&mut self, head: &RadioHead, verdict: &UpdateVerdict, noise_scale: f64) {
+    pub fn see(&mut self, head: &RadioHead, verdict: &UpdateResult, noise_scale: f64) {
         let refused = match verdict.reason {
             UpdateReason::Consistent => 0.0,
             UpdateReason::Outlier => 1.0,

@@ -17,7 +17,7 @@ use crate::localize::ekf::state::{ACROSS, ALONG, HEADING, STATES};
 use crate::localize::ekf::{Ekf, EkfConfig};
 use crate::localize::modes::{log_likelihood, log_likelihood_as_stated};
 use crate::localize::output::{InitialPose, PoseEstimate};
-use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
+use crate::localize::output::{OdometryResult, UpdateReason, UpdateResult};
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -280,16 +280,16 @@ impl GaussianSum {
     }
 
     /// Predicts every hypothesis.
-    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryResult {
         let ekfs = self.hypotheses.iter_mut();
-        ekfs.fold(OdometryVerdict::NotFinite, |_, hypothesis| {
+        ekfs.fold(OdometryResult::NotFinite, |_, hypothesis| {
             hypothesis.ekf.odometry(sample)
         })
     }
 
     /// Updates every hypothesis with an angle. The verdict is that of the most probable one.
-    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
-        let mut first = UpdateVerdict::unused(UpdateReason::Unusable);
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateResult {
+        let mut first = UpdateResult::unused(UpdateReason::Unusable);
         let mut is_used = false;
         let log_likelihood = if self.is_as_stated {
             log_likelihood_as_stated

@@ -30,7 +30,7 @@ use crate::localize::ekf::Ekf;
 use crate::localize::integrity::IntegrityMonitor;
 use crate::localize::localizer::{Localizer, Recovered, copy_into};
 use crate::localize::output::{Integrity, IntegrityState, PoseEstimate};
-use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
+use crate::localize::output::{OdometryResult, UpdateReason, UpdateResult};
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -131,21 +131,21 @@ impl Solution {
         (self.monitor()).map_or(1.0, |it| it.bank().noise_scale())
     }
 
-    fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+    fn odometry(&mut self, sample: &OdometrySample) -> OdometryResult {
         match self {
             Self::Bare(ekf) => ekf.odometry(sample),
             Self::Monitored(monitor) => monitor.odometry(sample),
         }
     }
 
-    fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+    fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateResult {
         match self {
             Self::Bare(ekf) => ekf.update(head, measured),
             Self::Monitored(monitor) => monitor.update(head, measured),
         }
     }
 
-    fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateVerdict {
+    fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
         match self {
             Self::Bare(ekf) => ekf.update_range(head, measured),
             Self::Monitored(monitor) => monitor.update_range(head, measured),
@@ -446,7 +446,7 @@ impl Relocalizer {
 }
 
 impl Localizer for Relocalizer {
-    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
+    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryResult, BoxError> {
         if let Some(search) = &mut self.search {
             return Ok(search.odometry(sample));
         }
@@ -457,14 +457,14 @@ impl Localizer for Relocalizer {
             heading.odometry(sample);
         }
         let solution = self.solution.as_mut();
-        Ok(solution.map_or(OdometryVerdict::NotFinite, |it| it.odometry(sample)))
+        Ok(solution.map_or(OdometryResult::NotFinite, |it| it.odometry(sample)))
     }
 
     fn update(
         &mut self,
         head: &RadioHead,
         measured: &AngleMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
+    ) -> Result<UpdateResult, BoxError> {
         let now_s = measured.time_s;
         if let Some(search) = &mut self.search {
             let verdict = search.update(head, measured);
@@ -484,7 +484,7 @@ impl Localizer for Relocalizer {
             self.begin(Phase::Confirming, now_s);
         }
         let Some(solution) = &mut self.solution else {
-            return Ok(UpdateVerdict::unused(UpdateReason::Unusable));
+            return Ok(UpdateResult::unused(UpdateReason::Unusable));
         };
         if let Some(test) = &mut self.test {
             test.update(solution.ekf(), head, measured);
@@ -506,10 +506,10 @@ impl Localizer for Relocalizer {
         &mut self,
         head: &RadioHead,
         measured: &RangeMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
+    ) -> Result<UpdateResult, BoxError> {
         // A search for the position uses angles only.
         let Some(solution) = &mut self.solution else {
-            return Ok(UpdateVerdict::unused(UpdateReason::Unusable));
+            return Ok(UpdateResult::unused(UpdateReason::Unusable));
         };
         if let Some(heading) = &mut self.heading {
             heading.update(solution.ekf(), head, measured);

@@ -4,7 +4,7 @@ use super::filter::{Ekf, OffMap};
 use super::motion::{Reading, Step, Yaw};
 use super::state::{ACROSS, ALONG, Belief, HEADING, SCALE, STATES, YAW_RATE_BIAS};
 use crate::gaussian::CERTAIN_SIGMAS;
-use crate::localize::output::OdometryVerdict;
+use crate::localize::output::OdometryResult;
 use crate::observation::OdometrySample;
 use crate::road::Gap;
 use crate::settings::DriveKind;
@@ -46,9 +46,9 @@ const UNTOLD_TURN: f64 = 0.5;
 
 impl Ekf {
     /// Predicts the state with one odometry sample.
-    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryResult {
         if !sample.is_finite() {
-            return OdometryVerdict::NotFinite;
+            return OdometryResult::NotFinite;
         }
         let most_mps = WILD * self.config.top_speed_mps;
         let sample = &OdometrySample {
@@ -58,14 +58,14 @@ impl Ekf {
         let Some(previous) = self.odometry else {
             self.odometry = Some(*sample);
             self.ask(sample.time_s);
-            return OdometryVerdict::First;
+            return OdometryResult::First;
         };
         let duration_s = sample.time_s - previous.time_s;
         if duration_s == 0.0 {
-            return OdometryVerdict::Duplicate;
+            return OdometryResult::Duplicate;
         }
         if duration_s < 0.0 {
-            return OdometryVerdict::TimeBackwards;
+            return OdometryResult::TimeBackwards;
         }
         self.odometry = Some(*sample);
         self.detect_slip(&previous, sample, duration_s);
@@ -115,18 +115,18 @@ impl Ekf {
         }
         self.ask(sample.time_s);
         if jumped {
-            OdometryVerdict::DistanceJump { jump_m: moved_m }
+            OdometryResult::DistanceJump { jump_m: moved_m }
         } else if let Some(radps) = refused {
-            OdometryVerdict::YawRateRefused { radps }
+            OdometryResult::YawRateRefused { radps }
         } else if duration_s > self.config.gap_s {
-            OdometryVerdict::AfterGap { gap_s: duration_s }
+            OdometryResult::AfterGap { gap_s: duration_s }
         } else {
             match self.off_map {
-                Some(OffMap::Beyond { by_m }) => OdometryVerdict::BeyondMap { by_m },
+                Some(OffMap::Beyond { by_m }) => OdometryResult::BeyondMap { by_m },
                 Some(OffMap::Gap(Gap { from_m, to_m })) => {
-                    OdometryVerdict::InMapGap { from_m, to_m }
+                    OdometryResult::InMapGap { from_m, to_m }
                 }
-                None => OdometryVerdict::Accepted,
+                None => OdometryResult::Accepted,
             }
         }
     }

@@ -8,7 +8,7 @@ use super::white_noise_fraction::Residual;
 use crate::gaussian::{Innovation, with_outliers};
 use crate::geometry::wrap_angle;
 use crate::localize::bias::{self, JumpHypotheses, MOST_VARIANCE};
-use crate::localize::output::{UpdateReason, UpdateVerdict};
+use crate::localize::output::{UpdateReason, UpdateResult};
 use crate::observation::{AngleMeasurement, MeasurementKind};
 use crate::radio_head::RadioHead;
 
@@ -214,7 +214,7 @@ impl Ekf {
     }
 
     /// Corrects the state by one angle to a radio head.
-    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateResult {
         self.update_predicted(self.predict_measurement(head, measured), measured)
     }
 
@@ -224,7 +224,7 @@ impl Ekf {
         &mut self,
         predicted: Result<PredictedMeasurement, UpdateReason>,
         measured: &AngleMeasurement,
-    ) -> UpdateVerdict {
+    ) -> UpdateResult {
         let predicted = match predicted {
             Ok(predicted) if predicted.excluded => {
                 return self.verdict(UpdateReason::Excluded, None);
@@ -261,7 +261,7 @@ impl Ekf {
         predicted: &PredictedMeasurement,
         hypotheses: &JumpHypotheses,
         measured: &AngleMeasurement,
-    ) -> UpdateVerdict {
+    ) -> UpdateResult {
         // Gated with the maximum bias variance added.
         let mut seen = predicted.innovation;
         seen.variance += MOST_VARIANCE;
@@ -346,8 +346,8 @@ impl Ekf {
             mean[ANGLE_TIME_OFFSET].clamp(-MAX_ANGLE_TIME_OFFSET_S, MAX_ANGLE_TIME_OFFSET_S);
     }
 
-    pub(super) fn verdict(&self, reason: UpdateReason, mahalanobis2: Option<f64>) -> UpdateVerdict {
-        UpdateVerdict {
+    pub(super) fn verdict(&self, reason: UpdateReason, mahalanobis2: Option<f64>) -> UpdateResult {
+        UpdateResult {
             accepted: reason == UpdateReason::Consistent,
             reason,
             mahalanobis_squared: mahalanobis2,

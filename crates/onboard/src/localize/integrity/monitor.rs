@@ -17,7 +17,7 @@ use crate::geometry::Pose;
 use crate::localize::ekf::Ekf;
 use crate::localize::modes::{Bank, RECOVERY_S};
 use crate::localize::output::{Integrity, IntegrityState, PoseEstimate};
-use crate::localize::output::{OdometryVerdict, SelectedHypothesis, UpdateVerdict};
+use crate::localize::output::{OdometryResult, SelectedHypothesis, UpdateResult};
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -161,7 +161,7 @@ impl IntegrityMonitor {
     }
 
     /// Predicts every filter.
-    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryResult {
         if let Some(restarted) = &mut self.restarted {
             restarted.bank.odometry(sample);
         }
@@ -170,12 +170,12 @@ impl IntegrityMonitor {
 
     /// Updates with an angle: the test of its radio head, and every filter that uses the radio
     /// head.
-    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateResult {
         self.update_by(measured.time_s, |bank| bank.update(head, measured))
     }
 
     /// Updates with a range in the same way.
-    pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateVerdict {
+    pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
         self.update_by(measured.time_s, |bank| bank.update_range(head, measured))
     }
 
@@ -183,8 +183,8 @@ impl IntegrityMonitor {
     fn update_by(
         &mut self,
         time_s: f64,
-        update: impl Fn(&mut Bank) -> UpdateVerdict,
-    ) -> UpdateVerdict {
+        update: impl Fn(&mut Bank) -> UpdateResult,
+    ) -> UpdateResult {
         self.now_s = self.now_s.max(time_s);
         let odometry_s = self.ekf().time_s();
         let (solution_id, told) = (self.solution_id(), self.ekf().pose(odometry_s));

@@ -18,7 +18,7 @@ use super::subsets::{CLEARED, DETECTED, HeadTest, RECOVERY_S, Subsets, exclude};
 use super::table::{Carry, Mode, TABLE};
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::{Ekf, PredictedMeasurement};
-use crate::localize::output::{OdometryVerdict, SelectedHypothesis, UpdateReason, UpdateVerdict};
+use crate::localize::output::{OdometryResult, SelectedHypothesis, UpdateReason, UpdateResult};
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -352,7 +352,7 @@ impl Bank {
     }
 
     /// Predicts every filter.
-    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryResult {
         for subset in self.subsets.iter_mut() {
             subset.ekf.odometry(sample);
         }
@@ -365,7 +365,7 @@ impl Bank {
 
     /// Updates with an angle: the test of its radio head, and every filter that uses the radio
     /// head.
-    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateResult {
         let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
         let number = self.heads.iter().position(is_it);
         if let Some(number) = number {

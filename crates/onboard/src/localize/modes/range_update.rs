@@ -4,7 +4,7 @@
 use super::bank::{Bank, ModeFilter};
 use super::likelihood::LikelihoodRatio;
 use crate::localize::ekf::PredictedRange;
-use crate::localize::output::{UpdateReason, UpdateVerdict};
+use crate::localize::output::{UpdateReason, UpdateResult};
 use crate::radio_head::RadioHead;
 use crate::range::{RangeMeasurement, RangeQuantity};
 
@@ -24,7 +24,7 @@ impl ModeFilter {
 
 impl Bank {
     /// Updates with a range.
-    pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateVerdict {
+    pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
         let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
         if let Some(number) = self.heads.iter().position(is_it) {
             self.watch(number);

@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 
 use super::clusters::Clusters;
-use super::environment::{Environment, Place};
+use super::environment::{Environment, LinkGeometry};
 use super::large_scale::{COUNT, Parameters};
 use crate::random::{Purpose, Streams};
 
@@ -32,20 +32,20 @@ pub struct Drop {
 }
 
 /// Draws one link at each position.
-pub fn draw_drops(environment: &Environment, places: &[Place], seed: u64) -> Vec<Drop> {
+pub fn draw_drops(environment: &Environment, links: &[LinkGeometry], seed: u64) -> Vec<Drop> {
     let parameters = [false, true].map(|clear| Parameters::of(environment, clear));
     let mut rng = Streams::new(seed, 0).generator(Purpose::Clusters, 0);
-    let drop = |place: &Place| {
-        let line_of_sight = rng.random::<f64>() < environment.line_of_sight_probability(place);
+    let drop = |link: &LinkGeometry| {
+        let line_of_sight = rng.random::<f64>() < environment.line_of_sight_probability(link);
         let parameters = &parameters[usize::from(line_of_sight)];
         let normals = [(); COUNT].map(|()| rng.sample(StandardNormal));
         let large_scale = parameters.large_scale(&normals);
-        let zenith_rad = place.level_m.atan2(place.head_m - place.array_m);
+        let zenith_rad = link.level_m.atan2(link.head_m - link.array_m);
         let clusters = Clusters::draw(parameters, &large_scale, 0.0, zenith_rad, &mut rng);
         let k = 10f64.powf(0.1 * large_scale.k_db);
         Drop {
             line_of_sight,
-            path_loss_db: environment.path_loss_db(place, line_of_sight),
+            path_loss_db: environment.path_loss_db(link, line_of_sight),
             shadowing_db: large_scale.shadowing_db,
             k_db: if line_of_sight {
                 large_scale.k_db
@@ -59,5 +59,5 @@ pub fn draw_drops(environment: &Environment, places: &[Place], seed: u64) -> Vec
             paths_azimuth_spread_deg: clusters.azimuth_spread_rad(k, 0.0).to_degrees(),
         }
     };
-    places.iter().map(drop).collect()
+    links.iter().map(drop).collect()
 }

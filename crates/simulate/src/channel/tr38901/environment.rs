@@ -29,9 +29,9 @@ pub(super) struct Factory {
     pub hall: HallSettings,
 }
 
-/// Position of the vehicle relative to a radio head.
+/// Geometry of the link between the vehicle and a radio head.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct LinkGeometry {
     /// Horizontal distance in metres.
     pub level_m: f64,
     /// Height of the radio head in metres.
@@ -40,7 +40,7 @@ pub struct Place {
     pub array_m: f64,
 }
 
-impl Place {
+impl LinkGeometry {
     /// Returns the distance in metres, at least 1 m because the models are valid in the far field
     /// only.
     pub fn distance_m(&self) -> f64 {
@@ -102,8 +102,8 @@ impl Environment {
     }
 
     /// Returns the probability of a line of sight (table 7.4.2-1).
-    pub fn line_of_sight_probability(&self, place: &Place) -> f64 {
-        let level_m = place.level_m;
+    pub fn line_of_sight_probability(&self, link: &LinkGeometry) -> f64 {
+        let level_m = link.level_m;
         match self.kind {
             Kind::Umi if level_m <= 18.0 => 1.0,
             Kind::Umi => {
@@ -113,12 +113,12 @@ impl Environment {
             Kind::Factory(Factory { high, hall, .. }) => {
                 let mut reach_m = -hall.clutter_size_m / (1.0 - hall.clutter_density).ln();
                 if high {
-                    let above_m = hall.clutter_height_m - place.array_m;
+                    let above_m = hall.clutter_height_m - link.array_m;
                     // An array above the clutter always has a line of sight.
                     if above_m <= 0.0 {
                         return 1.0;
                     }
-                    reach_m *= (place.head_m - place.array_m).max(0.0) / above_m;
+                    reach_m *= (link.head_m - link.array_m).max(0.0) / above_m;
                 }
                 (-level_m / reach_m).exp()
             }
@@ -134,20 +134,20 @@ impl Environment {
     }
 
     /// Returns the path loss in dB with or without a line of sight (table 7.4.1-1).
-    pub fn path_loss_db(&self, place: &Place, line_of_sight: bool) -> f64 {
-        let decades = place.distance_m().log10();
+    pub fn path_loss_db(&self, link: &LinkGeometry, line_of_sight: bool) -> f64 {
+        let decades = link.distance_m().log10();
         let carrier = self.carrier_ghz.log10();
         match self.kind {
             Kind::Umi => {
                 // The model is valid from 1.5 m upwards.
-                let array_m = place.array_m.max(1.5);
+                let array_m = link.array_m.max(1.5);
                 let breakpoint_m =
-                    4.0 * (place.head_m - 1.0).max(0.0) * (array_m - 1.0) * self.carrier_ghz * 1e9
+                    4.0 * (link.head_m - 1.0).max(0.0) * (array_m - 1.0) * self.carrier_ghz * 1e9
                         / SPEED_OF_LIGHT_MPS;
                 let near_db = 32.4 + 21.0 * decades + 20.0 * carrier;
-                let apart_m = place.head_m - array_m;
+                let apart_m = link.head_m - array_m;
                 let bend = breakpoint_m * breakpoint_m + apart_m * apart_m;
-                let clear_db = if place.level_m <= breakpoint_m {
+                let clear_db = if link.level_m <= breakpoint_m {
                     near_db
                 } else {
                     32.4 + 40.0 * decades + 20.0 * carrier - 9.5 * bend.max(1.0).log10()

@@ -14,5 +14,5 @@ mod propagation;
 mod track;
 
 pub use drops::{Drop, draw_drops};
-pub use environment::{Environment, Place};
+pub use environment::{Environment, LinkGeometry};
 pub use propagation::Tr38901Propagation;

@@ -8,7 +8,7 @@ use onboard::radio_head::RadioHead;
 use rand_chacha::ChaCha8Rng;
 
 use super::clusters::Clusters;
-use super::environment::{Environment, Place};
+use super::environment::{Environment, LinkGeometry};
 use super::large_scale::{COUNT, LargeScale, Parameters};
 use super::normal;
 use super::track::Track;
@@ -101,20 +101,20 @@ impl Tr38901Propagation {
     }
 
     fn mix(&self, sight: &LineOfSight) -> Mix {
-        let place = Place {
+        let link = LinkGeometry {
             level_m: sight.place.distance_m(self.head.position),
             head_m: self.head.height_m,
             array_m: self.array_m,
         };
         let along_m = sight.along_m;
-        let threshold = normal::quantile(self.environment.line_of_sight_probability(&place));
+        let threshold = normal::quantile(self.environment.line_of_sight_probability(&link));
         // Equation (7.6-17), with λ in metres.
         let sharpness = (20.0 * self.wavenumber_per_m / TAU).sqrt();
         let soft = 0.5 + (sharpness * (self.state.at(along_m) + threshold)).atan() / PI;
         let [clear, hidden] =
             [(&self.clear, true), (&self.hidden, false)].map(|(channel, clear)| {
                 let large_scale = channel.large_scale(along_m);
-                let loss_db = self.environment.path_loss_db(&place, clear);
+                let loss_db = self.environment.path_loss_db(&link, clear);
                 let gain = 10f64.powf(0.1 * (large_scale.shadowing_db - loss_db));
                 (gain, 10f64.powf(0.1 * large_scale.k_db))
             });

@@ -3,7 +3,7 @@
 use super::pseudorange::PredictedRange;
 use crate::localize::bias::{CLOCK, DRIFT, HeadState, RANGE_SCALE};
 use crate::localize::ekf::filter::Ekf;
-use crate::localize::output::{UpdateReason, UpdateVerdict};
+use crate::localize::output::{UpdateReason, UpdateResult};
 use crate::radio_head::RadioHead;
 use crate::range::{RangeMeasurement, RangeQuantity};
 
@@ -37,7 +37,7 @@ impl Ekf {
     }
 
     /// Updates state and range states with a range, range rate or carrier phase.
-    pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateVerdict {
+    pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
         self.update_predicted_range(self.predict_range(head, measured))
     }
 
@@ -45,7 +45,7 @@ impl Ekf {
     pub(in crate::localize) fn update_predicted_range(
         &mut self,
         predicted: Result<PredictedRange, UpdateReason>,
-    ) -> UpdateVerdict {
+    ) -> UpdateResult {
         let predicted = match predicted {
             Ok(predicted) if predicted.excluded => {
                 return self.verdict(UpdateReason::Excluded, None);

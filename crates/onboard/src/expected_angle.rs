@@ -8,13 +8,13 @@ use crate::settings::Vehicle;
 
 /// Measurement model of the angle of a radio head.
 #[derive(Debug, Clone)]
-pub struct Sight {
+pub struct ExpectedAngle {
     measurand: Measurand,
     position_m: [f64; 3],
     mounting_rad: f64,
 }
 
-impl Sight {
+impl ExpectedAngle {
     /// Creates the model of a vehicle's array.
     pub fn new(vehicle: &Vehicle) -> Self {
         Self {
