@@ -233,7 +233,7 @@ PID = '[vehicle]\nextends = "paper"\n[vehicle.wake_up.trigger]\nbase_ms = 300.0\
         (SCENARIO + HEAD + "[truth.vehicle.gyroscope]\nbias_radps = 1.0\n",
          ["truth.vehicle.gyroscope", "the nominal model has no such key"]),
         (SCENARIO + HEAD + '[truth.vehicle.localizer]\nkind = "tracker"\n',
-         ["truth.vehicle.localizer", "only physical keys"]),
+         ["truth.vehicle.localizer", "only in physical keys"]),
         (SCENARIO.replace('vehicle = "paper"', 'vehicle = "papr"') + HEAD, ["vehicle", "papr"]),
         (SCENARIO, ["radio_heads"]),
         ("name = \n", ["TOML"]),

@@ -89,12 +89,12 @@ def test_the_source_of_the_yaw_rate_is_reported(driven: Robot, tmp_path: Path) -
     told = locate(driven, tmp_path, tmp_path / "odometry.csv")
     as_told_m = driven.rms_error_m(told)
     cases = {
-        "angular_velocity.z of /imu/data, whose z axis is taken for up": [
+        "angular_velocity.z of /imu/data, whose z axis is assumed to point up": [
             *odometry(driven, heading=True),
             *imu(driven),
         ],
         "pose.orientation of /odom": odometry(driven, heading=True),
-        "twist.angular.z of /odom; --imu-topic takes that of /imu/data": [
+        "twist.angular.z of /odom; --imu-topic selects that of /imu/data": [
             *odometry(driven, yaw=True),
             *imu(driven, turned=-1.0),
         ],
@@ -235,4 +235,4 @@ def test_invalid_messages_are_omitted(driven: Robot, tmp_path: Path) -> None:
     gyroscope[9] = bag.imu(gyroscope[9].time_s, float("nan"))
     folder = bag.write(tmp_path / "cut", [*odometry(driven), *gyroscope])
     said = source(locate(driven, tmp_path, folder))
-    assert said.endswith("taken for up; 3 of its messages are left out")
+    assert said.endswith("assumed to point up; 3 of its messages are left out")

@@ -124,7 +124,7 @@ REMARKED = {
         odometry(yaw_rate_radps=pl.when(pl.int_range(pl.len()) == 600).then(20.0).otherwise(YAW)),
         "line 602: yaw_rate_radps is 20.000, far from the values next to it",
     ),
-    "angles late": (angles(time_s=TIME + 0.1), "later than stated, by the odometry's clock"),
+    "angles late": (angles(time_s=TIME + 0.1), "ms later than configured"),
     "twice as far": (
         odometry(distance_m=2 * DISTANCE, speed_mps=2 * SPEED),
         "check odometer.scale",

@@ -141,7 +141,7 @@ def test_an_unknown_method_names_the_platform_key_to_set() -> None:
     )
     with pytest.raises(access_av.SettingsError, match=r"`wake_up\.trigger\.base_ms`") as refused:
         access_av.simulate(scenario)
-    assert "what an estimate takes" in str(refused.value)
+    assert "duration of one estimate" in str(refused.value)
     stated = scenario.with_overrides({"vehicle.wake_up.trigger.base_ms": 20.0})
     assert access_av.simulate(stated).runs["energy_j"].item() is None
 

@@ -405,7 +405,7 @@ def test_spectrum_over_azimuth_and_elevation() -> None:
         ("nowhere", {}, "antennas, 2 or 3"),
         (CIRCLE * np.nan, {}, "element 0 must be within 100 wavelengths"),
         (CIRCLE * [0, 1], {}, "all elements are on one line"),
-        (CIRCLE * 0, {}, "elements 0 and 1 are in the same place"),
+        (CIRCLE * 0, {}, "elements 0 and 1 have the same position"),
         (CIRCLE, {"elevations_rad": (1.0, 0.5)}, "elevations must ascend"),
         (CIRCLE, {"calibration": [1, 1]}, "one gain per antenna: 5, not 2"),
     ],

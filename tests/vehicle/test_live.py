@@ -242,7 +242,7 @@ def test_the_ros_node_follows_its_topics(monkeypatch: pytest.MonkeyPatch) -> Non
     seen = ros(monkeypatch, now_s)
     runpy.run_path(str(ROOT / "examples/rclpy_node.py"))["main"](["yard", "tugger"])
     seen.timer()
-    assert "no odometry has come" in seen.published["access_av/status"][-1].message
+    assert "no odometry has arrived" in seen.published["access_av/status"][-1].message
     assert not seen.published["access_av/pose"]
 
     def header() -> Anything:

@@ -200,7 +200,7 @@ def test_a_real_time_recording_is_read_only_for_requested_bursts(tmp_path: Path)
     # Each radio head is found by the search at the start, then at its expected time.
     assert state["found_by_search"] == 4
     # A source that is switched off is not silent.
-    silent = [it for it in records if "nothing has come" in it.get("text", "")]
+    silent = [it for it in records if "no data has arrived" in it.get("text", "")]
     assert not [it for it in silent if it["source"] == "samples" and it["time_s"] < 8.5], silent
 
 
@@ -302,7 +302,7 @@ def test_every_radio_head_is_received_through_sockets(live: Live) -> None:
 
 def test_silent_sources_are_reported(live: Live) -> None:
     events = [it for it in live.records if it["type"] == "event"]
-    silent = {it["source"] for it in events if it["text"].startswith("nothing has come for")}
+    silent = {it["source"] for it in events if it["text"].startswith("no data has arrived for")}
     assert silent == {"samples", "messages"}
     assert events[-1]["text"].endswith("ends")
 

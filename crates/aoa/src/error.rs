@@ -25,11 +25,12 @@ pub enum Error {
     #[error("element {0} must be within 100 wavelengths of the origin on every axis")]
     ElementPlace(usize),
     /// Two elements have equal positions.
-    #[error("elements {0} and {1} are in the same place")]
+    #[error("elements {0} and {1} have the same position")]
     CoincidentElements(usize, usize),
     /// All elements are collinear, so that only the angle from their line is measurable.
     #[error(
-        "all elements are on one line, which shows only the angle from it: describe it as a linear array"
+        "all elements are on one line, so that only the angle from this line can be estimated: \
+         describe a linear array"
     )]
     ElementsInARow,
     /// The table of responses does not define a manifold.
@@ -75,7 +76,7 @@ pub enum Error {
     #[error("a covariance matrix must have no negative eigenvalue")]
     Indefinite,
     /// An item of a batch has more samples than the address space can hold.
-    #[error("{snapshots} snapshots of {antennas} antennas are more than can be addressed")]
+    #[error("{snapshots} snapshots of {antennas} antennas exceed the address range")]
     TooManySnapshots {
         /// Number of snapshots of an item.
         snapshots: usize,

@@ -223,7 +223,7 @@ impl Engine {
     /// is valid at the first start only.
     fn search(&mut self) -> Result<(), LiveError> {
         let text = match self.live.reset() {
-            Ok(()) => "the pose is searched for".to_owned(),
+            Ok(()) => "a search for the pose has started".to_owned(),
             Err(LiveError::Settings(_)) => {
                 "the vehicle cannot be found by a search: it starts at the configured pose"
                     .to_owned()
@@ -358,8 +358,8 @@ impl Engine {
         }
         if let Some(step) = self.live.take_odometry_step() {
             let text = format!(
-                "the clock has stepped by {:+.3} s to {:.3} s; the pose is resumed after {:.2} s and is to be confirmed \
-                 by angles",
+                "the clock has stepped by {:+.3} s to {:.3} s; the pose is resumed after {:.2} s \
+                 and must be confirmed by angles",
                 step.step_s, sample.time_s, step.elapsed_s
             );
             self.clock.reset();
@@ -408,8 +408,8 @@ impl Engine {
             |driven_m| format!("{driven_m:.2} m by the odometer"),
         );
         let text = format!(
-            "the pose of {elapsed_s:.1} s ago is resumed after {driven}, with a standard deviation of {:.2} m; it is \
-             to be confirmed by angles",
+            "the pose of {elapsed_s:.1} s ago is resumed after {driven}, with a standard \
+             deviation of {:.2} m; angles must confirm it",
             by.position_std_m
         );
         self.event(Level::Info, "state", text);
@@ -449,12 +449,14 @@ impl Engine {
             Ok((setup, live)) => {
                 self.swap(setup, live)?;
                 self.board.set_site(&self.setup.site);
-                let text = "site and vehicle are loaded again; the pose is resumed and is to be confirmed by angles";
+                let text = "site and vehicle were reloaded; the pose is resumed and must be \
+                     confirmed by angles";
                 self.event(Level::Info, "node", text.to_owned());
             }
             Err(error) => {
                 let text = format!(
-                    "site and vehicle are not loaded again, the earlier ones stay: {error:#}"
+                    "site and vehicle were not reloaded, and the previous ones remain active: \
+                     {error:#}"
                 );
                 self.event(Level::Warn, "node", text);
             }

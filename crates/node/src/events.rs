@@ -162,7 +162,10 @@ mod tests {
     #[test]
     fn measured_values_do_not_distinguish_causes_and_whole_numbers_do() {
         for (text, expected) in [
-            ("nothing has come for 0.5 s", "nothing has come for # s"),
+            (
+                "no data has arrived for 0.5 s",
+                "no data has arrived for # s",
+            ),
             (
                 "odometry goes back to -1.250 s.",
                 "odometry goes back to # s.",

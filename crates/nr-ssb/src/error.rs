@@ -56,7 +56,7 @@ pub enum Error {
         expected: usize,
     },
     /// Burst set size that is impossible for its pattern in time.
-    #[error("case {case} does not go with Lmax {count}: A, B and C have 4 or 8 SSBs, D and E 64")]
+    #[error("case {case} does not permit Lmax = {count}: A, B and C have 4 or 8 SSBs, D and E 64")]
     BurstSet {
         /// The SSB pattern.
         case: &'static str,

@@ -225,8 +225,8 @@ impl AngleLog {
                 is_used: true,
                 time_s: first.ssb.time_s,
                 message: format!(
-                    "time_s {} comes after a later time, as in {count} {kind}s altogether; the angles \
-                     were sorted by time",
+                    "time_s {} is earlier than a previous time ({count} {kind}s in total); the \
+                     angles were sorted by time",
                     first.ssb.time_s
                 ),
             });

@@ -91,7 +91,8 @@ pub fn read_wheel_odometry_csv(
     if wheels_turn && track_width_m.is_none() {
         return Err(table.missing(
             "yaw_rate_radps",
-            "it is taken from left and right wheel where the vehicle states odometer.track_width_m",
+            "the left and right wheel determine it if the vehicle file contains \
+             odometer.track_width_m",
         ));
     }
     let mut collector = OdometryCollector::new("line", OdometryFields::CSV);

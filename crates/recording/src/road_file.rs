@@ -173,7 +173,7 @@ fn system(json: &Value) -> Result<System, Defect> {
     };
     let unknown = |what: &str| {
         let message = format!(
-            "{what} is not read here; allowed are longitude and latitude (no `crs`), grids such as \
+            "{what} is not supported; allowed are longitude and latitude (no `crs`), grids such as \
              UTM, and urn:ogc:def:crs:OGC::Engineering for metres of the plant's own frame; \
              `access-av file new site NAME.toml --road FILE` converts any other system"
         );

@@ -74,7 +74,7 @@ impl Engine {
             let told = self.silent.contains(&source.name);
             if silent >= silent_after && !told {
                 self.silent.push(source.name);
-                let text = format!("nothing has come for {:.1} s", silent.as_secs_f64());
+                let text = format!("no data has arrived for {:.1} s", silent.as_secs_f64());
                 self.event(Level::Warn, source.name, text);
             } else if silent < silent_after && told {
                 self.silent.retain(|it| *it != source.name);

@@ -152,7 +152,7 @@ impl TomlFile for NodeSettings {
             hears,
             "samples",
             "missing",
-            "there must be [samples], [angles], or messages with angles",
+            "add [samples], [angles], or messages with angles",
         )?;
         check.that(
             self.samples.is_none() || self.angles.is_none(),
@@ -164,20 +164,21 @@ impl TomlFile for NodeSettings {
             self.odometry.is_some() || !self.messages.is_empty(),
             "odometry",
             "missing",
-            "there must be [odometry] with a file, or messages with odometry",
+            "add [odometry] with a file, or messages with odometry",
         )?;
         check.that(
             self.pace == Pace::RealTime || self.is_playback() || self.is_one_file_of_messages(),
             "pace",
             "fast",
-            "only files can be played faster than they were recorded: no messages and samples of a \
-             recording or none, or nothing but the messages of one file or of `-`",
+            "only files can be played faster than recorded: remove all messages and use at most \
+             the samples of a recording, or use the messages of one file or of `-` as the only \
+             input",
         )?;
         check.that(
             self.state_file.is_none() || !self.is_playback(),
             "state_file",
             self.state_file.as_deref().unwrap_or_default(),
-            "it must be absent where all input comes from files: a playback has no next start",
+            "remove it, because all inputs are files, and a playback is never resumed",
         )?;
         if let Some(SampleSource::Zeromq { endpoints, .. }) = &self.samples {
             for (index, endpoint) in endpoints.iter().enumerate() {
@@ -224,7 +225,7 @@ impl TomlFile for NodeSettings {
                     endpoints.len() == stream.antennas.len(),
                     "samples.endpoints",
                     format!("a list of {}", endpoints.len()),
-                    "there must be one for each of samples.stream.antennas",
+                    "each of samples.stream.antennas needs one endpoint",
                 )?;
             }
         }

@@ -289,7 +289,7 @@ impl Framing {
                             format!("samples of {lost_s:.2} s are missing")
                         }
                         Finding::WrongRate(excess) => format!(
-                            "{:.2} million samples a second come, not the {:.2} of \
+                            "{:.2} million samples per second arrive instead of the {:.2} of \
                              samples.stream.rate_msps",
                             1e-6 * self.rate_hz * (1.0 + excess),
                             1e-6 * self.rate_hz

@@ -85,7 +85,10 @@ impl Sources {
                 recording.check_drive()?;
                 let centre_hz = recording.centre_frequency_hz().with_context(|| {
                     let file = recording.data_file().display();
-                    format!("{file}: no capture states core:frequency; without it the SSB is not to be found")
+                    format!(
+                        "{file}: no capture contains core:frequency, which is required to \
+                         find the SSB"
+                    )
                 })?;
                 stream = Some(StreamConfig {
                     rate_hz: recording.sample_rate_hz(),
@@ -271,7 +274,7 @@ fn messages(address: &Address, inbox: &Inbox, health: &SourceHealth) {
                 health.defect();
                 // Report the first errors and then every 1000th.
                 if health.defects() <= 10 || health.defects().is_multiple_of(1000) {
-                    let (source, text) = ("messages", format!("{address}: left out, {why}"));
+                    let (source, text) = ("messages", format!("{address}: message ignored: {why}"));
                     inbox.put(Input::warning(source, text));
                 }
             }

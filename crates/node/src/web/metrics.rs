@@ -59,17 +59,18 @@ pub fn text(board: &StatusBoard) -> String {
     let latency_stats = &counters.latency_stats;
     text.histogram(
         "ssb_to_pose_seconds",
-        "From the arrival of an SSB's last sample to the pose with its angle.",
+        "Latency from the arrival of the last sample of an SSB to the pose that includes its \
+         angle.",
         &latency_stats.ssb_to_pose,
     );
     text.histogram(
         "odometry_to_pose_seconds",
-        "From the arrival of odometry to the pose by it.",
+        "Latency from the arrival of an odometry sample to its pose.",
         &latency_stats.odometry_to_pose,
     );
     text.histogram(
         "pose_jitter_seconds",
-        "Difference between the time from pose to pose and that from odometry to odometry.",
+        "Interval between two poses minus the interval between their odometry samples.",
         &latency_stats.jitter,
     );
     let [blocks, messages] = counters.inbox.dropped();
@@ -157,7 +158,7 @@ pub fn text(board: &StatusBoard) -> String {
     text.family(
         "state",
         "gauge",
-        "1 for the present state of the pose, 0 for the others.",
+        "1 for the current state of the pose, 0 for the others.",
     );
     for state in State::ALL {
         let value = f64::from(u8::from(state == status.state));

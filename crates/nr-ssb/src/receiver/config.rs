@@ -79,7 +79,8 @@ impl ReceiverConfig {
                 "oscillator_ppm",
                 self.oscillator_ppm,
                 0.0,
-                "from 0 to what 15 subcarriers are of the SSB's frequency; no offset beyond is searched",
+                "it must be from 0 to 15 subcarrier spacings, in ppm of the SSB frequency; larger \
+                 offsets are not searched",
                 widest_ppm * (1.0 + 1e-9),
             ),
             (

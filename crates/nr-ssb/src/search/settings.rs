@@ -55,7 +55,7 @@ impl SearchConfig {
             return Err(setting("cfo_range_hz", self.cfo_range_hz, allowed));
         }
         if self.cfo_centre_hz.is_nan() || self.cfo_centre_hz.abs() > 32.0 * self.spacing.hz() {
-            let allowed = "32 subcarriers to either side at most";
+            let allowed = "at most 32 subcarriers to either side";
             return Err(setting("cfo_centre_hz", self.cfo_centre_hz, allowed));
         }
         if !(self.false_alarm > 0.0 && self.false_alarm < 1.0) {

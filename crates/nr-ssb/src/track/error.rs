@@ -8,7 +8,8 @@ use crate::search::SearchError;
 pub enum TrackError {
     /// The window does not contain the SSB.
     #[error(
-        "an SSB expected from sample {expected} on does not lie in a window of {samples} from {window_start} on"
+        "the SSB expected at sample {expected} is outside the window of {samples} samples that \
+         begins at sample {window_start}"
     )]
     Window {
         /// First sample of the SSB.

@@ -47,7 +47,7 @@ pub enum LiveError {
         by_s: f64,
     },
     /// An angle that was received before.
-    #[error("angle: a copy of the last one of PCI {pci}; each angle counts once")]
+    #[error("angle: a copy of the last angle of PCI {pci}; give each angle once")]
     AngleRepeated {
         /// Physical cell identity.
         pci: u16,
@@ -56,13 +56,16 @@ pub enum LiveError {
     #[error("odometry: {0}")]
     Odometry(#[from] OdometryDefect),
     /// Cell that the vehicle does not receive.
-    #[error("no radio head with PCI {pci} at this site that the vehicle listens to")]
+    #[error(
+        "no radio head with PCI {pci}: the site does not contain it, or \
+         receiver.pci_allow_list excludes it"
+    )]
     UnknownCell {
         /// Physical cell identity.
         pci: u16,
     },
     /// Custom localizer, which this operation does not support.
-    #[error("the localizer is not the built-in one: a pose or a reset is for its maker to give it")]
+    #[error("the localizer is custom code: set or reset its pose there")]
     OwnLocalizer,
     /// Error of a custom estimator, policy or localizer.
     #[error("{0}")]

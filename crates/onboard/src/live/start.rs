@@ -29,8 +29,8 @@ pub fn starting_at(
         pose.is_some() || findable,
         "start.pose",
         "missing",
-        "without it the vehicle is found by a tracker (localizer.kind), along a road that it follows \
-         by two radio heads or more, elsewhere by three",
+        "a search without start pose needs localizer.kind = \"tracker\", and at least two radio \
+         heads along a road that the vehicle follows, elsewhere three",
     )?;
     Ok((vehicle, pose.unwrap_or_default()))
 }

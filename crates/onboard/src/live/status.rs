@@ -123,41 +123,42 @@ impl Reason {
                 "check the source of the odometry and its clock"
             }
             Self::NoAngle => {
-                "check that samples or angles come, the SSB's frequency and period in the site, and \
-                 the PCIs of the radio heads"
+                "check that samples or angles arrive; check the frequency and period of the SSBs \
+                 and the PCIs in the site file"
             }
             Self::AnglesSilent { .. } => {
-                "drive on with care to where radio heads are in sight; if they are, check antennas \
-                 and source of the samples"
+                "drive on with care until radio heads are in sight; if they are in sight, check \
+                 the antennas and the source of the samples"
             }
-            Self::SeveralPlaces { .. } => {
-                "drive on, straight ahead and around a bend, or give the pose"
+            Self::SeveralPlaces { .. } => "drive straight ahead and around a bend, or set the pose",
+            Self::AnglesElsewhere => {
+                "stop and set the pose, or drive on slowly until the \
+                 position is found"
             }
-            Self::AnglesElsewhere => "stop and give the pose, or drive on slowly until it is found",
             Self::SourcesDisagree => {
-                "stop; check the array's mounting and calibration, and the places of the radio heads"
+                "stop; check the array's mounting and calibration, and the positions of the radio \
+                 heads"
             }
             Self::FaultyHeads { .. } => {
-                "drive on; check place, PCI and line of sight of the radio heads that are left out"
+                "drive on; check position, PCI and line of sight of the excluded radio heads"
             }
             Self::LevelAboveLimit { .. } => {
                 "drive on with care: the level falls as more radio heads are received"
             }
             Self::FaultSuspected => {
-                "drive on with care; if it stays, check odometer, array and site against their files"
+                "drive on with care; if the suspicion persists, compare odometer, array and site \
+                 with their files"
             }
             Self::SensorFault(fault) => fault.what_to_do(),
             Self::Unconfirmed => {
-                "drive on with care to where two radio heads or more are in sight; the pose is confirmed \
-                 by five angles"
+                "drive on with care until at least two radio heads are in sight; five angles \
+                 confirm the pose"
             }
             Self::ClocksDisagree { .. } => {
                 "stop; synchronize the clocks of the odometry and of the samples or angles"
             }
             Self::Nominal => "nothing",
-            Self::NotMonitored => {
-                "set integrity.enabled = true to know whether the pose can be relied on"
-            }
+            Self::NotMonitored => "set integrity.enabled = true to monitor the pose",
         }
     }
 }
@@ -165,27 +166,38 @@ impl Reason {
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoOdometry => write!(f, "no odometry has come"),
+            Self::NoOdometry => write!(f, "no odometry has arrived"),
             Self::OdometrySilent { age_s } => write!(f, "no odometry for {age_s:.1} s"),
             Self::NoAngle => write!(f, "no angle has been accepted yet"),
             Self::AnglesSilent { age_s } => {
                 write!(f, "no angle has been accepted for {age_s:.1} s")
             }
             Self::SeveralPlaces { places: 1 } => {
-                write!(f, "the place that fits is not yet certain")
+                write!(
+                    f,
+                    "one position fits the received angles, but it is not yet certain"
+                )
             }
-            Self::SeveralPlaces { places } => write!(f, "{places} places fit the received angles"),
-            Self::AnglesElsewhere => write!(f, "angles come from elsewhere than predicted"),
-            Self::SourcesDisagree => write!(f, "half of the radio heads or more disagree"),
-            Self::FaultyHeads { heads: 1 } => write!(f, "a radio head is at fault and left out"),
+            Self::SeveralPlaces { places } => write!(
+                f,
+                "{places} positions fit the received \
+                 angles"
+            ),
+            Self::AnglesElsewhere => write!(f, "the angles contradict the predicted position"),
+            Self::SourcesDisagree => write!(
+                f,
+                "at least half of the radio heads contradict the \
+                 others"
+            ),
+            Self::FaultyHeads { heads: 1 } => write!(f, "a radio head is faulty and excluded"),
             Self::FaultyHeads { heads } => {
-                write!(f, "{heads} radio heads are at fault and left out")
+                write!(f, "{heads} radio heads are faulty and excluded")
             }
             Self::LevelAboveLimit { level_m, limit_m } => write!(
                 f,
                 "the protection level, {level_m:.2} m, is above the alert limit, {limit_m:.2} m"
             ),
-            Self::FaultSuspected => write!(f, "a fault is suspected or was a moment ago"),
+            Self::FaultSuspected => write!(f, "a fault is suspected, or was suspected recently"),
             Self::SensorFault(fault) => fault.fmt(f),
             Self::Unconfirmed => {
                 write!(f, "angles have not confirmed the given or resumed pose yet")
@@ -200,8 +212,8 @@ impl fmt::Display for Reason {
                     "ahead of"
                 },
             ),
-            Self::Nominal => write!(f, "nothing is wrong"),
-            Self::NotMonitored => write!(f, "nothing monitors the pose"),
+            Self::Nominal => write!(f, "no fault detected"),
+            Self::NotMonitored => write!(f, "the pose is not monitored"),
         }
     }
 }

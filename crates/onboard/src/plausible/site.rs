@@ -254,7 +254,7 @@ fn bends(site: &Site) -> Vec<Warning> {
             key: format!("road.segments[{index}].turn_rad"),
             value: it.turn_rad.to_string(),
             why: format!(
-                "over {} m this is a bend of {:.2} m radius, below that of any vehicle",
+                "over {} m this is a bend of {:.2} m radius, which no vehicle can drive",
                 it.length_m,
                 it.length_m / it.turn_rad.abs()
             ),

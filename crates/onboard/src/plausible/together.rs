@@ -139,7 +139,10 @@ fn strays(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     (vehicle.follows_road() && rms_m > 0.5 * width_m).then(|| Warning {
         key: "lane_keeping.rms_m".to_owned(),
         value: rms_m.to_string(),
-        why: format!("the road is {width_m} m wide: it would leave it a third of the time"),
+        why: format!(
+            "the road is {width_m} m wide: the vehicle would be beside the road a third \
+             of the time"
+        ),
         write: format!("write metres: {rms_m} cm are {}", rounded(rms_m / 100.0)),
     })
 }

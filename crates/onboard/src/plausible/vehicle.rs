@@ -10,7 +10,7 @@ use super::warning::Warning;
 use crate::settings::Vehicle;
 
 const TYRES: &str = "no tyre grips better than 1 g";
-const KNOWN_NO_BETTER: &str = "that is no better than not knowing the direction at all";
+const KNOWN_NO_BETTER: &str = "with this uncertainty, the direction is unknown";
 
 /// Usual ranges of numbers. They are wide: some vehicle exists at every value within.
 const ROWS: &[Usual] = &[
@@ -133,7 +133,7 @@ const ROWS: &[Usual] = &[
         key: "odometer.scale",
         within: [0.8, 1.25],
         why: "wear and load change the wheel radius by a few percent",
-        write: |_| "write metres read per metre driven: about 1".to_owned(),
+        write: |_| "write measured metres per metre driven: about 1".to_owned(),
     },
     Usual {
         key: "odometer.scale_std",

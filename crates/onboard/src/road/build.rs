@@ -36,7 +36,8 @@ pub enum RoadError {
     /// An unsurveyed segment is curved. The road's coordinates end at the centre of a curve, so
     /// that the distance of a vehicle from a guessed curve is undefined.
     #[error(
-        "segment {index} is not surveyed and turns by {turn_rad} rad; a guess must be straight"
+        "segment {index} is not surveyed and turns by {turn_rad} rad; an unsurveyed segment must \
+         be straight"
     )]
     BentGuess {
         /// Index of the segment.
@@ -45,13 +46,13 @@ pub enum RoadError {
         turn_rad: f64,
     },
     /// Two successive points are equal.
-    #[error("points {index} and {} of the polyline are in one place", index + 1)]
+    #[error("points {index} and {} of the polyline have the same position", index + 1)]
     RepeatedPoint {
         /// Index of the first of the two points.
         index: usize,
     },
     /// The road is longer than any vehicle drives.
-    #[error("the road is {length_m:.0} m long; the longest allowed is 1000 km")]
+    #[error("the road is {length_m:.0} m long; the maximum is 1000 km")]
     TooLong {
         /// Its length in metres.
         length_m: f64,

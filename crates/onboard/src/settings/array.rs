@@ -159,13 +159,16 @@ impl ArraySettings {
                 in_a_row,
                 key,
                 phase_rad,
-                "only a row has it: use channel_gains",
+                "it must be 0 unless the antennas are in a row: use array.channel_gains",
             )?;
         }
         let Some(gains) = &self.channel_gains else {
             return Ok(());
         };
-        let allowed = format!("array.elements is {}: one for each antenna", self.elements);
+        let allowed = format!(
+            "it must have one gain for each antenna, and array.elements is {}",
+            self.elements
+        );
         let fits = gains.len() == usize::from(self.elements);
         let count = format!("a list of {}", gains.len());
         check.that(fits, "array.channel_gains", count, &allowed)?;

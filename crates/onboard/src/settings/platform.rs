@@ -106,9 +106,9 @@ impl Platform {
         let first = whole.next();
         if let (Some(first), Some(second)) = (first, whole.next()) {
             let allowed = format!(
-                "a sum may hold the idle board once, here it is in a figure of boundary `{first}` \
-                 and in one of `{second}`; count one of them, or state the others above idle \
-                 (`marginal`)"
+                "the idle power of the board would be counted twice: a figure of boundary \
+                 `{first}` and one of boundary `{second}` contain it; count one of them, or give \
+                 the other above idle (boundary `marginal`)"
             );
             let file = &self.name;
             return Err(Check { file }.error("idle.counted", self.idle.counted, &allowed));
@@ -140,8 +140,8 @@ impl Platform {
                 mode.base_wake_up_ms.keys().chain(cycles).collect();
             let known: Vec<String> = known.iter().map(ToString::to_string).collect();
             let allowed = format!(
-                "mode {} of `{}` has a base wake-up time, what an estimate takes there, for {} \
-                 only; choose one of them, or state it yourself: `{}`",
+                "mode {} of `{}` has the base wake-up time (duration of one estimate) only for \
+                 {}; choose one of these methods, or set `{}`",
                 mode.mode,
                 self.name,
                 known.join(", "),

@@ -178,7 +178,8 @@ impl RadioHeadSettings {
                 members.count() > 1,
                 &format!("{key}.clock_group"),
                 group,
-                "no other radio head has this clock_group; leave it out for an own oscillator",
+                "no other radio head has this clock_group; remove it if the radio head has an \
+                 oscillator of its own",
             )?;
         }
         for (other_index, other) in all.iter().take(index).enumerate() {
@@ -186,7 +187,7 @@ impl RadioHeadSettings {
                 self.position_m != other.position_m,
                 &format!("{key}.position_m"),
                 &position,
-                &format!("radio_heads[{other_index}] stands in the same place"),
+                &format!("radio_heads[{other_index}] has the same position"),
             )?;
             check.that(
                 (self.pci, self.ssb_index) != (other.pci, other.ssb_index),

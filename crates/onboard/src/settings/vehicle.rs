@@ -193,25 +193,26 @@ impl TomlFile for Vehicle {
             tracks || self.integrity.is_none_or(|it| !it.enabled),
             "integrity",
             "given",
-            "it needs localizer.kind = \"tracker\"; leave it out, or write integrity.enabled = false",
+            "it needs localizer.kind = \"tracker\"; remove it, or write integrity.enabled = false",
         )?;
         check.that(
             tracks || !matches!(self.wake_up, Some(WakeUpSettings::Uncertainty(_))),
             "wake_up.policy",
             "uncertainty",
-            "it needs localizer.kind = \"tracker\", which knows its own error",
+            "it needs localizer.kind = \"tracker\", the only localizer that estimates its own \
+             error",
         )?;
         check.that(
             self.start.known || tracks,
             "start.known",
             false,
-            "to find the vehicle takes localizer.kind = \"tracker\"",
+            "a search for the vehicle needs localizer.kind = \"tracker\"",
         )?;
         check.that(
             self.start.known || self.start.pose.is_none(),
             "start.known",
             false,
-            "there is a start.pose",
+            "it contradicts start.pose: remove one of them",
         )?;
         if let Some(integrity) = &self.integrity {
             integrity.check(check)?;
@@ -243,13 +244,14 @@ pub fn check_together(
         heard > 0,
         "vehicle.receiver.pci_allow_list",
         "empty",
-        "leave it out to listen to all",
+        "remove it to receive all radio heads",
     )?;
     let along_road = site.road.is_some() && vehicle.follows_road();
     check.that(
         vehicle.start.known || heard > if along_road { 1 } else { 2 },
         "vehicle.start.known",
         false,
-        "to find the vehicle takes two radio heads or more along a road that it follows, three elsewhere",
+        "a search for the vehicle needs at least two radio heads along a road that it follows, \
+         elsewhere three",
     )
 }

@@ -167,7 +167,7 @@ impl PidSettings {
                 "position_uncertainty_m",
                 self.position_uncertainty_m,
                 format!(
-                    "at the top speed that is a t_max of {:.1} ms, which",
+                    "at the top speed it gives a t_max of {:.1} ms, which",
                     t_max_s * 1e3
                 ),
             ),

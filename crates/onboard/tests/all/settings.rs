@@ -219,7 +219,7 @@ fn a_site_need_not_have_a_road() {
     carrier.start.known = false;
     let (_, key, message) = refusal(check_together(&hall, &carrier, check));
     assert_eq!(key, "vehicle.start.known");
-    assert!(message.contains("three elsewhere"), "{message}");
+    assert!(message.contains("elsewhere three"), "{message}");
     let heads = "radio_heads = [{ pci = 1, position_m = [0.0, 0.0, 6.0] }, { pci = 2, position_m = [9.0, 0.0, 6.0] }, \
                  { pci = 3, position_m = [0.0, 9.0, 6.0] }]";
     let three = site(&format!("name = 'hall'\n{heads}")).unwrap();

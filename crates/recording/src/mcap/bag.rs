@@ -48,8 +48,8 @@ pub fn files_of(bag: &Path) -> Result<Vec<PathBuf>, RecordingError> {
                 file: bag.join("metadata.yaml").display().to_string(),
                 key: name,
                 allowed:
-                    "a file that it names must be in the folder; to read another alone, give that \
-                          file in place of the folder"
+                    "every file that it names must be in the folder; to read one file alone, give \
+                     that file in place of the folder"
                         .to_owned(),
             });
         }

@@ -290,7 +290,7 @@ impl Turning<'_> {
                 };
                 told = Some((
                     rates,
-                    format!("{source}, whose z axis is taken for up{but}"),
+                    format!("{source}, whose z axis is assumed to point up{but}"),
                 ));
             } else {
                 let why = self.apart(&times_s, gyroscope);
@@ -305,7 +305,7 @@ impl Turning<'_> {
             // Only an alternative source requires a remark.
             let others: Vec<&str> = self.imus.keys().map(String::as_str).collect();
             let said = format!(
-                "twist.angular.z of {}; --imu-topic takes that of {}",
+                "twist.angular.z of {}; --imu-topic selects that of {}",
                 self.topic,
                 others.join(" or ")
             );

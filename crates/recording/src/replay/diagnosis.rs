@@ -218,7 +218,7 @@ fn better_explanations(
         is_of_start: hypothesis.subject == Subject::Start,
         is_harmless: !is_lost && apart_m(&as_given.path, &evidence.path) < HARMLESS_M,
         text: format!(
-            "{:.0} % of the angles are not what is expected, but {:.0} % if {}; check {}",
+            "{:.0} % of the angles contradict the configuration, but only {:.0} % if {}; check {}",
             100.0 * as_given.all.misfit_share(),
             100.0 * evidence.all.misfit_share(),
             hypothesis.meant,
@@ -306,7 +306,7 @@ fn wrong_yaw_rate(
     }
     let is_near = |it: &Evidence| apart_m(&as_given.path, &it.path) < HARMLESS_M;
     let turned = told_per_turned.map_or(
-        String::from("angles come from elsewhere than expected"),
+        String::from("the angles contradict the configuration"),
         |told| format!("yaw_rate_radps is {told:.2} times the yaw rate of the vehicle"),
     );
     Ok(Some(Diagnosis {
@@ -359,7 +359,7 @@ fn doubtful_odometry(given: &Drive<'_>) -> impl Iterator<Item = Diagnosis> {
             _ => None,
         });
     doubts.map(|text| Diagnosis {
-        text: format!("the angles are not what is expected, and {text}"),
+        text: format!("the angles contradict the configuration, and {text}"),
         is_of_start: false,
         is_harmless: false,
     })
@@ -387,8 +387,8 @@ fn too_fast(given: &Drive<'_>) -> Option<Diagnosis> {
         is_of_start: false,
         is_harmless: false,
         text: format!(
-            "the odometry says {median_mps:.1} m/s in the median while it moves, where \
-             top_speed_kmh is {}; check the units of distances, speeds and {}",
+            "the median speed of the odometry in motion is {median_mps:.1} m/s, and top_speed_kmh \
+             is {}; check the units of distances, speeds and {}",
             vehicle.top_speed_kmh, given.odometry.fields.time
         ),
     })

@@ -185,9 +185,9 @@ impl<'a> Replay<'a> {
         }
         if angle_time_offset_s.is_remarkable(MIN_ANGLE_TIME_OFFSET_S) {
             let text = format!(
-                "angles are {:.0} ± {:.0} ms later than stated, by the odometry's clock, and are \
-                 taken as that; check the clocks, receiver.angle_time_offset_s, and whether the odometry is \
-                 of commands",
+                "by the odometry's clock, the angles are {:.0} ± {:.0} ms later than configured; \
+                 this is compensated; check the clocks, receiver.angle_time_offset_s, and whether \
+                 the odometry contains commands instead of measurements",
                 1e3 * (angle_time_offset_s.found - angle_time_offset_s.stated),
                 1e3 * angle_time_offset_s.std
             );
@@ -199,8 +199,8 @@ impl<'a> Replay<'a> {
         let (is_lost, recovered) = (self.onboard.is_lost(), self.onboard.recovered());
         if is_lost && !self.was_lost {
             let text = format!(
-                "angles at {time_s:.1} s: they come from elsewhere than expected, the position is \
-                 not available; searching"
+                "angles at {time_s:.1} s: they contradict the position, which is unavailable; a \
+                 search has started"
             );
             self.remark(time_s, text);
         }
@@ -212,7 +212,7 @@ impl<'a> Replay<'a> {
             );
             self.remark(time_s, text);
         } else if self.was_lost && !is_lost {
-            let text = format!("angles at {time_s:.1} s: they come from where expected again");
+            let text = format!("angles at {time_s:.1} s: they agree with the position again");
             self.remark(time_s, text);
         }
         (self.was_lost, self.recovered) = (is_lost, recovered);
@@ -356,8 +356,8 @@ impl<'a> Replay<'a> {
                 Ok(OdometryResult::YawRateRefused { radps }) => self.remark(
                     at_s,
                     format!(
-                        "odometry at {at_s} s: no vehicle turns by {} rad/s, its yaw rate was \
-                         refused; check its unit, or vehicle.top_yaw_rate_radps",
+                        "odometry at {at_s} s: a yaw rate of {} rad/s is impossible, it was not \
+                         used; check its unit, or vehicle.top_yaw_rate_radps",
                         number(radps)
                     ),
                 ),
@@ -365,7 +365,7 @@ impl<'a> Replay<'a> {
                     if !self.beyond_map {
                         let text = format!(
                             "odometry at {at_s} s: {by_m:.1} m beyond the end of the road, \
-                             driving on without it"
+                             continued without road"
                         );
                         self.remark(at_s, text);
                     }
@@ -376,7 +376,7 @@ impl<'a> Replay<'a> {
                     if !self.gaps_m.contains(&from_m) {
                         let text = format!(
                             "odometry at {at_s} s: the road was not surveyed from {from_m:.1} to \
-                             {to_m:.1} m, driving on without it"
+                             {to_m:.1} m, continued without road"
                         );
                         self.remark(at_s, text);
                         self.gaps_m.push(from_m);

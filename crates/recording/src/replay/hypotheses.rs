@@ -241,7 +241,7 @@ pub fn robot() -> Hypothesis {
 pub fn of_yaw_rate(constant_radps: Option<f64>) -> Vec<(f64, Hypothesis)> {
     if let Some(radps) = constant_radps {
         let radps = radps + 0.0; // a negative zero is zero
-        let meant = format!("yaw_rate_radps, which is {radps} throughout, says nothing");
+        let meant = format!("yaw_rate_radps, which is {radps} throughout, is not a measurement");
         let correction = Correction::Odometry(|it| it.yaw_rate_radps = None);
         let check = "the source of the yaw rate, and its column";
         return vec![(0.0, Hypothesis::new(meant, check, correction))];
@@ -337,12 +337,12 @@ pub fn of_drive() -> Vec<Hypothesis> {
             Correction::Odometry(|it| scale(it, 1e3)),
         ),
         (
-            "distances and speeds read double",
+            "distances and speeds are twice the true ones",
             "odometer.scale; the wheels' diameter against their radius",
             Correction::Odometry(|it| scale(it, 0.5)),
         ),
         (
-            "distances and speeds read half",
+            "distances and speeds are half of the true ones",
             "odometer.scale; the wheels' radius against their diameter",
             Correction::Odometry(|it| scale(it, 2.0)),
         ),

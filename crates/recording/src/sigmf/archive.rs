@@ -82,7 +82,7 @@ pub fn recording_in(archive: &Path) -> Result<(Vec<u8>, Extent), RecordingError>
             "an archive must hold a .sigmf-meta file".to_owned()
         } else {
             format!(
-                "an archive of one recording is read; extract one of {} with `tar -xf`",
+                "an archive must contain one recording; extract one of {} with `tar -xf`",
                 names.join(", ")
             )
         };

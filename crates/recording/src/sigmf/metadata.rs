@@ -302,7 +302,7 @@ fn explain(file: &Path, path: &str, message: &str) -> RecordingError {
         return RecordingError::Missing {
             file: file.display().to_string(),
             key: at(name),
-            allowed: "SigMF metadata must state it".to_owned(),
+            allowed: "SigMF metadata must contain it".to_owned(),
         };
     }
     // Format of the message: "invalid type: string "x", expected f64"

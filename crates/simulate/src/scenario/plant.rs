@@ -209,7 +209,7 @@ impl TomlFile for Plant {
             let ends = ["low", "value", "high"].map(|name| number(name).unwrap_or(0.0));
             let rise = ends.is_sorted();
             let key = format!("prices.{key}");
-            let allowed = "`low`, `value` and `high` must not fall";
+            let allowed = "`low`, `value` and `high` must be in ascending order";
             check.that(rise, &key, format!("{ends:?}"), allowed)?;
         }
         self.check_targets(check)?;
@@ -323,7 +323,7 @@ impl Plant {
             "prices.currency_per_usd",
             "missing",
             &format!(
-                "prices that are not stated are published in US dollars; write the price of one US \
+                "omitted prices are published in US dollars; write the price of one US \
                  dollar in {}",
                 self.currency()
             ),
@@ -479,7 +479,7 @@ mod tests {
         let lidar = "[prices]\nlidar = { low = 5000.0, value = 4000.0, high = 6000.0 }\n[fleet]";
         let message = refused(("[fleet]", lidar));
         assert!(
-            message.contains("prices.lidar") && message.contains("must not fall"),
+            message.contains("prices.lidar") && message.contains("must be in ascending order"),
             "{message}"
         );
     }

@@ -162,8 +162,8 @@ impl Scenario {
                 key: key.to_owned(),
                 value: speed_kmh.to_string(),
                 why: format!(
-                    "in the bend of {:.1} m radius at {along_m:.0} m that is {across_mps2:.0} m/s² \
-                     across, and tyres hold to {MOST_ACROSS_MPS2}",
+                    "in the bend of {:.1} m radius at {along_m:.0} m, the lateral acceleration is \
+                     {across_mps2:.0} m/s², and tyres permit {MOST_ACROSS_MPS2}",
                     1.0 / curvature_per_m
                 ),
                 write: format!("write at most {most_kmh:.0} km/h, or a larger radius"),

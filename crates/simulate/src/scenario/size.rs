@@ -71,7 +71,7 @@ impl DriveSize {
             "motion",
             format!("a drive of {hours:.1} h, {looks:.1e} SSBs and {gigabytes:.1} GB"),
             &format!(
-                "at most {MOST_LOOKS:.0e} SSBs or odometry samples and {:.1} GB are taken \
+                "at most {MOST_LOOKS:.0e} SSBs or odometry samples and {:.1} GB are allowed \
                  without allow_large = true (--allow-large); shorten the road or the stops, or \
                  raise top_speed_kmh",
                 MOST_BYTES * 1e-9
@@ -87,7 +87,7 @@ impl DriveSize {
             "runs",
             format!("{runs} in memory, {:.1} GB", self.bytes(runs) * 1e-9),
             &format!(
-                "at most {most_gb:.1} GB are taken without allow_large = true (--allow-large); \
+                "at most {most_gb:.1} GB are allowed without allow_large = true (--allow-large); \
                  drive in several parts, or keep no trajectories"
             ),
         )

@@ -33,7 +33,7 @@ impl TryFrom<String> for Target {
     fn try_from(text: String) -> Result<Self, String> {
         let parsed = parse(&text).ok_or_else(|| {
             format!(
-                "{:?} is no target; write a length from 1 mm to 100 m and a share from 50 % to \
+                "{:?} is not a target; write a length from 1 mm to 100 m and a share from 50 % to \
                  99.9 %, such as \"0.3 m 99 %\"",
                 text.chars().take(40).collect::<String>()
             )

@@ -82,8 +82,8 @@ impl TruthSettings {
             array.is_none_or(|array| !array.contains_key("channel_gains")),
             "truth.vehicle.array.channel_gains",
             "given",
-            "the gains of simulated channels are drawn: iq.channel_gain_db, iq.channel_phase_rad; a \
-             phase that calibration left is array.phase_rad",
+            "remove it: the gains of simulated channels are drawn from iq.channel_gain_db and \
+             iq.channel_phase_rad; array.phase_rad is the residual phase of the calibration",
         )?;
         Ok((
             depart(site, &self.site, &SITE_FACTS, check)?,
@@ -127,7 +127,10 @@ fn depart<T: TomlFile + Clone>(
             facts.contains(&key.as_str()) || !exists,
             &format!("{path}.{key}"),
             "given",
-            &format!("only physical keys can differ: {}", facts.join(", ")),
+            &format!(
+                "the truth can differ from the nominal model only in physical keys: {}",
+                facts.join(", ")
+            ),
         )?;
     }
     let departed = departed?;

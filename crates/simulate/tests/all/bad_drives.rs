@@ -198,7 +198,7 @@ fn bad_angles_are_reported_and_ignored() {
     let texts: Vec<&str> = located.remarks.iter().map(|it| it.text.as_str()).collect();
     let expected = [
         "1 angles are of pci 999, ssb_index 0, which the site does not have",
-        "line 301: time_s 0.98 comes after a later time, as in 1 lines altogether",
+        "line 301: time_s 0.98 is earlier than a previous time (1 lines in total)",
         "line 301: left out, pci 1 has the same angle at 0.98 s twice",
         "line 503: left out, phase_rad is not finite",
         "line 604: left out, phase_sigma_rad -0.1 is not above 0 (and 1 more like this)",

@@ -182,7 +182,7 @@ fn a_guess_of_the_road_must_be_straight() {
     assert_says(
         with_line("surveyed = true", "surveyed = false"),
         "site.road.segments[0].turn_rad",
-        "a guess must be straight",
+        "an unsurveyed segment must be straight",
     );
     assert_says(
         with_line("surveyed = true", "surveyed = \"no\""),
@@ -252,7 +252,7 @@ fn radio_heads_need_distinct_positions_and_names() {
     assert_says(
         with_heads(together),
         "site.radio_heads[1].position_m",
-        "same place",
+        "same position",
     );
     let namesakes = "{ position_m = [50, 20, 0] }, { position_m = [50, -20, 0] }";
     assert_says(
@@ -309,7 +309,7 @@ fn a_vehicle_without_radio_heads_is_rejected() {
     };
     assert!(hears("7").is_ok());
     let key = "vehicle.receiver.pci_allow_list";
-    assert_says(hears(""), key, "leave it out to listen to all");
+    assert_says(hears(""), key, "remove it to receive all radio heads");
     assert_says(hears("7, 8"), &format!("{key}[1]"), "must have this pci");
 }
 

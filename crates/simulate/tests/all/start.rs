@@ -108,7 +108,7 @@ fn settings_that_prevent_a_search_are_rejected() {
     let tracker = [("vehicle.localizer.kind", Value::from("tracker"))];
     refused("paper", &tracker, "two radio heads");
     let no_map = [("vehicle.localizer.map", false.into())];
-    refused("paper-real-odometry-2", &no_map, "three elsewhere");
+    refused("paper-real-odometry-2", &no_map, "elsewhere three");
 }
 
 /// Returns the errors of the published poses in metres and in standard deviations.

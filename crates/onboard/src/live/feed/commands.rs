@@ -41,7 +41,7 @@ impl Live {
             let elapsed_s = newest.time_s - time_s;
             if elapsed_s.abs() > HISTORY_S {
                 return Err(LiveError::Value {
-                    what: "the time of a pose from the newest odometry's",
+                    what: "the time of a pose minus that of the newest odometry",
                     value: -elapsed_s,
                     allowed: "it must be within 0.5 s",
                 });
@@ -129,8 +129,8 @@ fn deviations(covariance: &[[f64; 3]; 3]) -> Result<(f64, f64), LiveError> {
     let [.., [.., heading]] = *covariance;
     let [largest, least] = variances;
     for (what, value) in [
-        ("the variance of a place in m²", largest),
-        ("the variance of a place in m²", least),
+        ("the variance of a position in m²", largest),
+        ("the variance of a position in m²", least),
         ("the variance of a heading in rad²", heading),
     ] {
         if !(0.0..=1e8).contains(&value) {

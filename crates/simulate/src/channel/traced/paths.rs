@@ -196,8 +196,8 @@ impl Paths {
             let is_sight = (length_m - straight_m).abs() < DIRECT_M && straight_m > REACH_M;
             if is_sight && along_m < LEAST_COSINE * straight_m {
                 return PathsError::that(format!(
-                    "`azimuth_rad`, `elevation_rad` in row {row}: the line of sight does not come from \
-                     the radio head; they are of arrival, in the map's frame"
+                    "`azimuth_rad`, `elevation_rad` in row {row}: the line of sight does not come \
+                     from the radio head; write directions of arrival in the map frame"
                 ));
             }
             begins[link(row) + 1] += 1;
@@ -253,7 +253,7 @@ impl Paths {
             let (pci, ssb_index) = (settings.pci, settings.ssb_index);
             let Some(number) = self.head(settings) else {
                 return PathsError::that(format!(
-                    "no radio head pci={pci} ssb_index={ssb_index} in it, as the site has one"
+                    "it contains no paths of the site's radio head pci={pci} ssb_index={ssb_index}"
                 ));
             };
             let [x_m, y_m, _] = self.heads[number].position_m;
@@ -261,8 +261,8 @@ impl Paths {
                 .distance_m(Point::new(settings.position_m[0], settings.position_m[1]));
             if apart_m > 1.0 + 5.0 * settings.position_std_m {
                 return PathsError::that(format!(
-                    "its radio head pci={pci} stands {apart_m:.1} m from where the site has it: \
-                     another frame, or another plan"
+                    "its radio head pci={pci} is {apart_m:.1} m from its position in the site: \
+                     use one frame and one plan"
                 ));
             }
             let places = self.places.len();
