@@ -164,9 +164,9 @@ def test_results_that_cannot_be_repeated_are_reported(folder: Path, results: Pat
         assert done.returncode == 2, done.stdout
         return " ".join(done.stderr.split())
 
-    assert "no results of a command here" in refused(str(folder))
-    assert "working directory is missing" in refused(str(results), "--directory", "nowhere")
-    assert "--keep takes a new directory" in refused(str(results), "--keep", str(folder))
+    assert "no results of a command (" in refused(str(folder))
+    assert "working directory does not exist" in refused(str(results), "--directory", "nowhere")
+    assert "--keep needs a new directory" in refused(str(results), "--keep", str(folder))
     manifest = json.loads((results / "manifest.json").read_text())
     (results / "manifest.json").write_text(
         json.dumps({**manifest, "command": ["access-av", "fly"]})

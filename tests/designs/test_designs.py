@@ -72,7 +72,7 @@ def test_space_from_tables() -> None:
         ({"a": []}, "a: the list is empty"),
         ({"a": 1}, "a: 1 is one value"),
         ({"a": {"low": 2, "high": 1}}, "a: `low` must be below `high`"),
-        ({"a": {"low": 0, "high": 1, "log": True}}, "positive where `log`"),
+        ({"a": {"low": 0, "high": 1, "log": True}}, "positive if `log`"),
         ({"a": {"low": 0, "high": 1, "step": 2}}, "a.step: unknown"),
         ({"site": {"rician_k_db": [5.0, 9.0]}}, r"this key cannot be chosen; write \[world\]"),
         ({"channel": {"model": ["umi"]}}, "channel.model: this key cannot be chosen"),
@@ -184,7 +184,7 @@ class Dying(Executor):
 
 def test_finished_parts_survive_lost_workers(tmp_path: Path, whole: dict[str, bytes]) -> None:
     parts = ResultCache(tmp_path / "dying")
-    with pytest.raises(CampaignError, match=r"workers are gone.*repeat the command to continue"):
+    with pytest.raises(CampaignError, match=r"workers have ended.*repeat the command to continue"):
         Campaign(parts, Dying(5)).run(tasks())
     assert len(contents(parts.path)) == 5
     Campaign(parts).run(tasks())
@@ -321,7 +321,7 @@ finally:
 
 @pytest.mark.parametrize(
     ("dies", "says"),
-    [("worker", "finished"), ("scheduler", "the workers are gone")],
+    [("worker", "finished"), ("scheduler", "the workers have ended")],
 )
 def test_a_process_of_a_cluster_may_end(
     tmp_path: Path, whole: dict[str, bytes], dies: str, says: str
@@ -477,7 +477,7 @@ def test_limits_are_not_met_with_too_few_runs() -> None:
     assert bound.in_words({**row, "p99_error_high_m": 0.29})[0].endswith("met")
     assert bound.in_words({**row, "p99_error_m": 0.31})[0].endswith("missed")
     assert bound.in_words({**row, "p99_error_high_m": None})[0].endswith("too few runs")
-    with pytest.raises(InputError, match=r"percentile 42: it can be 50, 90, 95, 99, 99\.9"):
+    with pytest.raises(InputError, match=r"percentile 42: allowed are 50, 90, 95, 99, 99\.9"):
         Query(max_error_m=0.3, percentile=42.0)
 
 
@@ -627,7 +627,7 @@ def test_command_on_any_scenario(tmp_path: Path, run: Callable[..., Finished]) -
     assert len(list((tmp_path / "o/results/parts").glob("*.npz"))) == 2
     for bad, message in (
         (("design", "sweep", *asked, "--shard", "5/2"), "write --executor FILE.py:NAME"),
-        (("design", "select", "nowhere"), "no designs here"),
+        (("design", "select", "nowhere"), "no results of access-av design sweep"),
     ):
         done = run(tmp_path, *bad)
         assert (done.code, message in done.err) == (2, True)

@@ -306,7 +306,7 @@ def test_a_counter_that_jumps_is_refused(tmp_path: Path) -> None:
 
 def test_a_sensor_without_response_to_the_load_has_stopped() -> None:
     still = Window(0.0, 2.0, Interval(10.0, 0.1), is_constant=True)
-    with pytest.raises(SensorError, match="equal, idle and busy"):
+    with pytest.raises(SensorError, match="equal in the idle and in the busy phase"):
         above_idle(still, still)
 
 
@@ -439,7 +439,7 @@ def test_windows_of_a_sensor_without_response_are_kept(
     found = device.profile(tmp_path, window_s=1.0)
     (each,) = found.measured
     assert each.energy_j is None
-    assert "equal, idle and busy" in str(each.why_not)
+    assert "equal in the idle and in the busy phase" in str(each.why_not)
     for window in (each.idle, each.busy):
         assert window is not None
         assert window.energy_j.low <= 15.0 * window.duration_s <= window.energy_j.high
@@ -471,7 +471,7 @@ def test_bad_input_ends_with_one_message(
     done = access_av("design", "profile", "--sysfs-root", tmp_path / "none")
     assert (done.code, "no such directory" in done.err) == (2, True)
     done = access_av("design", "profile", "--sysfs-root", tmp_path, "--mode", "9")
-    assert (done.code, "this machine has 0" in done.err) == (2, True)
+    assert (done.code, "this computer has 0" in done.err) == (2, True)
 
 
 def test_repeated_work_is_timed() -> None:

@@ -158,7 +158,7 @@ def test_the_command_reports_parameters_that_were_not_estimated_or_do_not_fit(
     )
     (tmp_path / "turned.toml").write_text(turned.to_toml())
     done = access_av(*arguments[:3], "--site", "yard", "--vehicle", tmp_path / "turned.toml")
-    assert "are outliers and were left out" in done.err
+    assert "are outliers and were not used" in done.err
 
 
 def test_odometry_of_two_wheels_gives_equal_poses(logged: Path, tmp_path: Path) -> None:

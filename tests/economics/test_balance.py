@@ -103,12 +103,12 @@ def test_a_missing_payback_is_reported() -> None:
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("grid_g_per_kwh", -1.0, "grid_g_per_kwh: -1.0; low, central, high must rise"),
-        ("electricity_per_kwh", {"low": 2.0, "central": 1.0, "high": 3.0}, "must rise"),
+        ("grid_g_per_kwh", -1.0, "grid_g_per_kwh: -1.0; low, central and high must be ascending"),
+        ("electricity_per_kwh", {"low": 2.0, "central": 1.0, "high": 3.0}, "must be ascending"),
         ("electricity_per_kwh", {"low": 2.0, "high": 3.0}, "electricity_per_kwh.central: missing"),
         ("fleet", {"vehicles": 1}, "fleet.hours_per_day: None; write a number"),
         ("before", {"energy": 1}, "before.energy: unknown; allowed are"),
-        ("before", {"onboard": 1.0}, "before.onboard: a list of tables is needed"),
+        ("before", {"onboard": 1.0}, "before.onboard: must be a list of tables"),
         ("vehicles", 1, "vehicles: unknown"),
     ],
 )

@@ -59,7 +59,7 @@ def test_the_stated_modes_qualify(energies_j: tuple[float, ...], met: bool) -> N
 
 
 def test_an_unknown_rule_is_named() -> None:
-    with pytest.raises(InputError, match=r"unknown rule 'almost'; there are: at_most, above"):
+    with pytest.raises(InputError, match=r"unknown rule 'almost'; allowed are: at_most, above"):
         margin({"rule": "almost", "stated": 1.0}, 1.0)
 
 
@@ -163,7 +163,7 @@ def test_claims_without_a_value_are_reported_and_the_others_are_evaluated() -> N
     found = {
         claim.id: claim for claim in check_claims(synthetic.evaluation().outcome, stated=stated)
     }
-    for name, said in (("a1_adaptive_worst_m", "almost"), ("b1_not_ours", "no result exists")):
+    for name, said in (("a1_adaptive_worst_m", "almost"), ("b1_not_ours", "unknown claim")):
         assert found[name].verdict == NOT_JUDGED
         assert found[name].obtained is None
         assert said in found[name].note

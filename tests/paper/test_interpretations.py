@@ -103,7 +103,7 @@ def test_claims_are_not_judged_on_another_trip(
 
 
 def test_an_unknown_reading_is_named() -> None:
-    with pytest.raises(InputError, match="no interpretation gaet; there are: every-ssb"):
+    with pytest.raises(InputError, match="unknown interpretation gaet; allowed are: every-ssb"):
         interpretations.load("gaet")
 
 

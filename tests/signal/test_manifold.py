@@ -141,7 +141,7 @@ def test_a_schedule_that_leaves_out_an_antenna_is_refused() -> None:
         aoa.switched_direction(
             np.ones(4), [0, 0, 2, 2], np.arange(4.0), PLACES, frequency_hz=(0, 1)
         )
-    with pytest.raises(ValueError, match="lowest and a highest"):
+    with pytest.raises(ValueError, match="the minimum and the maximum frequency"):
         aoa.switched_direction(
             np.ones(4), [0, 0, 1, 1], np.arange(4.0), PLACES[:2], frequency_hz=(2, 1)
         )

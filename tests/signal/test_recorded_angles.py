@@ -81,7 +81,7 @@ def test_json_has_the_promised_keys(access_av: Callable[..., Finished], tmp_path
 
 
 def test_missing_parts_are_reported(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no `annotations`"):
+    with pytest.raises(InputError, match="`annotations` is missing"):
         estimate_bursts(write(tmp_path / "a", [20.0], annotations=[]))
     silent = {"core:datatype": "cf32_le", "core:sample_rate": 1e6, "core:version": "1.2.0"}
     with pytest.raises(InputError, match="--spacing"):

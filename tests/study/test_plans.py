@@ -455,7 +455,7 @@ def test_tables_of_points_are_read_as_a_log_is(tmp_path: Path, text: str, points
         (b"x_m,y_m\n0,0\n\n100,\n", "y_m is empty in line 4"),
         (b"x_m,y_m\n0,0\n# note\n100,nan\n", "y_m is 'nan' in line 4"),
         (b"x_m,y_m\n0,0\n100,inf\n", "y_m is 'inf' in line 3"),
-        (b"x_m,y_m,x_m\n0,0,1\n100,0,1\n", "column x_m is there twice"),
+        (b"x_m,y_m,x_m\n0,0,1\n100,0,1\n", "column x_m occurs twice"),
         (b"x_m,y_m\n0,0\n1,5,0\n", "line 3 has 3 cells instead of 2; with decimal commas"),
         (b'x_m,y_m\n"1,000.0",0\n"1,200.0",0\n', "'1,000.0' in line 2; a number without thousands"),
         (b"x_m;y_m\n1.000,5;0\n1.200,5;0\n", "without thousands separators"),
@@ -523,7 +523,7 @@ def test_files_other_than_drawings_are_rejected(tmp_path: Path, data: bytes) -> 
 def test_integers_beyond_the_float_range_are_rejected(tmp_path: Path) -> None:
     file = tmp_path / "road.geojson"
     file.write_text(f'{{"type": "LineString", "coordinates": [[{10**400}, 1], [2, 3]]}}', "utf-8")
-    with pytest.raises(InputError, match="finite numbers are needed"):
+    with pytest.raises(InputError, match="must be two or three finite numbers"):
         read(file, None, Options())
 
 

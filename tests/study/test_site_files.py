@@ -165,10 +165,10 @@ def test_a_drawing_gives_the_same_road(
         (1, (), "inches"),
         (6, (), "often wrong"),
         (4, ("--metres-per-unit", "0.001"), "Layers:"),
-        (4, ("--metres-per-unit", "0.001", "--road-layer", "CELLS"), "the road is one, or several"),
+        (4, ("--metres-per-unit", "0.001", "--road-layer", "CELLS"), "the road must be one"),
         (4, ("--two-points", "0,0,1,0"), "must be given together"),
-        (4, ("--two-points", "0,0,0,0", "--length-m", "5"), "two different points"),
-        (4, ("--metres-per-unit", "1", "--road-layer", "WAY"), "another unit"),
+        (4, ("--two-points", "0,0,0,0", "--length-m", "5"), "the two points must differ"),
+        (4, ("--metres-per-unit", "1", "--road-layer", "WAY"), "check its unit"),
     ],
 )
 def test_a_drawing_with_uncertain_scale_or_layer_is_rejected(
@@ -204,11 +204,11 @@ def head_at(*place: float) -> dict[str, Any]:
         ({"type": "LineString", "coordinates": [[11.5, None], [1, 2]]}, None, "finite numbers"),
         ({"type": "Polygon", "coordinates": []}, None, "LineString"),
         (ROAD, head_at(11.9, 48.5), "km from the road"),
-        (ROAD, {"type": "Point", "coordinates": [11.5, 48.1]}, "no height"),
+        (ROAD, {"type": "Point", "coordinates": [11.5, 48.1]}, "is not a height"),
         ("x_m,y_m\n0,0\n100,0\n", head_at(11.5, 48.1), "--origin"),
         ("x_m,y\n0,0\n", None, "y_m"),
-        ("x_m,y_m\n0,0\n", None, "two or more"),
-        ("x_m,y_m\n0,0\n0.1,0\n", None, "another unit"),
+        ("x_m,y_m\n0,0\n", None, "at least two"),
+        ("x_m,y_m\n0,0\n0.1,0\n", None, "check its unit"),
     ],
 )
 def test_files_other_than_plants_are_rejected(
@@ -260,7 +260,7 @@ def test_new_files_are_not_written_over_others(
 
 def test_two_points_determine_the_scale() -> None:
     assert dxf.metres_per_unit((0.0, 0.0, 3.0, 4.0), 10.0) == pytest.approx(2.0)
-    with pytest.raises(InputError, match="two different points"):
+    with pytest.raises(InputError, match="the two points must differ"):
         dxf.metres_per_unit((1.0, 1.0, 1.0, 1.0), 10.0)
 
 
@@ -385,9 +385,9 @@ def test_a_background_image_is_placed_by_two_points_and_a_length(
         (("--underlay", "plan.png", "--underlay-points", "0,0,9,0"), "must be given together"),
         (("--underlay", "none.png", "--underlay-metres-per-pixel", "1"), "No such file"),
         (("--underlay", ".", "--underlay-metres-per-pixel", "1"), "not a regular file"),
-        (("--underlay", "plan.svg", "--underlay-metres-per-pixel", "1"), "neither a PNG nor"),
-        (("--underlay", "cut.png", "--underlay-metres-per-pixel", "1"), "neither a PNG nor"),
-        (("--underlay", "cut.jpg", "--underlay-metres-per-pixel", "1"), "neither a PNG nor"),
+        (("--underlay", "plan.svg", "--underlay-metres-per-pixel", "1"), "not a PNG or JPEG"),
+        (("--underlay", "cut.png", "--underlay-metres-per-pixel", "1"), "not a PNG or JPEG"),
+        (("--underlay", "cut.jpg", "--underlay-metres-per-pixel", "1"), "not a PNG or JPEG"),
         (("--underlay", "large.png", "--underlay-metres-per-pixel", "1"), "at most 393216"),
         (("--underlay", "plan.png", "--underlay-metres-per-pixel", "1e6"), "metres_per_pixel"),
         (

@@ -276,7 +276,9 @@ def test_sighup_loads_a_good_vehicle_and_keeps_the_old_one_for_a_bad_one(
         run.node.send_signal(signal.SIGHUP)
         run.send(8.0)
         bad = run.events("node", 6.0)
-        assert any("vehicle.toml" in it and "name" in it and "remain active" in it for it in bad), bad
+        assert any("vehicle.toml" in it and "name" in it and "remain active" in it for it in bad), (
+            bad
+        )
         assert run.poses(7.0)[-1][1]["state"] == "ok"
         wider = access_av.Vehicle.from_toml(before).with_overrides({"integrity.alert_limit_m": 9.0})
         file.write_text(wider.to_toml(), encoding="utf-8")

@@ -21,11 +21,15 @@ def bound(
     out: Out = None,
     allow_large: AllowLarge = False,
     map_step_m: Annotated[
-        float | None, typer.Option(help="Side of the map's squares.", show_default="by the size")
+        float | None,
+        typer.Option(help="Side length of the map's squares.", show_default="by the size"),
     ] = None,
     kinds: Annotated[
         bool,
-        typer.Option("--kinds", help="Also bound delays, carrier phases and power, by clock."),
+        typer.Option(
+            "--kinds",
+            help="Also list the bound with delays, carrier phases and power, for several clocks.",
+        ),
     ] = False,
     as_json: AsJson = False,
 ) -> None:

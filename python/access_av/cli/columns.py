@@ -22,7 +22,9 @@ def columns(
         str | None, typer.Argument(metavar="TABLE", help="Name of a table.", show_default="all")
     ] = None,
     as_json_: AsJson = False,
-    as_markdown: Annotated[bool, typer.Option("--markdown", help="Print docs/columns.md.")] = False,
+    as_markdown: Annotated[
+        bool, typer.Option("--markdown", help="Print all tables as Markdown (docs/columns.md).")
+    ] = False,
 ) -> None:
     """Print name, unit and meaning of each column, and the condition of a null value."""
     from access_av.tables.columns.look_up import as_json, markdown, table

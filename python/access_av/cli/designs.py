@@ -52,7 +52,9 @@ def _bound(text: str) -> Any:
 )
 def designs(
     scenario: ScenarioArgument,
-    space: Annotated[Path, typer.Option(help="TOML file: keys of the scenario and their values.")],
+    space: Annotated[
+        Path, typer.Option(help="TOML file with the varied keys of the scenario and their values.")
+    ],
     sobol: Annotated[
         int | None,
         typer.Option(
@@ -185,7 +187,7 @@ def choose(
 
     file = results / TABLE
     if not file.is_file():
-        raise InputError(f"{results}: no designs here ({TABLE} is missing)")
+        raise InputError(f"{results}: no results of access-av design sweep ({TABLE} is missing)")
     rows = validation.read(file, "table of designs")
     validation.check_types(rows, str(file), "designs")
     limits = Query(

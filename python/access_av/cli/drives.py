@@ -49,17 +49,21 @@ def synth(
     scenario: ScenarioArgument,
     out: Annotated[Path, typer.Option(help="Output folder.")],
     duration_s: Annotated[
-        float | None, typer.Option(min=0.02, help="Duration from the start.", show_default="all")
+        float | None,
+        typer.Option(min=0.02, help="Duration from the start of the drive.", show_default="all"),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")] = 1,
-    run: Annotated[int, typer.Option(min=0, help="Number of the run.")] = 0,
+    run: Annotated[int, typer.Option(min=0, help="Number of the recorded run, from 0.")] = 0,
     continuous: Annotated[
-        bool, typer.Option("--continuous", help="Also write samples between the bursts (large).")
+        bool,
+        typer.Option(
+            "--continuous", help="Also write the samples between the bursts (large files)."
+        ),
     ] = False,
     datatype: Annotated[str, typer.Option(help="Sample format: ci16_le or cf32_le.")] = "ci16_le",
     angles: Annotated[
         bool,
-        typer.Option("--angles", help="Write angles.csv instead of samples (small)."),
+        typer.Option("--angles", help="Write angles.csv instead of samples (small file)."),
     ] = False,
     allow_large: AllowLarge = False,
     overrides: Overrides = None,
@@ -118,14 +122,14 @@ def locate(
         str, typer.Option(help="Vehicle: shipped name, or path of a TOML file.")
     ] = "default",
     out: Out = None,
-    truth: Annotated[Path | None, typer.Option(help="True trajectory, TUM.")] = None,
+    truth: Annotated[Path | None, typer.Option(help="True trajectory as a TUM file.")] = None,
     topic: Annotated[str | None, typer.Option(help="Odometry topic of the bag.")] = None,
     imu_topic: Annotated[
         str | None,
         typer.Option(help="IMU topic for the yaw rate.", show_default="yaw rate of the odometry"),
     ] = None,
     start_time_s: Annotated[
-        float, typer.Option(help="Time of the first sample, odometry clock, in s.")
+        float, typer.Option(help="Time of the first sample by the odometry's clock, in s.")
     ] = 0.0,
     start: Annotated[
         str | None,
@@ -353,5 +357,5 @@ def _pose(text: str) -> tuple[float, float, float]:
     if not all(map(math.isfinite, (x_m, y_m, heading_rad))):
         raise InputError(f"--start {text}: the numbers must be finite")
     if abs(heading_rad) > math.tau:
-        raise InputError(f"--start {text}: the heading exceeds one turn; write it in radians")
+        raise InputError(f"--start {text}: the heading exceeds 2π; write it in radians")
     return x_m, y_m, heading_rad

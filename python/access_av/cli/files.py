@@ -42,7 +42,7 @@ KindArgument = Annotated[Kind, typer.Argument(help="Kind of file.")]
 KindOption = Annotated[
     Kind | None, typer.Option(help="Kind of file.", show_default="recognized from the keys")
 ]
-Names = Annotated[list[str], typer.Argument(help="Shipped names, or paths.")]
+Names = Annotated[list[str], typer.Argument(help="Files: shipped names, or paths.")]
 PANEL = "Settings files"
 
 
@@ -104,7 +104,7 @@ def list_names(
     epilog="Example: [bold]access-av file show --kind site yard > mine.toml[/]",
 )
 def show(
-    name: Annotated[str, typer.Argument(help="Shipped name, or path.")],
+    name: Annotated[str, typer.Argument(help="File: shipped name, or path.")],
     kind: KindOption = None,
 ) -> None:
     """Print a settings file with all default values."""

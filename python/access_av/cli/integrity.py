@@ -66,19 +66,24 @@ def integrity(
     threads: Threads = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help="Difference of truth and model; repeatable.", show_default="all"),
+        typer.Option(
+            help="Fault: difference between truth and nominal model; repeatable.",
+            show_default="all",
+        ),
     ] = None,
     fault_scale: Annotated[
         str | None,
         typer.Option(
             metavar="N,N,…",
-            help="Also the site's fault hypotheses, at these multiples of their standard "
-            "deviations: 1,3,10.",
+            help="Also simulate the site's fault hypotheses at these multiples of their "
+            "standard deviations, for example 1,3,10.",
         ),
     ] = None,
     channel: Annotated[
         list[str] | None,
-        typer.Option(help="'as set', K=5 (a true Rician K of 5 dB), umi, inf-sl, …; repeatable."),
+        typer.Option(
+            help="True channel: 'as set', K=5 (Rician K of 5 dB), umi, inf-sl, …; repeatable."
+        ),
     ] = None,
     heads: Annotated[
         list[int] | None,

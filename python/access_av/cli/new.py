@@ -44,20 +44,26 @@ PicturePoints = Annotated[
     typer.Option(
         "--underlay-points",
         metavar="X1,Y1,X2,Y2",
-        help="Two pixels of the background, from its upper left corner.",
+        help="Two pixels X1,Y1,X2,Y2 of the background, counted from its upper left corner.",
     ),
 ]
 PictureLength = Annotated[
-    float | None, typer.Option("--underlay-length-m", min=0.0, help="Distance of the two pixels.")
+    float | None,
+    typer.Option("--underlay-length-m", min=0.0, help="Distance between the two pixels, in m."),
 ]
 PictureScale = Annotated[
     float | None,
-    typer.Option("--underlay-metres-per-pixel", min=0.0, help="Scale of the background."),
+    typer.Option(
+        "--underlay-metres-per-pixel", min=0.0, help="Scale of the background, in metres per pixel."
+    ),
 ]
 PictureZero = Annotated[
     str | None,
     typer.Option(
-        "--underlay-zero", metavar="X,Y", help="Pixel of the map origin.", show_default="lower left"
+        "--underlay-zero",
+        metavar="X,Y",
+        help="Pixel X,Y of the map origin.",
+        show_default="lower left",
     ),
 ]
 OriginText = Annotated[
@@ -65,7 +71,7 @@ OriginText = Annotated[
     typer.Option(
         "--origin",
         metavar="LAT,LON",
-        help="Map origin for GeoJSON in degrees.",
+        help="Map origin of a GeoJSON file: latitude,longitude in degrees.",
         show_default="first point",
     ),
 ]
@@ -74,13 +80,15 @@ HeadsLayer = Annotated[str, typer.Option(help="DXF layer of the radio heads.")]
 WallsLayer = Annotated[str, typer.Option(help="DXF layer of the walls.")]
 TwoPoints = Annotated[
     str | None,
-    typer.Option(metavar="X1,Y1,X2,Y2", help="Two points of a DXF, --length-m apart."),
+    typer.Option(
+        metavar="X1,Y1,X2,Y2", help="Two points X1,Y1,X2,Y2 of a DXF drawing, --length-m apart."
+    ),
 ]
 Length = Annotated[
-    float | None, typer.Option("--length-m", min=0.0, help="Distance of --two-points.")
+    float | None, typer.Option("--length-m", min=0.0, help="Distance between --two-points, in m.")
 ]
 MetresPerUnit = Annotated[
-    float | None, typer.Option(min=0.0, help="Unit of a DXF, for example 0.001 for mm.")
+    float | None, typer.Option(min=0.0, help="Unit of a DXF drawing, for example 0.001 for mm.")
 ]
 
 app = typer.Typer()
@@ -321,7 +329,7 @@ def export(
     file: Annotated[Path, typer.Argument(help="File to write: .geojson or .csv.")],
     origin: OriginText = None,
     decimal_comma: Annotated[
-        bool, typer.Option("--decimal-comma", help="CSV with semicolons and decimal commas.")
+        bool, typer.Option("--decimal-comma", help="Write CSV with semicolons and decimal commas.")
     ] = False,
 ) -> None:
     """Export a site's road, radio heads and walls.

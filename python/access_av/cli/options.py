@@ -33,11 +33,15 @@ Out = Annotated[
     Path | None, typer.Option(help="Output folder.", show_default="a new one in results/")
 ]
 AllowLarge = Annotated[
-    bool, typer.Option("--allow-large", help="Permit runs of hours and gigabytes.")
+    bool, typer.Option("--allow-large", help="Permit simulations that need hours or gigabytes.")
 ]
 Overrides = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Value of one key of the file; repeatable."),
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Value for one key of the file, as KEY=VALUE; repeatable.",
+    ),
 ]
 ExecutorOption = Annotated[
     str | None,
@@ -52,21 +56,32 @@ MaxRms = Annotated[
 ]
 MaxError = Annotated[
     float | None,
-    typer.Option(min=0.0, help="Maximum error percentile (see --percentile), in m."),
+    typer.Option(min=0.0, help="Maximum of the error percentile (see --percentile), in m."),
 ]
 PercentileOption = Annotated[
     float | None,
-    typer.Option(help="Percentile of --max-error-m: 50, 90, 95, 99 or 99.9.", show_default="99"),
+    typer.Option(
+        help="Error percentile limited by --max-error-m: 50, 90, 95, 99 or 99.9.", show_default="99"
+    ),
 ]
 Vary = Annotated[
     list[str] | None,
-    typer.Option("--sweep", metavar="KEY=a,b,c", help="Compared values of a key; repeatable."),
+    typer.Option(
+        "--sweep", metavar="KEY=a,b,c", help="Compare values of a key, as KEY=a,b,c; repeatable."
+    ),
 ]
-Compare = Annotated[list[str] | None, typer.Option("--against", help="Compared file; repeatable.")]
+Compare = Annotated[
+    list[str] | None,
+    typer.Option("--against", help="File to compare with the baseline; repeatable."),
+]
 Percents = Annotated[
     list[float] | None,
     typer.Option(
-        "--percentile", min=1.0, max=100.0, help="Compared percentiles.", show_default="50, 90, 99"
+        "--percentile",
+        min=1.0,
+        max=100.0,
+        help="Percentile of the error to compare; repeatable.",
+        show_default="50, 90, 99",
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]

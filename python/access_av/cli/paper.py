@@ -50,7 +50,7 @@ def evaluate(
     sensitivity: Annotated[
         bool,
         typer.Option(
-            "--sensitivity", help="Also a sensitivity analysis of the claims (takes minutes)."
+            "--sensitivity", help="Also analyse the sensitivity of the claims (takes minutes)."
         ),
     ] = False,
     claims: Annotated[
@@ -178,10 +178,15 @@ def chosen(
 def search(
     platform: PlatformOption = "jetson-agx-xavier",
     worlds: Annotated[int, typer.Option(min=1, help="Number of environments.")] = 64,
-    controllers: Annotated[int, typer.Option(min=1, help="Controllers per environment.")] = 32,
+    controllers: Annotated[
+        int, typer.Option(min=1, help="Number of controllers per environment.")
+    ] = 32,
     runs: Runs = 20,
     confirm: Annotated[
-        int, typer.Option(min=0, help="Runs of the best interpretation and its neighbours.")
+        int,
+        typer.Option(
+            min=0, help="Runs per setting for the best interpretation and its neighbours."
+        ),
     ] = 200,
     seed: Seed = 1,
     threads: Threads = None,
@@ -248,10 +253,15 @@ def explore(
         float | None, _bound("Maximum number of angle estimates per trip.")
     ] = None,
     mode: Annotated[list[int] | None, typer.Option(help="Power mode; repeatable.")] = None,
-    fixed: Annotated[bool, typer.Option("--fixed", help="Also fixed wake-up times.")] = False,
+    fixed: Annotated[
+        bool, typer.Option("--fixed", help="Also consider fixed wake-up times.")
+    ] = False,
     interpretation: InterpretationOption = "gate",
     results: Annotated[
-        Path | None, typer.Option(help="Results folder of evaluate.", show_default="results/latest")
+        Path | None,
+        typer.Option(
+            help="Results folder of access-av paper evaluate.", show_default="results/latest"
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

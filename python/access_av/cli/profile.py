@@ -26,11 +26,16 @@ def profile(
         list[int] | None, typer.Option(help="Power mode; repeatable.", show_default="all")
     ] = None,
     window_s: Annotated[
-        float, typer.Option(min=0.05, max=3600.0, help="Duration per workload, and idle before it.")
+        float,
+        typer.Option(
+            min=0.05, max=3600.0, help="Duration of each workload, and of the idle phase before it."
+        ),
     ] = 5.0,
     cpu_mhz: Annotated[
         float | None,
-        typer.Option(min=1.0, max=1e5, help="Clock frequency, if the computer does not report it."),
+        typer.Option(
+            min=1.0, max=1e5, help="CPU clock in MHz, if the computer does not report it."
+        ),
     ] = None,
     sysfs_root: Annotated[
         Path, typer.Option(help="Folder that contains sys/ with sensors and modes.")

@@ -31,8 +31,12 @@ def import_paths(
         typer.Argument(help="Ray-traced paths: Parquet or CSV, one row per path."),
     ],
     site: Annotated[str, typer.Option(help="Site: shipped name, or path of a TOML file.")],
-    carrier_mhz: Annotated[float, typer.Option(min=100.0, help="Carrier of the traced paths.")],
-    out: Annotated[Path, typer.Option(help="npz file to write, for channel.paths of a scenario.")],
+    carrier_mhz: Annotated[
+        float, typer.Option(min=100.0, help="Carrier frequency of the traced paths, in MHz.")
+    ],
+    out: Annotated[
+        Path, typer.Option(help="File to write (.npz), for channel.paths of a scenario.")
+    ],
 ) -> None:
     """Convert ray-traced paths into a channel for scenarios.
 
@@ -71,7 +75,9 @@ def plan(
     add: Annotated[int, typer.Option(min=1, help="Number of radio heads to add.")] = 1,
     eirp_dbm: Annotated[
         float | None,
-        typer.Option(help="EIRP of the new radio heads.", show_default="EIRP of the site's first"),
+        typer.Option(
+            help="EIRP of the added radio heads, in dBm.", show_default="EIRP of the site's first"
+        ),
     ] = None,
     out: Out = None,
     as_json: AsJson = False,

@@ -40,33 +40,42 @@ def scan(
     ],
     ssb_freq_hz: Annotated[
         float | None,
-        typer.Option(min=0.0, help="Centre of the SSB.", show_default="all of the raster"),
+        typer.Option(
+            min=0.0, help="Centre frequency of the SSB, in Hz.", show_default="all of the raster"
+        ),
     ] = None,
     scs_khz: Annotated[
-        int | None, typer.Option(help="Subcarrier spacing: 15 or 30.", show_default="both")
+        int | None, typer.Option(help="Subcarrier spacing in kHz: 15 or 30.", show_default="both")
     ] = None,
     cfo_ppm: Annotated[
         float | None,
-        typer.Option(min=0.0, help="Maximum oscillator offset, with --ssb-freq-hz."),
+        typer.Option(
+            min=0.0, help="Maximum frequency offset of the oscillator, in ppm; needs --ssb-freq-hz."
+        ),
     ] = None,
     centre_hz: Annotated[
         float | None,
-        typer.Option(min=0.0, help="Centre of the recording.", show_default="as recorded"),
+        typer.Option(
+            min=0.0, help="Centre frequency of the recording, in Hz.", show_default="as recorded"
+        ),
     ] = None,
     sample_rate_hz: Annotated[
-        float | None, typer.Option(help="Sample rate of raw cf32 files.")
+        float | None, typer.Option(help="Sample rate of raw cf32 files, in Hz.")
     ] = None,
     spacing_wavelengths: Annotated[
         float | None,
         typer.Option(
-            min=0.01, max=10.0, help="Antenna spacing.", show_default="as recorded, or 0.5"
+            min=0.01,
+            max=10.0,
+            help="Antenna spacing, in wavelengths.",
+            show_default="as recorded, or 0.5",
         ),
     ] = None,
     calibration: Annotated[
         str | None,
         typer.Option(
             metavar="GAINS",
-            help="Channel gains, for example 1,0.9+0.2j,1j,-1.",
+            help="Complex gain of each channel, for example 1,0.9+0.2j,1j,-1.",
             show_default="as recorded",
         ),
     ] = None,
@@ -171,7 +180,7 @@ def angles(
         str, typer.Option(help="Vehicle: shipped name, or path of a TOML file.")
     ] = "default",
     start_time_s: Annotated[
-        float, typer.Option(help="Time of the first sample, odometry clock, in s.")
+        float, typer.Option(help="Time of the first sample by the odometry's clock, in s.")
     ] = 0.0,
     out: Out = None,
     as_json: AsJson = False,

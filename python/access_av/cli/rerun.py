@@ -55,13 +55,13 @@ class Difference:
     epilog="Example: [bold]access-av run paper --out results/mine; access-av rerun results/mine[/]",
 )
 def rerun(
-    results: Annotated[Path, typer.Argument(help="Directory that a command has written.")],
+    results: Annotated[Path, typer.Argument(help="Results directory of the command to repeat.")],
     directory: Annotated[
         Path | None,
-        typer.Option(help="Working directory with the inputs; else that of the first time."),
+        typer.Option(help="Working directory with the inputs [default: that of the first run]."),
     ] = None,
     keep: Annotated[
-        Path | None, typer.Option(help="Directory for the new results; else they are removed.")
+        Path | None, typer.Option(help="Directory for the new results [default: they are removed].")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -80,7 +80,7 @@ def rerun(
     manifest = _manifest(results)
     where = directory or Path(manifest.get("directory") or ".")
     if not where.is_dir():
-        raise InputError(f"{where}: the working directory is missing; give it by --directory")
+        raise InputError(f"{where}: the working directory does not exist; add --directory")
     changed = _changed_inputs(manifest, where)
     for line in changed:
         show_warning(line)
@@ -131,13 +131,13 @@ def _show(record: Mapping[str, Any]) -> None:
 def _manifest(results: Path) -> dict[str, Any]:
     file = results / MANIFEST
     if not file.is_file():
-        raise InputError(f"{results}: no results of a command here ({MANIFEST} is missing)")
+        raise InputError(f"{results}: no results of a command ({MANIFEST} is missing)")
     try:
         found = json.loads(file.read_text(encoding="utf-8"))
     except ValueError as error:
         raise InputError(f"{file}: not JSON ({error})") from error
     if not isinstance(found, dict) or not isinstance(found.get("command"), list):
-        raise InputError(f"{file}: `command` is missing, which rerun needs")
+        raise InputError(f"{file}: `command` is missing; rerun needs it")
     return found
 
 
@@ -181,7 +181,7 @@ def _run(arguments: Sequence[str], where: Path, scratch: Path, keep: Path | None
     """Runs the command with an empty results folder; returns the directory that it wrote."""
     out = scratch / "out" if keep is None else keep.absolute()
     if out.exists() and any(out.iterdir()):
-        raise InputError(f"{out}: not empty; --keep takes a new directory")
+        raise InputError(f"{out}: not empty; --keep needs a new directory")
     done = subprocess.run(
         [sys.executable, "-m", "access_av", *arguments, "--out", str(out)],
         cwd=where,

@@ -22,7 +22,9 @@ app = typer.Typer()
 def survey(
     drives: Annotated[
         list[Path],
-        typer.Argument(help="Folders with odometry.csv or .mcap, angles.csv, vehicle.toml."),
+        typer.Argument(
+            help="Folders of drives: odometry.csv or odometry.mcap, angles.csv, vehicle.toml."
+        ),
     ],
     site: Annotated[str, typer.Option(help="Site: shipped name, or path of a TOML file.")],
     vehicle: Annotated[str, typer.Option(help="Vehicle: shipped name, or path of a TOML file.")],
@@ -103,8 +105,8 @@ def survey(
     console.print(made)
     if found.used < 0.5 * found.angles:
         show_warning(
-            f"{found.angles - found.used} of {found.angles} angles are outliers and were left out; "
-            "check site, vehicle and start poses"
+            f"{found.angles - found.used} of {found.angles} angles are outliers and were not "
+            f"used; check site, vehicle and start poses"
         )
     for it in found.parameters:
         if not it.is_as_believed:

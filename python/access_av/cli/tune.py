@@ -42,11 +42,12 @@ def tune(
     percentile: PercentileOption = None,
     max_rms_m: MaxRms = None,
     max_worst_m: Annotated[
-        float | None, typer.Option(min=0.0, help="Maximum error in 90 % of the runs, in m.")
+        float | None,
+        typer.Option(min=0.0, help="Maximum error of a drive, kept in 90 % of the runs, in m."),
     ] = None,
     max_energy_j: Annotated[
         float | None,
-        typer.Option(min=0.0, help="Maximum energy of a trip, in J; minimizes the error."),
+        typer.Option(min=0.0, help="Maximum energy of a trip, in J; the error is minimized."),
     ] = None,
     platform: Annotated[
         str, typer.Option(help="Platform: shipped name, or path of a TOML file.")

@@ -61,7 +61,7 @@ class Query:
     def __post_init__(self) -> None:
         if self.percent not in PERCENTS:
             allowed = ", ".join(f"{percent:g}" for percent in PERCENTS)
-            raise InputError(f"percentile {self.percent:g}: it can be {allowed}")
+            raise InputError(f"percentile {self.percent:g}: allowed are {allowed}")
 
     def __str__(self) -> str:
         parts = [
@@ -237,7 +237,7 @@ def what_to_change(query: Query, rows: pl.DataFrame) -> list[str]:
         No designs.
     """
     if rows.is_empty():
-        raise InputError("no designs to choose from")
+        raise InputError("the results contain no designs")
     records = rows.to_dicts()
     excesses = [query.excess(row) for row in records]
     advice = []

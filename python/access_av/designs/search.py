@@ -88,7 +88,7 @@ def search(
         Whether inferior designs are dropped early; all designs use the same runs.
     """
     if not designs:
-        raise InputError("no designs to drive")
+        raise InputError("no designs to simulate")
     left: list[tuple[Sequence[Design], list[list[Part]]]] = [
         (worlds, [[] for _ in worlds]) for worlds in designs
     ]
@@ -156,9 +156,7 @@ def suggested(
     try:
         import optuna
     except ImportError as error:
-        raise InputError(
-            "suggestions of designs need the extra: pip install 'access-av[optuna]'"
-        ) from error
+        raise InputError("--optuna needs the extra: pip install 'access-av[optuna]'") from error
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     sampler = (
         optuna.samplers.NSGAIISampler(seed=seed % 2**32, population_size=BATCH)

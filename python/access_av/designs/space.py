@@ -134,7 +134,9 @@ class Space:
         chosen = {key: value for key, value in table.items() if key != WORLD}
         found = tuple(_dimensions(chosen, ""))
         if not found:
-            raise InputError("no key with a list of choices, or with `low` and `high`")
+            raise InputError(
+                "the file contains no key with a list of values, or with `low` and `high`"
+            )
         for dimension in found:
             if any(f"{dimension.key}.".startswith(f"{key}.") for key in NOT_CHOSEN):
                 raise InputError(
@@ -255,5 +257,5 @@ def _range(key: str, table: Mapping[str, Any]) -> Dimension:
     if not all(isinstance(value, (int, float)) and math.isfinite(value) for value in (low, high)):
         raise InputError(f"{key}: `low` and `high` must be numbers")
     if not low < high or (is_log and low <= 0):
-        raise InputError(f"{key}: `low` must be below `high`, and positive where `log` is true")
+        raise InputError(f"{key}: `low` must be below `high`, and positive if `log` is true")
     return Dimension(key, low=float(low), high=float(high), is_log=bool(is_log))

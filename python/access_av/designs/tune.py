@@ -137,7 +137,7 @@ def tune(
         raise InputError("no limit given: add a maximum error or a maximum energy")
     space = space_of(scenario)
     if not space.dimensions:
-        raise InputError(f"{scenario.name}: its wake-up policy has nothing to tune")
+        raise InputError(f"{scenario.name}: its wake-up policy has no parameters to tune")
     goal = _Goal(limits)
 
     def again(some: list[Design], first_run: int) -> list[Driven]:
@@ -157,7 +157,7 @@ def tune(
     tried = sorted(found.driven, key=goal.with_margin)
     if not np.isfinite(tried[0].mean_energy_j):
         name = tried[0].design.platform.name
-        raise InputError(f"platform {name} has no energy of this method")
+        raise InputError(f"platform {name} contains no energy of the vehicle's estimator")
     finalists = [it.design for it in tried[:FINALISTS]]
     confirmed = again(finalists, runs)
     safest, best = (min(confirmed, key=it).design for it in (goal.with_margin, goal.as_found))

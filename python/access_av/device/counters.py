@@ -68,7 +68,10 @@ class Rail:
             volt, ampere = _number(self.voltage) * 1e-3, _number(self.current) * 1e-3
             return volt * ampere, self.bus_v * abs(ampere) + self.current_a * abs(volt)
         if self.power is None:
-            raise SensorError(f"{self.label} of {self.chip}: neither power nor voltage and current")
+            raise SensorError(
+                f"{self.label} of {self.chip}: the sensor has the sensor has "
+                f"neither power nor voltage and current"
+            )
         rounded_w = self.power_unit_w + self.current_a * USUAL_RAIL_V
         return _number(self.power) * self.power_unit_w, rounded_w
 
@@ -246,7 +249,9 @@ def _number(file: Path) -> float:
             text = file.read_text(encoding="utf-8")
         return float(text)
     except PermissionError as error:
-        raise SensorError(f"{file}: may not be read; run as root, or allow it") from error
+        raise SensorError(
+            f"{file}: no permission to read; run as root, or change its permissions"
+        ) from error
     except OSError as error:
         raise SensorError(f"{file}: the sensor stopped answering ({error.strerror})") from error
     except ValueError as error:

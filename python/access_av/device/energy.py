@@ -95,7 +95,9 @@ def above_idle(busy: Window, idle: Window) -> Interval:
         Constant equal values of both windows, because the sensor has stopped.
     """
     if busy.is_constant and idle.is_constant and busy.power_w.value == idle.power_w.value:
-        raise SensorError("the sensor stopped: its value is equal, idle and busy")
+        raise SensorError(
+            "the sensor stopped: its value is equal in the idle and in the busy phase"
+        )
     ratio = busy.duration_s / idle.duration_s
     idle_j = idle.energy_j.scaled(ratio)
     return Interval(
@@ -308,7 +310,8 @@ def _refuse_jumps(power_w: NDArray[np.float64], times_s: NDArray[np.float64], un
     usual = float(np.median(power_w))
     if usual <= 0.0:
         raise SensorError(
-            f"the sensor reports {usual:.3g} {unit}: it is not connected, or reversed"
+            f"the sensor reports {usual:.3g} {unit}: it is not connected, or its polarity is "
+            f"reversed"
         )
     wrong = (power_w > MOST_FACTOR * usual) | (power_w < usual / MOST_FACTOR)
     if wrong.any():

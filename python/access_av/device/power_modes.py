@@ -60,7 +60,9 @@ class Board:
         if self.kind == "nvpmodel":
             _nvpmodel("-m", str(mode.number))
             if _present_nvpmodel() != mode.number:
-                raise ModeError(f"mode {mode.number} ({mode.name}) needs a reboot: left out")
+                raise ModeError(
+                    f"mode {mode.number} ({mode.name}) needs a reboot: it is not measured"
+                )
         elif self.kind == "cpufreq":
             for policy in _policies(self.sysfs):
                 _write(policy / "scaling_max_freq", str(round(mode.cpu_mhz * 1e3)))
@@ -174,7 +176,7 @@ def chosen(board: Board, numbers: list[int] | None) -> list[Mode]:
     for number in numbers or []:
         if number not in by_number:
             there = ", ".join(map(str, by_number))
-            raise InputError(f"--mode {number}: no such power mode; this machine has {there}")
+            raise InputError(f"--mode {number}: unknown power mode; this computer has {there}")
     return [by_number[number] for number in numbers] if numbers else list(board.modes)
 
 
@@ -201,7 +203,7 @@ def _present_nvpmodel() -> int:
     said = _nvpmodel("-q")
     numbers = re.findall(r"^\s*(\d+)\s*$", said, re.M)
     if not numbers:
-        raise ModeError(f"nvpmodel -q: no mode in its answer {said.strip()!r}")
+        raise ModeError(f"nvpmodel -q: no power mode in the output {said.strip()!r}")
     return int(numbers[-1])
 
 

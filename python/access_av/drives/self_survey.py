@@ -154,13 +154,14 @@ def read_drive(folder: str | Path) -> SurveyDrive:
     folder = Path(folder)
     there = [it for it in (folder / "odometry.csv", folder / "odometry.mcap") if it.is_file()]
     if not there:
-        raise InputError(f"{folder}: neither odometry.csv nor odometry.mcap is here")
+        raise InputError(f"{folder}: the folder contains neither odometry.csv nor odometry.mcap")
     vehicle = _core.Vehicle.load(str(folder / "vehicle.toml"))
     stated = as_dict(vehicle)
     start = stated.get("start", {}).get("pose")
     if start is None:
         raise InputError(
-            f"{folder / 'vehicle.toml'}: `start.pose` is missing: where the drive starts"
+            f"{folder / 'vehicle.toml'}: `start.pose` is missing: add the pose at the start of "
+            f"the drive"
         )
     return SurveyDrive(
         name=str(folder),
@@ -213,7 +214,9 @@ def survey(
     received = {head for drive in logged for head in drive.log.heads}
     if not received & set(model.heads):
         which = ", ".join(f"pci={pci} ssb_index={index}" for pci, index in sorted(received)[:8])
-        raise InputError(f"no angle is to a radio head of {site.name}; received: {which or 'none'}")
+        raise InputError(
+            f"no angle belongs to a radio head of {site.name}; the log contains: {which or 'none'}"
+        )
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         return _identify(_Problem(model, logged, pool, progress))
 

@@ -154,9 +154,7 @@ def _trips(fleet: Mapping[str, Any], hours: float) -> float:
     """Returns the trips of one vehicle per working day: the given number, or continuous driving."""
     given = [name for name in TRIPS if name in fleet]
     if len(given) != 1:
-        raise InputError(
-            "fleet: give either trips_per_day, or trip_s where trip follows upon trip all day"
-        )
+        raise InputError("fleet: give either trips_per_day, or trip_s for trips without a pause")
     value = _range(fleet, f"fleet.{given[0]}").central
     if given == ["trips_per_day"]:
         return value
@@ -193,7 +191,7 @@ def _way(
     for place, count in (("infrastructure", 1.0), ("onboard", vehicles)):
         items = way.get(place, [])
         if not isinstance(items, list):
-            raise InputError(f"{name}.{place}: a list of tables is needed")
+            raise InputError(f"{name}.{place}: must be a list of tables")
         for index, item in enumerate(items):
             key = f"{name}.{place}[{index}]"
             _only(item, f"{key}.", {*ITEM, "name", "source"})
@@ -252,12 +250,14 @@ def _range(table: Mapping[str, Any], key: str) -> Range:
     if not all(isinstance(end, (int, float)) and not isinstance(end, bool) for end in ends):
         raise InputError(f"{key}: {value!r}; write a number, or low, central and high")
     if not 0.0 <= ends[0] <= ends[1] <= ends[2] < float("inf"):
-        raise InputError(f"{key}: {value!r}; low, central, high must rise, from 0 on")
+        raise InputError(
+            f"{key}: {value!r}; low, central and high must be ascending and at least 0"
+        )
     return Range(*map(float, ends))
 
 
 def _only(table: Any, path: str, allowed: set[str]) -> None:
     if not isinstance(table, dict):
-        raise InputError(f"{path.rstrip('.')}: a table is needed")
+        raise InputError(f"{path.rstrip('.')}: must be a table")
     if unknown := table.keys() - allowed:
         raise InputError(f"{path}{min(unknown)}: unknown; allowed are {', '.join(sorted(allowed))}")

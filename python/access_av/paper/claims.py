@@ -199,9 +199,7 @@ def _judge(
     else:
         try:
             if claim_id not in FINDINGS:
-                raise InputError(
-                    f"no result exists for this claim; claims are: {', '.join(FINDINGS)}"
-                )
+                raise InputError(f"unknown claim; allowed are: {', '.join(FINDINGS)}")
             finding = FINDINGS[claim_id](outcome)
             by = np.atleast_1d(margin(entry, finding.value))
             met = bool(by[0] >= 0.0)

@@ -140,9 +140,8 @@ def fit_energy(
     """
     if not modes.keys() >= NEEDED_MODES:
         raise InputError(
-            f"the platform has the modes {sorted(modes)}; the fit needs "
-            f"{sorted(NEEDED_MODES)}, "
-            "for which the paper gives figures"
+            f"the platform has the modes {sorted(modes)}; the fit needs the modes "
+            f"{sorted(NEEDED_MODES)}, for which the paper contains energies"
         )
     music = _fit_music(modes, own="mode" in freedoms)
     ratio: dict[str, Numbers] = dict.fromkeys(METHODS[1:], np.ones(()))

@@ -159,7 +159,7 @@ def energy_j(outcome: Outcome, mode: int, method: str, *, adaptive: bool = False
     per_execution_j = outcome.energy_per_execution_j[mode].get(method)
     if per_execution_j is None:
         raise MissingFigureError(
-            f"Platform {outcome.platform} has no energy per execution of {label(method)} in "
+            f"Platform {outcome.platform} has no energy per estimate of {label(method)} in "
             f"mode {mode}."
         )
     return np.asarray(drives.aoa_estimates * per_execution_j + drives.besides_j)

@@ -104,7 +104,8 @@ def load(name_or_path: str) -> Interpretation:
         )
     if not Path(name_or_path).exists() and name_or_path not in Scenario.names():
         raise InputError(
-            f"no interpretation {name_or_path}; there are: {', '.join(index)}; or a file"
+            f"unknown interpretation {name_or_path}; allowed are: {', '.join(index)}; or the "
+            f"path of a file"
         )
     scenario = Scenario.load(name_or_path)
     check_trip(scenario)

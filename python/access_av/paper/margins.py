@@ -39,7 +39,7 @@ def margin(entry: Mapping[str, Any], obtained: Any) -> Numbers:
     """
     rule = entry["rule"]
     if rule not in RULES:
-        raise InputError(f"unknown rule {rule!r}; there are: {', '.join(RULES)}")
+        raise InputError(f"unknown rule {rule!r}; allowed are: {', '.join(RULES)}")
     return np.asarray(RULES[rule](entry, obtained), dtype=np.float64)
 
 

@@ -117,7 +117,7 @@ def plan(
     heads = site["radio_heads"]
     candidates = _beside(scenario, site) if masts is None else _candidates(masts)
     if not 1 <= add <= len(candidates):
-        raise InputError(f"--add {add}: there are {len(candidates)} masts to choose from")
+        raise InputError(f"--add {add}: only {len(candidates)} candidate masts exist")
     eirp_dbm = heads[0]["eirp_dbm"] if eirp_dbm is None else eirp_dbm
     taken = {head["pci"] for head in heads}
     free = [pci for pci in range(CELLS) if pci not in taken]

@@ -87,7 +87,7 @@ def import_paths(
     validation.check(rows, where, numbers=needed)
     rows = rows.with_columns(pl.col(needed).cast(pl.Float64))
     if rows.is_empty():
-        raise InputError(f"{where}: there is no path in it")
+        raise InputError(f"{where}: the file contains no path")
     if not abs(carrier_mhz / site_mhz - 1.0) <= _SAME_CARRIER:
         raise InputError(
             f"{where}: traced at {carrier_mhz:g} MHz; the site's carrier is {site_mhz:g} MHz"

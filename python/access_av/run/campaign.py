@@ -118,7 +118,7 @@ class Campaign:
                 future.cancel()
         if lost is not None:
             raise CampaignError(
-                f"the workers are gone ({type(lost).__name__}: {lost}); finished parts "
+                f"the workers have ended ({type(lost).__name__}: {lost}); finished parts "
                 f"are in {self.parts.path}; repeat the command to continue"
             ) from lost
 

@@ -95,11 +95,9 @@ def difference(result: Simulation, baseline: Simulation, *, percent: float = 99.
         errors.append(np.where(np.isnan(kept), np.inf, kept))
     mine, its = errors
     if result.seed != baseline.seed:
-        raise InputError(
-            f"seeds {result.seed} and {baseline.seed}: only runs of equal seeds can be paired"
-        )
+        raise InputError(f"seeds {result.seed} and {baseline.seed}: pairs need equal seeds")
     if len(mine) != len(its):
-        raise InputError(f"{len(mine)} and {len(its)} runs: equal numbers are needed for pairs")
+        raise InputError(f"{len(mine)} and {len(its)} runs: pairs need equal numbers")
     delta_m, low_m, high_m = paired_difference(mine, its, percent)
     return Difference(
         percent=percent,

@@ -128,15 +128,17 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
     low, high = _extent(route, heads)
     step_m = _round_step(low, high) if map_step_m is None else map_step_m
     if not (math.isfinite(step_m) and step_m > 0.0):
-        raise InputError(f"--map-step-m {step_m}: a length above 0 is needed")
+        raise InputError(f"--map-step-m {step_m}: it must be above 0")
     extent_m = float((high - low).max())
     if step_m > extent_m:
-        raise InputError(f"--map-step-m {step_m:g}: the site is {extent_m:.0f} m across")
+        raise InputError(
+            f"--map-step-m {step_m:g}: it exceeds the size of the site, {extent_m:.0f} m"
+        )
     cells = math.prod(np.maximum(1.0, np.ceil((high - low) / step_m)).tolist())
     if cells > MOST_MAP_CELLS:
         raise InputError(
-            f"--map-step-m {step_m:g}: gives {cells:.3g} squares; "
-            f"allowed are at most {MOST_MAP_CELLS}, from {_least_step(low, high):.2g} m on"
+            f"--map-step-m {step_m:g}: it gives {cells:.3g} squares; at most {MOST_MAP_CELLS} "
+            f"are allowed: write at least {_least_step(low, high):.2g} m"
         )
     wavelength_m = SPEED_OF_LIGHT_MPS / (settings["carrier_mhz"] * 1e6)
     looks = max(1.0, MAP_TRAVEL_M * ANGLES_PER_WAVELENGTH / wavelength_m)

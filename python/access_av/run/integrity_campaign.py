@@ -128,7 +128,9 @@ def channels(names: Sequence[str]) -> dict[str, Overrides]:
             try:
                 found[name] = {"truth.site.rician_k_db": float(k_db)}
             except ValueError:
-                raise InputError(f"channel {name}: write K=5 for a Rician K of 5 dB") from None
+                raise InputError(
+                    f"channel {name}: write a number, for example K=5 for a Rician K of 5 dB"
+                ) from None
         else:
             found[name] = {"channel": {"model": name}}
     return found
@@ -196,7 +198,7 @@ def drive(
     known = {**usual, **hypotheses(scenario)} if only else usual
     for name in only or ():
         if name not in known:
-            raise InputError(f"mismatch {name!r}: there are {', '.join(known)}")
+            raise InputError(f"fault {name!r} is unknown; allowed are {', '.join(known)}")
     cells = [head["pci"] for head in as_dict(scenario.site)["radio_heads"]]
     for count in heads or ():
         if not 1 <= count <= len(cells):

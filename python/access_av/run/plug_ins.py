@@ -108,8 +108,8 @@ def factory(plug_in: Any, role: str) -> Factory | None:
         stating = plug_in() if role == "estimator" else plug_in
         return Factory(role, lambda *_: plug_in(), stating)
     raise TypeError(
-        f"the {role}'s factory takes {count} arguments; allowed are none, and three: site, vehicle "
-        "and start"
+        f"the {role}'s factory takes {count} arguments; allowed are no arguments, or three: "
+        f"site, vehicle and start"
     )
 
 

@@ -138,7 +138,7 @@ def sweep(
     if not isinstance(scenario, Scenario):
         scenario = Scenario.load(str(scenario))
     if not vary or not all(len(values) for values in vary.values()):
-        raise InputError("vary: at least one key with at least one value is needed")
+        raise InputError("vary: add at least one key with at least one value")
     combined = [
         dict(zip(vary, values, strict=True)) for values in itertools.product(*vary.values())
     ]

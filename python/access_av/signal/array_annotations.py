@@ -115,8 +115,8 @@ def _places(truth: dict[str, Any], channels: int) -> NDArray[np.float64] | None:
     )
     if not fine:
         raise InputError(
-            "`aoa:truth.element_places_wavelengths` must be a list of "
-            f"{channels} places [x, y], one of each channel"
+            "`aoa:truth.element_places_wavelengths` must be a list of {channels} positions [x, "
+            "y], one for each channel"
         )
     return np.array(places, dtype=float)
 

@@ -109,7 +109,9 @@ def estimate_bursts(
     metadata = json.loads(recording.metadata_json())
     annotations = metadata.get("annotations", [])
     if not annotations:
-        raise InputError(f"{path}: no `annotations`, so the positions of the bursts are unknown")
+        raise InputError(
+            f"{path}: `annotations` is missing; it contains the positions of the bursts"
+        )
     truths = stated_truths(recording, metadata)
     told = spacing_wavelengths is not None
     if spacing_wavelengths is None:
@@ -125,8 +127,8 @@ def estimate_bursts(
         count = annotation.get("core:sample_count", recording.length - start)
         if not 0 < count <= MOST_SAMPLES:
             raise InputError(
-                f"{path}: the annotation at sample {start} is of {count} samples; a burst has 1 to "
-                f"{MOST_SAMPLES}"
+                f"{path}: the annotation at sample {start} has {count} samples; a burst has 1 "
+                f"to {MOST_SAMPLES}"
             )
         snapshots = recording.read(start, count)
         label = str(annotation.get("core:label", ""))
@@ -166,7 +168,7 @@ def _estimate(
         azimuth_deg = from_broadside_deg(math.degrees(float(source.azimuth_rad)))
         return azimuth_deg, float(source.azimuth_sigma_rad), source
     if spacing_wavelengths is None:
-        raise InputError("neither spacing nor places of the antennas are known")
+        raise InputError("neither the spacing nor the positions of the antennas are known")
     found = aoa.maximum_likelihood(
         snapshots, spacing_wavelengths=spacing_wavelengths, calibration=phases
     )

@@ -121,7 +121,7 @@ def switched_direction(
     low, high = frequency_hz
     if not (np.isfinite([low, high]).all() and low <= high):
         raise ValueError(
-            f"frequency_hz is ({low}, {high}): a lowest and a highest frequency are needed"
+            f"frequency_hz is ({low}, {high}): write the minimum and the maximum frequency"
         )
     table = _table(manifold, antennas)
     # Every sample has equal weight, so that a response is weighted by its number of samples.
@@ -208,5 +208,7 @@ def _table(manifold: ArrayLike | ManifoldFit, antennas: int) -> NDArray[np.compl
         towards = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
         table = np.exp(2j * np.pi * towards @ places.T)
     if table.ndim != 2 or table.shape[1] != antennas:
-        raise ValueError(f"a manifold of {table.shape[-1]} antennas: elements names {antennas}")
+        raise ValueError(
+            f"the manifold has {table.shape[-1]} antennas, and elements contains {antennas}"
+        )
     return table

@@ -30,7 +30,7 @@ def read_road(path: Path) -> Drawn:
     validation.check(rows, str(path), numbers=("x_m", "y_m"), other=())
     points = rows.select(pl.col("x_m", "y_m").cast(pl.Float64)).rows()
     if len(points) < 2:
-        raise InputError(f"{path}: {len(points)} points; a road has two or more")
+        raise InputError(f"{path}: {len(points)} points; a road needs at least two")
     return Drawn(road_m=points)
 
 

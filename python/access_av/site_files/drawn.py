@@ -149,8 +149,8 @@ def checked(drawn: Drawn, road_file: str, heads_file: str, walls_file: str) -> D
     length_m = drawn.length_m
     if not SHORTEST_ROAD_M <= length_m <= LONGEST_ROAD_M and (points or drawn.segments):
         raise InputError(
-            f"{road_file}: its road is {length_m:,.3g} m long; from {SHORTEST_ROAD_M:g} to "
-            f"{LONGEST_ROAD_M:,.0f} m are allowed: is it in another unit?"
+            f"{road_file}: its road is {length_m:,.3g} m long; allowed are {SHORTEST_ROAD_M:g} "
+            f"to {LONGEST_ROAD_M:,.0f} m; check its unit"
         )
     near = points or [drawn.start[:2]]
     reach_m = FARTHEST_HEAD_M + (length_m if drawn.segments else 0.0)
@@ -166,7 +166,7 @@ def checked(drawn: Drawn, road_file: str, heads_file: str, walls_file: str) -> D
             raise InputError(
                 f"{file}: {what} at ({at[0]:.0f}, {at[1]:.0f}) m is "
                 f"{away_m / 1000.0:,.0f} km from the road; at most "
-                f"{FARTHEST_HEAD_M / 1000.0:g} km are allowed: both files must be of one place, in "
-                "one system and unit"
+                f"{FARTHEST_HEAD_M / 1000.0:g} km are allowed: both files must describe one "
+                f"plant in one reference system and unit"
             )
     return drawn

@@ -88,7 +88,7 @@ def metres_per_unit(points: tuple[float, float, float, float], length_m: float) 
     """
     drawn = math.dist(points[:2], points[2:])
     if not (drawn > 0.0 and math.isfinite(drawn) and length_m > 0.0):
-        raise InputError("--two-points: two different points and a length above 0 are needed")
+        raise InputError("--two-points: the two points must differ, and --length-m must be above 0")
     return length_m / drawn
 
 
@@ -194,16 +194,16 @@ class _Reader:
         found = list(self._curves(layer, ROAD_SAGITTA_M))
         if not found:
             raise InputError(
-                f"{self.path}: layer {name!r} holds 0 polylines, lines, arcs and splines; the road "
-                f"is one, or several that join. {self._held(layer, name)}"
+                f"{self.path}: layer {name!r} contains no polylines, lines, arcs or splines; "
+                f"the road must be one of them, or several that join. {self._held(layer, name)}"
             )
         self._report(layer, name)
         try:
             joined = curves.without_repeats(curves.join([curve for _, curve in found]))
         except CurveError as error:
             raise InputError(
-                f"{self.path}: layer {name!r} holds {len(found)} curves; the road is one, or "
-                f"several that join: {error}"
+                f"{self.path}: layer {name!r} contains {len(found)} curves; the road must be "
+                f"one curve, or several that join: {error}"
             ) from error
         if len(found) > 1:
             self.notes.append(
@@ -231,8 +231,8 @@ class _Reader:
             found.append(Head(named, *(self.scale_m * it for it in (at.x, at.y, at.z))))
         if not found:
             raise InputError(
-                f"{self.path}: layer {name!r} holds no points and no blocks; radio heads are one "
-                f"or the other. {self._held(layer, name)}"
+                f"{self.path}: layer {name!r} contains no points and no blocks; radio heads "
+                f"must be points or blocks. {self._held(layer, name)}"
             )
         self._report(layer, name)
         return found
@@ -249,8 +249,8 @@ class _Reader:
             walls.setdefault(min(key, key[::-1]), wall)
         if not walls:
             raise InputError(
-                f"{self.path}: layer {name!r} holds no lines, polylines, arcs or splines; walls "
-                f"are such. {self._held(layer, name)}"
+                f"{self.path}: layer {name!r} contains no lines, polylines, arcs or splines; "
+                f"walls must be one of them. {self._held(layer, name)}"
             )
         self._report(layer, name)
         return list(walls.values())

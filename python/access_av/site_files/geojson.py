@@ -151,14 +151,14 @@ class Map:
             shape.used = True
             parts = [[(x, y, 0.0) for x, y, *_ in line] for line in shape.lines if len(line) > 1]
             if not parts:
-                raise InputError(f"{self.path}: {shape.where}: a road has two or more points")
+                raise InputError(f"{self.path}: {shape.where}: a road needs at least two points")
             try:
                 return [(x, y) for x, y, _ in curves.without_repeats(curves.join(parts))]
             except CurveError as error:
                 raise InputError(
-                    f"{self.path}: {shape.where}: the road is one line: {error}"
+                    f"{self.path}: {shape.where}: the road must be one line: {error}"
                 ) from error
-        raise InputError(f"{self.path}: no LineString (the road) is in it{self._held()}")
+        raise InputError(f"{self.path}: the file contains no LineString (the road){self._held()}")
 
     def heads(self) -> list[Head]:
         """Returns every point as a radio head.
@@ -175,7 +175,9 @@ class Map:
                 for [at] in shape.lines:
                     found.append(_head(self.path, at, shape.properties, shape.where))
         if not found:
-            raise InputError(f"{self.path}: no Point (a radio head) is in it{self._held()}")
+            raise InputError(
+                f"{self.path}: the file contains no Point (a radio head){self._held()}"
+            )
         return found
 
     def walls(self) -> list[list[tuple[float, float]]]:
@@ -193,7 +195,8 @@ class Map:
                 walls += [[(at[0], at[1]) for at in it] for it in shape.lines if len(it) > 1]
         if not walls:
             raise InputError(
-                f"{self.path}: neither a LineString nor a Polygon (a wall) is in it{self._held()}"
+                f"{self.path}: the file contains neither a LineString nor a Polygon (a "
+                f"wall){self._held()}"
             )
         return walls
 
@@ -253,7 +256,7 @@ def _lines(path: Path, kind: str, coordinates: Any, where: str) -> list[list[lis
 
     def parts(held: Any) -> list[Any]:
         if not isinstance(held, list):
-            raise InputError(f"{path}: {where}: {str(held)[:80]}; a list of positions is needed")
+            raise InputError(f"{path}: {where}: {str(held)[:80]}; it must be a list of positions")
         return held
 
     if kind == "Point":
@@ -272,7 +275,7 @@ def _lines(path: Path, kind: str, coordinates: Any, where: str) -> list[list[lis
 def _numbers(path: Path, at: Any, where: str) -> list[float]:
     numbers = at if isinstance(at, list) else []
     if len(numbers) < 2 or not all(map(_is_finite, numbers)):
-        raise InputError(f"{path}: {where}: {str(at)[:80]}; two or three finite numbers are needed")
+        raise InputError(f"{path}: {where}: {str(at)[:80]}; it must be two or three finite numbers")
     return [float(it) for it in numbers]
 
 
@@ -312,13 +315,13 @@ def _head(path: Path, at: Sequence[float], properties: dict[str, Any], where: st
     pci = properties.get("pci")
     if not _is_finite(height):
         raise InputError(
-            f"{path}: {where}: {str(height)[:80]!r} is no height; a radio head needs one, as "
-            "property `height_m` or third coordinate, in metres"
+            f"{path}: {where}: {str(height)[:80]!r} is not a height; write the height of the "
+            f"radio head in metres, as property `height_m` or third coordinate"
         )
     if isinstance(pci, float) and pci.is_integer():
         pci = int(pci)
     if pci is not None and (not isinstance(pci, int) or isinstance(pci, bool)):
-        raise InputError(f"{path}: {where}: pci {pci!r} is no whole number")
+        raise InputError(f"{path}: {where}: pci {pci!r} is not an integer")
     return Head(str(properties.get("name") or ""), at[0], at[1], float(height), pci)
 
 

@@ -200,7 +200,7 @@ def to_wgs84(name: str | None, where: str) -> Callable[[Sequence[float]], Place]
     except CRSError as error:
         raise InputError(
             f"{where}: crs {name!r} is not a known reference system; write an EPSG code, for "
-            "example urn:ogc:def:crs:EPSG::25832, or leave crs out for longitude and latitude"
+            "example urn:ogc:def:crs:EPSG::25832, or remove crs for longitude and latitude"
         ) from error
     if system.is_compound:
         system = system.sub_crs_list[0]

@@ -102,7 +102,7 @@ def _read(path: Path) -> tuple[str, int, int, bytes]:
     elif data.startswith(JPEG):
         kind, size = "jpeg", _jpeg(data)
     if size is None or 0 in size:
-        raise InputError(f"{path}: neither a PNG nor a JPEG picture, or a broken one")
+        raise InputError(f"{path}: not a PNG or JPEG picture, or damaged")
     return (kind, *size, data)
 
 

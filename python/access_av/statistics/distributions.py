@@ -75,4 +75,4 @@ def _check(probability: float, *shapes: float) -> None:
         raise ValueError(f"`probability` is {probability}; it must be above 0 and below 1")
     for shape in shapes:
         if not (shape > 0.0 and math.isfinite(shape)):
-            raise ValueError(f"{shape} is not a shape of a distribution; it must be above 0")
+            raise ValueError(f"the shape parameter is {shape}; it must be above 0")

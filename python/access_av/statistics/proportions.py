@@ -118,6 +118,9 @@ def share_interval(shares: NDArray[np.float64], independent: int) -> tuple[float
 
 def _check(successes: int, trials: int, probability: float) -> None:
     if not 0 <= successes <= trials or trials < 1:
-        raise ValueError(f"{successes} of {trials}: there must be a trial, and no more successes")
+        raise ValueError(
+            f"{successes} of {trials}: there must be at least one trial, and at most as many "
+            f"successes as trials"
+        )
     if not 0.0 < probability < 1.0:
         raise ValueError(f"`probability` is {probability}; it must be above 0 and below 1")

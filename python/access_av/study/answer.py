@@ -83,8 +83,9 @@ def study_plant(
     scenario = plant.scenario()
     if scenario.vehicle.alert_limit_m is None:
         raise InputError(
-            f"{named}: vehicle.integrity: a study needs the integrity monitor. It is off, or the "
-            "localizer has none: remove `vehicle.integrity.enabled = false`, and set "
+            f"{named}: vehicle.integrity: a study needs the integrity monitor. The monitor is "
+            f"disabled, or the localizer has none: remove `vehicle.integrity.enabled = false`, "
+            f"and set "
             '`vehicle.localizer.kind = "tracker"`'
         )
     targets, (_, percent) = Targets.of(plant), plant.target

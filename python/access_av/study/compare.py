@@ -124,8 +124,8 @@ def varied(vary: Sequence[str]) -> list[tuple[str, dict[str, Any]]]:
     ]
     if len(found) > MOST_VARIANTS:
         raise InputError(
-            f"--sweep: {len(found)} variants; at most {MOST_VARIANTS} are compared, "
-            "access-av design sweep searches more"
+            f"--sweep: {len(found)} variants; at most {MOST_VARIANTS} are allowed; access-av "
+            f"design sweep searches more"
         )
     return found if vary else []
 

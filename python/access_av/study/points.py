@@ -183,7 +183,7 @@ def points(
         in_mode = driven.scenario.with_overrides({MODE_KEY: mode.number})
         energy = driven.in_scenario(in_mode).energy(platform)
         if energy is None:  # such modes are in no group
-            raise RuntimeError(f"mode {mode.number} has no figure of energy")
+            raise RuntimeError(f"mode {mode.number} has no energy in the platform file")
         found.append(
             Point(
                 driven=driven,

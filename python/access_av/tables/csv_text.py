@@ -136,8 +136,8 @@ def _lines(path: Path) -> Lines:
     except UnicodeDecodeError as error:
         of = data.count(b"\n", 0, error.start) + 1
         raise InputError(
-            f"{path}: byte 0x{data[error.start]:02X} in line {of} is not UTF-8, as in Latin-1 or "
-            "Windows-1252 text; save it as CSV UTF-8"
+            f"{path}: byte 0x{data[error.start]:02X} in line {of} is not UTF-8, probably "
+            f"Latin-1 or Windows-1252 text; save it as CSV UTF-8"
         ) from error
     separator: str | None = None
     names: list[str] | None = None
@@ -178,7 +178,7 @@ def _header(path: Path, line: bytes, separator: str) -> list[str]:
                     f"{path}: the first line holds the number {name}; it must name the columns, "
                     "without #"
                 )
-            raise InputError(f"{path}: column {name} is there twice; each may be there once")
+            raise InputError(f"{path}: column {name} occurs twice; each column may occur only once")
     return names
 
 

@@ -116,8 +116,8 @@ class Result:
         made = load(path)
         if not isinstance(made, cls):
             raise InputError(
-                f"{path}: holds a {type(made).__name__}, not a {cls.__name__}; "
-                f"load it with {type(made).__name__}.load"
+                f"{path}: contains a {type(made).__name__}, not a {cls.__name__}; load it with "
+                f"{type(made).__name__}.load"
             )
         return made
 

@@ -140,7 +140,7 @@ fn strays(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
         key: "lane_keeping.rms_m".to_owned(),
         value: rms_m.to_string(),
         why: format!(
-            "the road is {width_m} m wide: the vehicle would be beside the road a third \
+            "the road is {width_m} m wide: the vehicle would be off the road a third \
              of the time"
         ),
         write: format!("write metres: {rms_m} cm are {}", rounded(rms_m / 100.0)),

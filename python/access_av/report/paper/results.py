@@ -91,7 +91,7 @@ def operating_points(
     if results is not None:
         file = results / POINTS_FILE
         if not file.is_file():
-            raise InputError(f"{results}: no evaluation here ({POINTS_FILE} is missing)")
+            raise InputError(f"{results}: no results of an evaluation ({POINTS_FILE} is missing)")
     else:
         earlier = sorted(RESULTS.glob(f"*-evaluate/{POINTS_FILE}"))
         earlier += RESULTS.glob(f"latest/{POINTS_FILE}")
@@ -103,7 +103,8 @@ def operating_points(
     there = points["interpretation"].unique(maintain_order=True).to_list()
     if interpretation not in there:
         raise InputError(
-            f"{file.parent}: no interpretation {interpretation} here; there are: {', '.join(there)}"
+            f"{file.parent}: the results do not contain interpretation {interpretation}; they "
+            f"contain: {', '.join(there)}"
         )
     return points.filter(pl.col("energy_j").is_not_null(), interpretation=interpretation)
 
