@@ -305,6 +305,12 @@ def test_progress_is_printed_as_lines_in_a_pipe(
     lines = capsys.readouterr().err.splitlines()
     assert lines
     assert all(line.startswith("Driving: 3 of 12, 0 s, about ") for line in lines)
+    with terminal.progress("Evaluating", percent=True) as tick:
+        tick(3, 12)
+        time.sleep(0.2)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines
+    assert all(line.startswith("Evaluating: 25 %, 0 s, about ") for line in lines)
     with terminal.progress("Soon over") as tick:
         tick(1, 2)
     assert capsys.readouterr().err == ""

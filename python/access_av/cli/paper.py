@@ -73,7 +73,7 @@ def evaluate(
 
     names = [*(interpretation or []), *([scenario] if scenario else [])]
     parts = RESULTS / "parts"
-    with progress("Driving") as tick, campaign(parts, executor, threads) as kept:
+    with progress("Evaluating", percent=True) as tick, campaign(parts, executor, threads) as kept:
         made, directory = results.run(
             names,
             platform,

@@ -72,19 +72,20 @@ def give_up_output() -> None:
 
 
 @contextmanager
-def progress(title: str) -> Iterator[Callable[[int, int], None]]:
+def progress(title: str, *, percent: bool = False) -> Iterator[Callable[[int, int], None]]:
     """Shows progress on the error stream; yields the function that updates it.
 
-    Without a terminal it prints a line after two seconds, then at increasing intervals.
+    Without a terminal it prints a line after two seconds, then at increasing intervals. With
+    ``percent`` it shows the share, for work whose unit means nothing to the user.
     """
     if not errors.is_terminal:
-        with _lines(title) as tick:
+        with _lines(title, percent) as tick:
             yield tick
         return
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(bar_width=None if not is_narrow() else 12),
-        MofNCompleteColumn(),
+        TextColumn("{task.percentage:.0f} %") if percent else MofNCompleteColumn(),
         TimeRemainingColumn(compact=True),
         console=errors,
         transient=True,
@@ -95,7 +96,7 @@ def progress(title: str) -> Iterator[Callable[[int, int], None]]:
 
 
 @contextmanager
-def _lines(title: str) -> Iterator[Callable[[int, int], None]]:
+def _lines(title: str, percent: bool) -> Iterator[Callable[[int, int], None]]:
     """Prints progress as lines, each after 1.5 times the elapsed time."""
     known: list[tuple[int, int]] = []
     ended, begun_s = Event(), time.monotonic()
@@ -108,7 +109,8 @@ def _lines(title: str) -> Iterator[Callable[[int, int], None]]:
             if known and known[-1][1]:
                 done, total = known[-1]
                 left_s = f", about {passed_s * (total - done) / done:.0f} s left" if done else ""
-                line = f"{title}: {done:,} of {total:,}, {passed_s:.0f} s{left_s}"
+                share = f"{100 * done // total} %" if percent else f"{done:,} of {total:,}"
+                line = f"{title}: {share}, {passed_s:.0f} s{left_s}"
             errors.print(line, soft_wrap=True)
             wait_s = min(0.5 * passed_s, MOST_SILENT_S)
 

@@ -70,7 +70,7 @@ def effects(
 ) -> list[Effect]:
     """Returns the shipped values, each followed by the effects of its alternatives."""
     paper = load(SHIPPED).scenario
-    driver = replace(driver, methods=("music",), runs=runs, known={}, traces=[], progress=None)
+    driver = replace(driver, methods=("music",), runs=runs, known={}, traces=[])
     here = _driven(driver, paper)
     found: list[Effect] = []
     chosen = entries()

@@ -15,8 +15,6 @@ from access_av.run.pairs import ErrorSamples
 from access_av.run.simulation import Simulation, simulate
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from access_av._core import Scenario
     from access_av.device.platform import Platform
     from access_av.statistics.percentiles import Percentile
@@ -50,8 +48,6 @@ class Driver:
     seed: int
     threads: int | None = None
     count: int = RESAMPLES
-    progress: Callable[[int, int], None] | None = None
-    planned: int = 0
     methods: tuple[str, ...] = TAPED
     known: dict[str, Driven] = field(default_factory=dict)
     traces: list[MeasurementTraces] = field(default_factory=list)
@@ -62,19 +58,23 @@ class Driver:
         steps = next(iter(self.known.values())).steps
         return float(steps.select(pl.col("time_s").max()).item())
 
-    def drive(self, scenario: Scenario) -> Driven:
-        """Simulates runs of a scenario, unless an equal scenario was simulated before."""
+    def as_driven(self, scenario: Scenario) -> Scenario:
+        """Returns the scenario with all default values; equal drives have equal scenarios."""
         first_mode = self.platform.modes[0].number
         # A power mode affects the runs only by its base wake-up time, which is resolved here.
-        scenario = scenario.resolved(self.platform.core).with_overrides(
+        return scenario.resolved(self.platform.core).with_overrides(
             {"name": "drive", "description": "", "vehicle.platform.mode": first_mode}
         )
+
+    def drive(self, scenario: Scenario) -> Driven:
+        """Simulates runs of a scenario, unless an equal scenario was simulated before."""
+        return self.drive_once(self.as_driven(scenario))
+
+    def drive_once(self, scenario: Scenario) -> Driven:
+        """Simulates runs of a scenario of :meth:`as_driven`."""
         key = scenario.to_toml()
         if key not in self.known:
             self.known[key] = self._drive(scenario)
-            if self.progress is not None:
-                done = len(self.known) * self.runs
-                self.progress(done, max(done, self.planned * self.runs))
         return self.known[key]
 
     def _simulate(self, scenario: Scenario) -> Simulation:

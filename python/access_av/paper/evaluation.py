@@ -198,7 +198,7 @@ def evaluate(
     threads
         Worker threads. Default and maximum: one per core. Results do not depend on it.
     progress
-        Called as ``progress(done, total)`` with numbers of drives.
+        Called as ``progress(done, total)`` with numbers of settings.
 
     Returns
     -------
@@ -220,23 +220,41 @@ def evaluate(
     elif isinstance(interpretation, str):
         interpretation = load(interpretation)
     board = Platform.load(platform) if isinstance(platform, str) else platform
-    planned = len({case.setting for case in cases(board)})
-    driver = Driver(board, runs, seed, threads, progress=progress, planned=planned)
-    return evaluate_with(driver, interpretation)
+    driver = Driver(board, runs, seed, threads)
+    return evaluate_with(driver, interpretation, planned(driver, interpretation), progress)
 
 
-def evaluate_with(driver: Driver, interpretation: Interpretation) -> Evaluation:
-    """Evaluates an interpretation with a driver that may have cached runs."""
-    started = time.monotonic()
-    platform = driver.platform
-    driven: dict[Setting, Driven] = {}
-    wanted = cases(platform)
-    for case in wanted:
-        if case.setting not in driven:
+def planned(driver: Driver, interpretation: Interpretation) -> dict[Setting, Scenario]:
+    """Returns the scenario of each setting, in the order of the simulation."""
+    found: dict[Setting, Scenario] = {}
+    for case in cases(driver.platform):
+        if case.setting not in found:
             scenario = case.setting.apply(interpretation.scenario)
             if case.setting.adaptive and case.mode is not None:
                 scenario = scenario.with_overrides({"vehicle.platform.mode": case.mode.number})
-            driven[case.setting] = driver.drive(scenario)
+            found[case.setting] = driver.as_driven(scenario)
+    return found
+
+
+def evaluate_with(
+    driver: Driver,
+    interpretation: Interpretation,
+    settings: Mapping[Setting, Scenario] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Evaluation:
+    """Evaluates an interpretation with a driver that may have cached runs.
+
+    ``settings`` are those of :func:`planned`; ``progress`` is called with numbers of settings.
+    """
+    started = time.monotonic()
+    platform = driver.platform
+    wanted = cases(platform)
+    settings = planned(driver, interpretation) if settings is None else settings
+    driven: dict[Setting, Driven] = {}
+    for setting, scenario in settings.items():
+        driven[setting] = driver.drive_once(scenario)
+        if progress is not None:
+            progress(len(driven), len(settings))
     reference = driven[wanted[0].setting].steps
     outcome, refitted = outcome_of(
         [(case, driven[case.setting].drives) for case in wanted],

@@ -23,7 +23,10 @@ from access_av.paper.findings import MissingFigureError, energy_j
 from access_av.paper.outcome import interval
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from access_av._core import Scenario
+    from access_av.device.platform import Platform
     from access_av.paper.driver import Driver
     from access_av.paper.evaluation import Evaluation
     from access_av.paper.outcome import Drives
@@ -109,16 +112,28 @@ def _ours(scenario: Scenario, base_ms: float, *, knows_road: bool) -> Scenario:
     )
 
 
-def compare(driver: Driver, evaluation: Evaluation) -> list[Comparison]:
+def compare(
+    driver: Driver, evaluation: Evaluation, progress: Callable[[int, int], None]
+) -> list[Comparison]:
     """Compares the proposed method in every power mode, with and without a road map."""
-    found = []
+    found: list[Comparison] = []
     for mode in driver.platform.modes:
         for knows_road in (True, False):
             base_ms = mode.base_wake_up_ms["music"]
             scenario = _ours(evaluation.scenario, base_ms, knows_road=knows_road)
             drives = driver.drive(scenario).drives
             found.append(beside(evaluation, mode.number, drives, knows_road=knows_road))
+            progress(len(found), 2 * len(driver.platform.modes))
     return found
+
+
+def simulations(platform: Platform) -> int:
+    """Returns the number of different settings of :func:`compare` and :func:`fair`."""
+    bases = {mode.base_wake_up_ms["music"] for mode in platform.modes}
+    # With an exact odometer, the paper's method and the tracker are settings of :func:`compare`.
+    return 2 * len(bases) + sum(
+        who != "bound" if real else who == "one angle" for real, _, who in EQUAL
+    )
 
 
 def beside(evaluation: Evaluation, mode: int, ours: Drives, *, knows_road: bool) -> Comparison:
@@ -166,6 +181,20 @@ REAL = {
 }
 # Interval for a single estimate at the start: longer than any trip.
 ONCE_MS = 3.6e6
+# Comparisons with equal information: whether the odometer is real, whether the road is known, and
+# the method (see :class:`Fair`).
+EQUAL = (
+    (False, False, "paper"),
+    (False, False, "ours"),
+    (False, True, "ours"),
+    (False, True, "one angle"),
+    (True, False, "paper"),
+    (True, False, "ours"),
+    (True, False, "bound"),
+    (True, True, "ours"),
+    (True, True, "one angle"),
+    (True, True, "bound"),
+)
 
 
 @dataclass(frozen=True)
@@ -212,27 +241,21 @@ def fair(driver: Driver, evaluation: Evaluation) -> list[Fair]:
     odometer only, because the model of the localizer has no exact odometer.
     """
     mode = driver.platform.modes[0]
-    base_ms = mode.base_wake_up_ms["music"]
+    # A real odometer is another environment, in which only MUSIC is simulated.
+    drivers = (driver, replace(driver, methods=("music",), known={}, traces=[]))
     found = []
-    for real in (False, True):
-        if real:
-            # Another environment, in which only MUSIC is simulated.
-            driver = replace(driver, methods=("music",), known={}, traces=[], progress=None)
+    for real, knows_road, who in EQUAL:
         paper = evaluation.scenario.with_overrides(
             {"vehicle.platform.mode": mode.number, "vehicle.estimator.method": "music"}
             | (REAL if real else {})
         )
-        found.append(_fair(real, False, "paper", driver.drive(paper).drives))
-        for knows_road in (False, True):
-            mine = _ours(paper, base_ms, knows_road=knows_road)
-            found.append(_fair(real, knows_road, "ours", driver.drive(mine).drives))
-            once = mine.with_overrides(
-                {"vehicle.wake_up": {"policy": "fixed", "interval_ms": ONCE_MS}}
-            )
-            if knows_road:
-                found.append(_fair(real, knows_road, "one angle", driver.drive(once).drives))
-            if real:
-                found.append(_bound(real, knows_road, once))
+        mine = _ours(paper, mode.base_wake_up_ms["music"], knows_road=knows_road)
+        once = mine.with_overrides({"vehicle.wake_up": {"policy": "fixed", "interval_ms": ONCE_MS}})
+        if who == "bound":
+            found.append(_bound(real, knows_road, once))
+            continue
+        scenario = {"paper": paper, "ours": mine, "one angle": once}[who]
+        found.append(_fair(real, knows_road, who, drivers[real].drive(scenario).drives))
     return found
 
 

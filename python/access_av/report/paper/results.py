@@ -22,16 +22,24 @@ if TYPE_CHECKING:
 
     from access_av.report.chart import Spec
 
+# Cost of the report, in runs of a setting of the evaluation on two cores.
+REPORT_COST = 4000
 POINTS_FILE = "operating_points.parquet"
 
 
-def write(made: Study, directory: ResultsDirectory) -> None:
+def write(
+    made: Study,
+    directory: ResultsDirectory,
+    progress: Callable[[int, int], None],
+) -> None:
     """Writes tables, claims, report, scenarios, platform and manifest."""
     for name, table in made.tables().items():
         directory.write_table(f"{name}.parquet", table)
     directory.write_json("claims.json", as_records(made.claims))
+    progress(1, 4)
     specs: dict[str, Spec] = {}
     directory.write_text("report.html", render(made, specs))
+    progress(2, 4)
     for name, picture in figures(specs).items():
         directory.write_text(f"{name}.svg", picture)
     shown = made.shown
@@ -46,6 +54,7 @@ def write(made: Study, directory: ResultsDirectory) -> None:
         duration_s=round(made.duration_s, 3),
     )
     directory.link_latest()
+    progress(4, 4)
 
 
 def run(
@@ -55,13 +64,28 @@ def run(
     runs: int,
     seed: int,
     out: Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
     **how: Any,
 ) -> tuple[Study, ResultsDirectory]:
-    """Evaluates these interpretations, or all shipped ones, and writes the results."""
+    """Evaluates these interpretations, or all shipped ones, and writes the results.
+
+    ``progress`` is called as ``progress(done, total)`` with costs, including that of the report.
+    """
+    simulated = 0
+
+    def of_study(done: int, total: int) -> None:
+        nonlocal simulated
+        simulated = total
+        if progress is not None:
+            progress(done, total + REPORT_COST)
+
+    def of_report(done: int, total: int) -> None:
+        of_study(simulated + REPORT_COST * done // total, simulated)
+
     chosen, board = load_all(names), Platform.load(platform)
     directory = ResultsDirectory.create("evaluate", out)
-    made = study(chosen, board, runs=runs, seed=seed, **how)
-    write(made, directory)
+    made = study(chosen, board, runs=runs, seed=seed, progress=of_study, **how)
+    write(made, directory, of_report)
     return made, directory
 
 
