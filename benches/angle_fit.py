@@ -175,8 +175,8 @@ def channel_estimates(count: int) -> Iterator[Case]:
                     ("the cell's angle", cell),
                 ):
                     error = (angle.phase_rad - phase + np.pi) % (2 * np.pi) - np.pi
-                    told = not angle.doubt
-                    found[name].append((error, angle.phase_sigma_rad, told))
+                    is_reliable = not angle.doubt
+                    found[name].append((error, angle.phase_sigma_rad, is_reliable))
         for name, values in found.items():
             errors, sigmas, resolved = (np.array(it) for it in zip(*values, strict=True))
             yield f"{name}, SNR {snr_db:.0f} dB", errors, sigmas, resolved, None

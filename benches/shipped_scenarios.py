@@ -41,18 +41,18 @@ def main() -> int:
                 raise RuntimeError(f"{name} states no protection level")
             fails = quantiles_m[0.99] > ERROR_M or kept.exceedance_share > BEYOND
             short += fails
-            told = ""
+            p99_m = ""
             if "channel" in over and fails:
                 seen = {**over["channel"], "oracle_nlos_rejection": True}
-                of_told = simulate(
+                with_rejection = simulate(
                     scenario.with_overrides({"channel": seen}), runs=asked.runs, seed=asked.seed
                 )
-                told = f"{of_told.error_quantiles_m[0.99]:.2f}"
+                p99_m = f"{with_rejection.error_quantiles_m[0.99]:.2f}"
             print(
                 f"{name:24} {channel:7} {quantiles_m[0.9]:.2f}  {quantiles_m[0.99]:.2f} "
                 f"{100.0 * kept.availability:5.1f}  {kept.exceedance_share:8.1e} "
                 f"{kept.median_level_over_error:6.1f}  {found.runs['energy_j'].mean():10.1f} "
-                f"{told:>6}{' *' if fails else ''}",
+                f"{p99_m:>6}{' *' if fails else ''}",
                 flush=True,
             )
     return 1 if short else 0

@@ -97,14 +97,14 @@ def main() -> int:
             rejected += drive.rejected
             memory_mib.append(resident_mib(node.process.pid))
         node.process.stdin.flush()
-        while (told := node.state())["sources"][0]["items"] < sent:
+        while (status := node.state())["sources"][0]["items"] < sent:
             time.sleep(0.2)
         time.sleep(1.0)
-        told = node.state()
+        status = node.state()
         memory_mib.append(resident_mib(node.process.pid))
         node.process.stdin.close()
         node.process.wait()
-        drive_s, took_s = told["now_s"], time.monotonic() - began
+        drive_s, took_s = status["now_s"], time.monotonic() - began
         size, read = 0, {}
         for file in sorted(files.iterdir()):
             size += file.stat().st_size
@@ -114,8 +114,10 @@ def main() -> int:
         number = len(list(files.iterdir()))
     quarter = max(1, len(memory_mib) // 4)
     print(f"{drive_s / 3600:.2f} h of driving, {len(memory_mib) - 1} drives, in {took_s:.0f} s")
-    print(f"messages: {sent} sent, {told['sources'][0]['items']} taken, {told['dropped']} dropped")
-    defects = told["sources"][0]["defects"]
+    print(
+        f"messages: {sent} sent, {status['sources'][0]['items']} taken, {status['dropped']} dropped"
+    )
+    defects = status["sources"][0]["defects"]
     print(f"rejected: {defects}, expected: {rejected}")
     print(
         f"memory: {memory_mib[quarter - 1]:.1f} MiB after a quarter, {memory_mib[-1]:.1f} at the "
@@ -123,7 +125,7 @@ def main() -> int:
     )
     print(f"MCAP: {number} files, {size / 1e6:.1f} MB, {size / drive_s * 0.0864:.0f} MB a day")
     print(f"read of them: {read}")
-    lost = sum(told["dropped"].values()) + sent - told["sources"][0]["items"]
+    lost = sum(status["dropped"].values()) + sent - status["sources"][0]["items"]
     # One status message per second of the drive.
     whole = abs(read["/diagnostics"] - drive_s) <= 2 + 2 * len(memory_mib)
     return 0 if lost == 0 and whole and defects == rejected else 1

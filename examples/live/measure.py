@@ -135,8 +135,8 @@ def main() -> None:
             folder = recorded(whole, arguments.duration_s, continuous=True)
         if arguments.radio:
             sender = Radio(folder, Path(scratch))
-            told = settings_of(sender.samples, sender.odometry, ANY_PORT)
-            settings.write_text(told, encoding="utf-8")
+            text = settings_of(sender.samples, sender.odometry, ANY_PORT)
+            settings.write_text(text, encoding="utf-8")
             send = sender.run
         elif arguments.stream_off:
             sender = Wheels(odometry_of(folder))
@@ -148,8 +148,8 @@ def main() -> None:
             sender = RawTransmitter(drive, arguments.times)
             samples = f'source = "raw"\nformat = "ci16_le"\naddress = "{sender.address}"\n'
             samples += stream_toml(drive, arguments.times)
-            told = settings_of(samples, sender.wheels.address, ANY_PORT)
-            settings.write_text(told, encoding="utf-8")
+            text = settings_of(samples, sender.wheels.address, ANY_PORT)
+            settings.write_text(text, encoding="utf-8")
             send = sender.run
         else:
             sender = Transmitter(Drive(recorded(folder, arguments.duration_s)))
@@ -181,7 +181,7 @@ def main() -> None:
             used |= busy_s(process)
             if tracking is None and time.monotonic() - began >= TRACKS_S / arguments.speed:
                 tracking = (time.monotonic(), used.copy())
-        ended, told = time.monotonic(), node.state()
+        ended, state = time.monotonic(), node.state()
         used |= busy_s(process)
         node.end()
         sender.close()
@@ -201,12 +201,12 @@ def main() -> None:
     if on_s:
         print(f"radio on: {100 * sum(on_s) / drive_s:.1f} % of the time, {len(on_s)} times")
     print(
-        f"samples looked at: {100 * told['duty']:.1f} %, angles: {told['energy']['aoa_estimates']}"
+        f"samples received: {100 * state['duty']:.1f} %, angles: {state['energy']['aoa_estimates']}"
     )
-    print(f"state: {told['pose']['state']}, {told['pose']['tracked']} SSBs tracked")
-    print(f"SSBs found by a search: {told['found_by_search']}, all others where expected")
-    print(f"dropped: {told['dropped']}")
-    for name, figures in told["latency"].items():
+    print(f"state: {state['pose']['state']}, {state['pose']['tracked']} SSBs tracked")
+    print(f"SSBs found by a search: {state['found_by_search']}, all others where expected")
+    print(f"dropped: {state['dropped']}")
+    for name, figures in state["latency"].items():
         print(f"{name}: {figures}")
 
 

@@ -33,7 +33,7 @@ pub fn run(input: &[u8]) {
                     0 => read_odometry_csv(&file),
                     _ => read_wheel_odometry_csv(&file, Some(0.6)),
                 };
-                if let Ok(log) = told(read) {
+                if let Ok(log) = with_message(read) {
                     for it in &log.samples {
                         let rate = it.yaw_rate_radps.unwrap_or(0.0);
                         let all = [it.time_s, it.distance_m, it.speed_mps, rate];
@@ -44,7 +44,7 @@ pub fn run(input: &[u8]) {
                 }
             }
             2 => {
-                if let Ok(log) = told(read_angle_log(&file)) {
+                if let Ok(log) = with_message(read_angle_log(&file)) {
                     for it in &log.angles {
                         // The array model converts between phase and angle: the file needs only one of them.
                         let it = &it.measured;
@@ -55,7 +55,7 @@ pub fn run(input: &[u8]) {
                 }
             }
             3 => {
-                if let Ok(poses) = told(read_tum(&file)) {
+                if let Ok(poses) = with_message(read_tum(&file)) {
                     let finite = |it: &recording::TimedPose| {
                         it.time_s.is_finite() && it.pose.x_m.is_finite()
                     };
@@ -64,7 +64,7 @@ pub fn run(input: &[u8]) {
             }
             _ => {
                 let points = Files.points_m(&file.display().to_string(), "");
-                if let Ok(points) = told(points) {
+                if let Ok(points) = with_message(points) {
                     assert!(points.iter().flatten().all(|it| it.is_finite()));
                 }
             }
@@ -74,7 +74,7 @@ pub fn run(input: &[u8]) {
 }
 
 /// Asserts that an error has a message.
-fn told<T, E: std::fmt::Display>(read: Result<T, E>) -> Result<T, E> {
+fn with_message<T, E: std::fmt::Display>(read: Result<T, E>) -> Result<T, E> {
     if let Err(error) = &read {
         assert!(!error.to_string().is_empty());
     }

@@ -228,8 +228,8 @@ def said(overrides: dict[str, object]) -> list[str]:
 @pytest.mark.parametrize("what", NONSENSE)
 def test_invalid_values_are_rejected_with_a_valid_example(what: str) -> None:
     overrides, key, write = NONSENSE[what]
-    told = said(overrides)
-    assert any(key in one.split(" is ")[0] and write in one for one in told), told
+    warnings = said(overrides)
+    assert any(key in one.split(" is ")[0] and write in one for one in warnings), warnings
 
 
 def test_the_plant_causes_no_warning() -> None:

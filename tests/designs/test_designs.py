@@ -616,12 +616,12 @@ def test_command_on_any_scenario(tmp_path: Path, run: Callable[..., Finished]) -
     none = run(tmp_path, "design", "select", "o", "--max-rms-m", "0.0001", "--json")
     assert "m instead of 0.0001 m" in json.loads(none.out)["advice"][0]
     assert (some.code, none.code) == (0, 3)
-    told = json.loads((tmp_path / "o/manifest.json").read_text())
-    assert told["space"]["keys"]["vehicle.wake_up.interval_ms"] == [2000.0, 8000.0]
+    manifest = json.loads((tmp_path / "o/manifest.json").read_text())
+    assert manifest["space"]["keys"]["vehicle.wake_up.interval_ms"] == [2000.0, 8000.0]
     # The printed command repeats the same drives and gives the same results.
     shutil.copytree(tmp_path / "results", tmp_path / "o/results")
     before = (tmp_path / "o/designs.parquet").read_bytes()
-    again = run(tmp_path / "o", *shlex.split(told["repeat"])[1:], "--out", "again")
+    again = run(tmp_path / "o", *shlex.split(manifest["repeat"])[1:], "--out", "again")
     assert again.code == 0, again.err
     assert (tmp_path / "o/again/designs.parquet").read_bytes() == before
     assert len(list((tmp_path / "o/results/parts").glob("*.npz"))) == 2

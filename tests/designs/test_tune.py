@@ -155,8 +155,8 @@ def test_command(access_av: Callable[..., Finished], tmp_path: Path) -> None:
         "--out", tmp_path / "out", "--json",
     )  # fmt: skip
     assert done.code == 0, done.err
-    told = json.loads(done.out)
+    tuned = json.loads(done.out)
     # Two suggestions, both again, and two or three for the comparison; two runs each.
-    assert told["drives"] in (2 * (2 + 2 + 2), 2 * (2 + 2 + 3))
+    assert tuned["drives"] in (2 * (2 + 2 + 2), 2 * (2 + 2 + 3))
     vehicle = (tmp_path / "out/vehicle.toml").read_text()
-    assert f"interval_ms = {told['values']['vehicle.wake_up.interval_ms']}" in vehicle
+    assert f"interval_ms = {tuned['values']['vehicle.wake_up.interval_ms']}" in vehicle

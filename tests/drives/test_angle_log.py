@@ -74,8 +74,10 @@ def test_an_angle_log_gives_the_poses_of_its_samples(
     assert rows.columns == list(TABLES["recorded_angles"].columns)
     assert (rows["phase_sigma_rad"] > rows["phase_noise_sigma_rad"]).all()
 
-    def located(recording: Path, told: Path) -> drives.Drive:
-        return drives.locate(out / "site.toml", drive / "odometry.csv", recording, vehicle=told)
+    def located(recording: Path, vehicle_file: Path) -> drives.Drive:
+        return drives.locate(
+            out / "site.toml", drive / "odometry.csv", recording, vehicle=vehicle_file
+        )
 
     by_samples = located(drive / "iq.sigmf-meta", vehicle)
     by_csv = located(out / "angles.csv", out / "vehicle.toml")
@@ -106,14 +108,14 @@ def test_the_standard_deviation_covers_the_whole_error(drive: Path, log: Path) -
     rate_hz = truth["global"]["core:sample_rate"]
     spacing = truth["annotations"][0]["aoa:truth"]["element_spacing_wavelengths"]
     starts = {it["core:sample_start"]: it["core:global_index"] for it in truth["captures"]}
-    told = []
+    phases = []
     for one in truth["annotations"]:
         first = max(start for start in starts if start <= one["core:sample_start"])
         time_s = (starts[first] + one["core:sample_start"] - first) / rate_hz
         azimuth_rad = math.radians(one["aoa:truth"]["azimuth_from_broadside_deg"])
         phase_rad = 2 * math.pi * spacing * math.sin(azimuth_rad)
-        told.append((time_s, one["nr:ssb"]["pci"], phase_rad))
-    true = pl.DataFrame(told, schema=["time_s", "pci", "true_rad"], orient="row")
+        phases.append((time_s, one["nr:ssb"]["pci"], phase_rad))
+    true = pl.DataFrame(phases, schema=["time_s", "pci", "true_rad"], orient="row")
     true = true.with_columns(pl.col("pci").cast(pl.UInt16)).sort("time_s")
     found = pl.read_parquet(log / "angles.parquet").filter("resolved").sort("time_s")
     parts = [

@@ -87,9 +87,9 @@ def test_angles_of_heads_without_an_array_are_reported_and_not_used(tmp_path: Pa
     drive.with_arrays = False
     found = drive.locate(tmp_path)
     assert not found.angles["accepted"].any()
-    told = "\n".join(found.remarks)
-    assert "measured at the radio head (at_head is 1)" in told
-    assert "radio_heads[0].array.azimuth_rad" in told
+    remarks = "\n".join(found.remarks)
+    assert "measured at the radio head (at_head is 1)" in remarks
+    assert "radio_heads[0].array.azimuth_rad" in remarks
 
 
 def test_angles_of_vehicle_and_heads_are_used_together(tmp_path: Path) -> None:
@@ -111,8 +111,8 @@ def test_a_flag_that_is_neither_0_nor_1_is_left_out_with_its_line(tmp_path: Path
     values[4] = 2
     drive.angles = drive.angles.with_columns(pl.Series("at_head", values))
     found = drive.locate(tmp_path)
-    told = "\n".join(found.remarks)
-    assert "line 6: left out, at_head 2 is neither 1 nor 0" in told
+    remarks = "\n".join(found.remarks)
+    assert "line 6: left out, at_head 2 is neither 1 nor 0" in remarks
 
 
 @pytest.fixture(scope="module")

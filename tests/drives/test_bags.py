@@ -86,8 +86,8 @@ def source(drive: Any) -> str:
 
 def test_the_source_of_the_yaw_rate_is_reported(driven: Robot, tmp_path: Path) -> None:
     """Yaw rates of an IMU, of the orientation and of the odometry give similar positions."""
-    told = locate(driven, tmp_path, tmp_path / "odometry.csv")
-    as_told_m = driven.rms_error_m(told)
+    unchanged = locate(driven, tmp_path, tmp_path / "odometry.csv")
+    unchanged_m = driven.rms_error_m(unchanged)
     cases = {
         "angular_velocity.z of /imu/data, whose z axis is assumed to point up": [
             *odometry(driven, heading=True),
@@ -106,11 +106,11 @@ def test_the_source_of_the_yaw_rate_is_reported(driven: Robot, tmp_path: Path) -
         assert drive.poses.height == round(DURATION_S * RATE_HZ)
         assert drive.is_reliable
         # Heading differences do not contain the noise of the gyroscope.
-        assert driven.rms_error_m(drive) < as_told_m + 0.02, said
+        assert driven.rms_error_m(drive) < unchanged_m + 0.02, said
     silent = locate(driven, tmp_path, bag.write(tmp_path / "silent", odometry(driven)))
     assert not any("taken from" in it for it in silent.remarks)
     assert any("a differential drive has no source of the yaw rate" in it for it in silent.remarks)
-    assert driven.rms_error_m(silent) > as_told_m + 0.02
+    assert driven.rms_error_m(silent) > unchanged_m + 0.02
 
 
 def test_an_unusable_imu_is_reported(driven: Robot, tmp_path: Path) -> None:
@@ -135,8 +135,8 @@ def test_one_of_several_imus_is_selected(access_av: Cli, driven: Robot, tmp_path
         *imu(driven, topic="/imu/front"),
         *imu(driven, turned=-1.0, topic="/imu/back"),
     ]
-    told = bag.write(tmp_path / "told", [*odometry(driven, yaw=True), *gyroscopes])
-    untold = bag.write(tmp_path / "untold", [*odometry(driven), *gyroscopes])
+    with_yaw = bag.write(tmp_path / "with_yaw", [*odometry(driven, yaw=True), *gyroscopes])
+    without_yaw = bag.write(tmp_path / "without_yaw", [*odometry(driven), *gyroscopes])
     *given, _ = driven.write(tmp_path)
 
     def located(name: str, odometry: Path, *more: str) -> tuple[int, str]:
@@ -144,19 +144,19 @@ def test_one_of_several_imus_is_selected(access_av: Cli, driven: Robot, tmp_path
         done = access_av(*given, tmp_path / name, *more)
         return done.code, " ".join(done.err.split())
 
-    assert located("twist", told)[0] == 0
-    code, said = located("front", told, "--imu-topic", "/imu/front")
+    assert located("twist", with_yaw)[0] == 0
+    code, said = located("front", with_yaw, "--imu-topic", "/imu/front")
     assert code == 0
     assert "taken from angular_velocity.z of /imu/front" in said
     # The diagnosis of the drive reports a reversed yaw rate.
-    assert located("back", told, "--imu-topic", "/imu/back")[0] == 3
-    code, said = located("left", told, "--imu-topic", "/imu/left")
+    assert located("back", with_yaw, "--imu-topic", "/imu/back")[0] == 3
+    code, said = located("left", with_yaw, "--imu-topic", "/imu/left")
     assert code == 2
     assert "`/imu/left` is missing" in said
-    code, said = located("several", untold)
+    code, said = located("several", without_yaw)
     assert code == 2
     assert "choose one of /imu/back, /imu/front" in said
-    assert located("chosen", untold, "--imu-topic", "/imu/front")[0] == 0
+    assert located("chosen", without_yaw, "--imu-topic", "/imu/front")[0] == 0
     code, said = located("table", tmp_path / "odometry.csv", "--imu-topic", "/imu/front")
     assert code == 2
     assert "only an MCAP file or a rosbag2 folder has topics" in said

@@ -248,8 +248,8 @@ def test_the_start_may_be_given_with_the_command(
     vehicle.write_text(without_start((drive / "vehicle.toml").read_text()))
     given = locate(drive).poses
     start = (pose["x_m"], pose["y_m"], pose["heading_rad"])
-    told = locate(drive, vehicle=vehicle, start=start).poses
-    assert told.equals(given)
+    with_start = locate(drive, vehicle=vehicle, start=start).poses
+    assert with_start.equals(given)
     searched = arguments(drive, tmp_path / "out")
     assert "Position found after" in access_av(*searched, "--start", "unknown").out
     for bad in ("1,2", "1,2,x", "1,2,inf", "1,2,-95.8"):
@@ -310,8 +310,8 @@ def test_a_recording_of_two_antennas_is_refused(
 
 @pytest.mark.parametrize("by", ["distance", "speed", "speed alone", "distance alone"])
 def test_odometry_is_used_unchanged(tmp_path: Path, by: str) -> None:
-    told = robot()
-    rows = told.odometry.sort("time_s")
+    driven = robot()
+    rows = driven.odometry.sort("time_s")
     turned = (rows["yaw_rate_radps"] / RATE_HZ).cum_sum()
     yaw, distance, speed = rows["yaw_rate_radps"], rows["distance_m"], rows["speed_mps"]
     columns = {
@@ -326,36 +326,36 @@ def test_odometry_is_used_unchanged(tmp_path: Path, by: str) -> None:
         "speed alone": {"speed_mps": speed, "yaw_rate_radps": yaw},
         "distance alone": {"distance_m": distance, "yaw_rate_radps": yaw},
     }
-    as_rows = told.rms_error_m(told.locate(tmp_path))
-    told.odometry = rows.select("time_s", **columns[by])
-    told.sheet = told.sheet.replace("odometer = {", f"odometer = {{ track_width_m = {TRACK_M},")
-    assert told.rms_error_m(told.locate(tmp_path)) == pytest.approx(as_rows, abs=0.01)
+    as_rows = driven.rms_error_m(driven.locate(tmp_path))
+    driven.odometry = rows.select("time_s", **columns[by])
+    driven.sheet = driven.sheet.replace("odometer = {", f"odometer = {{ track_width_m = {TRACK_M},")
+    assert driven.rms_error_m(driven.locate(tmp_path)) == pytest.approx(as_rows, abs=0.01)
 
 
 def test_a_wider_track_than_specified_is_estimated(tmp_path: Path) -> None:
-    told = robot()
-    turned = (told.odometry["yaw_rate_radps"] / RATE_HZ).cum_sum()
-    told.odometry = told.odometry.select(
+    driven = robot()
+    turned = (driven.odometry["yaw_rate_radps"] / RATE_HZ).cum_sum()
+    driven.odometry = driven.odometry.select(
         "time_s",
         left_m=pl.col("distance_m") - 0.5 * TRACK_M * turned,
         right_m=pl.col("distance_m") + 0.5 * TRACK_M * turned,
     )
     with pytest.raises(RecordingError, match=r"odometer\.track_width_m"):
-        told.locate(tmp_path)
-    told.sheet = told.sheet.replace(
+        driven.locate(tmp_path)
+    driven.sheet = driven.sheet.replace(
         "odometer = {", f"odometer = {{ track_width_m = {1.08 * TRACK_M}, track_width_std_m = 0.02,"
     )
-    drive = told.locate(tmp_path)
+    drive = driven.locate(tmp_path)
     found = drive.findings.row(by_predicate=pl.col("constant") == "gyroscope.scale", named=True)
     assert found["stated_value"] == 1.0
     assert abs(found["found_value"] - 1 / 1.08) < 4.0 * found["found_value_std"] < 0.05
-    assert told.rms_error_m(drive) < 0.1
+    assert driven.rms_error_m(drive) < 0.1
 
 
 def test_the_report_shows_what_was_found(access_av: Cli, tmp_path: Path) -> None:
-    told = robot(60.0)
-    told.sheet += "integrity = {}\n"
-    arguments = told.write(tmp_path)
+    driven = robot(60.0)
+    driven.sheet += "integrity = {}\n"
+    arguments = driven.write(tmp_path)
     done = access_av(*arguments, "--truth", tmp_path / "truth.tum", "--smooth")
     assert done.code == 0, done.err
     page = (tmp_path / "out" / "report.html").read_text()
@@ -388,9 +388,9 @@ def test_the_files_of_the_docs_can_be_used(access_av: Cli, tmp_path: Path) -> No
     for shape in (road, *(width + way for way in ways)):
         (tmp_path / "site.toml").write_text(hall + shape)
         assert access_av("file", "check", "--kind", "site", tmp_path / "site.toml").code == 0
-    told = robot(60.0)
-    told.sheet = re.sub(r"^array = .*\n", "", vehicle, flags=re.MULTILINE)
-    done = access_av(*told.write(tmp_path), "--truth", tmp_path / "truth.tum")
+    driven = robot(60.0)
+    driven.sheet = re.sub(r"^array = .*\n", "", vehicle, flags=re.MULTILINE)
+    done = access_av(*driven.write(tmp_path), "--truth", tmp_path / "truth.tum")
     assert done.code == 0, done.err
     shown = access_av("record", "locate", "--help", columns=200).out
     for row in re.findall(r"^\| (?:odometry|the same|angles).*$", page, re.MULTILINE):

@@ -291,9 +291,9 @@ def test_exit_codes(access_av: Cli, tmp_path: Path) -> None:
     for said in (done.err, (tmp_path / "out" / "report.html").read_text()):
         assert "x is mirrored" in " ".join(said.split()).replace("&#x27;", "'")
     again = [*arguments[:-1], tmp_path / "again"]
-    told = json.loads(access_av(*again, "--json").out)
-    assert "x is mirrored" in told["suspicions"][0]
-    assert told["lost_share"] > 0.0
+    result = json.loads(access_av(*again, "--json").out)
+    assert "x is mirrored" in result["suspicions"][0]
+    assert result["lost_share"] > 0.0
     assert json.loads((tmp_path / "again" / "manifest.json").read_text())["suspicions"]
     whole.angles = whole.angles.with_columns(time_s=TIME + 1e9)
     whole.write(tmp_path)

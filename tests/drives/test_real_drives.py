@@ -35,17 +35,17 @@ def bench() -> Any:
 @pytest.fixture(scope="module")
 def converted(bench: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Returns the robot's drive, written as Robot1 of a data set and converted."""
-    told, rng = robot(120.0), np.random.default_rng(5)
+    driven, rng = robot(120.0), np.random.default_rng(5)
     dataset = tmp_path_factory.mktemp("MRCLAM_Dataset0")
-    times = EPOCH_S + told.odometry["time_s"].to_numpy()
+    times = EPOCH_S + driven.odometry["time_s"].to_numpy()
 
     def write(name: str, *columns: Any) -> None:
         np.savetxt(dataset / name, np.column_stack(columns), fmt="%.6f", header="a comment")
 
     # A command is valid until the next one, so that the value of a step is that of its start.
-    speed, yaw = (told.odometry[name].to_numpy() for name in ("speed_mps", "yaw_rate_radps"))
+    speed, yaw = (driven.odometry[name].to_numpy() for name in ("speed_mps", "yaw_rate_radps"))
     write("Robot1_Odometry.dat", times[:-1], speed[1:], yaw[1:])
-    x, y, heading = (told.truth[name].to_numpy() for name in ("x_m", "y_m", "heading_rad"))
+    x, y, heading = (driven.truth[name].to_numpy() for name in ("x_m", "y_m", "heading_rad"))
     write("Robot1_Groundtruth.dat", times, x, y, heading)
     seen = []
     for k in range(0, times.size, 3):
@@ -70,13 +70,13 @@ def converted(bench: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_converted_drive_equals_the_original(bench: Any, converted: Path) -> None:
-    drive, told = bench.read(converted), robot(120.0)
+    drive, original = bench.read(converted), robot(120.0)
     assert drive["odometry"]["time_s"][0] == 0.0
     assert np.diff(drive["odometry"]["time_s"]) == pytest.approx(1 / bench.RATE_HZ, abs=1e-6)
     assert set(drive["bearings"][:, 1]) == set(HEADS_M)
     assert np.abs(drive["bearings"][:, 2]).max() < VIEW_RAD + 0.1
-    assert drive["start"]["x_m"] == pytest.approx(told.start[0], abs=1e-3)
-    driven = told.odometry["distance_m"].to_numpy()
+    assert drive["start"]["x_m"] == pytest.approx(original.start[0], abs=1e-3)
+    driven = original.odometry["distance_m"].to_numpy()
     # One step at each end is excepted.
     assert drive["odometry"]["distance_m"][-1] == pytest.approx(driven[-1], abs=2 * 0.5 / RATE_HZ)
     assert drive["truth"][0, 0] == pytest.approx(0.0, abs=1e-4)

@@ -166,18 +166,18 @@ def test_odometry_of_two_wheels_gives_equal_poses(logged: Path, tmp_path: Path) 
     one = logged / "0"
     vehicle = Vehicle.load(str(one / "vehicle.toml"))
     paired = vehicle.with_overrides({"odometer.track_width_m": 2 * half_track_m})
-    told = pl.read_csv(one / "odometry.csv").with_columns(
+    rates = pl.read_csv(one / "odometry.csv").with_columns(
         yaw_rate_radps=0.02 * pl.col("time_s").cos()
     )
     off_mps = half_track_m * pl.col("yaw_rate_radps")
-    wheels = told.select(
+    wheels = rates.select(
         "time_s",
         "distance_m",
         left_mps=pl.col("speed_mps") - off_mps,
         right_mps=pl.col("speed_mps") + off_mps,
     )
     residuals = []
-    for name, rows in (("told", told), ("wheels", wheels)):
+    for name, rows in (("rates", rates), ("wheels", wheels)):
         folder = tmp_path / name
         folder.mkdir()
         rows.write_csv(folder / "odometry.csv")

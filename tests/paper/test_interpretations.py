@@ -128,9 +128,9 @@ def test_a_contradictory_interpretation_is_reported_and_the_others_are_evaluated
         tmp_path / "e",
     )
     assert done.code == 0, done.err
-    told = " ".join(done.out.split())
-    assert "Not evaluated: hasty" in told
-    assert "wake_up.t_max_ms" in told
+    output = " ".join(done.out.split())
+    assert "Not evaluated: hasty" in output
+    assert "wake_up.t_max_ms" in output
     claims = json.loads((tmp_path / "e/claims.json").read_text())
     assert {claim["interpretation"] for claim in claims} == {"gate"}
     alone = access_av(

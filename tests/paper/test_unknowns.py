@@ -64,7 +64,7 @@ def test_sobol_indices_of_a_known_function() -> None:
     expected = {
         "a": (3.0, 3.0 + variances["ab"]), "b": (0.0, variances["ab"]), "c": (1.0, 1.0),
     }  # fmt: skip
-    covered, told = 0, 0
+    covered, compared = 0, 0
     for draw in range(10):
         points = latin_hypercube(512, len(dimensions), seed=draw)
         one, two, choice = (2.0 * points - 1.0).T[:3]
@@ -77,7 +77,7 @@ def test_sobol_indices_of_a_known_function() -> None:
                 assert each.total < 0.01, "it is idle"
                 continue
             first, total = (value / whole for value in expected[each.dimension])
-            told += 2
+            compared += 2
             covered += each.first_low - 1e-9 <= first <= each.first_high + 1e-9
             covered += each.total_low <= total <= each.total_high
             assert abs(each.total - total) < 0.05
@@ -85,7 +85,7 @@ def test_sobol_indices_of_a_known_function() -> None:
         assert found.explained["c"] == pytest.approx(1.0 - 0.25 / whole, abs=0.02)
         assert found.holds["c"] == pytest.approx(np.mean(margin >= 0.0))
     # 95 % intervals: fewer than 45 of 60 in them has a probability below 1e-6.
-    assert told == 60
+    assert compared == 60
     assert covered >= 45, covered
 
 

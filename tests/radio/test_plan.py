@@ -98,8 +98,10 @@ def test_the_suggested_upgrades_reach_the_next_service_level() -> None:
     shares = {change.what: change.share for change in found.changes}
     assert all(found.share < share for share in shares.values())
     # This is equal for the radio heads of the plan.
-    told = {it.level.name: it.share for it in bound(planned.scenario).verdicts}
-    assert math.isclose(shares[f"a radio head at {planned.chosen[0]}"], told["6"], rel_tol=1e-12)
+    shares_by_level = {it.level.name: it.share for it in bound(planned.scenario).verdicts}
+    assert math.isclose(
+        shares[f"a radio head at {planned.chosen[0]}"], shares_by_level["6"], rel_tol=1e-12
+    )
 
 
 def test_a_site_at_the_highest_level_has_no_next_one() -> None:
@@ -275,7 +277,7 @@ def test_the_protection_level_increases_with_a_smaller_risk(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "told"),
+    ("key", "value", "expected"),
     [
         ("risk_per_hour", "1e-5", "below integrity.risk_per_hour"),
         ("fault_probability.array", "0.4", "below integrity.risk_per_hour"),
@@ -285,14 +287,14 @@ def test_the_protection_level_increases_with_a_smaller_risk(tmp_path: Path) -> N
     ],
 )
 def test_unmonitored_faults_above_the_risk_are_rejected(
-    access_av: Callable[..., Finished], key: str, value: str, told: str
+    access_av: Callable[..., Finished], key: str, value: str, expected: str
 ) -> None:
     less_risk = ["--set", "vehicle.integrity.risk_per_hour=0.3"]
     change = ["--set", f"vehicle.integrity.{key}={value}"]
     done = access_av("run", "yard", "--runs", "1", *less_risk, *change)
     assert done.code == 2
     assert "integrity" in done.err
-    assert told in done.err
+    assert expected in done.err
 
 
 def test_every_mismatch_can_be_simulated(tmp_path: Path) -> None:

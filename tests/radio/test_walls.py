@@ -57,9 +57,9 @@ def test_no_angle_is_estimated_through_a_wall(walled: Scenario) -> None:
 
 def test_the_channel_loses_the_direct_wave_behind_it() -> None:
     """A vehicle without the wall in its site receives the radio head weakly, and has errors."""
-    as_told = {"truth.sample_errors": False, "site.rician_k_db": 60.0}
-    open_air = trip(**as_told)
-    behind = trip(**as_told, **{"truth.site.walls": [WALL]})
+    nominal = {"truth.sample_errors": False, "site.rician_k_db": 60.0}
+    open_air = trip(**nominal)
+    behind = trip(**nominal, **{"truth.site.walls": [WALL]})
     assert behind.resolved() != open_air.resolved()
     levels = {}
     for name, scenario in (("open", open_air), ("behind", behind)):

@@ -120,8 +120,8 @@ def test_the_command_writes_the_files_that_its_help_lists(
     narrow = access_av("design", "bound", "yard", "--out", tmp_path / "b", columns=60).out
     assert re.search(r"^ 6 +0\.3 +99\.9% .* not reached", narrow, re.MULTILINE)
     route = pl.read_parquet(tmp_path / "b/bound.parquet")
-    told = json.loads(access_av("design", "bound", "yard", "--json", "--out", tmp_path / "b").out)
-    assert told["next_level"]["cheapest"] == "8 antennas"
-    assert told["median_m"] == route["bound_m"].median()
-    assert told["median_m"] < told["p90_m"] < told["max_m"]
-    assert [head["pci"] for head in told["heads"]] == [11, 12, 13, 14]
+    result = json.loads(access_av("design", "bound", "yard", "--json", "--out", tmp_path / "b").out)
+    assert result["next_level"]["cheapest"] == "8 antennas"
+    assert result["median_m"] == route["bound_m"].median()
+    assert result["median_m"] < result["p90_m"] < result["max_m"]
+    assert [head["pci"] for head in result["heads"]] == [11, 12, 13, 14]

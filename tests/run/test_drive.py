@@ -106,13 +106,13 @@ def test_run_prints_percentiles_and_integrity(
         "run", "paper-real-odometry-2", "--set", "vehicle.integrity={}", "--out", tmp_path,
     )  # fmt: skip
     assert done.code == 0, done.err
-    told = " ".join(done.out.split())
+    output = " ".join(done.out.split())
     for text in (
         "50th percentile of the error",
         "protection level / error",
         "The position is available",
     ):
-        assert text in told
+        assert text in output
     page = (tmp_path / "report.html").read_text()
     assert "stanford" in page
     assert "The position is available" in page

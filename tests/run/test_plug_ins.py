@@ -69,9 +69,9 @@ def test_a_likelihood_is_as_accurate_as_its_maximum() -> None:
     def likelihood(snapshots: np.ndarray) -> np.ndarray:
         return (abs(steering.conj() @ snapshots) ** 2).sum(axis=1) / 4.0
 
-    told = access_av.simulate(SHORT, runs=2, estimator=likelihood)
+    custom = access_av.simulate(SHORT, runs=2, estimator=likelihood)
     built_in = access_av.simulate(SHORT, runs=2)
-    assert told.rms_error_m < 1.2 * built_in.rms_error_m
+    assert custom.rms_error_m < 1.2 * built_in.rms_error_m
 
 
 @pytest.mark.parametrize(

@@ -220,9 +220,9 @@ def test_an_empty_scan_reports_the_searched_range_and_a_hint(
     noise = np.random.default_rng(2).normal(size=(40_000, 2)) @ [1, 1j]
     noise.astype(np.complex64).tofile(file)
     options = ["--sample-rate-hz", RATE_HZ, "--centre-hz", SSB_HZ]
-    told = " ".join(access_av("record", "scan", file, *options).out.split())
+    output = " ".join(access_av("record", "scan", file, *options).out.split())
     for words in ("raster", "any frequency from", "the first 5 ms of 1 channel", "--cfo-ppm"):
-        assert words in told
+        assert words in output
 
 
 @pytest.mark.parametrize("scenario", ["yard", "paper-real-odometry-4"])

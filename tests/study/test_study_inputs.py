@@ -48,8 +48,8 @@ def test_a_radio_head_behind_a_hall_is_doubted_on_the_other_side_of_the_road(
 ) -> None:
     """Radio head `gate` of `bends`, 25 m to the left of a straight of 200 m, behind a long wall."""
     walls = [{"name": "hall", "points_m": [[at_m, 10.0] for at_m in ends_m]}]
-    told = Plant.load("bends").with_overrides({"site.walls": walls}).warnings()
-    assert any("[60.0, -25.0, 8]" in str(it) for it in told) is is_doubtful
+    warnings = Plant.load("bends").with_overrides({"site.walls": walls}).warnings()
+    assert any("[60.0, -25.0, 8]" in str(it) for it in warnings) is is_doubtful
 
 
 @pytest.mark.parametrize(

@@ -139,16 +139,16 @@ def test_every_operating_point_is_numbered_without_overlap(results: Path) -> Non
 def test_a_drive_is_animated_unless_reduced_motion_is_preferred(results: Path) -> None:
     if (program := layout.chromium()) is None:
         pytest.skip("no chromium to play it with")
-    told, at_s = "document.querySelector('#map .role-title').textContent", "input[name=at_s]"
+    text, at_s = "document.querySelector('#map .role-title').textContent", "input[name=at_s]"
     with Browser(program, (results / "report.html").as_uri()) as browser:
         browser.wait_for("document.querySelector('.vega-bind button')", seconds=60.0)
-        first = browser.evaluate(told)
+        first = browser.evaluate(text)
         assert first.startswith("0.0 s: ")
         browser.evaluate("document.querySelector('.vega-bind button').click()")
         browser.wait_for(f"document.querySelector('{at_s}').value > 1")
         browser.evaluate("document.querySelector('.vega-bind button').click()")
         assert browser.evaluate("document.querySelector('.vega-bind button').textContent") == "Play"
-        assert browser.evaluate(told) != first
+        assert browser.evaluate(text) != first
         less = {"name": "prefers-reduced-motion", "value": "reduce"}
         browser.call("Emulation.setEmulatedMedia", features=[less])
         browser.evaluate("window.isBefore = true")
@@ -160,7 +160,7 @@ def test_a_drive_is_animated_unless_reduced_motion_is_preferred(results: Path) -
         for kind in ("keyDown", "keyUp"):
             key = {"key": "ArrowRight", "windowsVirtualKeyCode": 39}
             browser.call("Input.dispatchKeyEvent", type=kind, **key)
-        browser.wait_for(f"!{told}.startsWith('0.0 s: ')")
+        browser.wait_for(f"!{text}.startsWith('0.0 s: ')")
 
 
 def test_the_animated_drive_is_the_first_one(results: Path) -> None:
@@ -174,7 +174,7 @@ def test_the_animated_drive_is_the_first_one(results: Path) -> None:
     driven = pl.read_parquet(results / "trajectories.parquet")
     assert 100 < len(steps) <= 302
     for step in (0, len(steps) // 2):
-        at_s, off_m, level_m = map(float, re.findall(r"\d+\.\d+", steps[step]["told"]))
+        at_s, off_m, level_m = map(float, re.findall(r"\d+\.\d+", steps[step]["text"]))
         row = driven.row(by_predicate=(pl.col("time_s") - at_s).abs() < 1e-6, named=True)
         assert off_m == pytest.approx(np.hypot(row["error_x_m"], row["error_y_m"]), abs=0.006)
         assert level_m == pytest.approx(row["protection_level_m"], abs=0.006)

@@ -198,9 +198,9 @@ def test_command(access_av: Callable[..., Finished]) -> None:
     for name in columns.TABLES["aoa_estimates"].columns:
         assert re.search(rf"^ {name} ", done.out, flags=re.MULTILINE)
     assert "no angle could be estimated" in done.out
-    told = json.loads(access_av("file", "columns", "--json").out)
-    assert told.keys() == columns.TABLES.keys()
-    assert told["snr"]["columns"][0] == {
+    tables = json.loads(access_av("file", "columns", "--json").out)
+    assert tables.keys() == columns.TABLES.keys()
+    assert tables["snr"]["columns"][0] == {
         "name": "time_s", "unit": "s", "null": "never",
         "meaning": "Time from the start of the drive, or by the recording's clock",
     }  # fmt: skip

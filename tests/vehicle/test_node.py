@@ -180,8 +180,8 @@ def test_a_real_time_recording_is_read_only_for_requested_bursts(tmp_path: Path)
     wheels, page = Wheels(odometry_of(drive)), free_port()
     settings = tmp_path / "node.toml"
     samples = f'source = "sigmf"\nrecording = "{drive}/iq"\n'
-    told = settings_of(samples, wheels.address, f"127.0.0.1:{page}")
-    settings.write_text(told + f'[output.json]\naddress = "{tmp_path}/node.jsonl"\n')
+    configuration = settings_of(samples, wheels.address, f"127.0.0.1:{page}")
+    settings.write_text(configuration + f'[output.json]\naddress = "{tmp_path}/node.jsonl"\n')
     node = subprocess.Popen(command(drive, settings), stderr=subprocess.PIPE, text=True)
     wheels.run()
     with urllib.request.urlopen(f"http://127.0.0.1:{page}/state.json") as answer:

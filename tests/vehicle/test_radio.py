@@ -29,8 +29,8 @@ INTERVAL_S = 0.5
 
 def can_soapy(settings: Path, options: list[str]) -> bool:
     """Returns whether the node was built with the feature `soapy`."""
-    told = subprocess.run([NODE, *options, "--dry-run", settings], capture_output=True, text=True)
-    return "without the feature" not in told.stderr
+    done = subprocess.run([NODE, *options, "--dry-run", settings], capture_output=True, text=True)
+    return "without the feature" not in done.stderr
 
 
 @pytest.mark.skipif(not NODE.exists(), reason=f"no {NODE}: `make test-radio` makes it")
@@ -48,8 +48,8 @@ def test_a_radio_is_on_for_the_bursts_alone(tmp_path: Path) -> None:
     access_av.synthesize("yard", drive, duration_s=DURATION_S, continuous=True)
     wake_up_every(drive, INTERVAL_S)
     radio = Radio(drive, tmp_path)
-    told = settings_of(radio.samples, radio.odometry, "127.0.0.1:0")
-    settings.write_text(told + f'[output.json]\naddress = "{tmp_path}/node.jsonl"\n')
+    configuration = settings_of(radio.samples, radio.odometry, "127.0.0.1:0")
+    settings.write_text(configuration + f'[output.json]\naddress = "{tmp_path}/node.jsonl"\n')
     node = subprocess.Popen(command(drive, settings), stderr=subprocess.PIPE, text=True)
     assert node.stderr is not None
     page = node.stderr.readline().split()[-1].rstrip("/")

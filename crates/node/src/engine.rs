@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use onboard::live::{LiveError, Outcome, SavedState, StreamConfig, TimeCheck};
+use onboard::live::{AngleRecord, LiveError, SavedState, StreamConfig, TimeCheck};
 use onboard::localize::{OdometryResult, UpdateReason};
 use onboard::monitor::ActiveFaults;
 use onboard::observation::OdometrySample;
@@ -21,7 +21,7 @@ use crate::events::Collapse;
 use crate::gate::{BurstWindows, RxWindow};
 use crate::inbox::{Block, Command, Inbox, Input, Level};
 use crate::interruption::Interruptions;
-use crate::sink::{By, Distributor, PoseRecord, Record};
+use crate::sink::{Distributor, PoseCause, PoseRecord, Record};
 use crate::state::{self, StateStore};
 use crate::statistics::{LatencyStats, SourceHealth};
 use crate::supervisor::Watchdog;
@@ -263,7 +263,7 @@ impl Engine {
         }
         self.receive(true)?;
         self.live.flush()?;
-        self.publish_heard(None)?;
+        self.publish_angles(None)?;
         self.save()
     }
 
@@ -284,7 +284,7 @@ impl Engine {
                 let is_over = |[_, end_s]: [f64; 2]| until_s >= end_s;
                 if self.gate.wanted().is_some_and(is_over) {
                     self.receive(true)?;
-                    self.publish_heard(Some(came))?;
+                    self.publish_angles(Some(came))?;
                     self.sleep_until_next(until_s)?;
                 }
             }
@@ -304,7 +304,7 @@ impl Engine {
                     Err(error) => self.refused("angles", &error),
                 }
                 self.report_clocks();
-                self.publish_heard(Some(came))?;
+                self.publish_angles(Some(came))?;
             }
             Input::Range(range) => {
                 let (pci, ssb_index) = (range.pci, range.ssb_index);
@@ -381,7 +381,7 @@ impl Engine {
             }
             self.last_pose = Some((sample.time_s, now));
         }
-        let by = By::Odometry;
+        let by = PoseCause::Odometry;
         self.records.put(Record::Pose(PoseRecord { status, by }));
         Ok(())
     }
@@ -532,9 +532,9 @@ impl Engine {
     ///
     /// # Errors
     /// [`LiveError::Custom`].
-    pub fn publish_heard(&mut self, came: Option<Instant>) -> Result<(), LiveError> {
-        let mut last: Option<Outcome> = None;
-        while let Some(outcome) = self.live.next_outcome() {
+    pub fn publish_angles(&mut self, came: Option<Instant>) -> Result<(), LiveError> {
+        let mut last: Option<AngleRecord> = None;
+        while let Some(outcome) = self.live.next_angle_record() {
             if came.is_some() {
                 let end_s = outcome.angle_result.ssb.time_s + self.windows.ssb_s();
                 if let Some(arrived) = self.arrival_of(end_s) {
@@ -552,7 +552,7 @@ impl Engine {
         if let Some(last) = last {
             let status = self.live.status(last.after.time_s)?;
             self.report_faults(&status);
-            let by = By::Angles;
+            let by = PoseCause::Angles;
             self.records.put(Record::Pose(PoseRecord { status, by }));
         }
         Ok(())

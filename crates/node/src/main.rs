@@ -89,7 +89,7 @@ fn say(text: &str) -> ExitCode {
 fn node_settings(path: &std::path::Path) -> Result<NodeSettings> {
     let origin = path.display().to_string();
     let settings: NodeSettings = load(&origin)?;
-    Ok(settings.beside(&origin))
+    Ok(settings.relative_to(&origin))
 }
 
 fn run(arguments: &Arguments) -> Result<String> {

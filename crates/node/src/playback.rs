@@ -57,7 +57,7 @@ pub fn play(
         player.process_until(f64::INFINITY)?;
     }
     player.engine.live_mut().flush()?;
-    player.engine.publish_heard(None)?;
+    player.engine.publish_angles(None)?;
     Ok(())
 }
 
@@ -85,7 +85,7 @@ impl Player<'_> {
 
     /// Processes every burst that began before `time_s`.
     fn process_until(&mut self, time_s: f64) -> Result<()> {
-        self.hear_angles_before(time_s)?;
+        self.process_angles_before(time_s)?;
         while let Some(blocks) = &mut self.blocks
             && let Some(next_s) = blocks.next_s()
             && next_s <= time_s + AHEAD_S
@@ -105,7 +105,7 @@ impl Player<'_> {
                 live.end_segment()?;
             }
             live.process_until(time_s)?;
-            self.engine.publish_heard(None)?;
+            self.engine.publish_angles(None)?;
             let samples = self.samples.first().map_or(0, Vec::len);
             self.came("samples", samples as u64);
             self.wait_for(block_s);
@@ -115,10 +115,10 @@ impl Player<'_> {
             }
         }
         self.engine.live_mut().process_until(time_s)?;
-        Ok(self.engine.publish_heard(None)?)
+        Ok(self.engine.publish_angles(None)?)
     }
 
-    fn hear_angles_before(&mut self, time_s: f64) -> Result<()> {
+    fn process_angles_before(&mut self, time_s: f64) -> Result<()> {
         while let Some(first) = self.angles.first()
             && first.ssb.time_s < time_s
         {
@@ -130,7 +130,7 @@ impl Player<'_> {
                     .angle(&AngleObservation::from(angle))?;
             }
             self.engine.live_mut().flush()?;
-            self.engine.publish_heard(None)?;
+            self.engine.publish_angles(None)?;
             self.came("angles", burst.len() as u64);
             self.angles = later;
         }

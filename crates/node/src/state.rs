@@ -97,13 +97,13 @@ pub fn read(
 
 /// Replaces a file atomically, including on the disk.
 fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".new");
-    let beside = PathBuf::from(beside);
-    let mut file = File::create(&beside)?;
+    let mut temporary = path.as_os_str().to_owned();
+    temporary.push(".new");
+    let temporary = PathBuf::from(temporary);
+    let mut file = File::create(&temporary)?;
     file.write_all(bytes)?;
     file.sync_all()?;
-    fs::rename(&beside, path)?;
+    fs::rename(&temporary, path)?;
     let folder = path.parent().filter(|it| !it.as_os_str().is_empty());
     File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
 }
@@ -254,7 +254,7 @@ mod tests {
         assert_eq!(found, state());
         assert!((0.0..60.0).contains(&age_s));
         let text = fs::read_to_string(&path).unwrap();
-        for (text, fingerprint, now_s, said) in [
+        for (text, fingerprint, now_s, expected) in [
             (text.as_str(), "b", now_s, "another site or vehicle"),
             (&text, "a", now_s + 601.0, "s old; it must be"),
             (&text, "a", now_s - 60.0, "s old; it must be"),
@@ -277,7 +277,7 @@ mod tests {
         ] {
             fs::write(&path, text).unwrap();
             let error = read(&path, fingerprint, now_s).unwrap_err();
-            assert!(error.contains(said), "{said}: {error}");
+            assert!(error.contains(expected), "{expected}: {error}");
             assert!(error.contains("state.json"), "{error}");
         }
         fs::remove_dir_all(&folder).unwrap();

@@ -258,7 +258,7 @@ fn a_full_disk_under_mcap_and_tum_does_not_affect_other_outputs_and_both_recover
     );
     let node = Running::start(&folder, &outputs);
     node.drive(2.0);
-    let ballast = disk.fill();
+    let filler = disk.fill();
     for name in ["mcap", "tum"] {
         let failed = node.wait_for(name, false, REPORT);
         let cause = failed["cause"].as_str().unwrap();
@@ -274,7 +274,7 @@ fn a_full_disk_under_mcap_and_tum_does_not_affect_other_outputs_and_both_recover
         assert!(metrics.lines().any(|it| it == line), "{line}");
     }
     node.drive(3.0);
-    fs::remove_file(ballast).unwrap();
+    fs::remove_file(filler).unwrap();
     let freed = Instant::now();
     for name in ["mcap", "tum"] {
         let output = node.wait_for(name, true, RECOVERY);
@@ -341,12 +341,12 @@ fn free_space_is_kept_by_deleting_the_oldest_files_and_then_by_a_reported_failur
         names
     };
     assert!(names()[0].ends_with("1-00001.mcap"), "{:?}", names());
-    let ballast = disk.0.join("ballast");
-    fs::write(&ballast, vec![0; 80_000]).unwrap();
+    let filler = disk.0.join("ballast");
+    fs::write(&filler, vec![0; 80_000]).unwrap();
     let failed = node.wait_for("mcap", false, REPORT);
     let cause = failed["cause"].as_str().unwrap();
     assert!(cause.contains("min_free_mb"), "{cause}");
-    fs::remove_file(ballast).unwrap();
+    fs::remove_file(filler).unwrap();
     node.wait_for("mcap", true, RECOVERY);
     assert_eq!(node.terminate(), 0);
 }

@@ -76,7 +76,7 @@ fn poses_can_be_set_radio_heads_excluded_and_rejected_commands_are_reported() {
     let mut node = Node::start(&folder, "-", "");
     let mut input = node.process.stdin.take().unwrap();
     input.write_all(odometry(0.0).as_bytes()).unwrap();
-    for (command, said) in [
+    for (command, expected) in [
         (json!({"type": "exclude", "pci": 12}), "done"),
         (
             json!({"type": "exclude", "pci": 999}),
@@ -89,7 +89,7 @@ fn poses_can_be_set_radio_heads_excluded_and_rejected_commands_are_reported() {
         (json!({"type": "reset"}), "done"),
     ] {
         input.write_all(format!("{command}\n").as_bytes()).unwrap();
-        node.until_event("messages", said);
+        node.until_event("messages", expected);
     }
     input.write_all(odometry(0.1).as_bytes()).unwrap();
     assert_eq!(node.until(|it| it["type"] == "pose")["state"], "searching");
@@ -108,7 +108,7 @@ fn implausible_time_stamps_are_reported_by_cause_and_do_not_change_the_pose() {
         input.write_all(odometry(time_s).as_bytes()).unwrap();
         std::thread::sleep(Duration::from_millis(20));
     }
-    for (line, said) in [
+    for (line, expected) in [
         (odometry(102.2), "after its expected time"),
         (odometry(1e300), "it must be in seconds and at most"),
         (odometry(1.7e12), "milliseconds"),
@@ -116,7 +116,7 @@ fn implausible_time_stamps_are_reported_by_cause_and_do_not_change_the_pose() {
         (odometry(100.0), "before the last accepted message"),
     ] {
         input.write_all(line.as_bytes()).unwrap();
-        node.until_event("odometry", said);
+        node.until_event("odometry", expected);
     }
     let wrong = r#"{"type":"odometry","time_s":"abc","speed_mps":1}"#;
     input.write_all(format!("{wrong}\n").as_bytes()).unwrap();
@@ -235,12 +235,12 @@ fn file_input_is_processed_at_maximum_speed_and_nothing_is_dropped() {
     let file = folder.join("drive.jsonl").display().to_string();
     let began = Instant::now();
     let node = Node::start(&folder, &file, "");
-    let told: Vec<Value> = node
+    let messages: Vec<Value> = node
         .lines
         .lines()
         .map(|line| serde_json::from_str(&line.unwrap()).unwrap())
         .collect();
-    let count = |kind: &str| told.iter().filter(|it| it["type"] == kind).count();
+    let count = |kind: &str| messages.iter().filter(|it| it["type"] == kind).count();
     assert_eq!(count("pose"), 50 * seconds as usize + 1);
     assert!(count("status").abs_diff(seconds as usize) <= 2);
     assert!(began.elapsed() < Duration::from_secs(seconds.into()) / 4);
@@ -257,7 +257,7 @@ fn the_service_manager_is_notified_of_start_watchdog_and_end() {
     let socket = socket.display().to_string();
     let environment = [("NOTIFY_SOCKET", &*socket), ("WATCHDOG_USEC", "400000")];
     let mut node = Node::start_with(&folder, "-", "", &environment);
-    let told = || {
+    let receive = || {
         let mut bytes = [0; 1000];
         let count = manager.recv(&mut bytes).unwrap();
         String::from_utf8_lossy(&bytes[..count]).trim().to_owned()
@@ -265,11 +265,11 @@ fn the_service_manager_is_notified_of_start_watchdog_and_end() {
     let until = |wanted: &str| {
         let mut before = Vec::new();
         loop {
-            let said = told();
-            if said.starts_with(wanted) {
-                return (said, before);
+            let notification = receive();
+            if notification.starts_with(wanted) {
+                return (notification, before);
             }
-            before.push(said);
+            before.push(notification);
         }
     };
     until("READY=1");
@@ -279,8 +279,11 @@ fn the_service_manager_is_notified_of_start_watchdog_and_end() {
     assert!(began.elapsed() < 5 * Duration::from_millis(400));
     let mut input = node.process.stdin.take().unwrap();
     input.write_all(odometry(0.0).as_bytes()).unwrap();
-    let (said, _) = until("STATUS=");
-    assert!(said.starts_with("STATUS=searching: "), "{said}");
+    let (notification, _) = until("STATUS=");
+    assert!(
+        notification.starts_with("STATUS=searching: "),
+        "{notification}"
+    );
     node.terminate();
     let (_, before) = until("STOPPING=1");
     assert!(before.iter().all(|it| it != "READY=1"), "{before:?}");
@@ -288,11 +291,11 @@ fn the_service_manager_is_notified_of_start_watchdog_and_end() {
 
 #[test]
 fn the_schema_is_printed_and_contains_every_key() {
-    let told = Command::new(env!("CARGO_BIN_EXE_access-av-node"))
+    let output = Command::new(env!("CARGO_BIN_EXE_access-av-node"))
         .arg("schema")
         .output()
         .unwrap();
-    let schema: Value = serde_json::from_slice(&told.stdout).unwrap();
+    let schema: Value = serde_json::from_slice(&output.stdout).unwrap();
     for key in ["samples", "messages", "output", "page", "sleep"] {
         assert!(schema["properties"][key].is_object(), "{key}");
     }

@@ -16,7 +16,7 @@ mod air;
 #[path = "../tests/all/moving/mod.rs"]
 mod moving;
 
-use moving::{Error, Heard, Moving, summary};
+use moving::{Error, Moving, SsbErrors, summary};
 use nr_ssb::SubcarrierSpacing::{Khz15, Khz30};
 use nr_ssb::observables::delay::Multipath;
 use nr_ssb::observables::range_rate::RateSource;
@@ -38,7 +38,7 @@ fn main() {
     for spacing in [Khz15, Khz30] {
         for snr_db in [0.0, 10.0, 20.0, 30.0] {
             for sleep_s in [0.02, 0.16, 1.0, 5.0] {
-                let (mut heard, mut missed) = (Vec::new(), 0);
+                let (mut ssbs, mut missed) = (Vec::new(), 0);
                 for _ in 0..count.div_ceil(RUN) {
                     seed += 1;
                     let mut moving = Moving::new(spacing, snr_db, None, seed);
@@ -46,17 +46,17 @@ fn main() {
                         let settling = number < SETTLE;
                         match moving.next(if settling { 0.02 } else { sleep_s }) {
                             Some(_) if settling => {}
-                            Some(ssb) => heard.push(ssb),
+                            Some(ssb) => ssbs.push(ssb),
                             None => missed += 1,
                         }
                     }
                 }
-                let of = |select: fn(&Heard) -> Error| {
-                    let errors: Vec<Error> = heard.iter().map(select).collect();
+                let of = |select: fn(&SsbErrors) -> Error| {
+                    let errors: Vec<Error> = ssbs.iter().map(select).collect();
                     summary(&errors)
                 };
-                let share = |is: fn(&Heard) -> bool| {
-                    heard.iter().filter(|it| is(it)).count() as f64 / heard.len() as f64
+                let share = |is: fn(&SsbErrors) -> bool| {
+                    ssbs.iter().filter(|it| is(it)).count() as f64 / ssbs.len() as f64
                 };
                 let [delay, phase, rate, power] = [
                     of(|it| it.delay),

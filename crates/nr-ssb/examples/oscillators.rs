@@ -27,7 +27,7 @@ const SSB_FREQ_HZ: f64 = 3.6e9;
 const VEHICLE_PPM: f64 = 60.0;
 
 /// Received SSBs: number of the burst, beam.
-type Heard = Vec<(usize, u8)>;
+type Receptions = Vec<(usize, u8)>;
 
 struct Air {
     cell: Cell,
@@ -71,7 +71,12 @@ fn soon(period_s: f64) -> usize {
     SOON.max((SOON_S / period_s).ceil() as usize)
 }
 
-fn trial(spacing: SubcarrierSpacing, period_s: f64, ppm: f64, seed: u64) -> [(Heard, usize); 2] {
+fn trial(
+    spacing: SubcarrierSpacing,
+    period_s: f64,
+    ppm: f64,
+    seed: u64,
+) -> [(Receptions, usize); 2] {
     let air = Air::new(spacing, period_s, ppm, seed);
     let usual = ReceiverConfig::new(SSB_FREQ_HZ, spacing, ANTENNAS);
     let config = ReceiverConfig { period_s, ..usual };
@@ -82,9 +87,9 @@ fn trial(spacing: SubcarrierSpacing, period_s: f64, ppm: f64, seed: u64) -> [(He
         ..config
     };
     let mut windows = WindowReceiver::<ANTENNAS>::new(of_vehicle).unwrap();
-    let mut heard = [(Heard::new(), 0), (Heard::new(), 0)];
+    let mut received = [(Receptions::new(), 0), (Receptions::new(), 0)];
     let mut note = |which: usize, sample_start: f64, ssb_index: u8| {
-        let (right, wrong) = &mut heard[which];
+        let (right, wrong) = &mut received[which];
         match air.burst_of(sample_start, ssb_index) {
             Some(number) => right.push((number, ssb_index)),
             None => *wrong += 1,
@@ -118,7 +123,7 @@ fn trial(spacing: SubcarrierSpacing, period_s: f64, ppm: f64, seed: u64) -> [(He
     stream
         .finish(&mut |ssb| note(0, ssb.sample_start, ssb.ssb_index))
         .unwrap();
-    heard
+    received
 }
 
 fn main() {
@@ -133,18 +138,18 @@ fn main() {
                 let ppm = 4.0 * f64::from(step);
                 for number in 0..trials {
                     let seed = number * 11 + (step + 5) as u64 + 1;
-                    for (sum, (heard, wrong)) in
+                    for (sum, (received, wrong)) in
                         sums.iter_mut().zip(trial(spacing, period_s, ppm, seed))
                     {
-                        let first = heard.iter().map(|(burst, _)| *burst).min();
+                        let first = received.iter().map(|(burst, _)| *burst).min();
                         let found = first.is_some_and(|burst| burst < soon);
                         let after = first.map_or(0, |burst| 2 * (soon + MORE - 1 - burst));
-                        let followed = heard
+                        let followed = received
                             .iter()
                             .filter(|(burst, _)| Some(*burst) > first)
                             .count();
                         let missed = after.saturating_sub(followed);
-                        let counts = [1, usize::from(found), heard.len(), wrong, missed];
+                        let counts = [1, usize::from(found), received.len(), wrong, missed];
                         for (total, count) in sum.iter_mut().zip(counts) {
                             *total += count;
                         }

@@ -2,34 +2,34 @@
 
 use crate::BoxError;
 use crate::localize::AngleMeasurement;
-use crate::observation::{BURST_S, SensedSsb, SsbObservation};
-use crate::pipeline::{Observed, SsbSource};
+use crate::observation::{BURST_S, SsbDetection, SsbObservation};
+use crate::pipeline::{SsbInput, SsbSource};
 
 /// Item that contains one SSB.
 pub trait HasSsb {
     /// Returns the SSB.
-    fn ssb(&self) -> &SensedSsb;
+    fn ssb(&self) -> &SsbDetection;
     /// Returns the observation from which the pipeline obtains an angle.
-    fn observed(&self) -> Observed<'_>;
+    fn observed(&self) -> SsbInput<'_>;
 }
 
 impl HasSsb for SsbObservation {
-    fn ssb(&self) -> &SensedSsb {
+    fn ssb(&self) -> &SsbDetection {
         &self.ssb
     }
 
-    fn observed(&self) -> Observed<'_> {
-        Observed::Snapshots(self)
+    fn observed(&self) -> SsbInput<'_> {
+        SsbInput::Snapshots(self)
     }
 }
 
-impl HasSsb for (SensedSsb, AngleMeasurement) {
-    fn ssb(&self) -> &SensedSsb {
+impl HasSsb for (SsbDetection, AngleMeasurement) {
+    fn ssb(&self) -> &SsbDetection {
         &self.0
     }
 
-    fn observed(&self) -> Observed<'_> {
-        Observed::Angle(self.1)
+    fn observed(&self) -> SsbInput<'_> {
+        SsbInput::Angle(self.1)
     }
 }
 
@@ -37,12 +37,12 @@ impl HasSsb for (SensedSsb, AngleMeasurement) {
 pub struct Burst<'a, T>(pub &'a [T]);
 
 impl<T: HasSsb> SsbSource for Burst<'_, T> {
-    fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
+    fn sense(&mut self, sensed: &mut Vec<SsbDetection>) -> Result<(), BoxError> {
         sensed.extend(self.0.iter().map(HasSsb::ssb));
         Ok(())
     }
 
-    fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError> {
+    fn observe(&mut self, index: usize) -> Result<SsbInput<'_>, BoxError> {
         let ssb = self.0.get(index).ok_or("no such SSB in the burst")?;
         Ok(ssb.observed())
     }
@@ -65,7 +65,7 @@ mod tests {
     fn bursts_of_both_half_frames_are_distinguished() {
         let ssb = |time_s| {
             let mut observation = SsbObservation::new(4);
-            observation.restart(SensedSsb {
+            observation.restart(SsbDetection {
                 time_s,
                 ..observation.ssb
             });

@@ -12,7 +12,7 @@ use crate::settings::{
 /// Energy model of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnergyModel {
-    per_execution_j: f64,
+    per_estimate_j: f64,
     per_listening_j: f64,
     /// Receiver on-time for one burst, including settling, in seconds.
     pub on_time_s: f64,
@@ -91,18 +91,18 @@ impl EnergyModel {
         extent: Extent,
     ) -> Result<Option<Self>, SettingsError> {
         let mode = platform.mode(&vehicle.platform, &vehicle.name)?;
-        let execution = match cost {
-            EstimateCost::OfMethod => Execution::new(vehicle, platform, mode, extent),
-            EstimateCost::EnergyJ(energy_j) => Some(Execution {
+        let per_estimate = match cost {
+            EstimateCost::OfMethod => CostPerEstimate::new(vehicle, platform, mode, extent),
+            EstimateCost::EnergyJ(energy_j) => Some(CostPerEstimate {
                 energy_j,
                 time_s: 0.0,
                 boundary: Boundary::Marginal,
                 provenance: Provenance::Assumed,
             }),
-            EstimateCost::TimeS(time_s) => Execution::of_time(time_s, platform, mode, extent),
+            EstimateCost::TimeS(time_s) => CostPerEstimate::of_time(time_s, platform, mode, extent),
             EstimateCost::Unknown => None,
         };
-        let Some(execution) = execution else {
+        let Some(per_estimate) = per_estimate else {
             return Ok(None);
         };
         let idle = platform
@@ -111,7 +111,7 @@ impl EnergyModel {
         let receiver = &platform.receiver;
         let radio = receiver.power_w.as_ref().filter(|_| receiver.counted);
         let boundary = platform.boundary_of_sum([
-            Some(execution.boundary),
+            Some(per_estimate.boundary),
             radio.map(|figure| figure.boundary),
             idle.map(|figure| figure.boundary),
         ])?;
@@ -145,23 +145,23 @@ impl EnergyModel {
             });
         let sleep = platform.suspend.as_ref().map(|suspend| Sleep {
             power_w: suspend.power_w.at(extent),
-            awake_s: suspend.transition_ms.at(extent) * 1e-3 + on_s + burst_s + execution.time_s,
+            awake_s: suspend.transition_ms.at(extent) * 1e-3 + on_s + burst_s + per_estimate.time_s,
         });
         Ok(Some(Self {
-            per_execution_j: execution.energy_j * scale(execution.boundary),
+            per_estimate_j: per_estimate.energy_j * scale(per_estimate.boundary),
             per_listening_j: radio_j + burst_j,
             on_time_s: on_s,
             idle_w: idle.map_or(0.0, |figure| figure.at(extent)),
             sleep,
             boundary,
-            provenance: execution.provenance,
+            provenance: per_estimate.provenance,
         }))
     }
 
     /// Returns the energy of the reception of a burst in units of one estimate; `None` if an
     /// estimate has no energy.
     pub fn listening_in_aoa_estimates(&self) -> Option<f64> {
-        (self.per_execution_j > 0.0).then(|| self.per_listening_j / self.per_execution_j)
+        (self.per_estimate_j > 0.0).then(|| self.per_listening_j / self.per_estimate_j)
     }
 
     /// Returns the energy of a run from its numbers of estimates and received bursts, and its
@@ -181,7 +181,7 @@ impl EnergyModel {
             _ => duration_s * self.idle_w,
         };
         Energy {
-            aoa_estimates_j: aoa_estimates as f64 * self.per_execution_j,
+            aoa_estimates_j: aoa_estimates as f64 * self.per_estimate_j,
             listening_j: bursts_received as f64 * self.per_listening_j,
             idle_j,
         }
@@ -189,14 +189,14 @@ impl EnergyModel {
 }
 
 /// Cost of one estimate: the value of the power mode, otherwise cycles at its clock frequency.
-struct Execution {
+struct CostPerEstimate {
     energy_j: f64,
     time_s: f64,
     boundary: Boundary,
     provenance: Provenance,
 }
 
-impl Execution {
+impl CostPerEstimate {
     fn new(
         vehicle: &Vehicle,
         platform: &Platform,
@@ -216,14 +216,14 @@ impl Execution {
             });
         }
         let projected = cycles?.provenance == Provenance::Projected;
-        let execution = Self::of_time(time_s, platform, mode, extent)?;
+        let per_estimate = Self::of_time(time_s, platform, mode, extent)?;
         Some(if projected {
             Self {
                 provenance: Provenance::Projected,
-                ..execution
+                ..per_estimate
             }
         } else {
-            execution
+            per_estimate
         })
     }
 

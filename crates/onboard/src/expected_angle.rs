@@ -39,7 +39,7 @@ impl ExpectedAngle {
         value_rad: f64,
     ) -> f64 {
         let [forward_m, left_m, up_m] = self.position_m;
-        let array = pose.beside(forward_m, left_m);
+        let array = pose.point_at(forward_m, left_m);
         if kind.is_at_head() {
             let axis_rad = head.array.map_or(f64::NAN, |own| own.azimuth_rad);
             return wrap_angle(value_rad - head.position.bearing_rad(array) + axis_rad);

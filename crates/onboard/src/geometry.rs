@@ -155,7 +155,7 @@ impl Pose {
 
     /// Returns the point at `forward_m` and `left_m` in the frame of the pose.
     #[must_use]
-    pub fn beside(self, forward_m: f64, left_m: f64) -> Point {
+    pub fn point_at(self, forward_m: f64, left_m: f64) -> Point {
         let (sin, cos) = self.heading_rad.sin_cos();
         Point::new(
             self.x_m + forward_m * cos - left_m * sin,

@@ -39,7 +39,7 @@ pub mod walls;
 
 pub use live::Live;
 pub use pipeline::{
-    AngleResult, BurstResult, Custom, Observed, OdometryDefect, Pipeline, SsbSource,
+    AngleResult, BurstResult, Custom, OdometryDefect, Pipeline, SsbInput, SsbSource,
 };
 
 /// Error of user code.

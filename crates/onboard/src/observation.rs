@@ -61,7 +61,7 @@ impl OdometrySample {
 
 /// Identity and SNR of an SSB, measured before its angle is estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SensedSsb {
+pub struct SsbDetection {
     /// Physical cell identity, 0..=1007 (TS 38.211, 7.4.2.1).
     pub pci: u16,
     /// Index of the SSB in its burst (beam).
@@ -105,7 +105,7 @@ pub struct SsbRanging {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SsbObservation {
     /// Cell, beam, time and SNR.
-    pub ssb: SensedSsb,
+    pub ssb: SsbDetection,
     /// Noise power per antenna and snapshot, in the scale of the snapshots, if known.
     pub noise_variance: Option<f64>,
     /// Carrier frequency offset in Hz.
@@ -125,7 +125,7 @@ impl SsbObservation {
     pub fn new(elements: usize) -> Self {
         let elements = elements.clamp(1, MAX_ELEMENTS);
         Self {
-            ssb: SensedSsb {
+            ssb: SsbDetection {
                 pci: 0,
                 ssb_index: 0,
                 time_s: 0.0,
@@ -151,7 +151,7 @@ impl SsbObservation {
     }
 
     /// Removes all snapshots and sets the SSB, so that one buffer can be reused.
-    pub fn restart(&mut self, ssb: SensedSsb) {
+    pub fn restart(&mut self, ssb: SsbDetection) {
         self.ssb = ssb;
         self.noise_variance = None;
         (self.cfo_hz, self.is_first) = (0.0, false);

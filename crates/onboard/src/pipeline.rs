@@ -11,7 +11,7 @@ use crate::localize::{
 };
 use crate::manifold::Measurand;
 use crate::monitor::{ActiveFaults, Change, Fallback, Monitors};
-use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
+use crate::observation::{OdometrySample, SsbDetection, SsbObservation};
 use crate::radio_head::RadioHead;
 use crate::range::RangeMeasurement;
 use crate::settings::{
@@ -35,7 +35,7 @@ pub struct Pipeline {
     /// Speed of the previous sample if it was rejected as impossible (m/s).
     doubted_mps: Option<f64>,
     top_speed_mps: f64,
-    sensed: Vec<SensedSsb>,
+    sensed: Vec<SsbDetection>,
     chosen: Vec<bool>,
     aoa_estimates: Vec<AngleResult>,
     /// Updates for the localizer.
@@ -126,18 +126,18 @@ pub trait SsbSource {
     ///
     /// # Errors
     /// Errors of the source; an error ends the drive.
-    fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError>;
+    fn sense(&mut self, sensed: &mut Vec<SsbDetection>) -> Result<(), BoxError>;
 
     /// Returns the SSB number `index` of the burst.
     ///
     /// # Errors
     /// Errors of the source; an error ends the drive.
-    fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError>;
+    fn observe(&mut self, index: usize) -> Result<SsbInput<'_>, BoxError>;
 }
 
 /// SSB with snapshots, or with an angle that was estimated elsewhere.
 #[derive(Debug, Clone, Copy)]
-pub enum Observed<'a> {
+pub enum SsbInput<'a> {
     /// Snapshots of the array.
     Snapshots(&'a SsbObservation),
     /// Angle that was estimated elsewhere.
@@ -159,7 +159,7 @@ pub struct BurstResult<'a> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngleResult {
     /// The SSB.
-    pub ssb: SensedSsb,
+    pub ssb: SsbDetection,
     /// Angle; `None` if the snapshots contain none.
     pub measured: Option<AngleMeasurement>,
     /// Verdict of the localizer.
@@ -234,7 +234,7 @@ impl Pipeline {
             Some(policy) => policy,
             None => wake_up::built_in(site, vehicle, platform)?,
         };
-        let heads = RadioHead::heard(site, vehicle);
+        let heads = RadioHead::received_by(site, vehicle);
         let [_, _, height_m] = vehicle.array.position_m;
         Ok(Self {
             thermal: ThermalNoise::new(site, vehicle),
@@ -401,8 +401,8 @@ impl Pipeline {
                     continue;
                 };
                 match source.observe(index)? {
-                    Observed::Snapshots(observation) => self.estimate(observation)?,
-                    Observed::Angle(measured) => self.collect(ssb, Some(measured)),
+                    SsbInput::Snapshots(observation) => self.estimate(observation)?,
+                    SsbInput::Angle(measured) => self.collect(ssb, Some(measured)),
                 }
             }
             let are_right = |monitors: &Monitors| !monitors.faults().has_channel();
@@ -606,7 +606,7 @@ impl Pipeline {
     }
 
     /// Stores the angle of an SSB for the localizer, which processes those of a burst together.
-    fn collect(&mut self, ssb: SensedSsb, measured: Option<AngleMeasurement>) {
+    fn collect(&mut self, ssb: SsbDetection, measured: Option<AngleMeasurement>) {
         let measured = measured.map(|measured| AngleMeasurement {
             time_s: measured.time_s - self.angle_time_offset_s,
             ..measured

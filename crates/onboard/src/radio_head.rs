@@ -39,10 +39,10 @@ impl RadioHead {
     }
 
     /// Returns the radio heads of a site that a vehicle receives.
-    pub fn heard(site: &Site, vehicle: &Vehicle) -> Vec<Self> {
+    pub fn received_by(site: &Site, vehicle: &Vehicle) -> Vec<Self> {
         let heads = site.radio_heads.iter();
         heads
-            .filter(|head| vehicle.receiver.hears(head.pci))
+            .filter(|head| vehicle.receiver.receives(head.pci))
             .map(Self::from)
             .collect()
     }

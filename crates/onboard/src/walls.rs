@@ -90,7 +90,7 @@ mod tests {
             position: Point::new(0.0, 10.0),
             ..RadioHead::from(&site.radio_heads[0])
         };
-        let (behind, beside) = (Point::new(0.0, -10.0), Point::new(40.0, 5.0));
+        let (behind, outside) = (Point::new(0.0, -10.0), Point::new(40.0, 5.0));
         assert_eq!(Walls::new(&site).seen(&head, behind), Some(head));
 
         site.rician_k_db = 10.0;
@@ -107,7 +107,7 @@ mod tests {
         assert!((passing_db(behind) + 19.0).abs() < 1e-9);
         assert!((passing_db(Point::new(6.0, -4.0)) + 38.0).abs() < 1e-9);
         assert_eq!(concrete.seen(&head, behind), None);
-        assert_eq!(concrete.seen(&head, beside), Some(head));
+        assert_eq!(concrete.seen(&head, outside), Some(head));
 
         site.walls = vec![wall(Some(3.0))];
         let seen = Walls::new(&site).seen(&head, behind).unwrap();

@@ -92,7 +92,7 @@ pub fn simulate(
         estimator,
         policy,
         localizer,
-        told_of_sigma: Arc::new(AtomicBool::new(false)),
+        sigma_warned: Arc::new(AtomicBool::new(false)),
     };
     let estimate_cost = plug_ins.estimate_cost(py)?;
     let campaign = py.detach(|| {
@@ -108,14 +108,14 @@ pub fn simulate(
             custom: &|start| plug_ins.custom(&scenario.0, start),
             estimate_cost,
             progress: &|done| {
-                let told = Python::attach(|py| {
+                let called = Python::attach(|py| {
                     py.check_signals()?;
                     progress
                         .as_ref()
                         .map_or(Ok(()), |f| f.call1(py, (done, runs)).map(drop))
                 });
-                let go_on = told.is_ok();
-                *raised.borrow_mut() = told.err();
+                let go_on = called.is_ok();
+                *raised.borrow_mut() = called.err();
                 go_on
             },
         };
@@ -289,7 +289,7 @@ struct PlugIns {
     localizer: Option<Py<PyAny>>,
     /// Whether the message was printed that an estimator without standard deviations gets the
     /// bound.
-    told_of_sigma: Arc<AtomicBool>,
+    sigma_warned: Arc<AtomicBool>,
 }
 
 impl PlugIns {
@@ -310,9 +310,9 @@ impl PlugIns {
                     .map(|factory| made_for_run(factory.bind(py), scenario, start))
                     .transpose()
             };
-            let told = self.told_of_sigma.clone();
+            let sigma_warned = self.sigma_warned.clone();
             let estimator = made(&self.estimator)?
-                .map(|call| Box::new(PythonEstimator::new(call, measurand, told)) as _);
+                .map(|call| Box::new(PythonEstimator::new(call, measurand, sigma_warned)) as _);
             let policy = made(&self.policy)?.map(|call| Box::new(PythonPolicy::new(call)) as _);
             let localizer =
                 made(&self.localizer)?.map(|object| Box::new(PythonLocalizer::new(object)) as _);

@@ -81,17 +81,17 @@ pub fn synthesize(
         datatype,
     };
     let mut raised = None;
-    let mut tell = |share: f64| {
-        let told = Python::attach(|py| {
+    let mut report = |share: f64| {
+        let outcome = Python::attach(|py| {
             py.check_signals()?;
             let called = progress.as_ref().map(|call| call.call1(py, (share,)));
             called.transpose().map(drop)
         });
-        raised = told.err();
+        raised = outcome.err();
         raised.is_none()
     };
     let made = py
-        .detach(|| simulate::synthesize(&scenario.0, &settings, &directory, &mut tell))
+        .detach(|| simulate::synthesize(&scenario.0, &settings, &directory, &mut report))
         .map_err(|error| match error {
             SynthError::Stopped => raised
                 .take()

@@ -27,10 +27,10 @@ static WRITING: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// processed immediately, and SIGINT ends the program.
 #[pyfunction]
 pub fn watch() -> PyResult<i32> {
-    let (mut told, tells) = std::io::pipe()?;
+    let (mut receiver, sender) = std::io::pipe()?;
     thread::Builder::new().spawn(move || {
         let mut signal = [0];
-        while told.read_exact(&mut signal).is_ok() {
+        while receiver.read_exact(&mut signal).is_ok() {
             if signal == [SIGINT] {
                 CAME.store(true, Ordering::Release);
                 thread::sleep(GRACE);
@@ -38,7 +38,7 @@ pub fn watch() -> PyResult<i32> {
             }
         }
     })?;
-    Ok(tells.into_raw_fd())
+    Ok(sender.into_raw_fd())
 }
 
 /// Whether Ctrl-C was pressed.

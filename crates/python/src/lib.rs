@@ -83,7 +83,7 @@ mod _core {
     #[pymodule_export]
     use crate::message::brief_text;
     #[pymodule_export]
-    use crate::plug_ins::{RadioHead, SensedSsb, Situation};
+    use crate::plug_ins::{RadioHead, Situation, SsbDetection};
     #[pymodule_export]
     use crate::recording::{Recording, RecordingError};
     #[pymodule_export]

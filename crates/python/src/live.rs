@@ -5,8 +5,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use onboard::Custom;
 use onboard::geometry::Pose;
 use onboard::live::{
-    AngleObservation, Continuity, HeadStatus as CoreHead, Live as Core, LiveError,
-    Outcome as CoreOutcome, RangeObservation, RangeValue, Status as CoreStatus, StreamConfig,
+    AngleObservation, AngleRecord as CoreAngleRecord, Continuity, HeadStatus as CoreHead,
+    Live as Core, LiveError, RangeObservation, RangeValue, Status as CoreStatus, StreamConfig,
 };
 use onboard::localize::{OdometryResult, SelectedHypothesis};
 use onboard::observation::{MeasurementKind, OdometrySample};
@@ -126,8 +126,8 @@ pub struct LiveOutcome {
     pose: (f64, f64, f64),
 }
 
-impl From<CoreOutcome> for LiveOutcome {
-    fn from(outcome: CoreOutcome) -> Self {
+impl From<CoreAngleRecord> for LiveOutcome {
+    fn from(outcome: CoreAngleRecord) -> Self {
         let (ssb, verdict) = (outcome.angle_result.ssb, outcome.angle_result.verdict);
         let (measured, pose) = (outcome.angle_result.measured, outcome.after.pose);
         Self {
@@ -159,7 +159,7 @@ pub struct LiveHead {
     /// SNR of the last SSB in dB.
     snr_db: Option<f64>,
     /// Time of the last SSB with an angle estimate in seconds.
-    last_heard_s: Option<f64>,
+    last_angle_s: Option<f64>,
     /// Time of the last SSB with an accepted angle in seconds.
     last_accepted_s: Option<f64>,
     /// Residual of the last angle in radians.
@@ -178,7 +178,7 @@ impl From<&CoreHead> for LiveHead {
             is_excluded: it.is_excluded,
             is_faulty: it.is_faulty,
             snr_db: it.snr_db,
-            last_heard_s: it.last_heard_s,
+            last_angle_s: it.last_angle_s,
             last_accepted_s: it.last_accepted_s,
             residual_rad: it.residual_rad,
             accepted: it.accepted,
@@ -270,8 +270,8 @@ impl Live {
             (Some(rate_hz), Some(centre_hz)) => Some(StreamConfig { rate_hz, centre_hz }),
             (None, None) => None,
             _ => {
-                let said = "rate_hz and centre_hz must be given together or both be omitted";
-                return Err(PyValueError::new_err(said));
+                let text = "rate_hz and centre_hz must be given together or both be omitted";
+                return Err(PyValueError::new_err(text));
             }
         };
         let platform = load(&vehicle.0.platform.name).map_err(settings_error)?;
@@ -515,7 +515,7 @@ impl Live {
     /// Return the results of the angles since the last call, oldest first, at most 256.
     fn outcomes(&self) -> Vec<LiveOutcome> {
         let mut core = self.core();
-        let next = std::iter::from_fn(|| core.next_outcome());
+        let next = std::iter::from_fn(|| core.next_angle_record());
         next.map(LiveOutcome::from).collect()
     }
 

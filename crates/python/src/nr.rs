@@ -25,8 +25,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use recording::scan::{
-    ArraySetup, FoundAngle, FoundSsb, IqSource, SampleBlock, Scan as CoreScan, ScanError,
-    ScanSettings, View,
+    ArraySetup, FoundAngle, IqSource, SampleBlock, Scan as CoreScan, ScanError, ScanSettings,
+    ScannedSsb, View,
 };
 
 use crate::aoa::name_of;
@@ -167,7 +167,7 @@ macro_rules! cell {
 
 impl Cell {
     /// Returns the SSB of a receiver as a cell; the ratio converts samples to the input rate.
-    fn heard(
+    fn of_tracked(
         ssb: &TrackedSsb,
         ssb_freq_hz: f64,
         spacing: SubcarrierSpacing,
@@ -215,8 +215,8 @@ impl Cell {
     }
 }
 
-impl From<&FoundSsb> for Cell {
-    fn from(found: &FoundSsb) -> Self {
+impl From<&ScannedSsb> for Cell {
+    fn from(found: &ScannedSsb) -> Self {
         let ssb: &DetectedSsb = &found.ssb;
         let cell = cell!(ssb, ssb.measurements(),
             sample_start: found.sample_start,

@@ -12,7 +12,7 @@ use onboard::geometry::Pose;
 use onboard::localize::OdometryResult;
 use onboard::localize::{AngleMeasurement, Localizer, PoseEstimate, UpdateReason, UpdateResult};
 use onboard::manifold::Measurand;
-use onboard::observation::{OdometrySample, SensedSsb as CoreSensed, SsbObservation};
+use onboard::observation::{OdometrySample, SsbDetection as CoreSensed, SsbObservation};
 use onboard::radio_head::RadioHead as CoreHead;
 use onboard::wake_up::{Situation as CoreSituation, WakeUpPolicy};
 use pyo3::exceptions::{PyUserWarning, PyValueError};
@@ -51,7 +51,7 @@ impl From<&CoreHead> for RadioHead {
 
 /// Detected SSB whose angle is not yet estimated.
 #[pyclass(frozen, get_all, module = "access_av._core")]
-pub struct SensedSsb {
+pub struct SsbDetection {
     /// Physical cell identity.
     pci: u16,
     /// Index of the SSB in the burst.
@@ -81,7 +81,7 @@ pub struct Situation {
     /// Radio heads of the site.
     heads: Vec<Py<RadioHead>>,
     /// Detected SSBs of the burst; empty while the receiver is off.
-    sensed: Vec<Py<SensedSsb>>,
+    sensed: Vec<Py<SsbDetection>>,
 }
 
 impl Situation {
@@ -90,13 +90,13 @@ impl Situation {
         let estimate = now.localizer.pose(now.time_s).map_err(failed)?;
         let sensed = sensed.iter().map(|ssb| {
             let expected = now.head(ssb).map(|head| now.expected_snr_db(head));
-            let told = SensedSsb {
+            let detection = SsbDetection {
                 pci: ssb.pci,
                 ssb_index: ssb.ssb_index,
                 snr_db: ssb.snr_db,
                 expected_snr_db: expected.transpose().map_err(failed)?,
             };
-            Py::new(py, told)
+            Py::new(py, detection)
         });
         let heads = now
             .heads
@@ -136,21 +136,17 @@ const TIME: &str = "time_per_execution_s";
 pub struct PythonEstimator {
     call: Py<PyAny>,
     measurand: Measurand,
-    told_of_sigma: Arc<AtomicBool>,
+    sigma_warned: Arc<AtomicBool>,
 }
 
 impl PythonEstimator {
-    /// Creates the estimator for an array with the given measurand; `told_of_sigma` is shared by
+    /// Creates the estimator for an array with the given measurand; `sigma_warned` is shared by
     /// all runs.
-    pub const fn new(
-        call: Py<PyAny>,
-        measurand: Measurand,
-        told_of_sigma: Arc<AtomicBool>,
-    ) -> Self {
+    pub const fn new(call: Py<PyAny>, measurand: Measurand, sigma_warned: Arc<AtomicBool>) -> Self {
         Self {
             call,
             measurand,
-            told_of_sigma,
+            sigma_warned,
         }
     }
 
@@ -176,7 +172,7 @@ impl PythonEstimator {
                      and at most pi"
                 )));
             }
-            None if !self.told_of_sigma.swap(true, Ordering::Relaxed) => PyErr::warn(
+            None if !self.sigma_warned.swap(true, Ordering::Relaxed) => PyErr::warn(
                 py,
                 &py.get_type::<PyUserWarning>(),
                 c"the estimator returns no standard deviation; the Cramer-Rao bound at each SSB's \
@@ -450,12 +446,12 @@ impl Localizer for PythonLocalizer {
                 measured.phase_rad,
                 measured.phase_sigma_rad,
             );
-            let told = self.0.bind(py).call_method1("angle", arguments);
-            let told = told.map_err(|error| at(py, error, &what))?;
-            if told.is_none() {
+            let verdict = self.0.bind(py).call_method1("angle", arguments);
+            let verdict = verdict.map_err(|error| at(py, error, &what))?;
+            if verdict.is_none() {
                 return Ok(true);
             }
-            let accepted = told.extract::<bool>();
+            let accepted = verdict.extract::<bool>();
             accepted.map_err(|_| {
                 let message = "localizer.angle returned a value other than True, False or None";
                 at(py, refused(message), &what)

@@ -74,7 +74,7 @@ impl SettingsWarning {
     }
 }
 
-fn told(warnings: Vec<Warning>) -> Vec<SettingsWarning> {
+fn wrapped(warnings: Vec<Warning>) -> Vec<SettingsWarning> {
     warnings.into_iter().map(SettingsWarning).collect()
 }
 
@@ -181,11 +181,11 @@ toml_file! {
     #[pyo3(signature = (vehicle = None))]
     fn warnings(&self, vehicle: Option<&Vehicle>) -> PyResult<Vec<SettingsWarning>> {
         let Some(vehicle) = vehicle else {
-            return Ok(told(plausible::of_site(&self.0)));
+            return Ok(wrapped(plausible::of_site(&self.0)));
         };
         let mut found = plausible::of_site_and_vehicle(&self.0, &vehicle.0);
         found.extend(platform_warnings(&vehicle.0).map_err(settings_error)?);
-        Ok(told(found))
+        Ok(wrapped(found))
     }
 }
 
@@ -212,7 +212,7 @@ toml_file! {
     fn warnings(&self) -> PyResult<Vec<SettingsWarning>> {
         let mut found = plausible::of_vehicle(&self.0);
         found.extend(platform_warnings(&self.0).map_err(settings_error)?);
-        Ok(told(found))
+        Ok(wrapped(found))
     }
 }
 
@@ -241,7 +241,7 @@ toml_file! {
         Ok(HashMap::from([
             ("duration_s", size.duration_s),
             ("bursts", size.bursts),
-            ("ssbs", size.looks),
+            ("ssbs", size.angles),
             ("odometry_samples", size.odometry_samples),
             ("bytes", size.bytes(1)),
         ]))
@@ -254,7 +254,7 @@ toml_file! {
             .map_err(|error| settings_error(error.beneath(&self.0.name, "vehicle")))?;
         let mut found = self.0.warnings().map_err(settings_error)?;
         found.extend(of_platform);
-        Ok(told(found))
+        Ok(wrapped(found))
     }
 
     /// Return the scenario with explicit wake-up settings in place of the platform's defaults. The
@@ -308,7 +308,7 @@ toml_file! {
             .map_err(|error| settings_error(error.beneath(&self.0.name, "vehicle")))?;
         let mut found = self.0.warnings().map_err(settings_error)?;
         found.extend(of_platform);
-        Ok(told(found))
+        Ok(wrapped(found))
     }
 }
 
@@ -339,7 +339,7 @@ toml_file! {
 
     /// Return warnings about implausible values.
     fn warnings(&self) -> Vec<SettingsWarning> {
-        told(plausible::of_platform(&self.0))
+        wrapped(plausible::of_platform(&self.0))
     }
 
     /// Return the minimum time between two estimates in seconds for a vehicle's method and mode.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use numpy::{PyArray1, PyReadonlyArray1};
-use onboard::observation::SensedSsb;
+use onboard::observation::SsbDetection;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -71,7 +71,7 @@ impl LoggedDrive {
     #[getter]
     fn heads(&self) -> Vec<(u16, u8)> {
         let ssbs = self.angles.angles.iter().map(|it| &it.ssb);
-        ssbs.map(|&SensedSsb { pci, ssb_index, .. }| (pci, ssb_index))
+        ssbs.map(|&SsbDetection { pci, ssb_index, .. }| (pci, ssb_index))
             .collect()
     }
 

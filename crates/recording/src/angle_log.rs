@@ -19,11 +19,11 @@ use std::path::Path;
 use crate::error::RecordingError;
 use crate::file as files;
 use crate::table::Table;
-use onboard::Observed;
+use onboard::SsbInput;
 use onboard::burst::HasSsb;
 use onboard::live::AngleObservation;
 use onboard::localize::{AngleMeasurement, MeasurementKind};
-use onboard::observation::{BURST_S, SensedSsb};
+use onboard::observation::{BURST_S, SsbDetection};
 use onboard::time_unit::TimeUnit;
 
 const COLUMNS: [&str; 9] = [
@@ -71,7 +71,7 @@ const UNSTATED_SNR_DB: f64 = 20.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoggedAngle {
     /// Cell, SSB index, time and SNR.
-    pub ssb: SensedSsb,
+    pub ssb: SsbDetection,
     /// The angle.
     pub measured: AngleMeasurement,
 }
@@ -93,12 +93,12 @@ impl From<&LoggedAngle> for AngleObservation {
 }
 
 impl HasSsb for LoggedAngle {
-    fn ssb(&self) -> &SensedSsb {
+    fn ssb(&self) -> &SsbDetection {
         &self.ssb
     }
 
-    fn observed(&self) -> Observed<'_> {
-        Observed::Angle(self.measured)
+    fn observed(&self) -> SsbInput<'_> {
+        SsbInput::Angle(self.measured)
     }
 }
 
@@ -144,7 +144,7 @@ impl fmt::Display for AngleRemark {
 /// reported as remarks only.
 pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
     let table = Table::read(file, &REQUIRED, &OPTIONAL)?;
-    if let Some(key) = untold(|name| table.has(name)) {
+    if let Some(key) = missing_column(|name| table.has(name)) {
         return Err(table.missing(key, NEEDED));
     }
     let rows = table.rows.into_iter();
@@ -169,7 +169,7 @@ pub fn angle_log_of_columns(
     if let Some(key) = REQUIRED.into_iter().find(|it| !columns.contains_key(*it)) {
         return Err(missing(key, "there must be time_s and pci"));
     }
-    if let Some(key) = untold(|name| columns.contains_key(name)) {
+    if let Some(key) = missing_column(|name| columns.contains_key(name)) {
         return Err(missing(key, NEEDED));
     }
     let wanted = REQUIRED.into_iter().chain(OPTIONAL);
@@ -184,9 +184,9 @@ pub fn angle_log_of_columns(
 }
 
 /// Returns the name of a missing column that is required for angles and standard deviations.
-fn untold(has: impl Fn(&str) -> bool) -> Option<&'static str> {
-    let told = |column, sigma| has(column) && has(sigma);
-    if told("phase_rad", "phase_sigma_rad") || told("angle_rad", "angle_sigma_rad") {
+fn missing_column(has: impl Fn(&str) -> bool) -> Option<&'static str> {
+    let has_both = |column, sigma| has(column) && has(sigma);
+    if has_both("phase_rad", "phase_sigma_rad") || has_both("angle_rad", "angle_sigma_rad") {
         None
     } else if has("phase_rad") {
         Some("phase_sigma_rad")
@@ -353,7 +353,7 @@ pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     }
     let (pci, ssb_index) = (pci as u16, ssb_index as u8);
     Ok(LoggedAngle {
-        ssb: SensedSsb {
+        ssb: SsbDetection {
             pci,
             ssb_index,
             time_s,

@@ -29,10 +29,10 @@ impl Library for Files {
         what: &'static str,
         shipped: &[(&'static str, &'static str)],
         name: &str,
-        beside: &str,
+        referrer: &str,
     ) -> Result<NamedText, SettingsError> {
-        let path = relative_to(beside, name);
-        match Shipped.text(what, shipped, name, beside) {
+        let path = relative_to(referrer, name);
+        match Shipped.text(what, shipped, name, referrer) {
             Err(unknown) if !path.exists() => Err(unknown),
             Err(_) => Ok(NamedText {
                 text: read_text(&path, MOST_BYTES)?,
@@ -42,18 +42,18 @@ impl Library for Files {
         }
     }
 
-    fn points_m(&self, name: &str, beside: &str) -> Result<Vec<[f64; 2]>, SettingsError> {
-        read_points_m(&relative_to(beside, name))
+    fn points_m(&self, name: &str, referrer: &str) -> Result<Vec<[f64; 2]>, SettingsError> {
+        read_points_m(&relative_to(referrer, name))
     }
 
-    fn path(&self, name: &str, beside: &str) -> String {
-        let path = relative_to(beside, name);
+    fn path(&self, name: &str, referrer: &str) -> String {
+        let path = relative_to(referrer, name);
         let whole = std::path::absolute(&path).unwrap_or(path);
         whole.display().to_string()
     }
 }
 
-fn relative_to(beside: &str, name: &str) -> PathBuf {
-    let folder = Path::new(beside).parent().unwrap_or(Path::new(""));
+fn relative_to(referrer: &str, name: &str) -> PathBuf {
+    let folder = Path::new(referrer).parent().unwrap_or(Path::new(""));
     folder.join(name)
 }

@@ -85,12 +85,12 @@ mod tests {
         for (fields, last) in [(&["3,5"], "1.234"), (&["0.5"], "1,234")] {
             let mut numbers = Numbers::new(';');
             assert!(fields.iter().all(|field| numbers.read(field).is_ok()));
-            let told = numbers.read(last).unwrap_err();
-            assert!(told.contains("ambiguous"), "{told}");
+            let message = numbers.read(last).unwrap_err();
+            assert!(message.contains("ambiguous"), "{message}");
         }
         for field in ["1.234,5", "1,234,567"] {
-            let told = Numbers::new(';').read(field).unwrap_err();
-            assert!(told.contains("thousands"), "{told}");
+            let message = Numbers::new(';').read(field).unwrap_err();
+            assert!(message.contains("thousands"), "{message}");
         }
     }
 }

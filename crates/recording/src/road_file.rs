@@ -264,10 +264,10 @@ mod tests {
     fn invalid_csv_is_reported_with_its_line() {
         assert_eq!(from_csv("x,y\n1,2\n").unwrap_err().0, "header");
         assert_eq!(from_csv("x_m,y_m\n1,2\n3,nan\n").unwrap_err().0, "line 3");
-        let told = from_csv("x_m,y_m\n1,5,2,5\n").unwrap_err();
+        let error = from_csv("x_m,y_m\n1,5,2,5\n").unwrap_err();
         assert!(
-            told.0 == "line 2" && told.1.contains("semicolons"),
-            "{told:?}"
+            error.0 == "line 2" && error.1.contains("semicolons"),
+            "{error:?}"
         );
     }
 
@@ -275,8 +275,8 @@ mod tests {
     fn a_german_csv_has_semicolons_and_decimal_commas() {
         let points = from_csv("\u{feff}name;x_m;y_m\r\na;1,5;-2\r\nb;3;4,25\r\n").unwrap();
         assert_eq!(points, vec![[1.5, -2.0], [3.0, 4.25]]);
-        let told = from_csv("x_m;y_m\n1,5;2\n1.234;2\n").unwrap_err();
-        assert!(told.1.contains("ambiguous"), "{told:?}");
+        let error = from_csv("x_m;y_m\n1,5;2\n1.234;2\n").unwrap_err();
+        assert!(error.1.contains("ambiguous"), "{error:?}");
     }
 
     #[test]
@@ -305,8 +305,8 @@ mod tests {
             "20.2,67.85",
             "55.27,25.2",
         ] {
-            let told = line(&format!("[[{place}],[{place}]]"));
-            assert!(told.is_ok(), "{told:?}");
+            let result = line(&format!("[[{place}],[{place}]]"));
+            assert!(result.is_ok(), "{result:?}");
         }
     }
 
@@ -326,7 +326,7 @@ mod tests {
             1,
         );
         assert_eq!(from_geojson(&metres).unwrap()[2], [8.001, 60.001]);
-        for (name, said) in [
+        for (name, expected) in [
             ("urn:ogc:def:crs:EPSG::3857", "access-av file new site"),
             ("EPSG:900913", "access-av file new site"),
             ("EPSG:4978", "access-av file new site"),
@@ -334,7 +334,10 @@ mod tests {
         ] {
             let other = metres.replace("EPSG:25832", name);
             let (key, message) = from_geojson(&other).unwrap_err();
-            assert!(key == "crs" && message.contains(said), "{name}: {message}");
+            assert!(
+                key == "crs" && message.contains(expected),
+                "{name}: {message}"
+            );
         }
         for name in [
             "urn:ogc:def:crs:OGC:1.3:CRS84",

@@ -106,7 +106,7 @@ fn angle_to_pose(bencher: divan::Bencher, (map, estimates_bias): (bool, bool)) {
     let (site, mut vehicle) = nominal("trip-2");
     vehicle.receiver.multipath_bias_probability = Some(if estimates_bias { 0.75 } else { 0.0 });
     let road = site.build_road().unwrap().unwrap();
-    let heads = RadioHead::heard(&site, &vehicle);
+    let heads = RadioHead::received_by(&site, &vehicle);
     let config = EkfConfig::new(&site, &vehicle);
     let start = InitialPose {
         pose: road.pose(0.0),
@@ -149,22 +149,22 @@ fn burst_to_pose(bencher: divan::Bencher, guarded: bool) {
     let (site, mut vehicle) = nominal("trip-4");
     vehicle.integrity = guarded.then(IntegritySettings::default);
     let road = site.build_road().unwrap().unwrap();
-    let heads = RadioHead::heard(&site, &vehicle);
+    let heads = RadioHead::received_by(&site, &vehicle);
     let mut localizer = onboard::localize::built_in(&site, &vehicle, road.pose(0.0)).unwrap();
     let mut number = 0;
     let mut next = || {
         // The vehicle drives back and forth, so that the road does not end.
         let time_s = 0.02 * f64::from(number);
-        let way_m = 100.0 - 100.0 * (0.04 * time_s).cos();
+        let along_m = 100.0 - 100.0 * (0.04 * time_s).cos();
         number += 1;
         let odometry = localizer.odometry(&OdometrySample {
             time_s,
-            distance_m: way_m,
+            distance_m: along_m,
             speed_mps: 4.0 * (0.04 * time_s).sin(),
             yaw_rate_radps: None,
         });
         odometry.unwrap();
-        let pose = road.pose(way_m);
+        let pose = road.pose(along_m);
         for head in &heads {
             let angle_rad = pose.point().bearing_rad(head.position) - pose.heading_rad;
             let measured = AngleMeasurement {

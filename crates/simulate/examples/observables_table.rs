@@ -54,15 +54,15 @@ fn main() -> Result<()> {
     for channel in ["inf-sh", "umi"] {
         for khz in [15.0, 30.0] {
             for snr_db in [10.0, 20.0, 30.0] {
-                let mut heard = Vec::new();
+                let mut results = Vec::new();
                 for seed in &seeds {
-                    heard.extend(received(channel, khz, snr_db, count as u64, *seed)?);
+                    results.extend(received(channel, khz, snr_db, count as u64, *seed)?);
                 }
                 for (name, least, most) in CLASSES {
                     let of_class = |it: &&BurstResult| (least..most).contains(&it.k_db);
                     row(
                         &format!("{channel},{khz},{snr_db},{name}"),
-                        &heard.iter().filter(of_class).collect::<Vec<_>>(),
+                        &results.iter().filter(of_class).collect::<Vec<_>>(),
                     );
                 }
             }
@@ -135,7 +135,7 @@ fn received(
     let snrs_db = vec![snr_db; channels.len()];
     let wavelength_m = SPEED_OF_LIGHT_MPS / ssb_freq_hz;
     let state = |time_s: f64| path.at(time_s);
-    let mut heard = Vec::new();
+    let mut results = Vec::new();
     for number in (1..count * BURSTS).filter(|it| it % BURSTS < DIRECTLY) {
         let time_s = number as f64 * period_s;
         if time_s > path.duration_s() {
@@ -185,7 +185,7 @@ fn received(
             let moved_m = distance_m(time_s) - distance_m(time_s - interval_s);
             let cfo_hz = cfos_hz.get(head).copied().unwrap_or(0.0);
             let rate_m_s = moved_m / interval_s - wavelength_m * cfo_hz;
-            heard.push(BurstResult {
+            results.push(BurstResult {
                 k_db: k_db(channel, &here),
                 seen,
                 delay_error_m: (seen.delay.first_path_start - start) * metre,
@@ -195,7 +195,7 @@ fn received(
             });
         })?;
     }
-    Ok(heard)
+    Ok(results)
 }
 
 /// Returns the power of the direct path relative to the scatter, in dB. The direct path is constant

@@ -54,7 +54,7 @@ pub fn log_angles(
         })
         .collect();
     let mut vehicle = all_of_error(&scenario.site, &scenario.vehicle);
-    vehicle.start.pose = vehicle.start.known.then_some(trace.told_start);
+    vehicle.start.pose = vehicle.start.known.then_some(trace.given_start);
     let truth: Vec<_> = (trace.truth().filter(|(time_s, _)| *time_s <= end_s))
         .map(|(time_s, pose)| TimedPose { time_s, pose })
         .collect();

@@ -93,10 +93,10 @@ impl Bound {
         let road = scenario.path(check)?;
         let start = &vehicle.start;
         let traced = scenario.traced_paths(check)?.map(|paths| {
-            let heard = site.radio_heads.iter();
-            let heard = heard.filter(|head| vehicle.receiver.hears(head.pci));
+            let received = site.radio_heads.iter();
+            let received = received.filter(|head| vehicle.receiver.receives(head.pci));
             Traced {
-                heads: heard.map(|head| paths.head(head)).collect(),
+                heads: received.map(|head| paths.head(head)).collect(),
                 paths,
             }
         });
@@ -104,7 +104,7 @@ impl Bound {
             config: EkfConfig::new(site, vehicle),
             map: site.road.is_some() && vehicle.follows_road(),
             motion: MotionProfile::new(&scenario.motion, vehicle, road.length_m()),
-            heads: RadioHead::heard(site, vehicle),
+            heads: RadioHead::received_by(site, vehicle),
             thermal: ThermalNoise::new(site, vehicle),
             start: InitialPose {
                 pose: road.pose(scenario.motion.start_at_m),
@@ -132,7 +132,7 @@ impl Bound {
     pub fn along_route(&self) -> Vec<BoundPoint> {
         let scatter = |travelled_m, angle_model: &AngleModel| {
             scatter_bound(self.config.rician_k, angle_model.aperture)
-                * (self.config.array).correlation(travelled_m, angle_model.toward)
+                * (self.config.array).correlation(travelled_m, angle_model.direction_cosine)
         };
         let mut points = Vec::new();
         self.walk(scatter, |_, belief, time_s, along_m| {
@@ -171,7 +171,7 @@ impl Bound {
     ) {
         let map = self.map.then_some(&self.road);
         let mut belief = Ekf::prior(&self.config, map, &self.start);
-        let mut last_look_m = f64::NEG_INFINITY;
+        let mut last_angle_m = f64::NEG_INFINITY;
         let mut before_m = self.motion.at(0.0).along_m;
         let steps = (self.motion.duration_s() / self.period_s).ceil() as usize + 1;
         for number in 0..steps {
@@ -179,10 +179,10 @@ impl Bound {
             let along_m = self.motion.at(time_s).along_m;
             let mut transition = self.advance(&mut belief, along_m - before_m);
             before_m = along_m;
-            let travelled_m = along_m - last_look_m;
+            let travelled_m = along_m - last_angle_m;
             let scatter = |angle_model: &AngleModel| scatter(travelled_m, angle_model);
             self.listen(&mut belief, along_m, scatter, &mut transition);
-            last_look_m = along_m;
+            last_angle_m = along_m;
             visit(&transition, &belief, time_s, along_m);
         }
     }
@@ -310,11 +310,11 @@ impl Bound {
         }
     }
 
-    /// Returns the bound of the RMS position error (m) at `place` for `looks` independent angles of
+    /// Returns the bound of the RMS position error (m) at `place` for `angles` independent angles of
     /// every radio head. The heading is known with the standard deviation `heading_std_rad`, and
     /// the position has a flat prior. The information is averaged over eight headings. Returns
     /// `None` if the radio heads leave one direction unobservable.
-    pub fn at(&self, place: Point, looks: f64, heading_std_rad: f64) -> Option<f64> {
+    pub fn at(&self, place: Point, angles: f64, heading_std_rad: f64) -> Option<f64> {
         const HEADINGS: u32 = 8;
         const VAGUE_M: f64 = 1e4;
         let mut information = 0.0;
@@ -339,7 +339,7 @@ impl Bound {
                 };
                 let scatter = scatter_bound(self.config.rician_k, angle_model.aperture);
                 let thermal = self.thermal_variance(&head, &angle_model);
-                belief.update(0.0, &angle_model.row, (fading * scatter + thermal) / looks);
+                belief.update(0.0, &angle_model.row, (fading * scatter + thermal) / angles);
             }
             let [along, across] = [ALONG, ACROSS].map(|i| belief.covariance[i][i]);
             information += 1.0 / (along + across);

@@ -17,12 +17,12 @@ use crate::random::{Purpose, Streams};
 /// Perfectly consistent filter along a route.
 #[derive(Clone, Debug, Default)]
 pub struct IdealFilter {
-    points: Vec<Point>,
+    points: Vec<RoutePoint>,
 }
 
 /// Position at which the error is drawn.
 #[derive(Clone, Copy, Debug)]
-struct Point {
+struct RoutePoint {
     transition: Matrix<STATES>,
     /// Cholesky factor of the covariance of ξ, the new part of the error.
     fresh: Matrix<STATES>,
@@ -56,7 +56,7 @@ impl IdealFilter {
                 }
             }
         }
-        self.points.push(Point {
+        self.points.push(RoutePoint {
             transition: *transition,
             fresh: cholesky(&fresh, after),
             covariance_m2: [

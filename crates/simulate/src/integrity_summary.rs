@@ -64,8 +64,8 @@ impl IntegritySummary {
             summary.early_alarms += usize::from(early);
             let too_wide = integrity.protection_level_m > alert_limit_m;
             summary.too_wide += usize::from(!ok && !unavailable && too_wide);
-            let vouched = integrity.protection_level_m <= alert_limit_m;
-            summary.suspicions += usize::from(early && vouched);
+            let within_limit = integrity.protection_level_m <= alert_limit_m;
+            summary.suspicions += usize::from(early && within_limit);
             summary.worst_m = summary.worst_m.max(error_m);
             if exceeds {
                 summary.excursions += usize::from(exceeded_since_s.is_none());

@@ -1,8 +1,8 @@
 //! Reception of simulated IQ samples with the receiver of the vehicle.
 
-use onboard::observation::{SensedSsb, SsbObservation};
+use onboard::observation::{SsbDetection, SsbObservation};
 use onboard::receive::{Receiver, ReceiverConfig, Window};
-use onboard::{BoxError, Observed, SsbSource};
+use onboard::{BoxError, SsbInput, SsbSource};
 
 use crate::channel::{HeadChannel, IqAir};
 use crate::error::SimulationError;
@@ -72,17 +72,17 @@ impl IqReception {
 }
 
 impl SsbSource for IqBurstReception<'_> {
-    fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
-        let state = |time_s| self.path.heard_at(time_s, self.angle_time_offset_s);
+    fn sense(&mut self, sensed: &mut Vec<SsbDetection>) -> Result<(), BoxError> {
+        let state = |time_s| self.path.at_reception(time_s, self.angle_time_offset_s);
         self.reception
             .receive(self.number, state, self.channels, self.snrs_db)?;
         sensed.extend(self.reception.observations.iter().map(|it| it.ssb));
         Ok(())
     }
 
-    fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError> {
+    fn observe(&mut self, index: usize) -> Result<SsbInput<'_>, BoxError> {
         let observation = self.reception.observations.get(index);
-        Ok(Observed::Snapshots(
+        Ok(SsbInput::Snapshots(
             observation.ok_or("no such SSB in the burst")?,
         ))
     }

@@ -8,9 +8,9 @@
 
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
-use onboard::observation::{OdometrySample, SensedSsb, SsbObservation};
+use onboard::observation::{OdometrySample, SsbDetection, SsbObservation};
 use onboard::settings::EstimatorMethod;
-use onboard::{BoxError, Custom, Observed, Pipeline, SsbSource, estimator};
+use onboard::{BoxError, Custom, Pipeline, SsbInput, SsbSource, estimator};
 use rayon::prelude::*;
 
 use crate::campaign::{Campaign, CampaignOptions, thread_pool};
@@ -31,11 +31,11 @@ pub struct MeasurementTraces {
 /// Measurements of one run.
 pub(crate) struct MeasurementTrace {
     run: u64,
-    pub told_start: Pose,
+    pub given_start: Pose,
     pub odometry: Vec<OdometrySample>,
     bursts: Vec<Burst>,
     /// Detected SSBs of all bursts.
-    sensed: Vec<SensedSsb>,
+    sensed: Vec<SsbDetection>,
     /// Angles of the detected SSBs for each method.
     angles: Vec<Vec<Option<AngleMeasurement>>>,
 }
@@ -115,10 +115,13 @@ impl MeasurementTraces {
 
 impl MeasurementTrace {
     /// Returns the SSBs and angles of a method in order of time.
-    pub fn angles_of(&self, method: usize) -> impl Iterator<Item = (SensedSsb, AngleMeasurement)> {
+    pub fn angles_of(
+        &self,
+        method: usize,
+    ) -> impl Iterator<Item = (SsbDetection, AngleMeasurement)> {
         let angles = self.angles.get(method).into_iter().flatten();
-        let heard = self.sensed.iter().zip(angles);
-        heard.filter_map(|(&ssb, angle)| Some((ssb, (*angle)?)))
+        let received = self.sensed.iter().zip(angles);
+        received.filter_map(|(&ssb, angle)| Some((ssb, (*angle)?)))
     }
 
     /// Returns the times of the bursts and the true poses.
@@ -148,7 +151,7 @@ impl MeasurementTrace {
         let mut observation = SsbObservation::new(scenario.vehicle.array.elements.into());
         let mut trace = Self {
             run,
-            told_start: truth.told_start,
+            given_start: truth.given_start,
             odometry: Vec::new(),
             bursts: Vec::with_capacity(simulation.steps()),
             sensed: Vec::with_capacity(simulation.steps() * channels.len()),
@@ -162,7 +165,7 @@ impl MeasurementTrace {
             }
             let vehicle = truth
                 .path
-                .heard_at(time_s, truth.vehicle.receiver.angle_time_offset_s);
+                .at_reception(time_s, truth.vehicle.receiver.angle_time_offset_s);
             let mut strongest_db = f64::NEG_INFINITY;
             for (index, channel) in channels.iter_mut().enumerate() {
                 let snr_db = channel.next_snr_db(&vehicle);
@@ -170,7 +173,7 @@ impl MeasurementTrace {
                 let mut reception = channel.receive(&vehicle, snr_db);
                 let (head, array) = (channel.head(), channel.array());
                 faults.distort(index, head, array, &vehicle, reception.gains_mut());
-                if !reception.is_heard() {
+                if !reception.is_received() {
                     continue;
                 }
                 channel.observe(number as u64, &reception, &mut observation);
@@ -200,7 +203,7 @@ impl MeasurementTrace {
         let (site, vehicle) = (&scenario.site, &scenario.vehicle);
         let platform = simulation.platform();
         let custom = Custom::default();
-        let mut onboard = Pipeline::new(site, vehicle, platform, self.told_start, custom)?;
+        let mut onboard = Pipeline::new(site, vehicle, platform, self.given_start, custom)?;
         let mut record = RunRecord::new(self.run, self.bursts.len());
         let mut silence = SsbObservation::new(vehicle.array.elements.into());
         let mut odometry = self.odometry.iter().peekable();
@@ -219,8 +222,8 @@ impl MeasurementTrace {
                 angles: angles.get(here).unwrap_or_default(),
                 silence: &mut silence,
             };
-            let heard = onboard.process_burst(time_s, &mut played);
-            record.add(&heard.map_err(SimulationError::of_drive)?);
+            let result = onboard.process_burst(time_s, &mut played);
+            record.add(&result.map_err(SimulationError::of_drive)?);
             record.add_step(&onboard, time_s, burst.truth, burst.snr_db)?;
         }
         record.constants = onboard.constants();
@@ -230,26 +233,26 @@ impl MeasurementTrace {
 
 /// Burst from a trace.
 struct Played<'a> {
-    sensed: &'a [SensedSsb],
+    sensed: &'a [SsbDetection],
     angles: &'a [Option<AngleMeasurement>],
     /// Empty observation for an SSB without an angle.
     silence: &'a mut SsbObservation,
 }
 
 impl SsbSource for Played<'_> {
-    fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
+    fn sense(&mut self, sensed: &mut Vec<SsbDetection>) -> Result<(), BoxError> {
         sensed.extend_from_slice(self.sensed);
         Ok(())
     }
 
-    fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError> {
+    fn observe(&mut self, index: usize) -> Result<SsbInput<'_>, BoxError> {
         let found = self.sensed.get(index).zip(self.angles.get(index));
         let (&ssb, angle) = found.ok_or("no such SSB in the burst")?;
         Ok(if let Some(angle) = angle {
-            Observed::Angle(*angle)
+            SsbInput::Angle(*angle)
         } else {
             self.silence.restart(ssb);
-            Observed::Snapshots(self.silence)
+            SsbInput::Snapshots(self.silence)
         })
     }
 }

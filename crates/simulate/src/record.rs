@@ -120,10 +120,10 @@ impl RunRecord {
     }
 
     /// Adds the results of a burst.
-    pub(crate) fn add(&mut self, heard: &BurstResult<'_>) {
-        self.bursts_received += usize::from(heard.receiver_on);
-        self.aoa_estimates.extend_from_slice(heard.aoa_estimates);
-        self.out_of_reach += usize::from(heard.keeps_bound == Some(false));
+    pub(crate) fn add(&mut self, result: &BurstResult<'_>) {
+        self.bursts_received += usize::from(result.receiver_on);
+        self.aoa_estimates.extend_from_slice(result.aoa_estimates);
+        self.out_of_reach += usize::from(result.keeps_bound == Some(false));
     }
 
     /// Adds the delays, range rates and carrier phases of a burst.

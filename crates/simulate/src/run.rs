@@ -105,7 +105,7 @@ impl Simulation {
             let truth = drive.path.at(time_s);
             drive.send(number, time_s);
             drive.odometry_until(time_s, &mut record)?;
-            drive.hear_until(time_s, &mut record)?;
+            drive.process_until(time_s, &mut record)?;
             record.add_step(&drive.onboard, time_s, truth.pose, drive.strongest_db)?;
         }
         record.constants = drive.onboard.constants();
@@ -123,7 +123,7 @@ struct Drive {
     iq: Option<IqReception>,
     buffers: SnapshotBuffers,
     /// Bursts that have been sent and not yet processed.
-    on_the_way: VecDeque<Burst>,
+    in_transit: VecDeque<Burst>,
     /// Reusable buffers of processed bursts.
     spare: Vec<Vec<f64>>,
     latency_s: f64,
@@ -145,7 +145,7 @@ impl Drive {
     ) -> Result<Self, SimulationError> {
         let scenario = simulation.scenario();
         let mut truth = simulation.world.draw(streams);
-        let start = truth.told_start;
+        let start = truth.given_start;
         let onboard = Pipeline::new(
             &scenario.site,
             &scenario.vehicle,
@@ -165,7 +165,7 @@ impl Drive {
             faults: Faults::new(&scenario.faults),
             iq,
             buffers: SnapshotBuffers::new(scenario.vehicle.array.elements.into()),
-            on_the_way: VecDeque::new(),
+            in_transit: VecDeque::new(),
             spare: Vec::new(),
             latency_s: 1e-3 * scenario.ssb_latency_ms,
             angle_time_offset_s: truth.vehicle.receiver.angle_time_offset_s,
@@ -175,12 +175,12 @@ impl Drive {
 
     /// Sends burst number `number` with the time stamp `time_s`.
     fn send(&mut self, number: usize, time_s: f64) {
-        let vehicle = self.path.heard_at(time_s, self.angle_time_offset_s);
+        let vehicle = self.path.at_reception(time_s, self.angle_time_offset_s);
         let mut snrs_db = self.spare.pop().unwrap_or_default();
         let next_snr_db = |channel: &mut HeadChannel| channel.next_snr_db(&vehicle);
         snrs_db.extend(self.channels.iter_mut().map(next_snr_db));
         self.strongest_db = snrs_db.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        self.on_the_way.push_back(Burst {
+        self.in_transit.push_back(Burst {
             number: number as u64,
             vehicle,
             snrs_db,
@@ -195,7 +195,7 @@ impl Drive {
     ) -> Result<(), SimulationError> {
         while let Some(sample_s) = self.odometer.next_s(time_s) {
             while let Some(burst) = self.arrived(|arrives_s| arrives_s < sample_s) {
-                self.hear(burst, record)?;
+                self.process(burst, record)?;
             }
             if let Some(sample) = self.odometer.sample(self.path.at(sample_s)) {
                 // A simulated odometer never repeats a sample and never returns NaN.
@@ -209,20 +209,24 @@ impl Drive {
     }
 
     /// Processes the bursts that have arrived by `time_s`.
-    fn hear_until(&mut self, time_s: f64, record: &mut RunRecord) -> Result<(), SimulationError> {
+    fn process_until(
+        &mut self,
+        time_s: f64,
+        record: &mut RunRecord,
+    ) -> Result<(), SimulationError> {
         while let Some(burst) = self.arrived(|arrives_s| arrives_s <= time_s) {
-            self.hear(burst, record)?;
+            self.process(burst, record)?;
         }
         Ok(())
     }
 
     /// Returns the next burst if `by` accepts its arrival time.
     fn arrived(&mut self, by: impl Fn(f64) -> bool) -> Option<Burst> {
-        let arrives_s = self.on_the_way.front()?.vehicle.time_s + self.latency_s;
-        by(arrives_s).then(|| self.on_the_way.pop_front()).flatten()
+        let arrives_s = self.in_transit.front()?.vehicle.time_s + self.latency_s;
+        by(arrives_s).then(|| self.in_transit.pop_front()).flatten()
     }
 
-    fn hear(&mut self, burst: Burst, record: &mut RunRecord) -> Result<(), SimulationError> {
+    fn process(&mut self, burst: Burst, record: &mut RunRecord) -> Result<(), SimulationError> {
         let mut by_samples;
         let mut by_snapshots;
         let source: &mut dyn SsbSource = if let Some(reception) = &mut self.iq {
@@ -246,8 +250,8 @@ impl Drive {
             };
             &mut by_snapshots
         };
-        let heard = self.onboard.process_burst(burst.vehicle.time_s, source);
-        record.add(&heard.map_err(SimulationError::of_drive)?);
+        let result = self.onboard.process_burst(burst.vehicle.time_s, source);
+        record.add(&result.map_err(SimulationError::of_drive)?);
         record.add_ranges(self.onboard.ranges());
         let mut snrs_db = burst.snrs_db;
         snrs_db.clear();

@@ -1,7 +1,7 @@
 //! Reception of snapshots, which are drawn only for the SSBs whose angle is estimated.
 
-use onboard::observation::{SensedSsb, SsbObservation};
-use onboard::{BoxError, Observed, SsbSource};
+use onboard::observation::{SsbDetection, SsbObservation};
+use onboard::{BoxError, SsbInput, SsbSource};
 
 use crate::channel::{HeadChannel, Reception};
 use crate::world::{Faults, VehicleState};
@@ -40,14 +40,14 @@ impl SnapshotBuffers {
 }
 
 impl SsbSource for SnapshotReception<'_> {
-    fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
+    fn sense(&mut self, sensed: &mut Vec<SsbDetection>) -> Result<(), BoxError> {
         self.buffers.receptions.clear();
         for (index, (channel, snr_db)) in self.channels.iter_mut().zip(self.snrs_db).enumerate() {
             let mut reception = channel.receive(self.vehicle, *snr_db);
             let (head, array) = (channel.head(), channel.array());
             self.faults
                 .distort(index, head, array, self.vehicle, reception.gains_mut());
-            if reception.is_heard() {
+            if reception.is_received() {
                 sensed.push(reception.ssb);
                 self.buffers.receptions.push((index, reception));
             }
@@ -55,13 +55,13 @@ impl SsbSource for SnapshotReception<'_> {
         Ok(())
     }
 
-    fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError> {
-        let heard = self.buffers.receptions.get(index);
-        let (number, reception) = heard.ok_or("no such SSB in the burst")?;
+    fn observe(&mut self, index: usize) -> Result<SsbInput<'_>, BoxError> {
+        let received = self.buffers.receptions.get(index);
+        let (number, reception) = received.ok_or("no such SSB in the burst")?;
         let channel = self.channels.get_mut(*number);
         let channel = channel.ok_or("no such channel")?;
         let observation = &mut self.buffers.observation;
         channel.observe(self.number, reception, observation);
-        Ok(Observed::Snapshots(observation))
+        Ok(SsbInput::Snapshots(observation))
     }
 }

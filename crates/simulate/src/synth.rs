@@ -95,7 +95,8 @@ pub fn synthesize(
     let mut drawn = World::new(scenario)?.draw(streams);
     let mut channels = HeadChannel::all(&mut drawn, streams);
     let path = drawn.path;
-    let heard_at = |time_s| path.heard_at(time_s, drawn.vehicle.receiver.angle_time_offset_s);
+    let at_reception =
+        |time_s| path.at_reception(time_s, drawn.vehicle.receiver.angle_time_offset_s);
     let end_s = path
         .duration_s()
         .min(settings.duration_s.unwrap_or(f64::INFINITY));
@@ -105,7 +106,7 @@ pub fn synthesize(
     }
     fs::create_dir_all(directory).map_err(|source| RecordingError::io(directory, source))?;
 
-    let told = told_vehicle(scenario, drawn.told_start, air.channel_gains());
+    let vehicle = configured_vehicle(scenario, drawn.given_start, air.channel_gains());
     let mut writer = RecordingWriter::create(
         &directory.join("iq"),
         WriterSettings {
@@ -134,11 +135,11 @@ pub fn synthesize(
             time_s,
             pose: path.at(time_s).pose,
         });
-        let here = heard_at(time_s);
+        let here = at_reception(time_s);
         for (head, snr_db) in channels.iter_mut().zip(&mut snrs_db) {
             *snr_db = head.next_snr_db(&here);
         }
-        let burst = air.receive(number, heard_at, &channels, &snrs_db)?;
+        let burst = air.receive(number, at_reception, &channels, &snrs_db)?;
         if !settings.continuous || number == 0 {
             writer.begin_capture(burst.start);
         }
@@ -158,7 +159,7 @@ pub fn synthesize(
             return Err(SynthError::Stopped);
         }
     }
-    write_settings(directory, scenario, &told)?;
+    write_settings(directory, scenario, &vehicle)?;
     let odometry = directory.join("odometry.csv");
     write_odometry(scenario, &path, drawn.odometer, end_s, &odometry)?;
     write_tum(&directory.join("truth.tum"), &truth)?;
@@ -175,11 +176,11 @@ pub fn synthesize(
 pub(crate) fn write_settings(
     directory: &Path,
     scenario: &Scenario,
-    told: &Vehicle,
+    vehicle: &Vehicle,
 ) -> Result<(), RecordingError> {
     for (name, text) in [
         ("site.toml", scenario.site.to_toml()),
-        ("vehicle.toml", told.to_toml()),
+        ("vehicle.toml", vehicle.to_toml()),
         ("scenario.toml", scenario.to_toml()),
     ] {
         write_file(&directory.join(name), text.as_bytes())?;
@@ -189,7 +190,7 @@ pub(crate) fn write_settings(
 
 /// Returns the vehicle as its owner would describe it: with the given start, the calibrated channel
 /// gains and a tracker as localizer.
-fn told_vehicle(scenario: &Scenario, start: Pose, channel_gains: &[Complex64]) -> Vehicle {
+fn configured_vehicle(scenario: &Scenario, start: Pose, channel_gains: &[Complex64]) -> Vehicle {
     let mut vehicle = scenario.vehicle.clone();
     let gains = channel_gains.iter().map(|gain| [gain.re, gain.im]);
     vehicle.array.channel_gains = Some(gains.collect());

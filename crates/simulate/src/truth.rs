@@ -47,7 +47,7 @@ pub struct Truth {
     /// Path of the vehicle.
     pub path: Path,
     /// Initial pose with a random error of its specified covariance, as given to the vehicle.
-    pub told_start: Pose,
+    pub given_start: Pose,
     /// Propagation from each radio head.
     pub propagation: Vec<Box<dyn Propagation>>,
 }
@@ -166,13 +166,13 @@ impl World {
         let keeping = vehicle.lane_keeping.process();
         let path = Path::new(self.road.clone(), self.motion.clone(), keeping, streams);
         let start = path.at(0.0);
-        let told = &self.scenario.vehicle.start;
+        let specified = &self.scenario.vehicle.start;
         let mut rng = streams.generator(Purpose::Start, 0);
         let mut normal = || factor * rng.sample::<f64, _>(StandardNormal);
-        let told_start = Pose {
-            x_m: start.pose.x_m + told.position_std_m * normal(),
-            y_m: start.pose.y_m + told.position_std_m * normal(),
-            heading_rad: start.pose.heading_rad + told.heading_std_rad * normal(),
+        let given_start = Pose {
+            x_m: start.pose.x_m + specified.position_std_m * normal(),
+            y_m: start.pose.y_m + specified.position_std_m * normal(),
+            heading_rad: start.pose.heading_rad + specified.heading_std_rad * normal(),
         };
         Truth {
             heads: site.radio_heads.iter().map(RadioHead::from).collect(),
@@ -191,7 +191,7 @@ impl World {
                 })
                 .collect(),
             path,
-            told_start,
+            given_start,
             site,
             vehicle,
         }

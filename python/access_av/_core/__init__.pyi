@@ -27,7 +27,7 @@ __all__ = [
     "Recording",
     "RecordingError",
     "Scenario",
-    "SensedSsb",
+    "SsbDetection",
     "SettingsError",
     "SettingsWarning",
     "SimulationResult",
@@ -123,7 +123,7 @@ class LiveHead:
     is_excluded: Final[bool]
     is_faulty: Final[bool]
     snr_db: Final[float | None]
-    last_heard_s: Final[float | None]
+    last_angle_s: Final[float | None]
     last_accepted_s: Final[float | None]
     residual_rad: Final[float | None]
     accepted: Final[int]
@@ -272,7 +272,7 @@ class RadioHead:
     z_m: Final[float]
 
 @final
-class SensedSsb:
+class SsbDetection:
     pci: Final[int]
     ssb_index: Final[int]
     snr_db: Final[float]
@@ -287,7 +287,7 @@ class Situation:
     heading_rad: Final[float]
     covariance: Final[list[list[float]] | None]
     heads: Final[list[RadioHead]]
-    sensed: Final[list[SensedSsb]]
+    sensed: Final[list[SsbDetection]]
 
 @final
 class SimulationResult:

@@ -233,7 +233,7 @@ def locate(
     directory.write_text("report.html", page)
     directory.write_text("site.toml", plant.to_toml())
     directory.write_text("vehicle.toml", carrier.to_toml())
-    told: dict[str, Any] = {
+    result: dict[str, Any] = {
         **numbers,
         "lost_share": drive.lost_share,
         "unavailable_share": drive.unavailable_share,
@@ -243,12 +243,12 @@ def locate(
         **({} if doubt is None else {"truth": doubt}),
     }
     directory.write_manifest(
-        recording=str(recording), odometry=str(odometry), **told, warnings=plant.warnings(carrier)
+        recording=str(recording), odometry=str(odometry), **result, warnings=plant.warnings(carrier)
     )
     directory.link_latest()
     if as_json:
         more = {"compared": records(beside), "directory": str(directory.path)}
-        print(json_text({**told, **more}))
+        print(json_text({**result, **more}))
     else:
         _show(drive, numbers)
         if doubt is not None:

@@ -157,8 +157,12 @@ def integrity(
     directory.write_text("report.html", page)
     directory.write_manifest(scenario=scenario, runs=runs, seed=seed, warnings=chosen.warnings())
     if as_json:
-        told = {"cases": records, "compared": as_records(beside), "directory": str(directory.path)}
-        print(json_text(told))
+        result = {
+            "cases": records,
+            "compared": as_records(beside),
+            "directory": str(directory.path),
+        }
+        print(json_text(result))
         return
     _show(records)
     show_compared(beside)

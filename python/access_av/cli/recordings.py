@@ -218,8 +218,8 @@ def angles(
     )
     directory.link_latest()
     if as_json:
-        told = {**counts, "warnings": found.warnings, "directory": str(directory.path)}
-        print(json_text(told))
+        values = {**counts, "warnings": found.warnings, "directory": str(directory.path)}
+        print(json_text(values))
         return
     for warning in found.warnings:
         show_warning(warning)

@@ -110,8 +110,8 @@ def study(
     )
     directory.link_latest()
     if as_json:
-        told = {**found.summary(), "compared": records(beside), "directory": str(directory.path)}
-        print(json_text(told))
+        result = {**found.summary(), "compared": records(beside), "directory": str(directory.path)}
+        print(json_text(result))
         return
     console.print(found.verdict)
     for number, place in enumerate(found.worst, start=1):

@@ -115,11 +115,11 @@ def estimate_angles(
     """
     plant = site if isinstance(site, _core.Site) else _core.Site.load(str(site))
     carrier = vehicle if isinstance(vehicle, _core.Vehicle) else _core.Vehicle.load(str(vehicle))
-    columns, told, warnings = _core.estimate_angles(
+    columns, remarks, warnings = _core.estimate_angles(
         plant, carrier, recording, start_time_s=start_time_s
     )
     angles = pl.DataFrame(columns).with_columns(pl.col("resolved").cast(pl.Boolean))
-    return AngleLog(angles.select(TABLES["recorded_angles"].columns), plant, told, warnings)
+    return AngleLog(angles.select(TABLES["recorded_angles"].columns), plant, remarks, warnings)
 
 
 def columns_of(path: str | Path) -> dict[str, NDArray[np.float64]] | None:

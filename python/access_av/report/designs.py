@@ -70,16 +70,16 @@ def render_designs(
         sections.append(section("Energy against error", "No design has a known energy.", ""))
     else:
         specs["designs"] = _energy_against_error(known.head(MOST_DESIGNS))
-        told = (
+        caption = (
             "99th percentile of the horizontal error. Orange: Pareto front, with the 95 % interval "
             "of the bootstrap over whole runs. The numbers are those of the table."
         )
         if known.height > MOST_NAMES:
-            told += f" {MOST_NAMES} of {known.height} designs are numbered, the front first."
-        sections.append(section("Energy against error", told, figure("designs")))
+            caption += f" {MOST_NAMES} of {known.height} designs are numbered, the front first."
+        sections.append(section("Energy against error", caption, figure("designs")))
         specs["tracks"] = _over_time(driven, known)
-        told = "RMS error of one design over its runs. Select the design below the chart."
-        sections.append(section("Over the drive", told, figure("tracks")))
+        caption = "RMS error of one design over its runs. Select the design below the chart."
+        sections.append(section("Over the drive", caption, figure("tracks")))
     if not of_worlds.is_empty():
         sections.append(section("Each environment", "", _table(of_worlds)))
     written = source("Scenario with all default values", scenario.to_toml())

@@ -53,8 +53,8 @@ def render_located(
     sections = []
     operation = Operation.under(vehicle, drive.poses)
     if operation is not None:
-        told = f"{operation.in_words()} {operation.what_helps()}".strip()
-        sections.append(section("Operation", told, ""))
+        description = f"{operation.in_words()} {operation.what_helps()}".strip()
+        sections.append(section("Operation", description, ""))
     if drive.remarks:
         sections.append(section("Remarks", "", _list(drive.remarks)))
     known = drive.poses.filter(~pl.col("searching"))

@@ -78,8 +78,8 @@ def played(
         "step",
         pl.col("x_m", "y_m").round(1),
         ok=pl.col("integrity").fill_null("") == "ok",
-        told=pl.struct(pl.exclude("step")).map_elements(
-            lambda it: _told(it, began_s), return_dtype=pl.String
+        text=pl.struct(pl.exclude("step")).map_elements(
+            lambda it: _text(it, began_s), return_dtype=pl.String
         ),
     )
     lines = (
@@ -111,12 +111,12 @@ def played(
         layers += frame.put(rays, ends=True)
     layers += frame.put(vehicle, color=colour)
     title = alt.Title(
-        alt.expr(f"data('{DATA}')[{now}].told"), anchor="start", fontSize=13, fontWeight="normal"
+        alt.expr(f"data('{DATA}')[{now}].text"), anchor="start", fontSize=13, fontWeight="normal"
     )
     return layers.add_params(at).properties(title=title)
 
 
-def _told(step: dict[str, float | str | bool | None], began_s: float) -> str:
+def _text(step: dict[str, float | str | bool | None], began_s: float) -> str:
     """Returns the text of a step."""
     parts = []
     if step["searching"]:

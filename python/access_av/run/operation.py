@@ -72,8 +72,8 @@ class Operation:
 0.4 m. Otherwise the vehicle must slow down or stop. Causes: 30 % protection level above the alert \
 limit of 1 m, 8 % contradictions between radio heads, array and odometer.
         """
-        told = steps.filter(pl.col("integrity").is_not_null() | pl.col("searching"))
-        if told["integrity"].null_count() == told.height:
+        monitored = steps.filter(pl.col("integrity").is_not_null() | pl.col("searching"))
+        if monitored["integrity"].null_count() == monitored.height:
             return None
         ok = (pl.col("integrity") == "ok") & ~pl.col("searching")
         # The first cause that applies counts.
@@ -88,16 +88,16 @@ limit of 1 m, 8 % contradictions between radio heads, array and odometer.
             .then(pl.lit(Cause.TOO_WIDE.value))
             .otherwise(pl.lit(Cause.SUSPECTED.value))
         )
-        why = told.select(reason=reason)["reason"]
+        why = monitored.select(reason=reason)["reason"]
         counts = why.drop_nulls().value_counts().sort("count", "reason", descending=[True, False])
-        relied = told.filter(why.is_null())
+        relied = monitored.filter(why.is_null())
         level_m = relied["protection_level_m"].median()
         beyond = None
-        if "error_m" in told.columns:
+        if "error_m" in monitored.columns:
             beyond = int((relied["error_m"] > relied["protection_level_m"]).sum())
         return cls(
-            reliable=relied.height / told.height,
-            reasons={Cause(name): count / told.height for name, count in counts.iter_rows()},
+            reliable=relied.height / monitored.height,
+            reasons={Cause(name): count / monitored.height for name, count in counts.iter_rows()},
             level_m=float(level_m) if isinstance(level_m, float) else None,
             alert_limit_m=alert_limit_m,
             beyond=beyond,

@@ -113,10 +113,10 @@ def estimate_bursts(
             f"{path}: `annotations` is missing; it contains the positions of the bursts"
         )
     truths = stated_truths(recording, metadata)
-    told = spacing_wavelengths is not None
+    is_row = spacing_wavelengths is not None
     if spacing_wavelengths is None:
         spacing_wavelengths = stated_spacing(truths, metadata, recording.centre_frequency_hz)
-    places = None if told else stated_places(truths)
+    places = None if is_row else stated_places(truths)
     if spacing_wavelengths is None and places is None:
         raise InputError(f"{path}: the metadata contain no antenna spacing; give --spacing")
 

@@ -111,10 +111,10 @@ impl<const N: usize> Manifold<N> for MeasuredManifold<N> {
             let apart = TAU / self.columns as f64 * elevation_rad.cos();
             for column in 0..self.columns {
                 let here = &self.responses[row * self.columns + column];
-                let beside = &self.responses[row * self.columns + (column + 1) % self.columns];
+                let neighbour = &self.responses[row * self.columns + (column + 1) % self.columns];
                 // At the zenith, all azimuths are one direction.
                 if apart > 1e-3 {
-                    compare(here, beside, apart);
+                    compare(here, neighbour, apart);
                 }
                 if row + 1 < self.rows {
                     let above = &self.responses[(row + 1) * self.columns + column];

@@ -130,17 +130,17 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         let matrix = covariance.unscaled();
         let trace = covariance.power() * covariance.weight() * N as f64;
         let powers: Vec<f64> = self.grid.iter().map(|(_, a)| power(matrix, a)).collect();
-        let climb_from_best = |allowed: &dyn Fn(&Direction) -> bool| {
+        let ascend_from_best = |allowed: &dyn Fn(&Direction) -> bool| {
             let allowed = self
                 .grid
                 .iter()
                 .zip(&powers)
                 .filter(|(point, _)| allowed(&point.0));
             let best = allowed.max_by(|a, b| a.1.total_cmp(b.1))?;
-            Some(self.climb(matrix, trace, best.0.0))
+            Some(self.ascend(matrix, trace, best.0.0))
         };
-        let mut best = climb_from_best(&|_| true).ok_or(Error::Singular)?;
-        let mut other = climb_from_best(&|direction| best.is_far_from(direction));
+        let mut best = ascend_from_best(&|_| true).ok_or(Error::Singular)?;
+        let mut other = ascend_from_best(&|direction| best.is_far_from(direction));
         if let Some(other) = other.as_mut().filter(|other| other.beam > best.beam) {
             std::mem::swap(&mut best, other);
         }
@@ -232,7 +232,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
 
     /// Maximises the power by Fisher scoring: the step is the slope divided by the expected
     /// curvature, halved until the power increases.
-    pub(super) fn climb(&self, matrix: &Matrix<N>, trace: f64, start: Direction) -> Candidate<N> {
+    pub(super) fn ascend(&self, matrix: &Matrix<N>, trace: f64, start: Direction) -> Candidate<N> {
         let mut here = self.candidate(matrix, start);
         for _ in 0..STEPS {
             let mut step = self.scoring_step(matrix, trace, &here);
@@ -320,7 +320,7 @@ impl<const N: usize> Candidate<N> {
             let along = dot(response, &tangent) / power;
             std::array::from_fn(|n| tangent[n] - response[n] * along)
         });
-        residual::beside(matrix, response, &tangents[..parameters])
+        residual::of_response(matrix, response, &tangents[..parameters])
     }
 
     /// Whether the other direction is outside the main lobe, where the first-order expansion of the

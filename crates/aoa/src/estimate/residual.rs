@@ -95,7 +95,7 @@ impl<const W: usize> Residuals<W> {
 
 /// Returns the residual of a source with any response. The tangents are the derivatives with
 /// respect to the estimated parameters, orthogonal to the response.
-pub(super) fn beside<const N: usize>(
+pub(super) fn of_response<const N: usize>(
     matrix: &Matrix<N>,
     response: &[Complex64; N],
     tangents: &[[Complex64; N]],

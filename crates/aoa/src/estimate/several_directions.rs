@@ -26,22 +26,22 @@ const SETTLED_RAD: f64 = 1e-8;
 const FIRSTS: usize = 64;
 
 /// Response of an array orthogonal to the responses of other directions.
-struct Beside<'a, M, const N: usize> {
+struct ProjectedManifold<'a, M, const N: usize> {
     manifold: &'a M,
     /// Orthonormal basis of the responses of the other directions.
     others: List<[Complex64; N], N>,
 }
 
-impl<'a, M: Manifold<N>, const N: usize> Beside<'a, M, N> {
+impl<'a, M: Manifold<N>, const N: usize> ProjectedManifold<'a, M, N> {
     fn new(manifold: &'a M, directions: impl Iterator<Item = Direction>) -> Self {
-        let mut beside = Self {
+        let mut projected = Self {
             manifold,
             others: List::empty([Complex64::ZERO; N]),
         };
         for direction in directions {
-            beside.add(manifold.response(direction));
+            projected.add(manifold.response(direction));
         }
-        beside
+        projected
     }
 
     fn add(&mut self, response: [Complex64; N]) {
@@ -63,7 +63,7 @@ impl<'a, M: Manifold<N>, const N: usize> Beside<'a, M, N> {
     }
 
     /// Returns the response of unit length with the largest remaining power, and the power.
-    fn brightest<'g>(
+    fn strongest<'g>(
         &self,
         matrix: &Matrix<N>,
         grid: &'g [(Direction, [Complex64; N])],
@@ -78,7 +78,7 @@ impl<'a, M: Manifold<N>, const N: usize> Beside<'a, M, N> {
     }
 }
 
-impl<M: Manifold<N>, const N: usize> Manifold<N> for Beside<'_, M, N> {
+impl<M: Manifold<N>, const N: usize> Manifold<N> for ProjectedManifold<'_, M, N> {
     fn response(&self, direction: Direction) -> [Complex64; N] {
         self.left_of(self.manifold.response(direction))
     }
@@ -141,9 +141,10 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
             let mut moved = 0.0_f64;
             for k in 0..sources {
                 let others = (0..sources).filter(|other| *other != k);
-                let beside = Beside::new(self.manifold(), others.map(|other| directions[other]));
-                let finder = self.with_manifold(beside);
-                let found = finder.climb(matrix, trace, directions[k]).direction;
+                let projected =
+                    ProjectedManifold::new(self.manifold(), others.map(|other| directions[other]));
+                let finder = self.with_manifold(projected);
+                let found = finder.ascend(matrix, trace, directions[k]).direction;
                 let [x, y] = directions[k].step_to(&found);
                 moved = moved.max(x.hypot(y));
                 directions[k] = found;
@@ -164,15 +165,15 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         let grid = self.grid();
         let firsts = grid.iter().step_by(grid.len().div_ceil(FIRSTS).max(1));
         let sets = firsts.filter_map(|first| {
-            let mut beside = Beside::new(self.manifold(), std::iter::empty());
+            let mut projected = ProjectedManifold::new(self.manifold(), std::iter::empty());
             let mut explained = power(matrix, &first.1);
             let mut set = vec![first.0];
-            beside.add(first.1);
+            projected.add(first.1);
             while set.len() < sources {
-                let (beam, next) = beside.brightest(matrix, grid)?;
+                let (beam, next) = projected.strongest(matrix, grid)?;
                 explained += beam;
                 set.push(next.0);
-                beside.add(next.1);
+                projected.add(next.1);
             }
             Some((explained, set))
         });

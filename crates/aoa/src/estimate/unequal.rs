@@ -91,7 +91,7 @@ pub fn maximum_likelihood_pilots_unequal<const N: usize>(
     let response = std::array::from_fn(|n| steering[n] * whitening[n]);
     let centre = (0..N).map(|n| n as f64 * weights[n]).sum::<f64>() / total;
     let tangent = std::array::from_fn(|n| response[n] * Complex64::new(0.0, n as f64 - centre));
-    let left = residual::beside(&white, &response, &[tangent]);
+    let left = residual::of_response(&white, &response, &[tangent]);
     let model = Model {
         antennas: living as u8,
         ..Model::one::<N>(count, true)

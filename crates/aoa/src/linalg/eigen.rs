@@ -84,11 +84,11 @@ pub(crate) fn general_eigenvalues<const N: usize>(mut a: Matrix<N>, n: usize) ->
         while active >= 2 {
             let row = active - 1;
             let below: f64 = a[row][..row].iter().map(Complex64::norm_sqr).sum();
-            let beside: f64 = a[..active]
+            let total: f64 = a[..active]
                 .iter()
                 .map(|r| r[..active].iter().map(Complex64::norm_sqr).sum::<f64>())
                 .sum();
-            if below > f64::EPSILON * f64::EPSILON * beside {
+            if below > f64::EPSILON * f64::EPSILON * total {
                 break;
             }
             active -= 1;

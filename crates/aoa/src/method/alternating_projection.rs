@@ -217,14 +217,14 @@ pub(crate) fn phases<const N: usize>(matrix: &Matrix<N>, sources: usize) -> Opti
     }
     let mut phases = [0.0; N];
     for k in 0..sources {
-        phases[k] = Beam::beside(&phases[..k]).strongest(matrix);
+        phases[k] = Beam::with_nulls(&phases[..k]).strongest(matrix);
     }
     for _ in 0..ROUNDS {
         let mut moved = 0.0_f64;
         for k in 0..sources {
             let mut others = phases;
             others[k..sources].rotate_left(1);
-            let phase = Beam::beside(&others[..sources - 1]).strongest(matrix);
+            let phase = Beam::with_nulls(&others[..sources - 1]).strongest(matrix);
             moved = moved.max(wrap(phase - phases[k]).abs());
             phases[k] = phase;
         }
@@ -281,7 +281,7 @@ fn settle<const N: usize>(matrix: &Matrix<N>, phases: &mut [f64]) {
 struct Beam<const N: usize>(List<[Complex64; N], N>);
 
 impl<const N: usize> Beam<N> {
-    fn beside(phases: &[f64]) -> Self {
+    fn with_nulls(phases: &[f64]) -> Self {
         let mut beam = Self(List::empty([Complex64::ZERO; N]));
         for &phase in phases {
             let (left, power) = beam.left_of(phase);

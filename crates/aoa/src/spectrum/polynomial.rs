@@ -100,7 +100,7 @@ impl<const N: usize> Spectrum<N> {
                 // The end of the last interval is bit-identical to the start of the first one, so
                 // that no peak is lost or found twice.
                 let high = (phase(i), self.slope(phase(i % intervals)));
-                search.look_between(low, high, &mut peaks);
+                search.search_between(low, high, &mut peaks);
                 low = high;
             }
         }
@@ -141,7 +141,7 @@ struct PeakSearch<'a, const N: usize> {
 
 impl<const N: usize> PeakSearch<'_, N> {
     /// Adds the maxima between two electrical angles, each given with its slope.
-    fn look_between(&self, low: (f64, f64), high: (f64, f64), peaks: &mut List<(f64, f64), N>) {
+    fn search_between(&self, low: (f64, f64), high: (f64, f64), peaks: &mut List<(f64, f64), N>) {
         // Minimum distance of two extrema in rad.
         const CLOSEST_RAD: f64 = 1e-9;
         let (middle, half) = (0.5 * (low.0 + high.0), 0.5 * (high.0 - low.0));
@@ -157,8 +157,8 @@ impl<const N: usize> PeakSearch<'_, N> {
             }
             return;
         }
-        self.look_between(low, (middle, slope), peaks);
-        self.look_between((middle, slope), high, peaks);
+        self.search_between(low, (middle, slope), peaks);
+        self.search_between((middle, slope), high, peaks);
     }
 }
 

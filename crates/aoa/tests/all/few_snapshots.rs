@@ -97,7 +97,7 @@ const BEYOND_SHARE: f64 = 0.85;
 /// Number of conditions with these shares.
 fn check_row<const N: usize>(trials: usize) -> [usize; 2] {
     let mut random = Random::new(N as u64);
-    let mut judged = [0, 0];
+    let mut counts = [0, 0];
     let mut all = Errors::default();
     for count in [1, 2, 5, 10, 20] {
         for snr_db in [0.0, 5.0, 10.0, 20.0, 30.0] {
@@ -106,11 +106,11 @@ fn check_row<const N: usize>(trials: usize) -> [usize; 2] {
                 let trials = trials as f64;
                 errors.check_beyond(trials, &of);
                 if errors.count > RMS_SHARE * trials {
-                    judged[0] += 1;
+                    counts[0] += 1;
                     errors.check_rms(&of);
                 }
                 if errors.count > BEYOND_SHARE * trials {
-                    judged[1] += 1;
+                    counts[1] += 1;
                     errors.check_beyond(errors.count, &of);
                 }
                 all.count += errors.count;
@@ -120,23 +120,23 @@ fn check_row<const N: usize>(trials: usize) -> [usize; 2] {
         }
     }
     all.check(&format!("{N} antennas"));
-    judged
+    counts
 }
 
 #[test]
 fn errors_of_reliable_angles_follow_their_standard_deviation() {
     // Five numbers of snapshots, five SNRs, two estimators.
-    let judged = [
+    let counts = [
         check_row::<2>(4000),
         check_row::<3>(3000),
         check_row::<4>(3000),
         check_row::<8>(1500),
     ];
-    for (judged, least) in judged
+    for (counts, least) in counts
         .into_iter()
         .zip([[18, 14], [22, 16], [26, 18], [30, 24]])
     {
-        assert!(judged[0] >= least[0] && judged[1] >= least[1], "{judged:?}");
+        assert!(counts[0] >= least[0] && counts[1] >= least[1], "{counts:?}");
     }
 }
 

@@ -57,7 +57,7 @@ fn the_known_signal_bound_is_attained_and_reported() {
 fn weak_pilots_are_unresolved() {
     let array = Array::<4>::half_wavelength();
     let mut random = Random::new(22);
-    let (mut resolved, mut wrong, mut believed_noise) = (0, 0, 0);
+    let (mut resolved, mut wrong, mut nominal_noise) = (0, 0, 0);
     for _ in 0..4000 {
         let blocks = despread(&mut random, &array, 1.3, -24.0);
         let found = maximum_likelihood_pilots(&blocks, Some(1.0), &array).unwrap();
@@ -68,15 +68,15 @@ fn weak_pilots_are_unresolved() {
         }
         let noise = despread(&mut random, &array, 1.3, -90.0);
         let found = maximum_likelihood_pilots(&noise, Some(1.0), &array).unwrap();
-        believed_noise += usize::from(found.is_resolved());
+        nominal_noise += usize::from(found.is_resolved());
     }
     assert!(
         wrong * 50 <= resolved,
         "{wrong} of {resolved} resolved ones are wrong"
     );
     assert!(
-        believed_noise < 200,
-        "{believed_noise} of 4000 blocks of noise accepted"
+        nominal_noise < 200,
+        "{nominal_noise} of 4000 blocks of noise accepted"
     );
 }
 

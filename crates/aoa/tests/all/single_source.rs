@@ -348,10 +348,10 @@ fn verdicts_reject_unreliable_estimates() {
     };
     let trials = 2000;
     // Noise alone rarely resembles a source.
-    let believed = (0..trials)
+    let nominal = (0..trials)
         .filter(|_| of(&random.snapshots(&array, &[], 20)).is_resolved())
         .count();
-    assert!(believed < trials / 10, "{believed} of {trials}");
+    assert!(nominal < trials / 10, "{nominal} of {trials}");
     // In the threshold region, resolved estimates are correct.
     for snr_db in [-8.0, -5.0, -2.0, 0.0] {
         let (mut wrong, mut resolved) = (0, 0);

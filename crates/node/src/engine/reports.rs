@@ -71,12 +71,12 @@ impl Engine {
     pub(super) fn watch(&mut self, sources: &[Arc<SourceHealth>], silent_after: Duration) {
         for source in sources {
             let silent = source.silent_for();
-            let told = self.silent.contains(&source.name);
-            if silent >= silent_after && !told {
+            let is_reported = self.silent.contains(&source.name);
+            if silent >= silent_after && !is_reported {
                 self.silent.push(source.name);
                 let text = format!("no data has arrived for {:.1} s", silent.as_secs_f64());
                 self.event(Level::Warn, source.name, text);
-            } else if silent < silent_after && told {
+            } else if silent < silent_after && is_reported {
                 self.silent.retain(|it| *it != source.name);
                 self.event(Level::Info, source.name, "sends again".to_owned());
             }

@@ -35,19 +35,19 @@ impl Engine {
         }
         if self.pending.length() > 0 && !self.pending.continues_in(&block, self.rate_hz()) {
             self.receive(true)?;
-            self.publish_heard(Some(came))?;
+            self.publish_angles(Some(came))?;
         }
         self.pending.append(&block);
         inbox.give_back(block.antennas);
         if self.gate.wanted().is_none() && end_s - self.pending.time_s >= self.period_s {
             self.receive(false)?;
-            self.publish_heard(Some(came))?;
+            self.publish_angles(Some(came))?;
             self.sleep_until_next(end_s)?;
             if self.gate.wanted().is_some() {
                 // Flush the receiver's delayed SSBs; otherwise they are processed with the next
                 // window.
                 self.receive(true)?;
-                self.publish_heard(Some(came))?;
+                self.publish_angles(Some(came))?;
             }
         }
         Ok(())

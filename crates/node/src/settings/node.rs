@@ -119,7 +119,7 @@ impl NodeSettings {
 
     /// Makes the input paths relative to the folder of `origin`.
     #[must_use]
-    pub fn beside(mut self, origin: &str) -> Self {
+    pub fn relative_to(mut self, origin: &str) -> Self {
         let folder = Path::new(origin).parent().unwrap_or(Path::new(""));
         let place = |name: &mut String| *name = folder.join(&*name).display().to_string();
         if let Some(SampleSource::Sigmf { recording, .. }) = &mut self.samples {
@@ -147,9 +147,10 @@ impl TomlFile for NodeSettings {
     }
 
     fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
-        let hears = self.samples.is_some() || self.angles.is_some() || !self.messages.is_empty();
+        let has_radio =
+            self.samples.is_some() || self.angles.is_some() || !self.messages.is_empty();
         check.that(
-            hears,
+            has_radio,
             "samples",
             "missing",
             "add [samples], [angles], or messages with angles",

@@ -13,7 +13,7 @@ use recording::mcap::{DiagnosticLevel, DiagnosticStatus, Frames, NoSeek, Twist};
 
 use super::file::{GrowingFile, Tail, files_of, free_mb, keep_newest};
 use super::output::Sink;
-use super::record::{By, PoseRecord, Record};
+use super::record::{PoseCause, PoseRecord, Record};
 use crate::health::{OutputStatus, failures_text};
 use crate::inbox::Level;
 use crate::settings::McapOutput;
@@ -244,7 +244,7 @@ impl Sink for Mcap {
 
     fn take(&mut self, record: &Record) -> Result<bool> {
         match record {
-            Record::Pose(pose) if pose.by == By::Odometry => self.pose(pose),
+            Record::Pose(pose) if pose.by == PoseCause::Odometry => self.pose(pose),
             Record::Pose(_) => Ok(false),
             Record::Verdict(outcome) => {
                 let ssb = outcome.angle_result.ssb;

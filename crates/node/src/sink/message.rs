@@ -2,14 +2,14 @@
 
 use std::fmt::Write;
 
-use onboard::live::{HeadStatus, LiveEnergy, Outcome, State, Status};
+use onboard::live::{AngleRecord, HeadStatus, LiveEnergy, State, Status};
 use onboard::localize::SelectedHypothesis;
 use onboard::monitor::ActiveFault;
 use schemars::{JsonSchema, SchemaGenerator};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::record::{By, PoseRecord, Record};
+use super::record::{PoseCause, PoseRecord, Record};
 use super::vda5050::VdaPosition;
 use crate::health::OutputStatus;
 use crate::inbox::Level;
@@ -137,7 +137,7 @@ pub struct PoseMessage {
     #[schemars(extend("const" = "pose"))]
     pub kind: &'static str,
     /// Cause of the pose.
-    pub by: By,
+    pub by: PoseCause,
     /// Pose, state and reason.
     #[serde(flatten)]
     pub pose: PoseFields,
@@ -177,8 +177,8 @@ pub struct VerdictMessage {
     pub residual_rad: Option<f64>,
 }
 
-impl From<&Outcome> for VerdictMessage {
-    fn from(outcome: &Outcome) -> Self {
+impl From<&AngleRecord> for VerdictMessage {
+    fn from(outcome: &AngleRecord) -> Self {
         let (angle_result, verdict) = (&outcome.angle_result, &outcome.angle_result.verdict);
         Self {
             kind: "verdict",
@@ -236,7 +236,7 @@ pub struct HeadMessage {
     pub residual_rad: Option<f64>,
     /// Age of the last received SSB in seconds; null before the first.
     #[schemars(range(min = 0.0))]
-    pub heard_age_s: Option<f64>,
+    pub angle_age_s: Option<f64>,
     /// Age of the last accepted angle in seconds; null before the first.
     #[schemars(range(min = 0.0))]
     pub accepted_age_s: Option<f64>,
@@ -259,7 +259,7 @@ impl HeadMessage {
             ssb_index: status.head.ssb_index,
             snr_db: status.snr_db,
             residual_rad: status.residual_rad,
-            heard_age_s: age_s(status.last_heard_s),
+            angle_age_s: age_s(status.last_angle_s),
             accepted_age_s: age_s(status.last_accepted_s),
             accepted: status.accepted,
             refused: status.refused,

@@ -16,6 +16,6 @@ mod vda5050;
 pub use distributor::{Distributor, Lane};
 pub use message::{EnergyMessage, HeadMessage, Message, PoseFields, reference, schema};
 pub use output::Sink;
-pub use record::{By, PoseRecord, Record};
+pub use record::{PoseCause, PoseRecord, Record};
 pub use runner::{Running, sinks, start};
 pub use vda5050::{Localized, VdaPosition, position};

@@ -47,7 +47,7 @@ pub struct Mqtt {
     /// Newest pose; the origin of the map before the first one.
     pose: Pose,
     /// Whether the last published message said that the vehicle is localized.
-    said_localized: bool,
+    reported_localized: bool,
     last_record: Instant,
 }
 
@@ -61,7 +61,7 @@ impl Mqtt {
             localized: Localized::new(settings, alert_limit_m),
             last_s: f64::NEG_INFINITY,
             pose: Pose::default(),
-            said_localized: false,
+            reported_localized: false,
             last_record: Instant::now(),
         }
     }
@@ -115,7 +115,7 @@ impl Sink for Mqtt {
             Record::Status { status, .. } => status,
             _ => return Ok(false),
         };
-        let localized = self.localized.judge(status);
+        let localized = self.localized.is_localized(status);
         let Some(pose) = status.pose else {
             return Ok(false);
         };
@@ -123,7 +123,7 @@ impl Sink for Mqtt {
         let elapsed_s = status.time_s - self.last_s;
         let is_early = (0.0..0.99 / self.settings.rate_hz).contains(&elapsed_s);
         // The end of localization is published at once.
-        let ends = self.said_localized && !localized;
+        let ends = self.reported_localized && !localized;
         if is_early && !ends {
             return Ok(false);
         }
@@ -137,7 +137,7 @@ impl Sink for Mqtt {
             .client
             .try_publish(topic, QoS::AtMostOnce, false, payload);
         if sent.is_ok() {
-            (self.last_s, self.said_localized) = (status.time_s, localized);
+            (self.last_s, self.reported_localized) = (status.time_s, localized);
         }
         Ok(sent.is_ok())
     }
@@ -154,13 +154,13 @@ impl Sink for Mqtt {
         if link.thread.is_finished() {
             bail!("{}: the connection has ended", self.named());
         }
-        if self.said_localized && self.last_record.elapsed() > SILENCE {
+        if self.reported_localized && self.last_record.elapsed() > SILENCE {
             let payload = self.not_localized()?;
             let topic = &self.settings.topic;
             let sent = link
                 .client
                 .try_publish(topic, QoS::AtMostOnce, false, payload);
-            self.said_localized = sent.is_err();
+            self.reported_localized = sent.is_err();
             self.localized.reset();
         }
         Ok(true)
@@ -169,7 +169,7 @@ impl Sink for Mqtt {
     fn abandon(&mut self) {
         // Without its client, the network thread closes the connection, and the broker publishes the last will.
         self.link = None;
-        self.said_localized = false;
+        self.reported_localized = false;
         self.localized.reset();
     }
 

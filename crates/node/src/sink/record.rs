@@ -1,6 +1,6 @@
 //! Records: the results of the drive that the pipeline gives to the outputs.
 
-use onboard::live::{HeadStatus, LiveEnergy, Outcome, Status};
+use onboard::live::{AngleRecord, HeadStatus, LiveEnergy, Status};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -10,7 +10,7 @@ use crate::inbox::Level;
 /// Cause of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum By {
+pub enum PoseCause {
     /// An odometry sample; there is one pose for each.
     Odometry,
     /// The angles of a burst.
@@ -23,7 +23,7 @@ pub struct PoseRecord {
     /// State, pose and covariance.
     pub status: Status,
     /// Cause of the pose.
-    pub by: By,
+    pub by: PoseCause,
 }
 
 /// A record for the outputs.
@@ -32,7 +32,7 @@ pub enum Record {
     /// A pose.
     Pose(PoseRecord),
     /// The result of an angle.
-    Verdict(Outcome),
+    Verdict(AngleRecord),
     /// State of the whole node, once a second.
     Status {
         /// State, pose and reason.

@@ -9,7 +9,7 @@ use recording::{TimedPose, tum_text};
 
 use super::file::GrowingFile;
 use super::output::Sink;
-use super::record::{By, PoseRecord, Record};
+use super::record::{PoseCause, PoseRecord, Record};
 
 /// A TUM trajectory.
 pub struct Tum {
@@ -41,7 +41,7 @@ impl Sink for Tum {
         // No pose is written while the first pose is searched for.
         if let Record::Pose(PoseRecord {
             status,
-            by: By::Odometry,
+            by: PoseCause::Odometry,
         }) = record
             && let Some(pose) = status.pose
             && !matches!(status.state, State::Waiting | State::Searching)

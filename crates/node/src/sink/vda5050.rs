@@ -31,7 +31,7 @@ impl Localized {
     }
 
     /// Returns whether the vehicle is localized, given its newest status.
-    pub fn judge(&mut self, status: &Status) -> bool {
+    pub fn is_localized(&mut self, status: &Status) -> bool {
         let level_m = status.protection_level_m;
         let is_within = level_m.is_some_and(|it| it <= self.alert_limit_m);
         let is_valid = match status.state {
@@ -206,12 +206,13 @@ mod tests {
     #[test]
     fn a_vehicle_is_localized_after_a_while_and_never_above_the_alert_limit() {
         let mut localized = Localized::new(&settings(), 1.5);
-        let mut judge = |state, level_m, time_s| localized.judge(&status(state, level_m, time_s));
-        assert!(!judge(State::Ok, Some(0.5), 0.0));
-        assert!(!judge(State::Lost, None, 1.0));
-        assert!(!judge(State::Ok, Some(0.5), 1.5));
-        assert!(!judge(State::Degraded, Some(1.5), 3.4));
-        assert!(judge(State::Ok, Some(0.5), 3.5));
+        let mut is_localized =
+            |state, level_m, time_s| localized.is_localized(&status(state, level_m, time_s));
+        assert!(!is_localized(State::Ok, Some(0.5), 0.0));
+        assert!(!is_localized(State::Lost, None, 1.0));
+        assert!(!is_localized(State::Ok, Some(0.5), 1.5));
+        assert!(!is_localized(State::Degraded, Some(1.5), 3.4));
+        assert!(is_localized(State::Ok, Some(0.5), 3.5));
         // One status above the alert limit, or unavailable, ends it at once.
         for (state, level_m) in [
             (State::Degraded, Some(1.51)),
@@ -223,14 +224,14 @@ mod tests {
             (State::Lost, Some(0.5)),
             (State::Searching, Some(0.5)),
         ] {
-            assert!(!judge(state, level_m, 6.0), "{state:?} {level_m:?}");
-            assert!(!judge(State::Ok, Some(0.5), 6.0));
-            assert!(judge(State::Ok, Some(0.5), 8.0));
+            assert!(!is_localized(state, level_m, 6.0), "{state:?} {level_m:?}");
+            assert!(!is_localized(State::Ok, Some(0.5), 6.0));
+            assert!(is_localized(State::Ok, Some(0.5), 8.0));
         }
         // A drive whose time goes back begins again.
-        assert!(!judge(State::Ok, Some(0.5), 1.0));
-        assert!(!judge(State::Unmonitored, None, 2.9));
-        assert!(judge(State::Unmonitored, None, 3.0));
+        assert!(!is_localized(State::Ok, Some(0.5), 1.0));
+        assert!(!is_localized(State::Unmonitored, None, 2.9));
+        assert!(is_localized(State::Unmonitored, None, 3.0));
     }
 
     #[test]

@@ -34,19 +34,19 @@ pub fn read(
     mut take: impl FnMut(Event<'_>),
 ) {
     let remark = |text: String| inbox.put(Input::warning(source, text));
-    let mut said = String::new();
+    let mut last_text = String::new();
     let mut opener = Opener::default();
     while !inbox.is_closed() {
         match opener.open(address) {
             Ok(Some(mut stream)) => {
-                if !said.is_empty() {
+                if !last_text.is_empty() {
                     let (level, text) = (Level::Info, format!("{address}: connected"));
                     inbox.put(Input::Remark {
                         level,
                         source,
                         text,
                     });
-                    said.clear();
+                    last_text.clear();
                 }
                 take(Event::Begin);
                 let ended = drain(&mut *stream, inbox, &mut take);
@@ -59,14 +59,14 @@ pub fn read(
                     break;
                 }
                 remark(text.clone());
-                said = text;
+                last_text = text;
             }
             Ok(None) => {} // no client has connected yet
             Err(error) => {
                 let text = format!("{address}: {error}");
-                if text != said {
+                if text != last_text {
                     remark(text.clone());
-                    said = text;
+                    last_text = text;
                 }
                 if matches!(address, Address::File(_)) {
                     break;

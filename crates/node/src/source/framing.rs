@@ -15,7 +15,7 @@ use crate::statistics::SourceHealth;
 const MOST_FRAMES: usize = 1 << 15;
 /// Interval in seconds at which dropped samples before a window are reported; the pipeline is idle
 /// then.
-const SAID_S: f64 = 0.02;
+const REPORT_INTERVAL_S: f64 = 0.02;
 
 impl SampleFormat {
     /// Returns the number of bytes of one complex sample.
@@ -71,9 +71,9 @@ pub struct Framing {
     gate: Arc<RxWindow>,
     inbox: Arc<Inbox>,
     health: Arc<SourceHealth>,
-    told_of_defects: bool,
+    defects_reported: bool,
     /// Time up to which dropped samples were reported last.
-    said_s: f64,
+    reported_s: f64,
     /// Bytes of an incomplete frame (one sample of all channels).
     begun: Vec<u8>,
 }
@@ -105,8 +105,8 @@ impl Framing {
             gate,
             inbox,
             health,
-            told_of_defects: false,
-            said_s: f64::NEG_INFINITY,
+            defects_reported: false,
+            reported_s: f64::NEG_INFINITY,
             begun: Vec::new(),
         }
     }
@@ -125,7 +125,7 @@ impl Framing {
     pub fn restart(&mut self) {
         self.begun.clear();
         self.counted = 0;
-        self.said_s = f64::NEG_INFINITY;
+        self.reported_s = f64::NEG_INFINITY;
         if let Times::Arrival(clock) = &mut self.clock {
             *clock = ArrivalClock::new(self.rate_hz);
         }
@@ -182,7 +182,7 @@ impl Framing {
 
     /// Returns the number of next samples per channel that need not be processed immediately,
     /// because a window is given to the pipeline at its end.
-    pub fn unhurried(&self) -> usize {
+    pub fn deferrable(&self) -> usize {
         self.up_to(|[_, until_s]| until_s)
     }
 
@@ -268,8 +268,9 @@ impl Framing {
     /// Reports the time up to which samples were dropped: when a window is over, and at intervals.
     fn slept(&mut self, until_s: f64) {
         let is_over = |[_, end_s]: [f64; 2]| until_s >= end_s;
-        if until_s - self.said_s >= SAID_S || self.gate.wanted().is_none_or(is_over) {
-            self.said_s = until_s;
+        if until_s - self.reported_s >= REPORT_INTERVAL_S || self.gate.wanted().is_none_or(is_over)
+        {
+            self.reported_s = until_s;
             self.inbox.put(Input::Slept(until_s));
         }
     }
@@ -322,7 +323,7 @@ impl Framing {
         }
         if !all_numbers {
             self.health.defect();
-            if !std::mem::replace(&mut self.told_of_defects, true) {
+            if !std::mem::replace(&mut self.defects_reported, true) {
                 let text =
                     "samples that are not finite were set to 0; check samples.format".to_owned();
                 let source = self.health.name;
@@ -432,28 +433,28 @@ mod tests {
     #[test]
     fn dropped_samples_are_counted_and_reported_at_the_end_of_a_window() {
         let mut framing = framing(SampleFormat::Ci8, &[0]);
-        assert_eq!([framing.unwanted(), framing.unhurried()], [0, 0]);
+        assert_eq!([framing.unwanted(), framing.deferrable()], [0, 0]);
         framing.gate.set([5.0 + 100.5e-6, 5.0 + 300.5e-6]);
-        assert_eq!([framing.unwanted(), framing.unhurried()], [100, 300]);
+        assert_eq!([framing.unwanted(), framing.deferrable()], [100, 300]);
         framing.pass_over(60);
         framing.pass_over(30);
-        assert_eq!([framing.unwanted(), framing.unhurried()], [10, 210]);
+        assert_eq!([framing.unwanted(), framing.deferrable()], [10, 210]);
         framing.interleaved(&[1; 2 * 210]);
-        assert_eq!([framing.unwanted(), framing.unhurried()], [0, 0]);
+        assert_eq!([framing.unwanted(), framing.deferrable()], [0, 0]);
         framing.pass_over(10);
         assert_eq!(framing.unwanted(), MOST_FRAMES);
         // Expected inputs: the first report, the report before the window, the required samples,
         // and the end of the window.
-        let told: Vec<f64> = std::iter::from_fn(|| framing.inbox.take(Duration::ZERO))
+        let times_s: Vec<f64> = std::iter::from_fn(|| framing.inbox.take(Duration::ZERO))
             .map(|(_, input)| match input {
                 Input::Slept(until_s) => until_s,
                 Input::Samples(block) => block.time_s,
                 other => panic!("{other:?}"),
             })
             .collect();
-        for (told_s, expected) in told.iter().zip([60.0, 100.0, 310.0]) {
-            assert!((told_s - 5.0 - 1e-6 * expected).abs() < 2e-6, "{told:?}");
+        for (time_s, expected) in times_s.iter().zip([60.0, 100.0, 310.0]) {
+            assert!((time_s - 5.0 - 1e-6 * expected).abs() < 2e-6, "{times_s:?}");
         }
-        assert_eq!(told.len(), 3);
+        assert_eq!(times_s.len(), 3);
     }
 }

@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn invalid_lines_are_reported_with_their_error() {
-        for (line, said) in [
+        for (line, expected) in [
             ("{", "EOF"),
             ("[1]", "type"),
             (r#"{"type":"odometer"}"#, "odometry"),
@@ -267,7 +267,7 @@ mod tests {
             ),
         ] {
             let error = parse(line.as_bytes()).unwrap_err();
-            assert!(error.contains(said), "{line}: {error}");
+            assert!(error.contains(expected), "{line}: {error}");
         }
     }
 }

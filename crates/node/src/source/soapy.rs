@@ -20,13 +20,13 @@ const RETRY: Duration = Duration::from_secs(1);
 
 /// Receives until the node stops; a radio that fails is opened again.
 pub fn run(radio: &Radio, mut framing: Framing, gate: &Arc<RxWindow>, inbox: &Inbox) {
-    let mut said = String::new();
+    let mut last_text = String::new();
     while !inbox.is_closed() {
         if let Err(error) = session(radio, &mut framing, gate, inbox) {
             let text = format!("samples.device is {:?}: {error}", radio.device);
-            if text != said {
+            if text != last_text {
                 inbox.put(Input::warning("samples", text.clone()));
-                said = text;
+                last_text = text;
             }
             thread::sleep(RETRY);
         }
@@ -37,11 +37,11 @@ fn open(radio: &Radio) -> Result<RxStream<Complex32>, Error> {
     let device = Device::new(radio.device.as_str())?;
     let channels: Vec<usize> = (0..radio.stream.antennas.len()).collect();
     for &channel in &channels {
-        let way = Direction::Rx;
-        device.set_sample_rate(way, channel, radio.stream.rate_msps * 1e6)?;
-        device.set_frequency(way, channel, radio.stream.centre_mhz * 1e6, ())?;
+        let direction = Direction::Rx;
+        device.set_sample_rate(direction, channel, radio.stream.rate_msps * 1e6)?;
+        device.set_frequency(direction, channel, radio.stream.centre_mhz * 1e6, ())?;
         if let Some(gain_db) = radio.gain_db {
-            device.set_gain(way, channel, gain_db)?;
+            device.set_gain(direction, channel, gain_db)?;
         }
     }
     device.rx_stream(&channels)
@@ -70,10 +70,10 @@ fn session(
             }
             Err(error) => return Err(error),
         };
-        let told_s = stream.time_ns() as f64 * 1e-9;
+        let stream_s = stream.time_ns() as f64 * 1e-9;
         let now_s = unix_s();
-        let time_s = if told_s > 0.0 {
-            told_s + *zero_s.get_or_insert(now_s - count as f64 / rate_hz - told_s)
+        let time_s = if stream_s > 0.0 {
+            stream_s + *zero_s.get_or_insert(now_s - count as f64 / rate_hz - stream_s)
         } else {
             counted.block(count, now_s).0
         };

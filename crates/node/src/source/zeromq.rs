@@ -35,14 +35,14 @@ struct Channel {
 
 /// Requests samples until the node stops; if one transmitter fails, all connections are reopened.
 pub fn run(endpoints: &[Address], mut framing: Framing, inbox: &Inbox) {
-    let mut said = String::new();
+    let mut last_text = String::new();
     while !inbox.is_closed() {
         framing.restart();
         let (error, received) = session(endpoints, &mut framing, inbox);
         let text = error.to_string();
-        if received || text != said {
+        if received || text != last_text {
             inbox.put(Input::warning("samples", text.clone()));
-            said = text;
+            last_text = text;
         }
         std::thread::sleep(RETRY);
     }
@@ -97,8 +97,8 @@ fn open(endpoint: &Address) -> io::Result<Channel> {
 /// without a pause.
 fn rest(channels: &[Channel], framing: &Framing) {
     let answer = channels.iter().map(|it| it.last).min().unwrap_or(0);
-    let unhurried = framing.unhurried() * framing.sample_bytes();
-    let rest_s = framing.duration_s(unhurried.saturating_sub(answer).min(AT_ONCE * answer));
+    let deferrable = framing.deferrable() * framing.sample_bytes();
+    let rest_s = framing.duration_s(deferrable.saturating_sub(answer).min(AT_ONCE * answer));
     let rest = Duration::try_from_secs_f64(rest_s).unwrap_or_default();
     std::thread::sleep(rest.min(LONGEST_REST));
 }

@@ -30,8 +30,8 @@ pub fn greet(stream: &mut (impl Read + Write)) -> io::Result<()> {
         }
     }
     stream.write_all(&greeting)?;
-    let mut theirs = [0_u8; 64];
-    read_exact(stream, &mut theirs)?;
+    let mut greeting = [0_u8; 64];
+    read_exact(stream, &mut greeting)?;
     let [
         0xff,
         _,
@@ -46,7 +46,7 @@ pub fn greet(stream: &mut (impl Read + Write)) -> io::Result<()> {
         version,
         _,
         mechanism @ ..,
-    ] = &theirs
+    ] = &greeting
     else {
         return Err(invalid("the peer is not ZeroMQ"));
     };
@@ -251,15 +251,15 @@ mod tests {
     fn answers_of_one_frame_or_several_are_read() {
         let mut samples = Vec::new();
         let long = [&[LONG, 0, 0, 0, 0, 0, 0, 1, 0][..], &[7; 256]].concat();
-        let told = [&[MORE, 0][..], &long, &[MORE, 0, MORE, 2, 1, 2, 0, 1, 3]].concat();
-        let mut peer = Peer(&told);
+        let bytes = [&[MORE, 0][..], &long, &[MORE, 0, MORE, 2, 1, 2, 0, 1, 3]].concat();
+        let mut peer = Peer(&bytes);
         assert_eq!(answer(&mut peer, &mut samples, |_| true).unwrap(), 0);
         assert_eq!(samples, [7; 256]);
         assert_eq!(answer(&mut peer, &mut samples, |_| true).unwrap(), 0);
         assert_eq!(samples[256..], [1, 2, 3]);
         assert!(answer(&mut peer, &mut samples, |_| true).is_err());
         // A single frame can be dropped; of several frames, the first are not the whole answer.
-        let mut peer = Peer(&told);
+        let mut peer = Peer(&bytes);
         samples.clear();
         assert_eq!(
             answer(&mut peer, &mut samples, |it| it != 256).unwrap(),
@@ -279,7 +279,7 @@ mod tests {
             &[0; 10],
         ]
         .concat();
-        for told in [
+        for bytes in [
             &endless[..],
             &cut,
             &[0, 3, 1, 2, 3],
@@ -289,13 +289,13 @@ mod tests {
         ] {
             let mut samples = Vec::new();
             assert!(
-                answer(&mut Peer(told), &mut samples, |_| true).is_err(),
-                "{told:?}"
+                answer(&mut Peer(bytes), &mut samples, |_| true).is_err(),
+                "{bytes:?}"
             );
             assert!(samples.capacity() <= 2 << 16);
             assert!(
-                answer(&mut Peer(told), &mut samples, |_| false).is_err(),
-                "{told:?}"
+                answer(&mut Peer(bytes), &mut samples, |_| false).is_err(),
+                "{bytes:?}"
             );
         }
     }
@@ -313,12 +313,12 @@ mod tests {
             [&greeting[..], &[COMMAND, body.len() as u8], &body].concat()
         };
         assert!(greet(&mut Peer(&ready(b"REP"))).is_ok());
-        for told in [
+        for reply in [
             ready(b"PUB"),
             b"HTTP/1.1 200 OK\r\n".to_vec().repeat(8),
             greeting.to_vec(),
         ] {
-            assert!(greet(&mut Peer(&told)).is_err());
+            assert!(greet(&mut Peer(&reply)).is_err());
         }
     }
 }

@@ -70,9 +70,9 @@ impl Node {
         }
     }
 
-    pub fn until_event(&mut self, source: &str, said: &str) -> Value {
+    pub fn until_event(&mut self, source: &str, text: &str) -> Value {
         let is_it = |it: &Value| {
-            it["source"] == source && it["text"].as_str().is_some_and(|it| it.contains(said))
+            it["source"] == source && it["text"].as_str().is_some_and(|it| it.contains(text))
         };
         self.until(is_it)
     }

@@ -52,7 +52,7 @@ const TO_LAST: isize = 86;
 const RING: usize = TO_LAST as usize + 2;
 /// Number of samples on either side of the window into which most of a segment leaks, because it is
 /// limited to 48 subcarriers, ...
-const BESIDE: usize = 3;
+const NEIGHBOURS: usize = 3;
 /// ... up to 0.6 % of its energy. With 48 times this fraction of the neighbouring energy added to
 /// that of the window, a strong signal next to a silent window has a statistic of one at most.
 const LEAK: f32 = 0.29;
@@ -233,10 +233,10 @@ impl SegmentFilter {
         let far = FAR_LEAK * powers.iter().sum::<f32>();
         let mut energy: f64 = powers[..WIDTH].iter().map(|it| f64::from(*it)).sum();
         for (n, slot) in self.inverse_energy.iter_mut().enumerate() {
-            let beside: f32 = (0..BESIDE)
+            let neighbours: f32 = (0..NEIGHBOURS)
                 .map(|i| powers[(n + NARROW - 1 - i) % NARROW] + powers[(n + WIDTH + i) % NARROW])
                 .sum();
-            let all = energy as f32 + LEAK * beside;
+            let all = energy as f32 + LEAK * neighbours;
             // Converts the sum over samples of the inverse transform to samples at the base rate.
             let scale = WIDTH as f32 / STEP as f32;
             *slot = if all > far.max(f32::MIN_POSITIVE) {

@@ -67,11 +67,11 @@ pub(crate) fn refine_combined(rows: &[[Complex32; SUBCARRIERS]], near: f64) -> f
 
 /// Returns Σ a, in two strands.
 fn total<const N: usize>(a: &[Complex32; N]) -> Complex32 {
-    let mut strands = [Complex32::ZERO; 2];
+    let mut sums = [Complex32::ZERO; 2];
     for (i, z) in a.iter().enumerate() {
-        strands[i % 2] += z;
+        sums[i % 2] += z;
     }
-    strands[0] + strands[1]
+    sums[0] + sums[1]
 }
 
 /// Returns `exp(j2πk'τ/256)`, which removes a delay of τ samples from the subcarriers.

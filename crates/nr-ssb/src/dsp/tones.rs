@@ -524,7 +524,7 @@ mod tests {
         let mut canceller = ToneCanceller::new(2);
         canceller.detect(&clean, 0);
         assert!(!canceller.is_needed());
-        let told = [
+        let tones = [
             (0.0, 10.0_f32),
             (0.1234567, 1.0),
             (-0.3, 0.3),
@@ -532,14 +532,14 @@ mod tests {
         ];
         let mut disturbed = clean.clone();
         for samples in &mut disturbed {
-            for (cycles, amplitude) in told {
+            for (cycles, amplitude) in tones {
                 add_tone(samples, cycles, amplitude);
             }
         }
         canceller.detect(&disturbed, 0);
         let found: Vec<_> = canceller.tones(1.0).collect();
-        assert_eq!(found.len(), told.len(), "{found:?}");
-        for (cycles, amplitude) in told {
+        assert_eq!(found.len(), tones.len(), "{found:?}");
+        for (cycles, amplitude) in tones {
             let of = |tone: &&Tone| (tone.frequency_hz - cycles).abs() < 1e-5;
             let tone = found.iter().find(of).unwrap();
             let expected = 20.0 * f64::from(amplitude).log10();
@@ -568,17 +568,17 @@ mod tests {
         samples[..16_384].fill(Complex32::ZERO);
         planner.plan_fft_inverse(32_768).process(&mut samples);
         let mut samples: Vec<_> = samples.iter().map(|x| x / 32_768.0).collect();
-        let told = [0.2123, 0.4761];
-        for cycles in told {
+        let true_cycles = [0.2123, 0.4761];
+        for cycles in true_cycles {
             add_tone(&mut samples, cycles, 3.0);
         }
         let mut canceller = ToneCanceller::new(1);
         canceller.detect(&[&samples[..]], 0);
         let mut found: Vec<_> = canceller.tones(1.0).map(|it| it.frequency_hz).collect();
         found.sort_by(f64::total_cmp);
-        assert_eq!(found.len(), told.len(), "{found:?}");
-        for (found, told) in found.iter().zip(told) {
-            assert!((found - told).abs() < 1e-6, "{found} {told}");
+        assert_eq!(found.len(), true_cycles.len(), "{found:?}");
+        for (found, true_cycles) in found.iter().zip(true_cycles) {
+            assert!((found - true_cycles).abs() < 1e-6, "{found} {true_cycles}");
         }
     }
 

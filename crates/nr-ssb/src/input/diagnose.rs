@@ -82,8 +82,9 @@ pub fn diagnose(channels: &[&[Complex32]]) -> Vec<ChannelDiagnosis> {
             if share > CLIPPED_SHARE {
                 faults.push(Fault::Clipped { share });
             }
-            let twin = |other: &&[Complex32]| correlation(samples, other) > DUPLICATE_CORRELATION;
-            if let Some(of) = channels[..index].iter().position(twin) {
+            let duplicate =
+                |other: &&[Complex32]| correlation(samples, other) > DUPLICATE_CORRELATION;
+            if let Some(of) = channels[..index].iter().position(duplicate) {
                 faults.push(Fault::Duplicate { of });
             }
         }
@@ -158,11 +159,11 @@ mod tests {
             .iter()
             .map(|x| Complex32::new(limit(x.re), limit(x.im)))
             .collect();
-        let twin: Vec<_> = healthy
+        let duplicate: Vec<_> = healthy
             .iter()
             .map(|x| x * Complex32::new(0.0, 2.0))
             .collect();
-        let found = diagnose(&[&healthy, &broken, &silent, &weak, &clipped, &twin]);
+        let found = diagnose(&[&healthy, &broken, &silent, &weak, &clipped, &duplicate]);
         assert!(found[0].is_healthy(), "{found:?}");
         assert_eq!(found[1].faults, [Fault::NotFinite { samples: 1 }]);
         assert_eq!(found[2].faults, [Fault::Silent]);

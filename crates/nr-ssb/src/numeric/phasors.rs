@@ -13,12 +13,12 @@ pub(crate) fn wrap(angle_rad: f64) -> f64 {
 /// recursion has four interleaved strands in double precision, which hides its latency and keeps
 /// its error below 1e-12.
 pub(crate) fn fill_phasors(phasors: &mut [Complex32], first: f64, step: f64) {
-    const STRANDS: usize = 4;
-    let stride = Complex64::cis(TAU * step * STRANDS as f64);
-    let mut strands: [Complex64; STRANDS] =
-        std::array::from_fn(|strand| Complex64::cis(TAU * (first + step * strand as f64)));
-    for chunk in phasors.chunks_mut(STRANDS) {
-        for (slot, phasor) in chunk.iter_mut().zip(&mut strands) {
+    const LANES: usize = 4;
+    let stride = Complex64::cis(TAU * step * LANES as f64);
+    let mut lanes: [Complex64; LANES] =
+        std::array::from_fn(|lane| Complex64::cis(TAU * (first + step * lane as f64)));
+    for chunk in phasors.chunks_mut(LANES) {
+        for (slot, phasor) in chunk.iter_mut().zip(&mut lanes) {
             *slot = Complex32::new(phasor.re as f32, phasor.im as f32);
             *phasor = Complex64::new(
                 phasor.re * stride.re - phasor.im * stride.im,

@@ -3,19 +3,19 @@
 
 use num_complex::Complex32;
 
-const STRANDS: usize = 8;
+const LANES: usize = 8;
 
 /// Returns Σ a b.
 pub(crate) fn inner_product<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
-    let (a_chunks, a_rest) = a.as_chunks::<STRANDS>();
-    let (b_chunks, b_rest) = b.as_chunks::<STRANDS>();
-    let mut strands = [0.0_f32; STRANDS];
+    let (a_chunks, a_rest) = a.as_chunks::<LANES>();
+    let (b_chunks, b_rest) = b.as_chunks::<LANES>();
+    let mut lanes = [0.0_f32; LANES];
     for (x, y) in a_chunks.iter().zip(b_chunks) {
-        for i in 0..STRANDS {
-            strands[i] += x[i] * y[i];
+        for i in 0..LANES {
+            lanes[i] += x[i] * y[i];
         }
     }
-    let mut sum: f32 = strands.iter().sum();
+    let mut sum: f32 = lanes.iter().sum();
     for (x, y) in a_rest.iter().zip(b_rest) {
         sum += x * y;
     }
@@ -24,22 +24,22 @@ pub(crate) fn inner_product<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
 
 /// Returns Σ a b without conjugation.
 pub(crate) fn complex_product<const N: usize>(a: &[Complex32; N], b: &[Complex32; N]) -> Complex32 {
-    let (mut re, mut im) = ([0.0_f32; STRANDS], [0.0_f32; STRANDS]);
+    let (mut re, mut im) = ([0.0_f32; LANES], [0.0_f32; LANES]);
     for i in 0..N {
-        let strand = i % STRANDS;
-        re[strand] += a[i].re * b[i].re - a[i].im * b[i].im;
-        im[strand] += a[i].re * b[i].im + a[i].im * b[i].re;
+        let lane = i % LANES;
+        re[lane] += a[i].re * b[i].re - a[i].im * b[i].im;
+        im[lane] += a[i].re * b[i].im + a[i].im * b[i].re;
     }
     Complex32::new(re.iter().sum(), im.iter().sum())
 }
 
 /// Returns Σ |a|².
 pub(crate) fn energy<const N: usize>(a: &[Complex32; N]) -> f32 {
-    let mut strands = [0.0_f32; STRANDS];
+    let mut lanes = [0.0_f32; LANES];
     for i in 0..N {
-        strands[i % STRANDS] += a[i].re * a[i].re + a[i].im * a[i].im;
+        lanes[i % LANES] += a[i].re * a[i].re + a[i].im * a[i].im;
     }
-    strands.iter().sum()
+    lanes.iter().sum()
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ pub struct CarrierPhase {
     /// oscillators.
     pub phase_rad: f64,
     /// Standard deviation in rad: noise and multipath. The phase of an array that combines its
-    /// antennas, [`Observed::phase_toward`](super::Observed::phase_toward), is more precise.
+    /// antennas, [`ArrayObservables::phase_for_response`](super::ArrayObservables::phase_for_response), is more precise.
     pub sigma_rad: f64,
     /// Standard deviation due to multipath at one antenna, in rad.
     pub multipath_sigma_rad: f64,

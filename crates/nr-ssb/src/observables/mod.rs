@@ -50,7 +50,7 @@ pub struct Observables {
 
 /// Observables with the amplitude of every antenna.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Observed<const A: usize> {
+pub struct ArrayObservables<const A: usize> {
     /// Observables.
     pub observables: Observables,
     /// Complex amplitude of a resource element at every antenna, with the phase of
@@ -60,11 +60,11 @@ pub struct Observed<const A: usize> {
     pub amplitude_variance: [f64; A],
 }
 
-impl<const A: usize> Observed<A> {
+impl<const A: usize> ArrayObservables<A> {
     /// Returns the carrier phase at the reference point of an array, for the response of every
     /// antenna to the direction of the first path, and its standard deviation, both in rad. The
     /// standard deviation includes multipath.
-    pub fn phase_toward(&self, response: &[Complex64; A]) -> (f64, f64) {
+    pub fn phase_for_response(&self, response: &[Complex64; A]) -> (f64, f64) {
         let (mut sum, mut variance, mut power) = (Complex64::ZERO, 0.0, 0.0);
         for ((y, noise), weight) in self
             .amplitudes

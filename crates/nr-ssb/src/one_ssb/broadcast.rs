@@ -45,7 +45,7 @@ pub(crate) struct BroadcastDecoder {
     llrs: [f32; E],
     spacing: SubcarrierSpacing,
     /// Burst set size, if known.
-    told: Option<Lmax>,
+    configured: Option<Lmax>,
     size: LikelyLmax,
     undecoded: Vec<Undecoded>,
     half_frame_samples: f64,
@@ -63,7 +63,7 @@ impl BroadcastDecoder {
             decoder: Decoder::default(),
             llrs: [0.0; E],
             spacing,
-            told: lmax,
+            configured: lmax,
             size: size(spacing, lmax, ssb_freq_hz),
             undecoded: Vec::with_capacity(KEPT),
             half_frame_samples: 5e-3 * spacing.base_rate_hz(),
@@ -72,7 +72,7 @@ impl BroadcastDecoder {
 
     /// Sets another SSB frequency.
     pub(crate) fn tune(&mut self, ssb_freq_hz: Option<f64>) {
-        self.size = size(self.spacing, self.told, ssb_freq_hz);
+        self.size = size(self.spacing, self.configured, ssb_freq_hz);
         self.forget();
     }
 
@@ -99,7 +99,7 @@ impl BroadcastDecoder {
             Lmax::L8 => Some(Lmax::L4),
             Lmax::L64 => None,
         };
-        std::iter::once(likely).chain(other.filter(|_| self.told.is_none()))
+        std::iter::once(likely).chain(other.filter(|_| self.configured.is_none()))
     }
 
     /// Decodes the PBCH of the acquirer's SSB.
@@ -112,7 +112,7 @@ impl BroadcastDecoder {
             let decoded = self.decoder.decode(&self.llrs, pci, v, lmax).ok()??;
             fits(&decoded.payload, lmax, ibar_ssb).then(|| Broadcast {
                 payload: decoded.payload,
-                lmax: told_by(&decoded.payload, lmax, ibar_ssb, certain),
+                lmax: implied_lmax(&decoded.payload, lmax, ibar_ssb, certain),
                 symbols: decoded.symbols(),
             })
         })
@@ -141,19 +141,19 @@ impl BroadcastDecoder {
                 && (samples - whole * half_frame).abs() < PERIOD_TOLERANCE
         };
         // The latest examined PBCH, which need not be the latest received one.
-        let mut heard = [None; PERIODS];
-        for (slot, other) in heard
+        let mut periods_of_ssb = [None; PERIODS];
+        for (slot, other) in periods_of_ssb
             .iter_mut()
             .zip(self.undecoded.iter().rev().filter(repeats))
         {
             *slot = Some(other);
         }
-        let count = heard.iter().flatten().count();
+        let count = periods_of_ssb.iter().flatten().count();
         let time_of = |one: Option<&Undecoded>| one.map_or(f64::INFINITY, |one| one.time);
-        heard.sort_by(|a, b| time_of(*a).total_cmp(&time_of(*b)));
-        let first = heard[0].filter(|_| count > 1)?;
+        periods_of_ssb.sort_by(|a, b| time_of(*a).total_cmp(&time_of(*b)));
+        let first = periods_of_ssb[0].filter(|_| count > 1)?;
         let after_first = |time: f64| ((time - first.time) / half_frame).round() as u16;
-        let periods = heard.map(|one| {
+        let periods = periods_of_ssb.map(|one| {
             let one = one.unwrap_or(first);
             Period {
                 llr: &one.llrs,
@@ -171,7 +171,7 @@ impl BroadcastDecoder {
             let payload = moved(decoded.payload, elapsed);
             fits(&payload, lmax, ibar_ssb).then(|| Broadcast {
                 payload,
-                lmax: told_by(&payload, lmax, ibar_ssb, certain),
+                lmax: implied_lmax(&payload, lmax, ibar_ssb, certain),
                 symbols: pbch::encode(&payload, pci, lmax),
             })
         })
@@ -189,7 +189,12 @@ impl BroadcastDecoder {
 /// Returns the burst set size implied by a PBCH that was decoded with `lmax`; `certain` is the size
 /// if only one is possible. The first four SSBs of the first half frame are identical in burst sets
 /// of 4 and 8.
-fn told_by(payload: &BchPayload, lmax: Lmax, ibar_ssb: u8, certain: Option<Lmax>) -> Option<Lmax> {
+fn implied_lmax(
+    payload: &BchPayload,
+    lmax: Lmax,
+    ibar_ssb: u8,
+    certain: Option<Lmax>,
+) -> Option<Lmax> {
     let same = lmax != Lmax::L64 && ibar_ssb < 4 && !payload.half_frame;
     if same { certain } else { Some(lmax) }
 }
@@ -212,10 +217,14 @@ fn moved(payload: BchPayload, half_frames: i32) -> BchPayload {
 }
 
 /// The configured size of burst sets, or the size in the bands at this frequency.
-fn size(spacing: SubcarrierSpacing, told: Option<Lmax>, ssb_freq_hz: Option<f64>) -> LikelyLmax {
-    let told = told.map(|likely| LikelyLmax {
+fn size(
+    spacing: SubcarrierSpacing,
+    configured: Option<Lmax>,
+    ssb_freq_hz: Option<f64>,
+) -> LikelyLmax {
+    let configured = configured.map(|likely| LikelyLmax {
         likely,
         certain: true,
     });
-    told.unwrap_or_else(|| likely_lmax(spacing, ssb_freq_hz))
+    configured.unwrap_or_else(|| likely_lmax(spacing, ssb_freq_hz))
 }

@@ -51,7 +51,7 @@ impl PointSearch {
     ) -> Result<Option<RasterFind>, ScanError> {
         self.tune(antennas, &[point.ssb_freq_hz - centre_hz.unwrap_or(0.0)])?;
         self.searcher.centre(cfo_centre_hz)?;
-        self.look(0, point, centre_hz.is_some())
+        self.search_point(0, point, centre_hz.is_some())
     }
 
     /// Returns the SSBs at up to [`AT_ONCE`] points of known frequency.
@@ -66,7 +66,7 @@ impl PointSearch {
         self.tune(antennas, &offsets_hz.collect::<Vec<_>>())?;
         self.searcher.centre(0.0)?;
         for (index, point) in points.iter().enumerate() {
-            finds.extend(self.look(index, *point, true)?);
+            finds.extend(self.search_point(index, *point, true)?);
         }
         Ok(finds)
     }
@@ -78,7 +78,7 @@ impl PointSearch {
     }
 
     /// Searches the tuned offset number `index`.
-    fn look(
+    fn search_point(
         &mut self,
         index: usize,
         point: RasterPoint,

@@ -26,7 +26,7 @@ const BEFORE: usize = 256;
 const AFTER: usize = 512;
 
 /// Detected PSS.
-pub(super) struct Seen {
+pub(super) struct PssDetection {
     statistic: f32,
     /// First sample of the PSS in the recording.
     pub(super) sample: f64,
@@ -43,7 +43,7 @@ pub(super) fn likely_offsets(
     rate_hz: f64,
     antennas: &[&[Complex32]],
     reach_hz: f64,
-) -> Result<Vec<Seen>, ScanError> {
+) -> Result<Vec<PssDetection>, ScanError> {
     let scs_hz = spacing.hz();
     let reach = (reach_hz / scs_hz).floor() as usize;
     let tiles = tiles(reach);
@@ -82,7 +82,7 @@ pub(super) fn likely_offsets(
             filter.run(&tiles, bases, (first, end), threshold, &mut maxima);
             let seen = maxima.iter().map(|maximum| {
                 let received_hz = maximum.subcarriers * scs_hz;
-                Seen {
+                PssDetection {
                     statistic: maximum.statistic,
                     sample: from as f64 + maximum.sample * ratio,
                     received_hz: received_hz.clamp(-reach_hz, reach_hz),
@@ -102,10 +102,10 @@ pub(super) fn likely_offsets(
 
 /// Returns the strongest maxima, one for each offset, without frequency-shifted sidelobes of a
 /// stronger PSS. `near` is the number of samples of a symbol.
-fn strongest(mut seen: Vec<Seen>, near: f64, scs_hz: f64) -> Vec<Seen> {
+fn strongest(mut seen: Vec<PssDetection>, near: f64, scs_hz: f64) -> Vec<PssDetection> {
     seen.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
     let width_hz = SUBCARRIERS as f64 * scs_hz;
-    let mut kept: Vec<Seen> = Vec::new();
+    let mut kept: Vec<PssDetection> = Vec::new();
     let mut likeliest: Vec<usize> = Vec::new();
     for one in seen {
         if likeliest.len() == MOST_OFFSETS {

@@ -35,8 +35,8 @@ pub fn scan(
         Some(centre_hz) => scan_raster(antennas, rate_hz, centre_hz)?,
         None => Vec::new(),
     };
-    let beside = scan_off_raster(antennas, rate_hz, centre_hz, &finds)?;
-    finds.extend(beside);
+    let off_raster = scan_off_raster(antennas, rate_hz, centre_hz, &finds)?;
+    finds.extend(off_raster);
     Ok(without_shadows(finds))
 }
 

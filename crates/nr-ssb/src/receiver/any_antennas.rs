@@ -73,12 +73,12 @@ impl Receiver {
         sample_rate_hz: f64,
         centre_frequency_hz: f64,
     ) -> Result<Self, ReceiverError> {
-        let told = config.clone();
+        let stream_config = config.clone();
         macro_rules! of {
             ($($antennas:literal)*) => {
-                match told.search.antennas {
+                match stream_config.search.antennas {
                     $($antennas => Box::new(StreamReceiver::<$antennas>::new(
-                        told,
+                        stream_config,
                         sample_rate_hz,
                         centre_frequency_hz,
                     )?),)*

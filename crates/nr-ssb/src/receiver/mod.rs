@@ -49,4 +49,4 @@ pub use config::ReceiverConfig;
 pub use error::ReceiverError;
 pub use stream::StreamReceiver;
 pub use tracked_ssb::TrackedSsb;
-pub use window::{Seen, Window, WindowReceiver};
+pub use window::{ReceivedBeam, Window, WindowReceiver};

@@ -4,7 +4,7 @@ use num_complex::Complex32;
 
 use super::config::ReceiverConfig;
 use super::error::ReceiverError;
-use super::window::{GUARD, Seen, Window, WindowReceiver};
+use super::window::{GUARD, ReceivedBeam, Window, WindowReceiver};
 use crate::dsp::base_rate::SSB_SAMPLES;
 use crate::input::front_end::FrontEnd;
 
@@ -69,7 +69,7 @@ impl<const A: usize> StreamReceiver<A> {
 
     /// Returns the sample at the base rate before which all SSBs of tracked beams have been passed
     /// on. A burst is complete once its last beam has been.
-    pub fn heard_until(&self) -> f64 {
+    pub fn passed_until(&self) -> f64 {
         let next_start = self.receiver.next_start();
         if next_start.is_finite() {
             next_start
@@ -86,11 +86,11 @@ impl<const A: usize> StreamReceiver<A> {
     pub fn push(
         &mut self,
         antennas: &[&[Complex32]],
-        take: &mut dyn FnMut(Seen<'_, A>),
+        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
     ) -> Result<(), ReceiverError> {
         self.front_end.push(antennas, &mut self.base)?;
         self.next_input += antennas.first().map_or(0, |it| it.len()) as u64;
-        self.hear(false, take)
+        self.process(false, take)
     }
 
     /// Sets the index of the next input sample to `sample`; the samples before it are missing.
@@ -101,7 +101,7 @@ impl<const A: usize> StreamReceiver<A> {
     pub fn gap_to(
         &mut self,
         sample: u64,
-        take: &mut dyn FnMut(Seen<'_, A>),
+        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
     ) -> Result<(), ReceiverError> {
         self.end_segment(take)?;
         self.resume_at(sample);
@@ -113,18 +113,24 @@ impl<const A: usize> StreamReceiver<A> {
     ///
     /// # Errors
     /// Those of [`push`](Self::push).
-    pub fn finish(&mut self, take: &mut dyn FnMut(Seen<'_, A>)) -> Result<(), ReceiverError> {
+    pub fn finish(
+        &mut self,
+        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
+    ) -> Result<(), ReceiverError> {
         self.end_segment(take)?;
         self.resume_at(self.next_input);
         Ok(())
     }
 
-    fn end_segment(&mut self, take: &mut dyn FnMut(Seen<'_, A>)) -> Result<(), ReceiverError> {
+    fn end_segment(
+        &mut self,
+        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
+    ) -> Result<(), ReceiverError> {
         self.front_end.finish(&mut self.base);
         for samples in &mut self.base {
             samples.extend([Complex32::ZERO; GUARD as usize]);
         }
-        self.hear(true, take)
+        self.process(true, take)
     }
 
     /// Continues at this input sample.
@@ -136,8 +142,8 @@ impl<const A: usize> StreamReceiver<A> {
 
     /// Removes beams and samples, for a restarted stream.
     pub fn reset(&mut self) {
-        let mut unheard: [Vec<Complex32>; A] = std::array::from_fn(|_| Vec::new());
-        self.front_end.finish(&mut unheard);
+        let mut rest: [Vec<Complex32>; A] = std::array::from_fn(|_| Vec::new());
+        self.front_end.finish(&mut rest);
         self.receiver.reset();
         self.resume_at(0);
     }
@@ -158,10 +164,10 @@ impl<const A: usize> StreamReceiver<A> {
 
     /// Searches and tracks in the order in which the samples become available; at the end, all of
     /// them.
-    fn hear(
+    fn process(
         &mut self,
         is_end: bool,
-        take: &mut dyn FnMut(Seen<'_, A>),
+        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
     ) -> Result<(), ReceiverError> {
         let end = self.end();
         loop {

@@ -2,7 +2,7 @@
 
 use num_complex::{Complex32, Complex64};
 
-use super::window::Seen;
+use super::window::ReceivedBeam;
 use crate::dsp::channel_covariance::ChannelCovariance;
 use crate::observables::Observables;
 use crate::one_ssb::measure::Measurement;
@@ -57,7 +57,7 @@ pub struct TrackedSsb {
 
 impl TrackedSsb {
     /// Converts a received SSB; `ratio` is the number of input samples per sample at the base rate.
-    pub(super) fn new<const A: usize>(seen: &mut Seen<'_, A>, ratio: f64) -> Self {
+    pub(super) fn new<const A: usize>(seen: &mut ReceivedBeam<'_, A>, ratio: f64) -> Self {
         let ssb = seen.ssb;
         let observed = seen.tracker.observe(ssb);
         let observables = observed.as_ref().map(|it| {

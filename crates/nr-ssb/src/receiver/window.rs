@@ -14,7 +14,7 @@ use super::error::ReceiverError;
 use crate::dsp::base_rate::SSB_SAMPLES;
 use crate::dsp::tones::Tone;
 use crate::search::{SearchError, Searcher};
-use crate::track::{Tracked, Tracker};
+use crate::track::{Tracker, TrackerOutput};
 
 /// Number of samples required on either side of an SSB, at the base rate: half a cyclic prefix and
 /// the range of the filter.
@@ -53,9 +53,9 @@ impl Window<'_> {
 }
 
 /// Received SSB and its tracker, which stores the received elements.
-pub struct Seen<'a, const A: usize> {
+pub struct ReceivedBeam<'a, const A: usize> {
     /// Result of the tracker.
-    pub ssb: &'a Tracked<A>,
+    pub ssb: &'a TrackerOutput<A>,
     /// Its tracker.
     pub tracker: &'a mut Tracker<A>,
     /// Whether the SSB was received at its expected time; `false` for the first one after a search.
@@ -78,7 +78,7 @@ pub struct WindowReceiver<const A: usize> {
     /// Frequency offset of the last detected beams, in Hz, and number of offsets searched without
     /// success since then.
     offset_hz: f64,
-    in_vain: u32,
+    failed_searches: u32,
     /// Total number of unreported missing samples.
     unreported_gap: f64,
     /// Position of the last tone measurement (samples), and the samples without tones.
@@ -105,7 +105,7 @@ impl<const A: usize> WindowReceiver<A> {
             search_until: f64::NEG_INFINITY,
             searches: 0,
             offset_hz: 0.0,
-            in_vain: 0,
+            failed_searches: 0,
             unreported_gap: 0.0,
             tones_measured: f64::NEG_INFINITY,
             cleaned: vec![Vec::with_capacity(BEFORE + AFTER); A],
@@ -132,7 +132,7 @@ impl<const A: usize> WindowReceiver<A> {
     pub fn reset(&mut self) {
         self.beams.clear();
         (self.search_begun, self.search_until) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-        (self.in_vain, self.unreported_gap) = (0, 0.0);
+        (self.failed_searches, self.unreported_gap) = (0, 0.0);
         self.tones_measured = f64::NEG_INFINITY;
     }
 
@@ -165,13 +165,13 @@ impl<const A: usize> WindowReceiver<A> {
     pub fn receive(
         &mut self,
         window: &Window<'_>,
-        take: &mut dyn FnMut(Seen<'_, A>),
+        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
     ) -> Result<(), ReceiverError> {
         self.measure_tones(window);
         if self.searches_at(window.start as f64) {
             self.search(window)?;
             self.search_until = f64::NEG_INFINITY; // all of a burst is in a window
-            self.count_in_vain();
+            self.count_failed_searches();
         }
         while self.track_next(window, take)? {}
         Ok(())
@@ -184,7 +184,7 @@ impl<const A: usize> WindowReceiver<A> {
         }
         if self.search_until.is_finite() {
             self.search_until = f64::NEG_INFINITY;
-            self.count_in_vain();
+            self.count_failed_searches();
         }
         if self.all_come() {
             return false;
@@ -192,7 +192,7 @@ impl<const A: usize> WindowReceiver<A> {
         let came = self.beams.iter().any(|beam| beam.tracker.misses() == 0);
         let interval_s = if came {
             self.config.search_every_s
-        } else if self.beams.is_empty() && self.in_vain < self.config.offsets() {
+        } else if self.beams.is_empty() && self.failed_searches < self.config.offsets() {
             0.0
         } else {
             LOST_INTERVAL_S
@@ -220,9 +220,9 @@ impl<const A: usize> WindowReceiver<A> {
     }
 
     /// Records a search over a whole period.
-    fn count_in_vain(&mut self) {
+    fn count_failed_searches(&mut self) {
         if self.beams.is_empty() {
-            self.in_vain = self.in_vain.saturating_add(self.at_once());
+            self.failed_searches = self.failed_searches.saturating_add(self.at_once());
         }
     }
 
@@ -238,7 +238,7 @@ impl<const A: usize> WindowReceiver<A> {
         if let Some(beam) = self.beams.iter().min_by_key(|beam| beam.tracker.misses()) {
             return beam.tracker.cfo_hz();
         }
-        let turn = (self.in_vain + number) % self.config.offsets();
+        let turn = (self.failed_searches + number) % self.config.offsets();
         let away = f64::from(turn.div_ceil(2)) * self.config.search.spacing.hz();
         self.offset_hz + if turn % 2 == 1 { away } else { -away }
     }
@@ -269,7 +269,7 @@ impl<const A: usize> WindowReceiver<A> {
             if wanted.is_some_and(|cells| !cells.contains(&found.pci.get())) {
                 continue;
             }
-            (self.in_vain, self.offset_hz) = (0, found.cfo_hz);
+            (self.failed_searches, self.offset_hz) = (0, found.cfo_hz);
             let mut found = found.clone();
             found.sample_start += window.start as f64;
             let same =
@@ -299,7 +299,7 @@ impl<const A: usize> WindowReceiver<A> {
     pub(super) fn track_next(
         &mut self,
         window: &Window<'_>,
-        take: &mut dyn FnMut(Seen<'_, A>),
+        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
     ) -> Result<bool, ReceiverError> {
         let antennas = <&[&[Complex32]; A]>::try_from(window.antennas).map_err(|_| {
             let (given, expected) = (window.antennas.len(), A);
@@ -345,7 +345,7 @@ impl<const A: usize> WindowReceiver<A> {
         if let Some(ssb) = seen.filter(|seen| seen.ssb_index == beam.ssb_index) {
             let is_followed = beam.is_followed;
             beam.seen(ssb.sample_start, period);
-            take(Seen {
+            take(ReceivedBeam {
                 ssb: &ssb,
                 tracker: &mut beam.tracker,
                 is_followed,

@@ -55,7 +55,7 @@ impl DetectedSsb {
 
 /// Received resource elements of one SSB. Stronger cells, delay and frequency offset are removed.
 #[derive(Debug, Clone, Copy)]
-pub struct ReceivedSsb<'a> {
+pub struct ReceivedElements<'a> {
     /// Resource elements of every antenna, `[symbol][subcarrier]`.
     pub elements: &'a [ReceivedGrid],
     /// Known elements, zero elsewhere: pilots, and the PBCH if it was decoded.

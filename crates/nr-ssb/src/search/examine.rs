@@ -4,7 +4,7 @@ use std::f32::consts::SQRT_2;
 
 use num_complex::Complex32;
 
-use super::detected::{DetectedSsb, ReceivedSsb, SearchCounts};
+use super::detected::{DetectedSsb, ReceivedElements, SearchCounts};
 use super::settings::SearchConfig;
 use crate::dsp::alignment::Alignment;
 use crate::dsp::base_rate::{CYCLIC_PREFIX, SSB_SAMPLES};
@@ -146,7 +146,7 @@ impl Examiner {
         &mut self,
         (samples, block_start): (&mut [Vec<Complex32>], f64),
         candidate: &PssCandidate,
-        look: &mut dyn FnMut(&DetectedSsb, &ReceivedSsb<'_>),
+        inspect: &mut dyn FnMut(&DetectedSsb, &ReceivedElements<'_>),
     ) -> Option<Alignment> {
         self.counts.pss_candidates += 1;
         let mut acquired = self.acquirer.acquire(samples, candidate)?;
@@ -186,14 +186,14 @@ impl Examiner {
         }
         self.report(block_start, &acquired, broadcast.as_ref());
         if let Some(ssb) = self.found.last() {
-            let received = ReceivedSsb {
+            let received = ReceivedElements {
                 channel_covariance: &self.acquirer.estimate.covariance(),
                 elements: &self.acquirer.grids,
                 known: &self.acquirer.reference,
                 channel: &self.acquirer.estimate.channel,
                 noise_variance: &self.acquirer.estimate.noise_variance,
             };
-            look(ssb, &received);
+            inspect(ssb, &received);
         }
         self.remove(samples, &acquired.alignment);
         Some(acquired.alignment)

@@ -11,7 +11,7 @@ mod searcher;
 mod settings;
 
 pub use crate::dsp::received_grid::MAX_ANTENNAS;
-pub use detected::{DetectedSsb, ReceivedSsb, SearchCounts};
+pub use detected::{DetectedSsb, ReceivedElements, SearchCounts};
 pub use error::SearchError;
 pub use searcher::Searcher;
 pub use settings::SearchConfig;

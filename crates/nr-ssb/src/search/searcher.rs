@@ -2,7 +2,7 @@
 
 use num_complex::Complex32;
 
-use super::detected::{DetectedSsb, ReceivedSsb, SearchCounts};
+use super::detected::{DetectedSsb, ReceivedElements, SearchCounts};
 use super::error::SearchError;
 use super::examine::Examiner;
 use super::settings::{SearchConfig, check_frequency};
@@ -94,7 +94,7 @@ impl Searcher {
         self.push_with(antennas, &mut |_, _| {})
     }
 
-    /// Like [`push`](Self::push), and passes every SSB to `look` upon detection, stronger ones
+    /// Like [`push`](Self::push), and passes every SSB to `inspect` upon detection, stronger ones
     /// first. Its payload may become known later, from another SSB.
     ///
     /// # Errors
@@ -102,7 +102,7 @@ impl Searcher {
     pub fn push_with(
         &mut self,
         antennas: &[&[Complex32]],
-        look: &mut dyn FnMut(&DetectedSsb, &ReceivedSsb<'_>),
+        inspect: &mut dyn FnMut(&DetectedSsb, &ReceivedElements<'_>),
     ) -> Result<&[DetectedSsb], SearchError> {
         let length = self.common_length(antennas)?;
         let kept = self.buffer.first().map_or(0, Vec::len);
@@ -122,7 +122,7 @@ impl Searcher {
         self.canceller.detect(&self.buffer, tail);
         self.canceller.subtract(&mut self.buffer, tail);
         self.examiner.begin_block(self.buffer_start as f64);
-        self.examine_all(tail + length, look);
+        self.examine_all(tail + length, inspect);
         Ok(self.examiner.found_in_order())
     }
 
@@ -193,7 +193,11 @@ impl Searcher {
         }
     }
 
-    fn examine_all(&mut self, length: usize, look: &mut dyn FnMut(&DetectedSsb, &ReceivedSsb<'_>)) {
+    fn examine_all(
+        &mut self,
+        length: usize,
+        inspect: &mut dyn FnMut(&DetectedSsb, &ReceivedElements<'_>),
+    ) {
         // PSS of an SSB within the buffer.
         let Some(end) = (length + 1).checked_sub(SSB_SAMPLES - CYCLIC_PREFIX) else {
             return;
@@ -219,7 +223,7 @@ impl Searcher {
             let candidate = self.candidates.swap_remove(index);
             let start = self.buffer_start;
             let place = (self.buffer.as_mut_slice(), start as f64);
-            let Some(alignment) = self.examiner.examine(place, &candidate, look) else {
+            let Some(alignment) = self.examiner.examine(place, &candidate, inspect) else {
                 continue;
             };
             // The matched filter is repeated around an SSB that was subtracted.

@@ -27,7 +27,7 @@ const ROUNDING: f32 = 1e-6;
 
 /// Received beam, and its delay in samples relative to the grids.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Seen {
+pub(super) struct BeamDetection {
     pub(super) ibar_ssb: u8,
     pub(super) delay: f64,
 }
@@ -77,7 +77,7 @@ impl Beams {
         &mut self,
         grids: &[ReceivedGrid],
         phases: &[Complex32; SYMBOLS],
-    ) -> Option<Seen> {
+    ) -> Option<BeamDetection> {
         // PSS and SSS are on the same subcarriers of their symbols.
         let outputs = self.sync.iter_mut().zip(&mut self.energies);
         for (grid, (groups, power)) in grids.iter().zip(outputs) {
@@ -127,7 +127,7 @@ impl Beams {
         };
         let fits = self.dmrs.iter().map(fit).zip(0..);
         let (best, ibar_ssb) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        (best > BEAM_STANDS_OUT * by_chance).then_some(Seen { ibar_ssb, delay })
+        (best > BEAM_STANDS_OUT * by_chance).then_some(BeamDetection { ibar_ssb, delay })
     }
 }
 

@@ -38,12 +38,12 @@ struct Covariance {
 impl ClockLoop {
     /// Creates the loop at an SSB from a search, with its frequency offset if the carrier is known.
     pub(super) fn new(start: f64, cfo_hz: f64, carrier_hz: Option<f64>, base_rate_hz: f64) -> Self {
-        let told = carrier_hz.filter(|hz| *hz > 0.0).map(|hz| -cfo_hz / hz);
-        let sigma = told.map_or(DRIFT_UNKNOWN, |_| DRIFT_BY_CFO);
+        let drift_by_cfo = carrier_hz.filter(|hz| *hz > 0.0).map(|hz| -cfo_hz / hz);
+        let sigma = drift_by_cfo.map_or(DRIFT_UNKNOWN, |_| DRIFT_BY_CFO);
         Self {
             base_rate_hz,
             last_start: start,
-            drift: told.unwrap_or(0.0),
+            drift: drift_by_cfo.unwrap_or(0.0),
             covariance: Covariance {
                 start: SEARCHED * SEARCHED,
                 both: 0.0,

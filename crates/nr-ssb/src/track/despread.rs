@@ -7,7 +7,7 @@ use crate::dsp::timing;
 use crate::numeric::sums::complex_product;
 use crate::standard::grid::{SUBCARRIERS, SYMBOLS, SsbGrid};
 
-/// Computes the blocks and pilot numbers of [`Tracked`](super::Tracked), after the compensation of
+/// Computes the blocks and pilot numbers of [`TrackerOutput`](super::TrackerOutput), after the compensation of
 /// another `delay` samples.
 pub(super) fn despread<const A: usize>(
     grids: &[ReceivedGrid],

@@ -17,9 +17,9 @@ mod frequency;
 mod index;
 mod late;
 mod observe;
-mod tracked;
+mod output;
 mod tracker;
 
 pub use error::TrackError;
-pub use tracked::Tracked;
+pub use output::TrackerOutput;
 pub use tracker::Tracker;

@@ -1,6 +1,6 @@
 //! Observables of a tracked SSB, from the tracker's received elements.
 
-use super::tracked::Tracked;
+use super::output::TrackerOutput;
 use crate::dsp::alignment::Alignment;
 use crate::dsp::base_rate::SYMBOL_FFT;
 use crate::observables::carrier_phase::{CarrierPhase, CarrierResets, rotation};
@@ -9,7 +9,7 @@ use crate::observables::elements::{Elements, offset_by_sync};
 use crate::observables::first_path::FirstPath;
 use crate::observables::power::Power;
 use crate::observables::range_rate::{Instant, RateTracker};
-use crate::observables::{Observables, Observed};
+use crate::observables::{ArrayObservables, Observables};
 use crate::one_ssb::acquire::Acquirer;
 use crate::standard::numerology::SubcarrierSpacing;
 
@@ -42,11 +42,11 @@ impl<const A: usize> Observer<A> {
     /// Computes the observables of an SSB with its demodulation in a window.
     pub(super) fn observe(
         &mut self,
-        ssb: &Tracked<A>,
+        ssb: &TrackerOutput<A>,
         acquirer: &Acquirer,
         demodulation: &Alignment,
         window_start: f64,
-    ) -> Observed<A> {
+    ) -> ArrayObservables<A> {
         let elements = Elements::new(
             &ssb.blocks,
             &ssb.noise_variance,
@@ -144,7 +144,7 @@ impl<const A: usize> Observer<A> {
         covariance[0][0] = delay.sigma_s * delay.sigma_s;
         covariance[1][1] = phase.sigma_rad * phase.sigma_rad;
         covariance[2][2] += self.rate.multipath_variance(phase_multipath) / A as f64;
-        Observed {
+        ArrayObservables {
             observables: Observables {
                 delay,
                 phase,

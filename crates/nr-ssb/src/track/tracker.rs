@@ -12,13 +12,13 @@ use super::frequency::FrequencyLoop;
 use super::index::SsbIndex;
 use super::late::REACH;
 use super::observe::Observer;
-use super::tracked::Tracked;
+use super::output::TrackerOutput;
 use crate::dsp::alignment::Alignment;
 use crate::dsp::base_rate::{CYCLIC_PREFIX, SYMBOL_FFT};
 use crate::dsp::channel_covariance::ChannelCovariance;
 use crate::dsp::timing;
 use crate::numeric::decibel::decibel;
-use crate::observables::Observed;
+use crate::observables::ArrayObservables;
 use crate::one_ssb::acquire::{Acquired, Acquirer};
 use crate::one_ssb::broadcast::BroadcastDecoder;
 use crate::one_ssb::measure::measure;
@@ -138,7 +138,7 @@ impl<const A: usize> Tracker<A> {
         window_start: f64,
         expected_start: f64,
         decode_pbch: bool,
-    ) -> Result<Option<Tracked<A>>, TrackError> {
+    ) -> Result<Option<TrackerOutput<A>>, TrackError> {
         let expected = expected_start - window_start;
         let reach = DEVIATIONS * self.clock.deviation(expected_start) + OTHER_PATH;
         let steps = ((reach - REACH as f64) / STEP)
@@ -159,7 +159,7 @@ impl<const A: usize> Tracker<A> {
                     samples: antennas.iter().map(|it| it.len()).min().unwrap_or(0),
                 });
             };
-            seen = self.look(antennas, alignment, decode_pbch);
+            seen = self.measure(antennas, alignment, decode_pbch);
             if seen.is_some() {
                 break;
             }
@@ -210,7 +210,7 @@ impl<const A: usize> Tracker<A> {
     }
 
     /// Returns the received resource elements of one antenna, `[symbol][subcarrier]`, of the last
-    /// SSB. The predicted delay and frequency offset are compensated; [`Tracked::residual_delay`]
+    /// SSB. The predicted delay and frequency offset are compensated; [`TrackerOutput::residual_delay`]
     /// is not.
     pub fn received(&self, antenna: usize) -> Option<&[[Complex32; SUBCARRIERS]; SYMBOLS]> {
         self.acquirer.grids.get(antenna)
@@ -246,7 +246,7 @@ impl<const A: usize> Tracker<A> {
 
     /// Returns delay, carrier phase, range rate and power of the last SSB, which [`track`](Self::track)
     /// returned; `None` without a carrier frequency. Each SSB is passed once, in order of time.
-    pub fn observe(&mut self, ssb: &Tracked<A>) -> Option<Observed<A>> {
+    pub fn observe(&mut self, ssb: &TrackerOutput<A>) -> Option<ArrayObservables<A>> {
         let observer = self.observer.as_mut()?;
         Some(observer.observe(ssb, &self.acquirer, &self.demodulation, self.window_start))
     }
@@ -257,12 +257,12 @@ impl<const A: usize> Tracker<A> {
     }
 
     /// Processes the demodulated grids.
-    fn look(
+    fn measure(
         &mut self,
         antennas: &[&[Complex32]; A],
         mut alignment: Alignment,
         decode_pbch: bool,
-    ) -> Option<Tracked<A>> {
+    ) -> Option<TrackerOutput<A>> {
         let phases = alignment.symbol_phases();
         let mut travelled = 0.0;
         let mut found = self.beams.identify(&self.acquirer.grids, &phases)?;
@@ -321,7 +321,7 @@ impl<const A: usize> Tracker<A> {
             (None, Lmax::L4) => Some(ibar_ssb >= 4),
             (None, _) => None,
         };
-        Some(Tracked {
+        Some(TrackerOutput {
             pci: self.pci,
             // `track` derives index and time from these values.
             ssb_index: ibar_ssb,

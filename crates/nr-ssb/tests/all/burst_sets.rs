@@ -108,6 +108,6 @@ fn an_unknown_burst_set_size_is_determined_by_the_first_decoded_ssb() {
     // The sixth SSB exists only for Lmax 8, which then also applies to the first one.
     cell.ssb_indices = vec![1, 5];
     let ssbs = found(&cell, None, 10.0);
-    let told: Vec<_> = ssbs.iter().map(|ssb| (ssb.ssb_index, ssb.lmax)).collect();
-    assert_eq!(told, [(1, Some(Lmax::L8)), (5, Some(Lmax::L8))]);
+    let indices: Vec<_> = ssbs.iter().map(|ssb| (ssb.ssb_index, ssb.lmax)).collect();
+    assert_eq!(indices, [(1, Some(Lmax::L8)), (5, Some(Lmax::L8))]);
 }

@@ -101,7 +101,7 @@ struct Tally {
 
 impl Tally {
     /// Tracks the beam of period `number`, `periods` after the last received one.
-    fn look(&mut self, air: &mut Drifting, tracker: &mut Tracker<4>, number: f64, periods: f64) {
+    fn track(&mut self, air: &mut Drifting, tracker: &mut Tracker<4>, number: f64, periods: f64) {
         let (antennas, window_start) = air.window(number);
         let windows = std::array::from_fn(|antenna| antennas[antenna].as_slice());
         let expected = tracker.expected_start(periods * air.period);
@@ -147,7 +147,7 @@ fn every_clock_period_spacing_and_level_is_tracked() {
                     let mut air = Drifting::new(spacing, ppm, 1e-3 * period_ms, snr_db, seed);
                     let mut tracker = air.tracker();
                     for number in 1..=15 {
-                        tally.look(&mut air, &mut tracker, f64::from(number), 1.0);
+                        tally.track(&mut air, &mut tracker, f64::from(number), 1.0);
                     }
                 }
             }
@@ -171,11 +171,11 @@ fn the_estimated_drift_bridges_a_sleep() {
                     for _ in 0..3 {
                         for _ in 0..25 {
                             number += 1.0;
-                            tally.look(&mut air, &mut tracker, number, 1.0);
+                            tally.track(&mut air, &mut tracker, number, 1.0);
                         }
                         let periods = asleep_s / 0.02;
                         number += periods;
-                        tally.look(&mut air, &mut tracker, number, periods);
+                        tally.track(&mut air, &mut tracker, number, periods);
                     }
                 }
             }

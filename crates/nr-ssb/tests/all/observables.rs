@@ -8,14 +8,14 @@ use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
 use num_complex::Complex64;
 
 use crate::air;
-use crate::moving::{Echoes, Error, Heard, Moving, summary};
+use crate::moving::{Echoes, Error, Moving, SsbErrors, summary};
 
 /// SSBs of one run, and SSBs at its beginning that are not counted.
 const RUN: usize = 30;
 const SETTLE: usize = 6;
 
 /// Returns SSBs at 3.6 and 7.2 MHz after sleeps of 20 ms to 5 s.
-fn received(snrs_db: &[f64], runs: u64, echoes: Option<Echoes>) -> Vec<Heard> {
+fn received(snrs_db: &[f64], runs: u64, echoes: Option<Echoes>) -> Vec<SsbErrors> {
     let mut all = Vec::new();
     for spacing in [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30] {
         for (number, snr_db) in snrs_db.iter().enumerate() {
@@ -30,8 +30,8 @@ fn received(snrs_db: &[f64], runs: u64, echoes: Option<Echoes>) -> Vec<Heard> {
                 let sleeps_s = [0.02, 0.02, 0.02, 0.16, 1.0, 5.0];
                 for (ssb, sleep_s) in sleeps_s.into_iter().cycle().take(RUN).enumerate() {
                     let settling = ssb < SETTLE;
-                    let heard = moving.next(if settling { 0.02 } else { sleep_s });
-                    all.extend(heard.filter(|_| !settling));
+                    let ssbs = moving.next(if settling { 0.02 } else { sleep_s });
+                    all.extend(ssbs.filter(|_| !settling));
                 }
             }
         }
@@ -40,16 +40,16 @@ fn received(snrs_db: &[f64], runs: u64, echoes: Option<Echoes>) -> Vec<Heard> {
 }
 
 /// Selection of a quantity.
-type Select = fn(&Heard) -> Error;
+type Select = fn(&SsbErrors) -> Error;
 
-fn errors(heard: &[Heard], of: Select) -> Vec<Error> {
-    heard.iter().map(of).collect()
+fn errors(ssbs: &[SsbErrors], of: Select) -> Vec<Error> {
+    ssbs.iter().map(of).collect()
 }
 
 #[test]
 fn errors_in_noise_reach_the_bound_and_their_standard_deviations() {
-    let heard = received(&[0.0, 15.0, 30.0], 5, None);
-    assert_eq!(heard.len(), 2 * 3 * 5 * (RUN - SETTLE));
+    let ssbs = received(&[0.0, 15.0, 30.0], 5, None);
+    assert_eq!(ssbs.len(), 2 * 3 * 5 * (RUN - SETTLE));
     let quantities: [(&str, Select); 4] = [
         ("delay", |it| it.delay),
         ("phase", |it| it.phase),
@@ -57,7 +57,7 @@ fn errors_in_noise_reach_the_bound_and_their_standard_deviations() {
         ("power", |it| it.power),
     ];
     for (name, of) in quantities {
-        let it = summary(&errors(&heard, of));
+        let it = summary(&errors(&ssbs, of));
         // Four standard deviations of a mean of squares of standard normal variables, and of their
         // mean.
         let margin = 4.0 * (2.0 / it.count as f64).sqrt();
@@ -69,11 +69,11 @@ fn errors_in_noise_reach_the_bound_and_their_standard_deviations() {
         );
     }
     // No false detection of multipath in most SSBs, and no wrong number of cycles.
-    let single = heard
+    let single = ssbs
         .iter()
         .filter(|it| it.multipath == Multipath::NotDetected);
-    assert!(single.count() * 100 > heard.len() * 97);
-    let from_phase: Vec<_> = heard
+    assert!(single.count() * 100 > ssbs.len() * 97);
+    let from_phase: Vec<_> = ssbs
         .iter()
         .filter(|it| it.source == RateSource::PhaseDifference)
         .collect();
@@ -83,7 +83,7 @@ fn errors_in_noise_reach_the_bound_and_their_standard_deviations() {
             .all(|it| it.rate.value.abs() < 6.0 * it.rate.sigma)
     );
     // At 15 dB, the phase difference is used after every sleep of 20 ms, and never after 1 or 5 s.
-    assert!(from_phase.len() * 4 > heard.len());
+    assert!(from_phase.len() * 4 > ssbs.len());
     assert!(from_phase.iter().all(|it| it.sleep_s < 1.0));
 }
 
@@ -95,21 +95,17 @@ fn a_first_path_is_found_in_multipath_or_reported_as_uncertain() {
             mean_delay_s,
             count: 12,
         };
-        let heard = received(&[10.0, 20.0], 3, Some(echoes));
-        let detected = heard
+        let ssbs = received(&[10.0, 20.0], 3, Some(echoes));
+        let detected = ssbs
             .iter()
             .filter(|it| it.multipath != Multipath::NotDetected);
-        assert!(detected.count() * 10 > heard.len() * 9, "K {k_db} dB");
-        let found: Vec<Heard> = heard
+        assert!(detected.count() * 10 > ssbs.len() * 9, "K {k_db} dB");
+        let found: Vec<SsbErrors> = ssbs
             .iter()
             .filter(|it| it.multipath != Multipath::Uncertain)
             .copied()
             .collect();
-        assert!(
-            found.len() * 2 > heard.len(),
-            "K {k_db} dB: {}",
-            found.len()
-        );
+        assert!(found.len() * 2 > ssbs.len(), "K {k_db} dB: {}", found.len());
         for (name, of) in [
             ("delay", (|it| it.delay) as Select),
             ("phase", |it| it.phase),
@@ -129,11 +125,11 @@ fn a_first_path_is_found_in_multipath_or_reported_as_uncertain() {
         mean_delay_s: 60e-9,
         count: 12,
     };
-    let heard = received(&[20.0], 2, Some(blocked));
-    let uncertain = heard
+    let ssbs = received(&[20.0], 2, Some(blocked));
+    let uncertain = ssbs
         .iter()
         .filter(|it| it.multipath == Multipath::Uncertain);
-    assert!(uncertain.count() * 10 > heard.len() * 9);
+    assert!(uncertain.count() * 10 > ssbs.len() * 9);
 }
 
 /// Observed SSB: beam, start and phase reference in input samples, phases of both antennas.
@@ -163,11 +159,11 @@ fn receive_with_gaps(gaps: &[(usize, usize)]) -> Vec<Phases> {
     let config = ReceiverConfig::new(cell.ssb_freq_hz, spacing, 2);
     let mut receiver =
         StreamReceiver::<2>::new(config, rate_hz, cell.ssb_freq_hz - offset_hz).unwrap();
-    let mut heard = Vec::new();
-    let mut take = |seen: nr_ssb::receiver::Seen<'_, 2>| {
+    let mut found = Vec::new();
+    let mut take = |seen: nr_ssb::receiver::ReceivedBeam<'_, 2>| {
         let observed = seen.tracker.observe(seen.ssb).unwrap();
         let start = observed.observables.delay.first_path_start;
-        heard.push((
+        found.push((
             seen.ssb.ssb_index,
             start,
             observed.amplitudes.map(Complex64::arg),
@@ -183,7 +179,7 @@ fn receive_with_gaps(gaps: &[(usize, usize)]) -> Vec<Phases> {
         from = gap_end;
     }
     receiver.finish(&mut take).unwrap();
-    heard
+    found
 }
 
 #[test]

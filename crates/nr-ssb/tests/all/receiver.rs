@@ -37,26 +37,32 @@ fn cell_and_samples() -> (Cell, Vec<Vec<Complex32>>) {
     (cell, samples)
 }
 
-fn heard(config: ReceiverConfig, samples: &[Vec<Complex32>], block: usize) -> Vec<TrackedSsb> {
+fn tracked_ssbs(
+    config: ReceiverConfig,
+    samples: &[Vec<Complex32>],
+    block: usize,
+) -> Vec<TrackedSsb> {
     let mut receiver = Receiver::new(config, RATE_HZ, 3.6e9 - 2e6).unwrap();
-    let mut heard = Vec::new();
+    let mut tracked_ssbs = Vec::new();
     for first in (0..samples[0].len()).step_by(block) {
         let end = samples[0].len().min(first + block);
         let slices: Vec<&[Complex32]> = samples.iter().map(|it| &it[first..end]).collect();
         receiver
-            .push(&slices, &mut |ssb| heard.push(ssb.clone()))
+            .push(&slices, &mut |ssb| tracked_ssbs.push(ssb.clone()))
             .unwrap();
     }
-    receiver.finish(&mut |ssb| heard.push(ssb.clone())).unwrap();
+    receiver
+        .finish(&mut |ssb| tracked_ssbs.push(ssb.clone()))
+        .unwrap();
     assert_eq!(receiver.tracked(), 0);
-    heard
+    tracked_ssbs
 }
 
 #[test]
 fn every_ssb_of_a_stream_is_received_once_with_its_channel() {
     let (cell, samples) = cell_and_samples();
     let config = ReceiverConfig::new(cell.ssb_freq_hz, SPACING, 3);
-    let all = heard(config.clone(), &samples, 1_000_000_000);
+    let all = tracked_ssbs(config.clone(), &samples, 1_000_000_000);
     let beams: Vec<u8> = all.iter().map(|ssb| ssb.ssb_index).collect();
     assert_eq!(beams, [2, 5, 2, 5, 2, 5, 2, 2, 2, 2, 5, 2, 5]);
     assert!(all.iter().skip(2).all(|ssb| ssb.tracked), "one search");
@@ -89,7 +95,11 @@ fn every_ssb_of_a_stream_is_received_once_with_its_channel() {
     }
     // The result does not depend on the block boundaries.
     for block in [1000, 76_800, 500_001] {
-        assert_eq!(heard(config.clone(), &samples, block), all, "{block}");
+        assert_eq!(
+            tracked_ssbs(config.clone(), &samples, block),
+            all,
+            "{block}"
+        );
     }
 }
 
@@ -170,14 +180,19 @@ fn an_oscillator_20_ppm_off_is_found_within_three_bursts_of_the_longest_period()
                 start: begin.floor() as i64 - 300,
                 antennas: &slices(&samples),
             };
-            let mut heard = Vec::new();
+            let mut tracked_ssbs = Vec::new();
             receiver
-                .receive(&window, &mut |seen| heard.push(seen.ssb.ssb_index))
+                .receive(&window, &mut |seen| tracked_ssbs.push(seen.ssb.ssb_index))
                 .unwrap();
-            beams.push(heard);
+            beams.push(tracked_ssbs);
         }
         println!("{spacing:?} {ppm}: {beams:?}");
-        assert!(beams[2..].iter().all(|heard| *heard == [2, 5]), "{beams:?}");
+        assert!(
+            beams[2..]
+                .iter()
+                .all(|tracked_ssbs| *tracked_ssbs == [2, 5]),
+            "{beams:?}"
+        );
     }
 }
 

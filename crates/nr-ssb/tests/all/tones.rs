@@ -115,13 +115,13 @@ fn tones_do_not_change_the_phases_between_antennas() {
             let mut samples = clean.clone();
             add_tone(&mut samples, cycles(seed, &mut rng), above_ssb_db, &mut rng);
             searcher.reset();
-            let mut look = |_: &_, received: &nr_ssb::search::ReceivedSsb<'_>| {
+            let mut inspect = |_: &_, received: &nr_ssb::search::ReceivedElements<'_>| {
                 let sum = received.channel[0].iter().zip(&received.channel[1]);
                 let both: Complex32 = sum.map(|(a, b)| a.conj() * b).sum();
                 let both = Complex64::new(f64::from(both.re), f64::from(both.im));
                 *square += squared_error(&cell, [1.0.into(), both]);
             };
-            let found = searcher.push_with(&slices(&samples), &mut look).unwrap();
+            let found = searcher.push_with(&slices(&samples), &mut inspect).unwrap();
             assert_eq!(found.len(), 1, "{seed}: {above_ssb_db} dB");
         }
     }

@@ -10,7 +10,7 @@ use crate::BoxError;
 use crate::elements::for_elements;
 use crate::localize::{AngleMeasurement, MeasurementKind};
 use crate::manifold::{ArrayManifold, Measurand};
-use crate::observation::{SensedSsb, SsbObservation};
+use crate::observation::{SsbDetection, SsbObservation};
 use crate::settings::{EstimatorMethod, Vehicle};
 
 /// Estimation method of the `aoa` crate for a uniform linear array of `N` antennas.
@@ -110,7 +110,7 @@ impl<const N: usize> AngleEstimator for AzimuthEstimator<N> {
 /// is the standard deviation of an estimate without one, `measurand` the angle that the array
 /// measures.
 pub fn measurement(
-    ssb: &SensedSsb,
+    ssb: &SsbDetection,
     estimated: EstimatedAngle,
     measurand: &Measurand,
     bound_rad: impl FnOnce() -> f64,

@@ -26,7 +26,7 @@ enum Entry<const N: usize> {
     Moved(Box<Matrix<N>>),
     Redrawn(Box<Redrawn<N>>),
     Measured(Box<Measurement<N>>),
-    Asked(Box<Asked<N>>),
+    OutputState(Box<OutputState<N>>),
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +48,7 @@ struct Redrawn<const N: usize> {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-struct Asked<const N: usize> {
+struct OutputState<const N: usize> {
     time_s: f64,
     belief: Gaussian<N>,
     /// Covariance of each error with the state.
@@ -105,13 +105,13 @@ impl<const N: usize> Journal<N> {
 
     /// Requests the smoothed state at `time_s`. `errors` are the covariances of the errors with the
     /// state.
-    pub fn asked(
+    pub fn output(
         &mut self,
         time_s: f64,
         belief: &Gaussian<N>,
         errors: impl Iterator<Item = [f64; N]>,
     ) {
-        self.entries.push(Entry::Asked(Box::new(Asked {
+        self.entries.push(Entry::OutputState(Box::new(OutputState {
             time_s,
             belief: *belief,
             errors: errors.collect(),
@@ -135,7 +135,7 @@ impl<const N: usize> Journal<N> {
                 Entry::Moved(jacobian) => rest.before_motion(jacobian),
                 Entry::Redrawn(redrawn) => rest.before_redrawing(redrawn),
                 Entry::Measured(measurement) => rest.before_measurement(measurement),
-                Entry::Asked(asked) => smoothed.push((asked.time_s, rest.improve(asked))),
+                Entry::OutputState(output) => smoothed.push((output.time_s, rest.improve(output))),
             }
         }
         smoothed.reverse();
@@ -230,15 +230,15 @@ impl Rest {
         }
     }
 
-    fn improve<const N: usize>(&self, asked: &Asked<N>) -> Gaussian<N> {
+    fn improve<const N: usize>(&self, output: &OutputState<N>) -> Gaussian<N> {
         let size = self.vector.len();
         // Covariance of the state with states and errors.
         let covariance = |i: usize, k: usize| {
-            let states = asked.belief.covariance[i].get(k);
-            let error = || asked.errors.get(k - N).map(|with| with[i]);
+            let states = output.belief.covariance[i].get(k);
+            let error = || output.errors.get(k - N).map(|with| with[i]);
             states.copied().or_else(error).unwrap_or_default()
         };
-        let mut improved = asked.belief;
+        let mut improved = output.belief;
         let mut half = vec![vec![0.0; size]; N]; // P Λ
         for i in 0..N {
             for k in 0..size {
@@ -359,7 +359,7 @@ mod tests {
                 }
             }
             // Requested before the measurement of the same time.
-            journal.asked(step as f64, &belief, std::iter::empty());
+            journal.output(step as f64, &belief, std::iter::empty());
             let (value, variance) = seen(step);
             let row = [1.0, 0.4];
             let residual = value - row[0] * belief.mean[0] - row[1] * belief.mean[1];
@@ -387,7 +387,7 @@ mod tests {
     fn correlated_biases_are_smoothed_as_if_they_were_part_of_the_state() {
         let (f, kept, by_state) = ([[1.0, 0.5], [-0.1, 0.9]], 0.8, [-0.2, 0.1]);
         let mut whole = Gaussian::independent([1.0, -0.5, 0.2], [1.4, 0.8, 0.3]);
-        let (mut beside, mut within) = (Journal::<2>::default(), Journal::<3>::default());
+        let (mut separate, mut within) = (Journal::<2>::default(), Journal::<3>::default());
         for step in 0..STEPS {
             let mut motion = [[0.0; 3]; 3];
             motion[0][..2].copy_from_slice(&f[0]);
@@ -395,8 +395,8 @@ mod tests {
             motion[2][2] = 1.0;
             let mut redrawing = identity::<3>();
             redrawing[2] = [by_state[0], by_state[1], kept];
-            beside.moved(&f);
-            beside.redrawn(0, kept, &by_state);
+            separate.moved(&f);
+            separate.redrawn(0, kept, &by_state);
             for motion in [motion, redrawing] {
                 within.moved(&motion);
                 let before = whole.mean;
@@ -408,18 +408,18 @@ mod tests {
                 covariance: [0, 1].map(|i| [whole.covariance[i][0], whole.covariance[i][1]]),
             };
             let error = [whole.covariance[0][2], whole.covariance[1][2]];
-            beside.asked(step as f64, &state, std::iter::once(error));
-            within.asked(step as f64, &whole, std::iter::empty());
+            separate.output(step as f64, &state, std::iter::once(error));
+            within.output(step as f64, &whole, std::iter::empty());
             // Alternately with the error and without it.
             let error = (step % 2 == 0).then_some(0);
             let row = [1.0, 0.4, error.map_or(0.0, |_| 1.0)];
             let residual = (step as f64 * 1.7).sin();
             let total = whole.variance_along(&row) + 0.3;
             let gain = whole.update(residual, &row, 0.3);
-            beside.measured(&[row[0], row[1]], error, gain.into_iter(), residual, total);
+            separate.measured(&[row[0], row[1]], error, gain.into_iter(), residual, total);
             within.measured(&row, None, gain.into_iter(), residual, total);
         }
-        for ((_, one), (_, other)) in beside.smoothed().iter().zip(within.smoothed()) {
+        for ((_, one), (_, other)) in separate.smoothed().iter().zip(within.smoothed()) {
             for i in 0..2 {
                 assert!((one.mean[i] - other.mean[i]).abs() < 1e-12);
                 for j in 0..2 {
@@ -433,9 +433,9 @@ mod tests {
     fn the_last_state_is_not_changed_by_smoothing() {
         let mut belief = Gaussian::independent([1.0, 2.0], [0.5, 0.0]);
         let mut journal = Journal::default();
-        journal.asked(0.0, &belief, std::iter::empty());
+        journal.output(0.0, &belief, std::iter::empty());
         measure(&mut journal, &mut belief, 0.3, &[1.0, 1.0], 0.1);
-        journal.asked(0.0, &belief, std::iter::empty());
+        journal.output(0.0, &belief, std::iter::empty());
         let smoothed = journal.smoothed();
         assert_eq!(smoothed[1].1, belief);
         // Without a motion in between, both states are equal, and exactly known states are

@@ -13,7 +13,7 @@ use num_complex::Complex32;
 
 use super::clocks::Clocks;
 use super::error::LiveError;
-use super::outcome::{HeadStatus, Outcome};
+use super::outcome::{AngleRecord, HeadStatus};
 use super::start::starting_at;
 use super::stream::{SampleStream, StreamConfig, StreamCounts};
 use super::stream_clock::Continuity;
@@ -26,7 +26,7 @@ use crate::expected_angle::ExpectedAngle;
 use crate::geometry::{Pose, wrap_angle};
 use crate::localize::{AngleMeasurement, MeasurementKind, OdometryResult, UpdateReason};
 use crate::monitor::Confirmation;
-use crate::observation::{BURST_S, OdometrySample, SensedSsb};
+use crate::observation::{BURST_S, OdometrySample, SsbDetection};
 use crate::pipeline::{Custom, OdometryDefect, Pipeline};
 use crate::radio_head::RadioHead;
 use crate::receive::ReceiverConfig;
@@ -89,8 +89,8 @@ pub struct Live {
     expected_angle: ExpectedAngle,
     stream: Option<SampleStream>,
     /// Angles of an incomplete burst.
-    angles: Vec<(SensedSsb, AngleMeasurement)>,
-    outcomes: VecDeque<Outcome>,
+    angles: Vec<(SsbDetection, AngleMeasurement)>,
+    outcomes: VecDeque<AngleRecord>,
     heads: Vec<HeadStatus>,
     /// Clocks of the sources. All other times are those of the pipeline, except those of `heads`,
     /// which are of the odometry's clock.
@@ -136,7 +136,7 @@ impl Live {
         let onboard = Pipeline::new(site, &vehicle, platform, start, custom)?;
         let receiver = || ReceiverConfig::new(site, &vehicle);
         let stream = stream.map(|config| SampleStream::new(config, receiver()));
-        let heads = RadioHead::heard(site, &vehicle);
+        let heads = RadioHead::received_by(site, &vehicle);
         Ok(Self {
             expected_angle: ExpectedAngle::new(&vehicle),
             stream: stream.transpose()?,
@@ -172,7 +172,7 @@ impl Live {
 
     /// Processes the next samples of every antenna, of any length. `time_s` is the reception time
     /// of the first sample by the sample clock. The results of the SSBs are in the
-    /// [`outcomes`](Self::next_outcome). The time reveals missing and repeated samples, and a
+    /// [`outcomes`](Self::next_angle_record). The time reveals missing and repeated samples, and a
     /// restarted stream.
     ///
     /// # Errors
@@ -235,9 +235,9 @@ impl Live {
                 self.refused_burst = Some(error);
                 continue;
             }
-            let heard = hear(&mut self.onboard, stream.first(number));
+            let result = process(&mut self.onboard, stream.first(number));
             stream.forget(number);
-            self.book(heard)?;
+            self.record_results(result)?;
         }
         Ok(())
     }
@@ -281,7 +281,7 @@ impl Live {
         if let Some((first, _)) = self.angles.first()
             && first.time_s + BURST_S <= sample.time_s
         {
-            self.hear_angles()?;
+            self.process_angles()?;
         }
         let sample = self.with_distance(&sample);
         let verdict = self
@@ -295,7 +295,7 @@ impl Live {
     /// Converts stored times of the odometry to its new clock after a step.
     fn resumed(&mut self, step: &ClockStep) {
         for head in &mut self.heads {
-            for time_s in [&mut head.last_heard_s, &mut head.last_accepted_s] {
+            for time_s in [&mut head.last_angle_s, &mut head.last_accepted_s] {
                 *time_s = time_s.map(|it| it + step.step_s);
             }
         }
@@ -356,10 +356,10 @@ impl Live {
         if let Some((first, _)) = self.angles.first()
             && ((time_s - first.time_s).abs() >= BURST_S || self.angles.len() == ANGLES)
         {
-            self.hear_angles()?;
+            self.process_angles()?;
         }
         let snr_db = angle.snr_db.unwrap_or(UNSTATED_SNR_DB);
-        let ssb = SensedSsb {
+        let ssb = SsbDetection {
             pci: angle.pci,
             ssb_index: angle.ssb_index,
             time_s,
@@ -386,14 +386,15 @@ impl Live {
     /// Whether an angle is a copy of the last one of its radio head; `time_s` is its time in the
     /// pipeline.
     fn is_repeated(&self, angle: &AngleObservation, time_s: f64) -> bool {
-        let is_same = |(ssb, measured): &(SensedSsb, AngleMeasurement)| {
+        let is_same = |(ssb, measured): &(SsbDetection, AngleMeasurement)| {
             (ssb.pci, ssb.ssb_index, ssb.time_s) == (angle.pci, angle.ssb_index, time_s)
                 && measured.phase_rad == angle.phase_rad
         };
-        let heard_s = Some(self.clocks.odometry.outside(time_s));
+        let received_s = Some(self.clocks.odometry.outside(time_s));
         self.angles.iter().any(is_same)
-            || (self.heads.iter())
-                .any(|it| it.head.sends(angle.pci, angle.ssb_index) && it.last_heard_s == heard_s)
+            || (self.heads.iter()).any(|it| {
+                it.head.sends(angle.pci, angle.ssb_index) && it.last_angle_s == received_s
+            })
     }
 
     /// Processes an incomplete burst without waiting for further angles, for example at the end of
@@ -404,12 +405,12 @@ impl Live {
     pub fn flush(&mut self) -> Result<(), LiveError> {
         self.end_segment()?;
         self.process_until(f64::INFINITY)?;
-        self.hear_angles()
+        self.process_angles()
     }
 
     /// Returns the next outcome of an angle, oldest first. If there are more than 256 outcomes, the oldest
     /// are lost.
-    pub fn next_outcome(&mut self) -> Option<Outcome> {
+    pub fn next_angle_record(&mut self) -> Option<AngleRecord> {
         self.outcomes.pop_front()
     }
 
@@ -478,22 +479,22 @@ impl Live {
         }
     }
 
-    fn hear_angles(&mut self) -> Result<(), LiveError> {
+    fn process_angles(&mut self) -> Result<(), LiveError> {
         if self.angles.is_empty() {
             return Ok(());
         }
-        let heard = hear(&mut self.onboard, &self.angles);
+        let result = process(&mut self.onboard, &self.angles);
         self.angles.clear();
-        self.book(heard)
+        self.record_results(result)
     }
 
     /// Stores the outcomes of a burst.
-    fn book(&mut self, heard: Result<BurstSummary, BoxError>) -> Result<(), LiveError> {
+    fn record_results(&mut self, result: Result<BurstSummary, BoxError>) -> Result<(), LiveError> {
         let BurstSummary {
             time_s,
             ssb_index,
             receiver_on,
-        } = heard.map_err(LiveError::Custom)?;
+        } = result.map_err(LiveError::Custom)?;
         self.see(time_s);
         let burst_s = self.clocks.angles.outside(time_s) - self.time_offset_s();
         self.last_burst = Some((burst_s, ssb_index));
@@ -531,16 +532,16 @@ impl Live {
             if is_judged && self.clocks.agree() {
                 self.confirmation.angle(ssb.pci, verdict.accepted);
             }
-            let heard_s = odometry.outside(ssb.time_s);
+            let received_s = odometry.outside(ssb.time_s);
             if let Some(status) = &mut status {
                 status.is_faulty = !status.is_excluded && verdict.reason == UpdateReason::Excluded;
                 status.snr_db = Some(ssb.snr_db);
-                status.last_heard_s = Some(heard_s);
+                status.last_angle_s = Some(received_s);
                 status.residual_rad = residual_rad;
                 status.accepted += u64::from(verdict.accepted);
                 status.refused += u64::from(!verdict.accepted);
                 if verdict.accepted {
-                    status.last_accepted_s = Some(heard_s);
+                    status.last_accepted_s = Some(received_s);
                 }
             }
             if self.outcomes.len() == OUTCOMES {
@@ -551,7 +552,7 @@ impl Live {
             if let Some(measured) = &mut angle_result.measured {
                 measured.time_s = angles.outside(measured.time_s);
             }
-            self.outcomes.push_back(Outcome {
+            self.outcomes.push_back(AngleRecord {
                 angle_result,
                 residual_rad,
                 after: found,
@@ -571,7 +572,7 @@ struct BurstSummary {
     receiver_on: bool,
 }
 
-fn hear<T: HasSsb>(onboard: &mut Pipeline, burst: &[T]) -> Result<BurstSummary, BoxError> {
+fn process<T: HasSsb>(onboard: &mut Pipeline, burst: &[T]) -> Result<BurstSummary, BoxError> {
     let first = burst.first().map(HasSsb::ssb);
     let (time_s, ssb_index) = first.map_or((0.0, 0), |it| (it.time_s, it.ssb_index));
     let receiver_on = onboard

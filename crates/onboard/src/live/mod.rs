@@ -49,7 +49,7 @@ mod time_check;
 
 pub use error::LiveError;
 pub use feed::{AngleObservation, Live, LiveEnergy, RangeObservation, RangeValue};
-pub use outcome::{HeadStatus, Outcome};
+pub use outcome::{AngleRecord, HeadStatus};
 pub use samples::{cf32, ci8, ci16};
 pub use saved::{MAX_GROWTH_M, Resumption, SavedState};
 pub use start::starting_at;

@@ -6,7 +6,7 @@ use crate::radio_head::RadioHead;
 
 /// Angle with its result.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
+pub struct AngleRecord {
     /// SSB, angle and verdict.
     pub angle_result: AngleResult,
     /// Measured minus predicted angle for the pose after it: electrical angle, or azimuth of a
@@ -28,10 +28,10 @@ pub struct HeadStatus {
     /// SNR per antenna and resource element of its last SSB, in dB.
     pub snr_db: Option<f64>,
     /// Time of the last SSB with an angle estimate, in seconds ...
-    pub last_heard_s: Option<f64>,
+    pub last_angle_s: Option<f64>,
     /// ... and of the last one with an accepted angle.
     pub last_accepted_s: Option<f64>,
-    /// Residual of the last angle in radians; see [`Outcome::residual_rad`].
+    /// Residual of the last angle in radians; see [`AngleRecord::residual_rad`].
     pub residual_rad: Option<f64>,
     /// Number of accepted angles ...
     pub accepted: u64,
@@ -47,7 +47,7 @@ impl HeadStatus {
             is_excluded: false,
             is_faulty: false,
             snr_db: None,
-            last_heard_s: None,
+            last_angle_s: None,
             last_accepted_s: None,
             residual_rad: None,
             accepted: 0,

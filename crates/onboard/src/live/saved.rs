@@ -94,18 +94,18 @@ impl SavedState {
         let counted_m = self.distance_m.map(|before_m| sample.distance_m - before_m);
         // A counter that was reset in the meantime contains no information.
         let driven_m = counted_m.filter(|it| it.abs() <= reach_m + STANDING_STD_M);
-        let (growth_m, way_m) = match driven_m {
+        let (growth_m, distance_m) = match driven_m {
             Some(driven_m) => {
-                let way_m = driven_m.abs();
-                let turn_std_rad = (TURN_STD_RAD_PER_M * way_m).min(1.0);
-                let across_m = 0.5 * way_m * turn_std_rad;
-                let along_m = COUNTER_STD * way_m;
-                (STANDING_STD_M.hypot(along_m).hypot(across_m), way_m)
+                let distance_m = driven_m.abs();
+                let turn_std_rad = (TURN_STD_RAD_PER_M * distance_m).min(1.0);
+                let across_m = 0.5 * distance_m * turn_std_rad;
+                let along_m = COUNTER_STD * distance_m;
+                (STANDING_STD_M.hypot(along_m).hypot(across_m), distance_m)
             }
             // Anywhere within reach: half of it is the standard deviation along each axis of a disc.
             None => (STANDING_STD_M.hypot(0.5 * reach_m), reach_m),
         };
-        let turn_rad = STANDING_STD_RAD.hypot(TURN_STD_RAD_PER_M * way_m);
+        let turn_rad = STANDING_STD_RAD.hypot(TURN_STD_RAD_PER_M * distance_m);
         let heading_std_rad = self.heading_std_rad.hypot(turn_rad);
         (growth_m <= MAX_GROWTH_M).then(|| Resumption {
             elapsed_s,
@@ -118,11 +118,11 @@ impl SavedState {
     /// Pose after the motion: the counted distance, or half of the way at the last speed where only that is known,
     /// along an arc of the last yaw rate.
     fn moved(&self, by: &Resumption) -> Pose {
-        let way_m = by.driven_m.unwrap_or(0.5 * self.speed_mps * by.elapsed_s);
+        let distance_m = by.driven_m.unwrap_or(0.5 * self.speed_mps * by.elapsed_s);
         let turn_rad = self.yaw_rate_radps.unwrap_or(0.0) * by.elapsed_s;
-        let is_plausible = turn_rad.abs() <= 2.0 * by.heading_std_rad && way_m != 0.0;
+        let is_plausible = turn_rad.abs() <= 2.0 * by.heading_std_rad && distance_m != 0.0;
         self.pose
-            .along_chord(way_m, if is_plausible { turn_rad } else { 0.0 })
+            .along_chord(distance_m, if is_plausible { turn_rad } else { 0.0 })
     }
 }
 

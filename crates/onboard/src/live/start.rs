@@ -17,13 +17,13 @@ pub fn starting_at(
     let mut vehicle = vehicle.clone();
     vehicle.start.pose = pose;
     vehicle.start.known = pose.is_some();
-    let heard = site.radio_heads.iter();
-    let heard = heard
-        .filter(|head| vehicle.receiver.hears(head.pci))
+    let received = site.radio_heads.iter();
+    let received = received
+        .filter(|head| vehicle.receiver.receives(head.pci))
         .count();
     let along_road = site.road.is_some() && vehicle.follows_road();
     let tracks = matches!(vehicle.localizer, LocalizerSettings::Tracker(_));
-    let findable = tracks && heard > if along_road { 1 } else { 2 };
+    let findable = tracks && received > if along_road { 1 } else { 2 };
     let file = &vehicle.name;
     Check { file }.that(
         pose.is_some() || findable,

@@ -69,7 +69,7 @@ struct Bursts {
     /// Interruptions that the caller reported, in seconds.
     interrupted_s: f64,
     /// Time before which all SSBs are complete; infinite after the end of a segment.
-    heard_until_s: f64,
+    passed_until_s: f64,
 }
 
 impl Bursts {
@@ -209,7 +209,7 @@ impl SampleStream {
         } = self;
         let time_s = |sample| clock.time_s(sample);
         receiver.push(new, &time_s, &mut |it, gap_s| bursts.take(it, gap_s))?;
-        bursts.heard_until_s = clock.time_s(receiver.heard_until()) + bursts.correction_s();
+        bursts.passed_until_s = clock.time_s(receiver.passed_until()) + bursts.correction_s();
         Ok(continuity)
     }
 
@@ -219,7 +219,7 @@ impl SampleStream {
     /// Those of [`push`](Self::push).
     pub fn break_off(&mut self) -> Result<(), LiveError> {
         self.gap_to(self.clock.next(), &self.clock.clone())?;
-        self.bursts.heard_until_s = f64::INFINITY;
+        self.bursts.passed_until_s = f64::INFINITY;
         self.is_stretch_ended = true;
         Ok(())
     }
@@ -238,7 +238,7 @@ impl SampleStream {
         let held = self.bursts.observations.get(..self.bursts.held);
         let held = held.unwrap_or_default();
         match held.first() {
-            Some(first) if first.ssb.time_s + BURST_S <= self.bursts.heard_until_s => {
+            Some(first) if first.ssb.time_s + BURST_S <= self.bursts.passed_until_s => {
                 let number = first_burst(held);
                 let alone = held.iter().take(number).position(|it| it.is_first);
                 let number = alone.map_or(number, |place| place.max(1));

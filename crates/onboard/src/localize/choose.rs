@@ -32,7 +32,7 @@ pub fn built_in(
         }));
     }
     let config = EkfConfig::new(site, vehicle);
-    let heads = RadioHead::heard(site, vehicle);
+    let heads = RadioHead::received_by(site, vehicle);
     let integrity = vehicle.integrity_monitor();
     let road = site.build_road()?.filter(|_| vehicle.follows_road());
     if !vehicle.start.known {

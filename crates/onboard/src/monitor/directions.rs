@@ -218,7 +218,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::observation::SensedSsb;
+    use crate::observation::SsbDetection;
     use crate::settings::{Shipped, TomlFile};
 
     /// Normal numbers by a linear congruential generator.
@@ -249,7 +249,7 @@ mod tests {
         let mut found = Vec::new();
         for number in 0..400_u32 {
             let mut observation = SsbObservation::new(4);
-            let ssb = SensedSsb {
+            let ssb = SsbDetection {
                 pci: 11,
                 ssb_index: 2,
                 time_s: 0.02 * f64::from(number),

@@ -69,7 +69,7 @@ impl Fallback {
         config.yaw_noise_rad_per_sqrt_s = NOISE_RAD_PER_SQRT_S;
         let follows_road = self.vehicle.follows_road();
         let road = self.site.build_road()?.filter(|_| follows_road);
-        let heads = RadioHead::heard(&self.site, &self.vehicle);
+        let heads = RadioHead::received_by(&self.site, &self.vehicle);
         let start = InitialPose {
             pose,
             position_std_m: UNDETECTED_S * self.vehicle.top_speed_mps(),

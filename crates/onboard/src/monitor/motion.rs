@@ -83,7 +83,7 @@ struct Reference {
 
 /// An angle of a burst, reduced to what is compared.
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+struct BurstAngle {
     kind: MeasurementKind,
     head: RadioHead,
     time_s: f64,
@@ -211,7 +211,7 @@ impl MotionMonitor {
             if measured.kind.is_at_head() && update.head.array.is_none() {
                 continue;
             }
-            let seen = Seen {
+            let seen = BurstAngle {
                 kind: measured.kind,
                 head: update.head,
                 time_s: measured.time_s,
@@ -259,7 +259,7 @@ impl MotionMonitor {
     }
 
     /// Compares an angle with its radio head's reference, which is replaced once it has served.
-    fn compare(&mut self, seen: &Seen, has_pose: bool, burst: &mut Burst) {
+    fn compare(&mut self, seen: &BurstAngle, has_pose: bool, burst: &mut Burst) {
         let sends = |it: &Reference| it.head.sends(seen.head.pci, seen.head.ssb_index);
         let Some(place) = self.references.iter().position(sends) else {
             if self.references.len() < self.references.capacity() {
@@ -347,7 +347,7 @@ impl MotionMonitor {
         }
     }
 
-    fn reference(&self, seen: &Seen) -> Reference {
+    fn reference(&self, seen: &BurstAngle) -> Reference {
         Reference {
             head: seen.head,
             time_s: seen.time_s,

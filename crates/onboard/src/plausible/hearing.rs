@@ -22,25 +22,33 @@ const NEAREST_M: f64 = 10.0;
 
 /// Returns warnings for radio heads that are received nowhere along the road. Without a road, the
 /// positions of the other radio heads are examined.
-pub(super) fn unheard(site: &Site, vehicle: &Vehicle, road: Option<&Road>) -> Vec<Warning> {
+pub(super) fn without_reception(
+    site: &Site,
+    vehicle: &Vehicle,
+    road: Option<&Road>,
+) -> Vec<Warning> {
     let air = Air::new(site, vehicle);
     let where_ = if road.is_some() {
         "along the road"
     } else {
         "near any other"
     };
-    air.unheard(&air.places(road), where_)
+    air.without_reception(&air.places(road), where_)
 }
 
 /// Returns warnings for cells with simultaneous SSBs that are needed at a position where the
 /// interference of the others is too strong.
-pub(super) fn drowned(site: &Site, vehicle: &Vehicle, road: Option<&Road>) -> Vec<Warning> {
+pub(super) fn with_interference(
+    site: &Site,
+    vehicle: &Vehicle,
+    road: Option<&Road>,
+) -> Vec<Warning> {
     let air = Air::new(site, vehicle);
-    air.drowned(site, &air.places(road))
+    air.with_interference(site, &air.places(road))
 }
 
 /// Returns a warning if no radio head is received at the start.
-pub(super) fn unheard_at_start(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
+pub(super) fn without_reception_at_start(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     let air = Air::new(site, vehicle);
     let pose = vehicle.start.pose?;
     let heads = air.heads.iter();
@@ -48,10 +56,10 @@ pub(super) fn unheard_at_start(site: &Site, vehicle: &Vehicle) -> Option<Warning
         .clone()
         .map(|head| head.position.distance_m(pose.point()))
         .fold(f64::INFINITY, f64::min);
-    let is_heard = heads
+    let is_received = heads
         .clone()
         .any(|head| air.snr_db(head, pose.point()) >= FOUND_DB);
-    (!is_heard).then(|| Warning {
+    (!is_received).then(|| Warning {
         key: "start.pose".to_owned(),
         value: format!("[{}, {}]", pose.x_m, pose.y_m),
         why: format!("no radio head is received there: the nearest is {nearest_m:.0} m away"),
@@ -89,9 +97,9 @@ struct Air {
 
 impl Air {
     fn new(site: &Site, vehicle: &Vehicle) -> Self {
-        let heard = site.radio_heads.iter().enumerate();
-        let heard = heard.filter(|(_, head)| vehicle.receiver.hears(head.pci));
-        let (numbers, heads) = heard
+        let received = site.radio_heads.iter().enumerate();
+        let received = received.filter(|(_, head)| vehicle.receiver.receives(head.pci));
+        let (numbers, heads) = received
             .map(|(number, it)| (number, RadioHead::from(it)))
             .unzip();
         Self {
@@ -124,7 +132,7 @@ impl Air {
         !self.walls.is_empty() && !others.any(|place| self.walls.seen(head, *place).is_some())
     }
 
-    fn unheard(&self, places: &[Point], where_: &str) -> Vec<Warning> {
+    fn without_reception(&self, places: &[Point], where_: &str) -> Vec<Warning> {
         let heads = || self.heads.iter().zip(&self.numbers);
         let hidden = heads().filter(|(head, _)| self.hidden(head, places));
         let hidden = hidden.map(|(head, number)| Warning {
@@ -158,7 +166,7 @@ impl Air {
         far.chain(hidden).collect()
     }
 
-    fn drowned(&self, site: &Site, places: &[Point]) -> Vec<Warning> {
+    fn with_interference(&self, site: &Site, places: &[Point]) -> Vec<Warning> {
         let count = self.heads.len();
         // For each radio head: minimum ratio to the interference, its position, and the strongest
         // interferer.

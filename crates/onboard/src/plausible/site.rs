@@ -272,14 +272,14 @@ fn other_side(site: &Site, road: &Road) -> Vec<Warning> {
     if site.walls.is_empty() {
         return Vec::new();
     }
-    let way: Vec<(f64, Point)> = steps_along(road, STEP_M, MOST_STEPS).collect();
+    let route: Vec<(f64, Point)> = steps_along(road, STEP_M, MOST_STEPS).collect();
     let is_hidden = |from: Point, to: Point| {
         let mut walls = site.walls.iter().flat_map(|wall| wall.points_m.windows(2));
         walls.any(|ends| cross([from, to], [ends[0].into(), ends[1].into()]))
     };
     // Share of the road about a distance along it that walls hide from a position.
     let hidden_share = |from: Point, about_m: f64| {
-        let near = way
+        let near = route
             .iter()
             .filter(|(along_m, _)| (along_m - about_m).abs() <= NEXT_TO_M);
         let (count, hidden) = near.fold((0.0, 0.0), |(count, hidden), (_, point)| {
@@ -328,10 +328,10 @@ fn across(site: &Site, road: &Road) -> Vec<Warning> {
     if site.walls.is_empty() {
         return Vec::new();
     }
-    let way: Vec<(f64, Point)> = steps_along(road, STEP_M, MOST_STEPS).collect();
+    let route: Vec<(f64, Point)> = steps_along(road, STEP_M, MOST_STEPS).collect();
     let blocked_m = |ends: &[[f64; 2]]| {
         let wall = [ends[0].into(), ends[1].into()];
-        let mut steps = way.windows(2);
+        let mut steps = route.windows(2);
         steps
             .find(|step| cross(wall, [step[0].1, step[1].1]))
             .map(|step| step[0].0)

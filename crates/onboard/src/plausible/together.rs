@@ -1,6 +1,6 @@
 //! Plausibility of a site together with a vehicle.
 
-use super::hearing::{drowned, unheard, unheard_at_start};
+use super::hearing::{with_interference, without_reception, without_reception_at_start};
 use super::site::written;
 use super::usual::rounded;
 use super::vehicle::of_vehicle;
@@ -15,7 +15,7 @@ pub fn of_site(site: &Site) -> Vec<Warning> {
         return written(site, road.as_ref()); // it is shipped
     };
     let mut found = in_reach(site, &vehicle, road.as_ref());
-    found.extend(drowned(site, &vehicle, road.as_ref()));
+    found.extend(with_interference(site, &vehicle, road.as_ref()));
     found
 }
 
@@ -30,9 +30,9 @@ pub fn of_site_and_vehicle(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
 
 /// Returns the warnings of a site and a vehicle for a recorded path. Interference is not checked,
 /// because the recording shows it.
-pub fn of_site_and_vehicle_along(site: &Site, vehicle: &Vehicle, way: &Road) -> Vec<Warning> {
-    let mut of_site = in_reach(site, vehicle, Some(way));
-    of_site.extend(drowned(site, vehicle, Some(way)));
+pub fn of_site_and_vehicle_along(site: &Site, vehicle: &Vehicle, route: &Road) -> Vec<Warning> {
+    let mut of_site = in_reach(site, vehicle, Some(route));
+    of_site.extend(with_interference(site, vehicle, Some(route)));
     beneath("site", of_site)
         .chain(beneath("vehicle", on_site(site, vehicle)))
         .collect()
@@ -43,12 +43,12 @@ fn beneath(path: &str, found: Vec<Warning>) -> impl Iterator<Item = Warning> {
 }
 
 /// Returns the warnings of the site, and of radio heads that are received nowhere on the path.
-fn in_reach(site: &Site, vehicle: &Vehicle, way: Option<&Road>) -> Vec<Warning> {
-    let mut found = written(site, way);
+fn in_reach(site: &Site, vehicle: &Vehicle, route: Option<&Road>) -> Vec<Warning> {
+    let mut found = written(site, route);
     // Positions in degrees or grid coordinates have a warning already.
     let of_places = |it: &Warning| it.key.ends_with("position_m") || it.key.starts_with("road");
     if !found.iter().any(of_places) {
-        found.extend(unheard(site, vehicle, way));
+        found.extend(without_reception(site, vehicle, route));
     }
     found
 }
@@ -57,7 +57,9 @@ fn in_reach(site: &Site, vehicle: &Vehicle, way: Option<&Road>) -> Vec<Warning> 
 fn on_site(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
     let mut found = of_vehicle(vehicle);
     found.extend(spacing_in_metres(site, vehicle));
-    found.extend(start_off_road(site, vehicle).or_else(|| unheard_at_start(site, vehicle)));
+    found.extend(
+        start_off_road(site, vehicle).or_else(|| without_reception_at_start(site, vehicle)),
+    );
     found.extend(strays(site, vehicle));
     found.extend(one_head_only(site, vehicle));
     found.extend(below_array(site, vehicle));
@@ -118,15 +120,15 @@ fn spacing_in_metres(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
 fn start_off_road(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     let (pose, road) = (vehicle.start.pose?, site.build_road().ok().flatten()?);
     let projection = road.project(pose.point());
-    let beside_m = road
+    let road_distance_m = road
         .pose(projection.along_m.clamp(0.0, road.length_m()))
         .point()
         .distance_m(pose.point());
     let may_m = road.width_m() + 3.0 * vehicle.start.position_std_m + 10.0;
-    (vehicle.follows_road() && beside_m > may_m).then(|| Warning {
+    (vehicle.follows_road() && road_distance_m > may_m).then(|| Warning {
         key: "start.pose".to_owned(),
         value: format!("[{}, {}]", pose.x_m, pose.y_m),
-        why: format!("that is {beside_m:.0} m from the road that the vehicle follows"),
+        why: format!("that is {road_distance_m:.0} m from the road that the vehicle follows"),
         write:
             "write it in metres in the frame of the road, or drive = \"differential\" if it roams"
                 .to_owned(),

@@ -39,16 +39,16 @@ pub fn unusual(settings: &impl Serialize, rows: &[Usual]) -> Vec<Warning> {
     found
 }
 
-/// Calls `told` with the path and value of every number that the steps lead to.
-fn visit(here: &Value, steps: &[&str], path: String, told: &mut impl FnMut(String, f64)) {
+/// Calls `report` with the path and value of every number that the steps lead to.
+fn visit(parent: &Value, steps: &[&str], path: String, report: &mut impl FnMut(String, f64)) {
     let Some((step, rest)) = steps.split_first() else {
-        if let Some(number) = here.as_f64() {
-            told(path, number);
+        if let Some(number) = parent.as_f64() {
+            report(path, number);
         }
         return;
     };
-    let (name, place) = step.split_once('[').unwrap_or((step, ""));
-    let Some(held) = here.get(name) else {
+    let (name, index_text) = step.split_once('[').unwrap_or((step, ""));
+    let Some(value) = parent.get(name) else {
         return;
     };
     let path = if path.is_empty() {
@@ -56,13 +56,13 @@ fn visit(here: &Value, steps: &[&str], path: String, told: &mut impl FnMut(Strin
     } else {
         format!("{path}.{name}")
     };
-    if place.is_empty() {
-        return visit(held, rest, path, told);
+    if index_text.is_empty() {
+        return visit(value, rest, path, report);
     }
-    let wanted: Option<usize> = place.trim_end_matches(']').parse().ok();
-    for (index, item) in held.as_array().into_iter().flatten().enumerate() {
+    let wanted: Option<usize> = index_text.trim_end_matches(']').parse().ok();
+    for (index, item) in value.as_array().into_iter().flatten().enumerate() {
         if wanted.is_none_or(|wanted| wanted == index) {
-            visit(item, rest, format!("{path}[{index}]"), told);
+            visit(item, rest, format!("{path}[{index}]"), report);
         }
     }
 }

@@ -281,15 +281,15 @@ pub fn of_vehicle(vehicle: &Vehicle) -> Vec<Warning> {
 /// km/h.
 pub fn speed_in_mps(key: &str, speed_kmh: f64) -> Option<Warning> {
     let is_round = |value: f64, step: f64| (value / step - (value / step).round()).abs() < 1e-6;
-    let meant_kmh = (speed_kmh * 3.6).round();
+    let intended_kmh = (speed_kmh * 3.6).round();
     // Within two decimal places.
-    let fits = meant_kmh >= 1.0 && (meant_kmh / 3.6 - speed_kmh).abs() <= 0.005;
+    let fits = intended_kmh >= 1.0 && (intended_kmh / 3.6 - speed_kmh).abs() <= 0.005;
     let doubtful = fits && !is_round(speed_kmh, 0.1) && !is_round(speed_kmh / 3.6, 0.05);
     doubtful.then(|| Warning {
         key: key.to_owned(),
         value: speed_kmh.to_string(),
-        why: format!("{meant_kmh} km/h are {speed_kmh} m/s"),
-        write: format!("write km/h: {meant_kmh}, or {speed_kmh:.1} if it is so slow"),
+        why: format!("{intended_kmh} km/h are {speed_kmh} m/s"),
+        write: format!("write km/h: {intended_kmh}, or {speed_kmh:.1} if it is so slow"),
     })
 }
 
@@ -299,10 +299,13 @@ mod tests {
 
     #[test]
     fn a_speed_in_mps_is_distinguished_from_a_slow_vehicle() {
-        for (written, meant) in [(3.33, 12), (2.78, 10), (4.17, 15), (1.39, 5), (0.83, 3)] {
-            let told = speed_in_mps("top_speed_kmh", written).map(|it| it.write);
-            let wanted = format!("write km/h: {meant},");
-            assert!(told.is_some_and(|it| it.starts_with(&wanted)), "{written}");
+        for (written, intended) in [(3.33, 12), (2.78, 10), (4.17, 15), (1.39, 5), (0.83, 3)] {
+            let suggestion = speed_in_mps("top_speed_kmh", written).map(|it| it.write);
+            let wanted = format!("write km/h: {intended},");
+            assert!(
+                suggestion.is_some_and(|it| it.starts_with(&wanted)),
+                "{written}"
+            );
         }
         // Tenths of m/s up to 4 m/s, and whole and half km/h.
         let robots = (1..40).map(|tenths| f64::from(tenths) * 0.36);

@@ -7,7 +7,7 @@ use aoa::{
     AngleEstimate, Array, Calibration, DirectionEstimate, DirectionFinder,
     maximum_likelihood_pilots,
 };
-use nr_ssb::search::ReceivedSsb;
+use nr_ssb::search::ReceivedElements;
 use num_complex::Complex64;
 
 use super::despread::Despread;
@@ -69,7 +69,7 @@ pub struct View {
 /// Estimator of the angle of SSBs from a search or a receiver.
 pub trait ArrayView: Send + Sync {
     /// Returns the angle of an SSB, using all its known resource elements as pilots.
-    fn view(&self, ssb: &ReceivedSsb<'_>) -> Option<View>;
+    fn view(&self, ssb: &ReceivedElements<'_>) -> Option<View>;
 
     /// Returns the angle from the despread pilots of each symbol. `noise_variance` contains that of
     /// each antenna.
@@ -88,17 +88,17 @@ pub fn array_view(
     if !(2..=MAX_ELEMENTS).contains(&antennas) {
         return Ok(None);
     }
-    for_elements!(antennas, A => Ok(Some(Box::new(Looker::<A>::new(setup)?))))
+    for_elements!(antennas, A => Ok(Some(Box::new(Viewer::<A>::new(setup)?))))
 }
 
-struct Looker<const A: usize> {
+struct Viewer<const A: usize> {
     array: Array<A>,
     /// Direction finder of a non-linear array.
     finder: Option<DirectionFinder<ArrayManifold<A>, A>>,
     calibration: Calibration<A>,
 }
 
-impl<const A: usize> Looker<A> {
+impl<const A: usize> Viewer<A> {
     fn new(setup: &ArraySetup) -> Result<Self, aoa::Error> {
         let mut calibration = Calibration::IDENTITY;
         if let Some(gains) = &setup.calibration {
@@ -122,12 +122,12 @@ impl<const A: usize> Looker<A> {
         self.calibration.gains().map(|gain| scale / gain)
     }
 
-    /// Returns the angle from `looked_at`, together with all blocks.
-    fn seen(&self, looked_at: &[[Complex64; A]], blocks: &[[Complex64; A]]) -> Option<View> {
+    /// Returns the angle from `used`, together with all blocks.
+    fn seen(&self, used: &[[Complex64; A]], blocks: &[[Complex64; A]]) -> Option<View> {
         let angle = if let Some(finder) = &self.finder {
-            FoundAngle::Direction(finder.estimate_pilots(looked_at, Some(1.0)).ok()?)
+            FoundAngle::Direction(finder.estimate_pilots(used, Some(1.0)).ok()?)
         } else {
-            let found = maximum_likelihood_pilots(looked_at, Some(1.0), &self.array);
+            let found = maximum_likelihood_pilots(used, Some(1.0), &self.array);
             FoundAngle::FromRow(found.ok()?)
         };
         let blocks = blocks.iter().map(|block| block.to_vec()).collect();
@@ -135,14 +135,14 @@ impl<const A: usize> Looker<A> {
     }
 }
 
-impl<const A: usize> ArrayView for Looker<A> {
-    fn view(&self, ssb: &ReceivedSsb<'_>) -> Option<View> {
+impl<const A: usize> ArrayView for Viewer<A> {
+    fn view(&self, ssb: &ReceivedElements<'_>) -> Option<View> {
         let elements = ssb.elements.first_chunk::<A>()?.each_ref();
         let gains = self.gains(ssb.noise_variance);
         let despread = Despread::new(elements, ssb.known, Pilots::Ssb, 0.0).scaled(&gains);
         let blocks: Vec<[Complex64; A]> = despread.blocks().collect();
-        let told = line_of_sight(&despread, self.finder.as_ref()).map(|told| [told.block]);
-        self.seen(told.as_ref().map_or(&blocks[..], |block| block), &blocks)
+        let direct = line_of_sight(&despread, self.finder.as_ref()).map(|direct| [direct.block]);
+        self.seen(direct.as_ref().map_or(&blocks[..], |block| block), &blocks)
     }
 
     fn of_blocks(&self, blocks: &[Vec<Complex64>], noise_variance: &[f64]) -> Option<View> {

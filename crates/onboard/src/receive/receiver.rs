@@ -6,8 +6,8 @@
 
 use aoa::DirectionFinder;
 use nr_ssb::grid::{SUBCARRIERS, SYMBOLS};
-use nr_ssb::receiver::{self as ssb, ReceiverError, Seen, WindowReceiver};
-use nr_ssb::track::{Tracked, Tracker};
+use nr_ssb::receiver::{self as ssb, ReceivedBeam, ReceiverError, WindowReceiver};
+use nr_ssb::track::{Tracker, TrackerOutput};
 use nr_ssb::{Complex32, SubcarrierSpacing, Tone};
 use num_complex::Complex64;
 use thiserror::Error;
@@ -17,7 +17,7 @@ use super::ranging::RangingClock;
 use super::wideband::line_of_sight;
 use crate::elements::for_elements;
 use crate::manifold::ArrayManifold;
-use crate::observation::{SensedSsb, SsbObservation};
+use crate::observation::{SsbDetection, SsbObservation};
 use crate::settings::{ArraySettings, Pilots, Site, Vehicle};
 
 /// Samples of an SSB at the base rate: four symbols of 256 samples with a cyclic prefix of 18.
@@ -62,8 +62,8 @@ impl ReceiverConfig {
             SubcarrierSpacing::Khz15
         };
         let heads = site.radio_heads.iter();
-        let heard = heads.filter(|head| vehicle.receiver.hears(head.pci));
-        let beams: Vec<_> = heard.map(|head| (head.pci, head.ssb_index)).collect();
+        let received = heads.filter(|head| vehicle.receiver.receives(head.pci));
+        let beams: Vec<_> = received.map(|head| (head.pci, head.ssb_index)).collect();
         Self {
             ssb_freq_hz: site.carrier_mhz * 1e6,
             spacing,
@@ -136,9 +136,9 @@ impl Receiver {
     /// # Errors
     /// [`ReceiveError::Ssb`] or [`ReceiveError::Calibration`] for invalid settings.
     pub fn new(config: ReceiverConfig) -> Result<Self, ReceiveError> {
-        let told = config.of_ssbs();
+        let ssb_config = config.of_ssbs();
         for_elements!(config.array.elements, A => {
-            let receiver = WindowReceiver::<A>::new(told)?;
+            let receiver = WindowReceiver::<A>::new(ssb_config)?;
             Ok(Self(Box::new((receiver, Observer::<A>::new(config)?))))
         })
     }
@@ -181,9 +181,9 @@ impl StreamReceiver {
         sample_rate_hz: f64,
         centre_hz: f64,
     ) -> Result<Self, ReceiveError> {
-        let told = config.of_ssbs();
+        let ssb_config = config.of_ssbs();
         for_elements!(config.array.elements, A => {
-            let receiver = ssb::StreamReceiver::<A>::new(told, sample_rate_hz, centre_hz)?;
+            let receiver = ssb::StreamReceiver::<A>::new(ssb_config, sample_rate_hz, centre_hz)?;
             Ok(Self(Box::new((receiver, Observer::<A>::new(config)?))))
         })
     }
@@ -199,8 +199,8 @@ impl StreamReceiver {
     }
 
     /// Returns the input sample before which all SSBs have been passed on.
-    pub fn heard_until(&self) -> f64 {
-        self.0.heard_until()
+    pub fn passed_until(&self) -> f64 {
+        self.0.passed_until()
     }
 
     /// Returns the number of SSBs that a search has detected; all others were received at their
@@ -287,7 +287,7 @@ impl<const A: usize> DynWindowReceiver for (WindowReceiver<A>, Observer<A>) {
 trait DynStreamReceiver: Send {
     fn tracked(&self) -> usize;
     fn tone(&self, index: usize) -> Option<Tone>;
-    fn heard_until(&self) -> f64;
+    fn passed_until(&self) -> f64;
     fn found(&self) -> u64;
     fn push(
         &mut self,
@@ -315,8 +315,8 @@ impl<const A: usize> DynStreamReceiver for (ssb::StreamReceiver<A>, Observer<A>)
         Some(tone)
     }
 
-    fn heard_until(&self) -> f64 {
-        self.0.heard_until() * self.0.input_per_output()
+    fn passed_until(&self) -> f64 {
+        self.0.passed_until() * self.0.input_per_output()
     }
 
     fn found(&self) -> u64 {
@@ -406,7 +406,7 @@ impl<const A: usize> Observer<A> {
     }
 
     /// Returns the observation of a received SSB with its reception time.
-    fn observe(&mut self, seen: &mut Seen<'_, A>, time_s: f64) -> &SsbObservation {
+    fn observe(&mut self, seen: &mut ReceivedBeam<'_, A>, time_s: f64) -> &SsbObservation {
         self.found += u64::from(!seen.is_followed);
         let ranging = self.ranging.as_mut().and_then(|clock| {
             let observed = seen.tracker.observe(seen.ssb)?;
@@ -431,7 +431,7 @@ impl<const A: usize> Observer<A> {
 
     fn observe_in_stream(
         &mut self,
-        seen: &mut Seen<'_, A>,
+        seen: &mut ReceivedBeam<'_, A>,
         ratio: f64,
         time_s: &dyn Fn(f64) -> f64,
         take: &mut dyn FnMut(&SsbObservation, f64),
@@ -449,10 +449,10 @@ fn fill<const A: usize>(
     calibration: &[Complex64; A],
     finder: Option<&DirectionFinder<ArrayManifold<A>, A>>,
     tracker: &Tracker<A>,
-    seen: &Tracked<A>,
+    seen: &TrackerOutput<A>,
     time_s: f64,
 ) {
-    into.restart(SensedSsb {
+    into.restart(SsbDetection {
         pci: seen.pci.get(),
         ssb_index: seen.ssb_index,
         time_s,
@@ -471,8 +471,8 @@ fn fill<const A: usize>(
     into.noise_variance = Some(1.0);
     let delay = seen.residual_delay;
     let despread = Despread::new(elements, tracker.known(), config.pilots, delay).scaled(&gains);
-    if let Some(told) = line_of_sight(&despread, finder) {
-        into.push(&told.block);
+    if let Some(direct) = line_of_sight(&despread, finder) {
+        into.push(&direct.block);
         return;
     }
     for block in despread.blocks() {

@@ -378,7 +378,7 @@ mod tests {
     }
 
     struct Errors {
-        told: f64,
+        separated: f64,
         flat: f64,
         normalised: f64,
         bound: f64,
@@ -394,8 +394,8 @@ mod tests {
         for _ in 0..trials {
             // The receiver tracks the delay of the maximum power.
             let ssb = ssb(&mut rng, snr, k, decay, -0.1);
-            let told = line_of_sight(&ssb, None).expect("the channel varies");
-            let seen = maximum_likelihood_pilots(&[told.block], Some(1.0), &array).unwrap();
+            let separated = line_of_sight(&ssb, None).expect("the channel varies");
+            let seen = maximum_likelihood_pilots(&[separated.block], Some(1.0), &array).unwrap();
             let blocks: Vec<_> = ssb.blocks().collect();
             let flat = maximum_likelihood_pilots(&blocks, Some(1.0), &array).unwrap();
             let error = seen.phase_rad - TRUTH;
@@ -403,7 +403,7 @@ mod tests {
             sums[1] += (flat.phase_rad - TRUTH).powi(2);
             sums[2] += (error / seen.phase_sigma_rad).powi(2);
         }
-        let [told, flat, normalised] = sums.map(|sum| sum / f64::from(trials));
+        let [separated, flat, normalised] = sums.map(|sum| sum / f64::from(trials));
         let channel = Channel::<A> {
             antennas: [[Complex64::ZERO; GROUPS]; A],
             counts: [COUNT * SYMBOLS as f64; GROUPS],
@@ -413,7 +413,7 @@ mod tests {
             .energy;
         let bound = known_signal::<A>(energy * snr * k / (k + 1.0)).powi(2);
         Errors {
-            told,
+            separated,
             flat,
             normalised,
             bound,
@@ -432,14 +432,14 @@ mod tests {
             let case = format!("{snr_db} dB, K = {k_db} dB, {decay} samples");
             println!(
                 "{case}: RMSE {:.4}, known covariance {:.4}, flat {:.4}, normalised {:.3}",
-                errors.told.sqrt(),
+                errors.separated.sqrt(),
                 errors.bound.sqrt(),
                 errors.flat.sqrt(),
                 errors.normalised
             );
-            assert!(errors.told < errors.bound * (1.0 + bound), "{case}");
+            assert!(errors.separated < errors.bound * (1.0 + bound), "{case}");
             assert!(
-                errors.flat > errors.told * (1.0 + 2f64.sqrt() * bound),
+                errors.flat > errors.separated * (1.0 + 2f64.sqrt() * bound),
                 "{case}"
             );
             assert!((errors.normalised - 1.0).abs() < bound, "{case}");

@@ -279,10 +279,10 @@ mod tests {
             (mean_m / (driven_m * (-0.5 * heading).exp()) - 1.0).abs() < 0.003,
             "{mean_m}"
         );
-        let foretold_m2 = driven_m * keeping.shortening_m2_per_m(heading);
+        let predicted_m2 = driven_m * keeping.shortening_m2_per_m(heading);
         assert!(
-            (0.75..1.25).contains(&(variance_m2 / foretold_m2)),
-            "{variance_m2} {foretold_m2}"
+            (0.75..1.25).contains(&(variance_m2 / predicted_m2)),
+            "{variance_m2} {predicted_m2}"
         );
     }
 }

@@ -347,13 +347,13 @@ fn solve(bands: Vec<[f64; 3]>, mut right: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
             let [d, _, l2] = factors[i - 2];
             factors[i][0] -= d * l2 * l2;
         }
-        let mut beside = factors[i][1];
+        let mut off_diagonal = factors[i][1];
         if i >= 1 {
             let [d, l1, l2] = factors[i - 1];
-            beside -= d * l1 * l2;
+            off_diagonal -= d * l1 * l2;
         }
         let d = factors[i][0];
-        factors[i][1] = beside / d;
+        factors[i][1] = off_diagonal / d;
         factors[i][2] /= d;
     }
     for axis in 0..2 {

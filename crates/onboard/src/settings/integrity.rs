@@ -145,7 +145,7 @@ mod tests {
         let mut settings = IntegritySettings::default();
         assert!(settings.check(check).is_ok());
         (settings.risk_per_hour, settings.fault_probability.array) = (0.3, 0.3);
-        let told = settings.check(check).unwrap_err().to_string();
-        assert!(told.contains("integrity.fault_probability"), "{told}");
+        let message = settings.check(check).unwrap_err().to_string();
+        assert!(message.contains("integrity.fault_probability"), "{message}");
     }
 }

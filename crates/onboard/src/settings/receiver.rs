@@ -84,7 +84,7 @@ impl Default for ReceiverSettings {
 
 impl ReceiverSettings {
     /// Whether the receiver processes a cell.
-    pub fn hears(&self, pci: u16) -> bool {
+    pub fn receives(&self, pci: u16) -> bool {
         let list = self.pci_allow_list.as_ref();
         list.is_none_or(|list| list.contains(&pci))
     }

@@ -26,9 +26,9 @@ impl Library for Shipped {
             })
     }
 
-    fn points_m(&self, name: &str, beside: &str) -> Result<Vec<[f64; 2]>, SettingsError> {
+    fn points_m(&self, name: &str, referrer: &str) -> Result<Vec<[f64; 2]>, SettingsError> {
         Err(SettingsError::Value {
-            file: beside.to_owned(),
+            file: referrer.to_owned(),
             key: "road.file".to_owned(),
             value: format!("{name:?}"),
             allowed: "no file is opened here; give the points as `polyline_m`".to_owned(),

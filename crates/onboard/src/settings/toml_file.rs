@@ -31,7 +31,7 @@ pub struct NamedText {
 
 /// Source of the files that other files name. Code on the vehicle opens no files itself.
 pub trait Library {
-    /// Returns the file `name` of this kind, as named in the file `beside`.
+    /// Returns the file `name` of this kind, as named in the file `referrer`.
     ///
     /// # Errors
     /// [`SettingsError`] if the file does not exist or cannot be read.
@@ -40,16 +40,16 @@ pub trait Library {
         what: &'static str,
         shipped: &[(&'static str, &'static str)],
         name: &str,
-        beside: &str,
+        referrer: &str,
     ) -> Result<NamedText, SettingsError>;
 
-    /// Returns the points of a survey file, as named in the file `beside`.
+    /// Returns the points of a survey file, as named in the file `referrer`.
     ///
     /// # Errors
     /// [`SettingsError`] if the file does not exist or cannot be read.
-    fn points_m(&self, name: &str, beside: &str) -> Result<Vec<[f64; 2]>, SettingsError>;
+    fn points_m(&self, name: &str, referrer: &str) -> Result<Vec<[f64; 2]>, SettingsError>;
 
-    /// Returns the full path of a file that the file `beside` names and that is not opened here.
+    /// Returns the full path of a file that the file `referrer` names and that is not opened here.
     /// Without a file system, the name is returned unchanged.
     fn path(&self, name: &str, _beside: &str) -> String {
         name.to_owned()
@@ -200,9 +200,9 @@ fn apply_extends<T: TomlFile>(
     library: &dyn Library,
 ) -> Result<(), SettingsError> {
     refuse_renamed(table, "", origin)?;
-    let mut beside = origin.to_owned();
+    let mut referrer = origin.to_owned();
     for _ in 0..MAX_EXTENDS {
-        let check = Check { file: &beside };
+        let check = Check { file: &referrer };
         let name = match table.remove("extends") {
             None => return Ok(()),
             Some(Value::String(name)) => name,
@@ -210,13 +210,13 @@ fn apply_extends<T: TomlFile>(
                 return Err(check.error("extends", other, "it must be the name of a file"));
             }
         };
-        let base = library.text(T::WHAT, T::SHIPPED, &name, &beside);
-        let base = base.map_err(|error| error.beneath(&beside, "extends"))?;
+        let base = library.text(T::WHAT, T::SHIPPED, &name, &referrer);
+        let base = base.map_err(|error| error.beneath(&referrer, "extends"))?;
         let mut laid = parse(&base.text, &base.origin)?;
         refuse_renamed(&laid, "", &base.origin)?;
         lay_over(&mut laid, std::mem::take(table), "", check)?;
         *table = laid;
-        beside = base.origin;
+        referrer = base.origin;
     }
     let allowed = format!("a chain of `extends` may contain at most {MAX_EXTENDS} files");
     Err(Check { file: origin }.error("extends", "endless", &allowed))

@@ -238,17 +238,17 @@ pub fn check_together(
             "a radio head of the site must have this pci",
         )?;
     }
-    let heard = (site.radio_heads.iter()).filter(|head| vehicle.receiver.hears(head.pci));
-    let heard = heard.count();
+    let received = (site.radio_heads.iter()).filter(|head| vehicle.receiver.receives(head.pci));
+    let received = received.count();
     check.that(
-        heard > 0,
+        received > 0,
         "vehicle.receiver.pci_allow_list",
         "empty",
         "remove it to receive all radio heads",
     )?;
     let along_road = site.road.is_some() && vehicle.follows_road();
     check.that(
-        vehicle.start.known || heard > if along_road { 1 } else { 2 },
+        vehicle.start.known || received > if along_road { 1 } else { 2 },
         "vehicle.start.known",
         false,
         "a search for the vehicle needs at least two radio heads along a road that it follows, \

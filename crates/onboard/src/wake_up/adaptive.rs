@@ -3,7 +3,7 @@
 use super::due::Due;
 use super::policy::{Situation, WakeUpPolicy};
 use crate::BoxError;
-use crate::observation::SensedSsb;
+use crate::observation::SsbDetection;
 
 /// Wake-up policy that estimates an angle when the wake-up time of Algorithm 1 has elapsed since
 /// the previous estimate.
@@ -28,7 +28,7 @@ impl WakeUpPolicy for Adaptive {
     fn decide(
         &mut self,
         now: &Situation<'_>,
-        sensed: &[SensedSsb],
+        sensed: &[SsbDetection],
         chosen: &mut [bool],
     ) -> Result<f64, BoxError> {
         if let Some((ssb, head)) = now.strongest(sensed)

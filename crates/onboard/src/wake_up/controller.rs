@@ -3,7 +3,7 @@
 use super::pid::Pid;
 use super::policy::Situation;
 use crate::BoxError;
-use crate::observation::SensedSsb;
+use crate::observation::SsbDetection;
 use crate::radio_head::RadioHead;
 use crate::settings::{DeltaT, PidSettings, SnrSetPoint};
 
@@ -40,7 +40,7 @@ impl Controller {
     pub fn sense(
         &mut self,
         now: &Situation<'_>,
-        ssb: &SensedSsb,
+        ssb: &SsbDetection,
         head: &RadioHead,
     ) -> Result<Option<f64>, BoxError> {
         let interval_s = self.last_sensed_s.map(|last_s| now.time_s - last_s);

@@ -3,7 +3,7 @@
 use super::controller::Controller;
 use super::policy::{SAME_TIME_S, Situation};
 use crate::BoxError;
-use crate::observation::SensedSsb;
+use crate::observation::SsbDetection;
 use crate::radio_head::RadioHead;
 use crate::settings::SensingMode;
 
@@ -60,7 +60,7 @@ impl Due {
     pub fn sense(
         &mut self,
         now: &Situation<'_>,
-        ssb: &SensedSsb,
+        ssb: &SsbDetection,
         head: &RadioHead,
     ) -> Result<bool, BoxError> {
         // In sleep until due, the controller measures this SSB only after the wake-up.

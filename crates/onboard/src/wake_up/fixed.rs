@@ -3,7 +3,7 @@
 use super::due::Due;
 use super::policy::{Situation, WakeUpPolicy};
 use crate::BoxError;
-use crate::observation::{BURST_S, SensedSsb};
+use crate::observation::{BURST_S, SsbDetection};
 
 /// Wake-up policy with a constant time between estimates, on the clock of Algorithm 1. A late SSB
 /// (at or before the previous estimate) is accepted.
@@ -42,7 +42,7 @@ impl WakeUpPolicy for FixedInterval {
     fn decide(
         &mut self,
         now: &Situation<'_>,
-        _sensed: &[SensedSsb],
+        _sensed: &[SsbDetection],
         chosen: &mut [bool],
     ) -> Result<f64, BoxError> {
         chosen.fill(self.take(now.time_s));

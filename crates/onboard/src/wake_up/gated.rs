@@ -8,7 +8,7 @@
 use super::due::Due;
 use super::policy::{Situation, WakeUpPolicy};
 use crate::BoxError;
-use crate::observation::SensedSsb;
+use crate::observation::SsbDetection;
 use crate::settings::SnrSetPoint;
 
 /// Wake-up policy that estimates an angle at the first due SSB above the SNR threshold.
@@ -39,7 +39,7 @@ impl WakeUpPolicy for Gated {
     fn decide(
         &mut self,
         now: &Situation<'_>,
-        sensed: &[SensedSsb],
+        sensed: &[SsbDetection],
         chosen: &mut [bool],
     ) -> Result<f64, BoxError> {
         if let Some((ssb, head)) = now.strongest(sensed) {

@@ -3,7 +3,7 @@
 use crate::BoxError;
 use crate::link_budget::LinkBudget;
 use crate::localize::Localizer;
-use crate::observation::SensedSsb;
+use crate::observation::SsbDetection;
 use crate::radio_head::RadioHead;
 use crate::settings::SnrSetPoint;
 
@@ -34,13 +34,16 @@ pub struct Situation<'a> {
 
 impl Situation<'_> {
     /// Returns the radio head that transmits an SSB, if it is known and in line of sight.
-    pub fn head(&self, ssb: &SensedSsb) -> Option<&RadioHead> {
+    pub fn head(&self, ssb: &SsbDetection) -> Option<&RadioHead> {
         let mut heads = self.heads.iter();
         heads.find(|head| head.sends(ssb.pci, ssb.ssb_index))
     }
 
     /// Returns the strongest measured SSB of a known radio head, and the radio head.
-    pub fn strongest<'s>(&self, sensed: &'s [SensedSsb]) -> Option<(&'s SensedSsb, &RadioHead)> {
+    pub fn strongest<'s>(
+        &self,
+        sensed: &'s [SsbDetection],
+    ) -> Option<(&'s SsbDetection, &RadioHead)> {
         let known = sensed.iter().filter_map(|ssb| Some((ssb, self.head(ssb)?)));
         known.max_by(|a, b| a.0.snr_db.total_cmp(&b.0.snr_db))
     }
@@ -52,7 +55,7 @@ impl Situation<'_> {
     pub fn snr_shortfall_db(
         &self,
         set_point: SnrSetPoint,
-        ssb: &SensedSsb,
+        ssb: &SsbDetection,
         head: &RadioHead,
     ) -> Result<f64, BoxError> {
         let set_point_db = match set_point {
@@ -91,7 +94,7 @@ pub trait WakeUpPolicy: Send {
     fn decide(
         &mut self,
         now: &Situation<'_>,
-        sensed: &[SensedSsb],
+        sensed: &[SsbDetection],
         chosen: &mut [bool],
     ) -> Result<f64, BoxError>;
 

@@ -27,7 +27,7 @@ use crate::BoxError;
 use crate::gaussian::RadialQuantile;
 use crate::localize::Ekf;
 use crate::localize::ekf::state::Belief;
-use crate::observation::SensedSsb;
+use crate::observation::SsbDetection;
 use crate::radio_head::RadioHead;
 use crate::settings::{Site, UncertaintySettings, Vehicle};
 use crate::thermal::ThermalNoise;
@@ -189,7 +189,7 @@ impl WakeUpPolicy for UncertaintyDriven {
     fn decide(
         &mut self,
         now: &Situation<'_>,
-        sensed: &[SensedSsb],
+        sensed: &[SsbDetection],
         chosen: &mut [bool],
     ) -> Result<f64, BoxError> {
         self.last_wake_up_s = Some(now.time_s);
@@ -198,7 +198,7 @@ impl WakeUpPolicy for UncertaintyDriven {
             return Ok(self.period_s);
         };
         let snr_db = |head: &RadioHead, distance_m| {
-            let sends = |ssb: &&SensedSsb| head.sends(ssb.pci, ssb.ssb_index);
+            let sends = |ssb: &&SsbDetection| head.sends(ssb.pci, ssb.ssb_index);
             let ssb = (self.snr_headroom_db).and_then(|_| sensed.iter().find(sends));
             ssb.map_or_else(|| now.budget.snr_db(head, distance_m), |ssb| ssb.snr_db)
         };

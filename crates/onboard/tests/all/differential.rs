@@ -94,7 +94,7 @@ fn the_odometer_scale_is_constant_only_if_its_deviation_and_noise_are_configured
         EkfConfig::new(&site, &vehicle).noise.scale_per_sqrt_m
     };
     assert_eq!(walk_of(VEHICLE), 0.0);
-    for told in ["scale_std = 0.003\n", "noise_m_per_sqrt_m = 0.01\n"] {
-        assert!(walk_of(&VEHICLE.replace(told, "")) > 0.0, "{told}");
+    for key in ["scale_std = 0.003\n", "noise_m_per_sqrt_m = 0.01\n"] {
+        assert!(walk_of(&VEHICLE.replace(key, "")) > 0.0, "{key}");
     }
 }

@@ -57,7 +57,7 @@ fn the_gap_is_reported_and_increases_the_covariance_until_the_lane_is_followed_a
     let (mut tracker, gap) = tracker(60.0, 0.0, 0.1);
     assert_eq!(tracker.odometry(&sample(0)), OdometryResult::First);
     let lane_m2 = tracker.config().lane_keeping.stationary()[0];
-    let (mut told_m, mut before) = (Vec::new(), 0.0);
+    let (mut reported_m, mut before) = (Vec::new(), 0.0);
     for number in 1..(150 * 50 / 4) {
         let verdict = tracker.odometry(&sample(number));
         let along_m = 60.0 + 0.08 * f64::from(number);
@@ -68,18 +68,18 @@ fn the_gap_is_reported_and_increases_the_covariance_until_the_lane_is_followed_a
         } else {
             let Gap { from_m, to_m } = gap;
             assert_eq!(verdict, OdometryResult::InMapGap { from_m, to_m });
-            if !told_m.is_empty() {
+            if !reported_m.is_empty() {
                 assert!(larger > before, "{along_m}");
             }
             before = larger;
-            told_m.push(along_m);
+            reported_m.push(along_m);
         }
     }
     // At that time, the position error consists of 0.1 m of the start, a scale error of 0.003 and
     // 0.01 m per √m; the verdict follows one sample later.
     let margin_m =
         |driven_m: f64| 3.0 * (0.01 + (0.003 * driven_m).powi(2) + 1e-4 * driven_m).sqrt() + 0.08;
-    let (first_m, last_m) = (told_m[0], told_m[told_m.len() - 1]);
+    let (first_m, last_m) = (reported_m[0], reported_m[reported_m.len() - 1]);
     let (early_m, late_m) = (gap.from_m - first_m, last_m - gap.to_m);
     assert!(early_m > 0.0 && early_m < margin_m(30.0), "{early_m}");
     assert!(late_m > 0.0 && late_m < margin_m(111.0), "{late_m}");

@@ -354,10 +354,10 @@ fn a_gap_of_all_messages_adds_the_odometry_error_of_the_driven_distance() {
         let (_, error_m, after_m) = drive.status();
         assert!(error_m < after_m, "{error_m} {after_m}");
         // The odometer's scale is known to 0.3 % or better; a level is 5.3 standard deviations, with slip as a fault.
-        let way_m = SPEED_MPS * gap_s;
+        let distance_m = SPEED_MPS * gap_s;
         println!("{gap_s} s: {before_m} -> {after_m}");
         assert!(
-            after_m < before_m + 0.1 * way_m + 0.5,
+            after_m < before_m + 0.1 * distance_m + 0.5,
             "{gap_s}: {before_m} {after_m}"
         );
         drive.drive(3.0);

@@ -42,7 +42,7 @@ fn drive(seed: u64) {
     );
     let site = Site::from_toml(&site, "site", &Shipped).unwrap();
     let vehicle = Vehicle::from_toml(&vehicle, "vehicle", &Shipped).unwrap();
-    let heads = RadioHead::heard(&site, &vehicle);
+    let heads = RadioHead::received_by(&site, &vehicle);
     let mut localizer =
         OutOfSequenceBuffer::new(built_in(&site, &vehicle, Pose::default()).unwrap());
 
@@ -91,7 +91,7 @@ fn drive(seed: u64) {
             } else {
                 0.0
             };
-            let eye = truth.beside(0.2, 0.1);
+            let eye = truth.point_at(0.2, 0.1);
             let ground_m = eye.distance_m(head.position);
             let level = ground_m / ground_m.hypot(head.height_m - 0.5).max(1e-9);
             let phase_rad = PI * level * (eye.bearing_rad(head.position) - truth.heading_rad).cos();

@@ -88,7 +88,7 @@ fn setup(heads: usize, kinds: Kinds) -> (EkfConfig, Vec<RadioHead>) {
     let vehicle = Vehicle::from_toml(&vehicle, "vehicle", &Shipped).unwrap();
     (
         EkfConfig::new(&site, &vehicle),
-        RadioHead::heard(&site, &vehicle),
+        RadioHead::received_by(&site, &vehicle),
     )
 }
 
@@ -360,9 +360,9 @@ fn drive(seed: u64, heads: usize, kinds: Kinds, fault: Fault, sums: &mut Sums) -
             }
         }
         if step > STEPS / 3 && step % 50 == 0 {
-            let told = ekf.pose(time_s);
-            let [[xx, xy, _], [_, yy, _], _] = told.covariance.unwrap();
-            let (dx, dy) = (told.pose.x_m - truth.x_m, told.pose.y_m - truth.y_m);
+            let estimate = ekf.pose(time_s);
+            let [[xx, xy, _], [_, yy, _], _] = estimate.covariance.unwrap();
+            let (dx, dy) = (estimate.pose.x_m - truth.x_m, estimate.pose.y_m - truth.y_m);
             sums.error2 += dx * dx + dy * dy;
             sums.nees += (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
             if let Some(bound) = &bound {

@@ -62,7 +62,7 @@ fn setup(heads: usize) -> (EkfConfig, Vec<RadioHead>) {
     let vehicle = Vehicle::from_toml(&vehicle, "vehicle", &Shipped).unwrap();
     (
         EkfConfig::new(&site, &vehicle),
-        RadioHead::heard(&site, &vehicle),
+        RadioHead::received_by(&site, &vehicle),
     )
 }
 
@@ -158,7 +158,7 @@ impl Bound {
 
     fn update(&mut self, number: usize, head: &RadioHead, pose: &Pose) {
         let count = self.covariance.len();
-        let eye = pose.beside(0.3, 0.1);
+        let eye = pose.point_at(0.3, 0.1);
         let (dx, dy) = (eye.x_m - head.position.x_m, eye.y_m - head.position.y_m);
         let range_m = dx.hypot(dy).hypot(head.height_m - 1.0);
         let mut row = vec![0.0; count];
@@ -245,7 +245,7 @@ fn drive(seed: u64, heads: usize, sums: &mut Sums) {
         });
         let number = step as usize % heads;
         let head = &known[number];
-        let range_m = head.distance_m(truth.beside(0.3, 0.1), 1.0);
+        let range_m = head.distance_m(truth.point_at(0.3, 0.1), 1.0);
         let measured = RangeMeasurement::range(
             time_s,
             range_m + clock_m + common_m + offsets_m[number] + normal(SIGMA_M),
@@ -256,9 +256,9 @@ fn drive(seed: u64, heads: usize, sums: &mut Sums) {
             bound.update(number, head, &truth);
         }
         if step > STEPS / 4 && step % 50 == 0 {
-            let told = ekf.pose(time_s);
-            let [[xx, xy, _], [_, yy, _], _] = told.covariance.unwrap();
-            let (dx, dy) = (told.pose.x_m - truth.x_m, told.pose.y_m - truth.y_m);
+            let estimate = ekf.pose(time_s);
+            let [[xx, xy, _], [_, yy, _], _] = estimate.covariance.unwrap();
+            let (dx, dy) = (estimate.pose.x_m - truth.x_m, estimate.pose.y_m - truth.y_m);
             sums.error2 += dx * dx + dy * dy;
             sums.nees += (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
             if let Some(bound) = &bound {

@@ -75,7 +75,7 @@ impl Air {
     }
 
     /// Returns the beams that the receiver reports for burst `number`.
-    fn heard(&self, receiver: &mut Receiver, number: u32) -> Vec<u8> {
+    fn received(&self, receiver: &mut Receiver, number: u32) -> Vec<u8> {
         let observed = self.observed(receiver, number);
         let mut beams: Vec<u8> = observed.iter().map(|it| it.ssb.ssb_index).collect();
         beams.sort_unstable();
@@ -128,13 +128,17 @@ fn a_beam_that_vanishes_and_returns_is_received_again() {
     let all: Vec<u8> = (0..8).collect();
     let others: Vec<u8> = all.iter().copied().filter(|beam| *beam != 3).collect();
     for number in 0..50 {
-        assert_eq!(air.heard(&mut receiver, number), all, "burst {number}");
+        assert_eq!(air.received(&mut receiver, number), all, "burst {number}");
     }
     // Beams are missing for three seconds.
     air.send(others.clone());
     let before = receiver.searches();
     for number in 50..200 {
-        assert_eq!(air.heard(&mut receiver, number), others, "burst {number}");
+        assert_eq!(
+            air.received(&mut receiver, number),
+            others,
+            "burst {number}"
+        );
     }
     assert!(
         receiver.searches() - before <= 3,
@@ -144,11 +148,11 @@ fn a_beam_that_vanishes_and_returns_is_received_again() {
     assert_eq!(receiver.tracked(), 7);
     // Beams are received again within the second between two searches.
     air.send(all.clone());
-    let back = (200..252).find(|number| air.heard(&mut receiver, *number) == all);
+    let back = (200..252).find(|number| air.received(&mut receiver, *number) == all);
     println!("received again in burst {back:?}");
     let back = back.unwrap();
     for number in back + 1..back + 20 {
-        assert_eq!(air.heard(&mut receiver, number), all, "burst {number}");
+        assert_eq!(air.received(&mut receiver, number), all, "burst {number}");
     }
 }
 
@@ -158,13 +162,13 @@ fn no_search_while_all_known_beams_are_received() {
     let all: Vec<u8> = (0..8).collect();
     let mut receiver = air.receiver_of(&all);
     for number in 0..150 {
-        assert_eq!(air.heard(&mut receiver, number), all, "burst {number}");
+        assert_eq!(air.received(&mut receiver, number), all, "burst {number}");
     }
     assert_eq!(receiver.searches(), 1);
     // One beam is missing until it is removed, and detected again as by a receiver without beams.
     air.send((1..8).collect());
     for number in 150..280 {
-        air.heard(&mut receiver, number);
+        air.received(&mut receiver, number);
     }
     assert_eq!(receiver.tracked(), 7);
     assert!(
@@ -173,7 +177,7 @@ fn no_search_while_all_known_beams_are_received() {
         receiver.searches()
     );
     air.send(all.clone());
-    assert!((280..332).any(|number| air.heard(&mut receiver, number) == all));
+    assert!((280..332).any(|number| air.received(&mut receiver, number) == all));
 }
 
 #[test]
@@ -182,14 +186,14 @@ fn a_briefly_hidden_beam_causes_no_search() {
     let mut receiver = air.receiver();
     let all: Vec<u8> = (0..8).collect();
     for number in 0..10 {
-        assert_eq!(air.heard(&mut receiver, number), all);
+        assert_eq!(air.received(&mut receiver, number), all);
     }
     air.send(vec![0, 7]);
     for number in 10..30 {
-        assert_eq!(air.heard(&mut receiver, number), [0, 7]);
+        assert_eq!(air.received(&mut receiver, number), [0, 7]);
     }
     air.send(all.clone());
-    assert_eq!(air.heard(&mut receiver, 30), all);
+    assert_eq!(air.received(&mut receiver, 30), all);
     assert_eq!(receiver.searches(), 1);
 }
 
@@ -200,17 +204,17 @@ fn any_oscillator_is_found_from_cold_and_sleep_is_bridged() {
             let air = Air::new(spacing, ppm, 5.0, 3);
             let mut receiver = air.receiver();
             let all: Vec<u8> = (0..8).collect();
-            let first = (0..30).find(|number| air.heard(&mut receiver, *number) == all);
+            let first = (0..30).find(|number| air.received(&mut receiver, *number) == all);
             let first = first.unwrap();
             println!("{spacing:?} {ppm} ppm: found in burst {first}");
             for number in first + 1..first + 6 {
-                assert_eq!(air.heard(&mut receiver, number), all);
+                assert_eq!(air.received(&mut receiver, number), all);
             }
             // Reception of one burst per second, and of one burst in ten seconds, without
             // additional searches.
             for asleep in [50, 500, 1000] {
-                let heard = air.heard(&mut receiver, first + 6 + asleep);
-                assert_eq!(heard, all, "{spacing:?} {ppm} ppm, {asleep}");
+                let received = air.received(&mut receiver, first + 6 + asleep);
+                assert_eq!(received, all, "{spacing:?} {ppm} ppm, {asleep}");
             }
         }
     }

@@ -47,7 +47,7 @@ struct Drive {
     rng: ChaCha8Rng,
     truth: Pose,
     steps: u32,
-    way_m: f64,
+    distance_m: f64,
 }
 
 impl Drive {
@@ -56,12 +56,12 @@ impl Drive {
         let site = Site::from_toml(SITE, "hall", &Shipped).unwrap();
         let vehicle = Vehicle::from_toml(VEHICLE, "robot", &Shipped).unwrap();
         Self {
-            heads: RadioHead::heard(&site, &vehicle),
+            heads: RadioHead::received_by(&site, &vehicle),
             localizer: built_in(&site, &vehicle, start).unwrap(),
             rng: ChaCha8Rng::seed_from_u64(1),
             truth: Pose::default(),
             steps: 0,
-            way_m: 0.0,
+            distance_m: 0.0,
         }
     }
 
@@ -76,11 +76,11 @@ impl Drive {
     /// Advances by one step; every fifth step has an angle of each radio head.
     fn step(&mut self, speed_mps: f64, rate_radps: f64) {
         self.steps += 1;
-        self.way_m += STEP_S * speed_mps;
+        self.distance_m += STEP_S * speed_mps;
         self.truth = (self.truth).along_chord(STEP_S * speed_mps, STEP_S * rate_radps);
         let sample = OdometrySample {
             time_s: self.time_s(),
-            distance_m: self.way_m,
+            distance_m: self.distance_m,
             speed_mps,
             yaw_rate_radps: Some(rate_radps + 0.02 * self.normal() / STEP_S.sqrt()),
         };
@@ -123,8 +123,8 @@ impl Drive {
 
 /// Ninety seconds of a winding path in the hall: returns the maximum error after sixty seconds, and
 /// whether a search relocated the vehicle.
-fn drive(told: Pose) -> (f64, bool) {
-    let mut drive = Drive::new(told);
+fn drive(start: Pose) -> (f64, bool) {
+    let mut drive = Drive::new(start);
     let worst_m = drive.wind(90.0, 60.0);
     (worst_m, drive.localizer.recovered().is_some())
 }
@@ -140,15 +140,15 @@ fn a_wrong_start_is_detected_and_corrected() {
         (0.0, 0.0, -FRAC_PI_2),
         (0.0, 0.0, PI),
     ] {
-        let told = Pose {
+        let start = Pose {
             x_m,
             y_m,
             heading_rad,
         };
-        let (wrong_m, recovered) = drive(told);
+        let (wrong_m, recovered) = drive(start);
         assert!(
             recovered && wrong_m < 1.2 * right_m + 0.01,
-            "{told:?}: {wrong_m}"
+            "{start:?}: {wrong_m}"
         );
     }
 }

@@ -11,10 +11,10 @@ impl Library for WithOldFile {
         what: &'static str,
         shipped: &[(&'static str, &'static str)],
         name: &str,
-        beside: &str,
+        referrer: &str,
     ) -> Result<NamedText, SettingsError> {
         if name != "old" {
-            return Shipped.text(what, shipped, name, beside);
+            return Shipped.text(what, shipped, name, referrer);
         }
         Ok(NamedText {
             origin: "old".to_owned(),
@@ -22,8 +22,8 @@ impl Library for WithOldFile {
         })
     }
 
-    fn points_m(&self, name: &str, beside: &str) -> Result<Vec<[f64; 2]>, SettingsError> {
-        Shipped.points_m(name, beside)
+    fn points_m(&self, name: &str, referrer: &str) -> Result<Vec<[f64; 2]>, SettingsError> {
+        Shipped.points_m(name, referrer)
     }
 }
 

@@ -15,14 +15,14 @@ impl Library for Shelf {
         what: &'static str,
         shipped: &[(&'static str, &'static str)],
         name: &str,
-        beside: &str,
+        referrer: &str,
     ) -> Result<NamedText, SettingsError> {
         match self.0.iter().find(|it| it.0 == name) {
             Some((name, text)) => Ok(NamedText {
                 origin: (*name).to_owned(),
                 text: (*text).to_owned(),
             }),
-            None => Shipped.text(what, shipped, name, beside),
+            None => Shipped.text(what, shipped, name, referrer),
         }
     }
 
@@ -121,9 +121,9 @@ fn a_changed_tag_removes_the_keys_of_the_previous_variant() {
         (0.1, 1.5e-4)
     );
     // The keys also remain if the table contains no kind.
-    let told = "extends = 'paper'\nwake_up.snr_set_point = { kind = 'absolute', snr_db = 5.0 }";
+    let text = "extends = 'paper'\nwake_up.snr_set_point = { kind = 'absolute', snr_db = 5.0 }";
     assert!(matches!(
-        vehicle(told).unwrap().wake_up,
+        vehicle(text).unwrap().wake_up,
         Some(WakeUpSettings::Gated(_))
     ));
     let tracker = "extends = 'paper'\nlocalizer.kind = 'tracker'";
@@ -184,8 +184,11 @@ fn overrides_go_by_path_and_are_checked_like_a_file() {
         ),
     ] {
         let outcome = yard.with_overrides([(path, 999_999.into())], &Shipped);
-        let (file, told, message) = refusal(outcome);
-        assert_eq!((file.as_str(), told.as_str()), ("yard with overrides", key));
+        let (file, rejected_key, message) = refusal(outcome);
+        assert_eq!(
+            (file.as_str(), rejected_key.as_str()),
+            ("yard with overrides", key)
+        );
         assert!(message.contains(allowed), "{message}");
     }
 }

@@ -67,12 +67,12 @@ const CORRIDOR: Environment = Environment {
 
 impl Environment {
     /// Pose after a distance along the path, counter-clockwise from the middle of the lower straight.
-    fn pose(&self, way_m: f64) -> Pose {
+    fn pose(&self, distance_m: f64) -> Pose {
         let half_m = 0.5 * self.straight_m;
         let bend_m = PI * self.radius_m;
-        let way_m = (way_m + half_m).rem_euclid(2.0 * (self.straight_m + bend_m));
-        let second = way_m >= self.straight_m + bend_m;
-        let along_m = way_m
+        let distance_m = (distance_m + half_m).rem_euclid(2.0 * (self.straight_m + bend_m));
+        let second = distance_m >= self.straight_m + bend_m;
+        let along_m = distance_m
             - if second {
                 self.straight_m + bend_m
             } else {
@@ -128,9 +128,9 @@ fn drive(environment: &Environment, seed: u64, given: Option<fn(Pose) -> Pose>) 
     let site = environment.site();
     let mut vehicle = Vehicle::from_toml(VEHICLE, "cart", &Shipped).unwrap();
     vehicle.start.known = given.is_some();
-    let heads = RadioHead::heard(&site, &vehicle);
-    let lap_m = 2.0 * (environment.straight_m + PI * environment.radius_m);
-    let start_m = rng.random::<f64>() * lap_m;
+    let heads = RadioHead::received_by(&site, &vehicle);
+    let circuit_m = 2.0 * (environment.straight_m + PI * environment.radius_m);
+    let start_m = rng.random::<f64>() * circuit_m;
     let truth = environment.pose(start_m);
     let mut normal = move || -> [f64; 2] { [rng.sample(StandardNormal), rng.random()] };
     let near = Pose {
@@ -138,16 +138,16 @@ fn drive(environment: &Environment, seed: u64, given: Option<fn(Pose) -> Pose>) 
         y_m: truth.y_m + 0.3 * normal()[0],
         heading_rad: truth.heading_rad + 0.05 * normal()[0],
     };
-    let told = given.map_or(Pose::default(), |given| given(near));
-    let mut localizer = built_in(&site, &vehicle, told).unwrap();
+    let start = given.map_or(Pose::default(), |given| given(near));
+    let mut localizer = built_in(&site, &vehicle, start).unwrap();
     let scale = 1.0 + 0.005 * normal()[0];
-    let (mut driven, mut way_m, mut read_m) = (Driven::default(), start_m, 0.0);
+    let (mut driven, mut distance_m, mut read_m) = (Driven::default(), start_m, 0.0);
     let (mut square, mut epochs) = (0.0, 0.0);
     let mut before = truth;
     for step in 1..=(DRIVE_S / STEP_S) as u32 {
         let time_s = STEP_S * f64::from(step);
-        way_m += SPEED_MPS * STEP_S;
-        let pose = environment.pose(way_m);
+        distance_m += SPEED_MPS * STEP_S;
+        let pose = environment.pose(distance_m);
         read_m += scale * SPEED_MPS * STEP_S + 0.01 * (SPEED_MPS * STEP_S).sqrt() * normal()[0];
         let turned_rad = (pose.heading_rad - before.heading_rad + PI).rem_euclid(TAU) - PI;
         before = pose;

@@ -21,7 +21,7 @@ fn road() -> Road {
 
 fn tracker() -> (Ekf, RadioHead) {
     let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
-    let heads = RadioHead::heard(&site(), &vehicle);
+    let heads = RadioHead::received_by(&site(), &vehicle);
     let start = InitialPose {
         pose: Pose::default(),
         position_std_m: 0.5,
@@ -64,7 +64,7 @@ fn angle(time_s: f64, phase_rad: f64, phase_sigma_rad: f64) -> AngleMeasurement 
 fn invalid_angles_are_reported_and_do_not_change_the_state() {
     let (mut tracker, head) = tracker();
     let before = tracker.clone();
-    let stranger = RadioHead { pci: 999, ..head };
+    let unknown_head = RadioHead { pci: 999, ..head };
     let here = RadioHead {
         position: tracker.pose(0.1).pose.point(),
         ..head
@@ -78,7 +78,7 @@ fn invalid_angles_are_reported_and_do_not_change_the_state() {
         (head, angle(0.12, 2.8, 0.0), UpdateReason::Unusable),
         (head, angle(0.05, 2.8, 0.01), UpdateReason::TooLate),
         (head, angle(0.12, -1.0, 0.01), UpdateReason::Outlier),
-        (stranger, good, UpdateReason::UnknownRadioHead),
+        (unknown_head, good, UpdateReason::UnknownRadioHead),
     ] {
         let verdict = tracker.update(&head, &measured);
         assert_eq!(verdict.reason, reason);
@@ -210,12 +210,12 @@ fn a_gap_is_bridged_and_a_jump_increases_the_covariance() {
 fn the_transition_matrix_propagates_a_covariance_as_the_filter_does() {
     let (tracker, _) = tracker();
     let belief = *tracker.belief();
-    for way_m in [0.0, 0.2, 4.0, 30.0] {
-        let found = (tracker.transition(&belief, way_m)).principal_variances(&belief);
-        let expected = Ekf::principal_variances(&tracker.carry(belief, way_m));
+    for travelled_m in [0.0, 0.2, 4.0, 30.0] {
+        let found = (tracker.transition(&belief, travelled_m)).principal_variances(&belief);
+        let expected = Ekf::principal_variances(&tracker.carry(belief, travelled_m));
         for (found, expected) in found.into_iter().zip(expected) {
             let ratio = found / expected;
-            assert!((ratio - 1.0).abs() < 1e-9, "{way_m} m: {ratio}");
+            assert!((ratio - 1.0).abs() < 1e-9, "{travelled_m} m: {ratio}");
         }
     }
 }

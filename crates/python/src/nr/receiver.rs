@@ -124,7 +124,7 @@ impl Receiver {
     fn push(&self, py: Python<'_>, samples: &Bound<'_, PyAny>) -> PyResult<Vec<Py<Cell>>> {
         let samples = complex_samples(samples)?;
         let antennas = rows(&samples)?;
-        self.hear(py, |receiver, take| {
+        self.process(py, |receiver, take| {
             check_finite(&antennas)?;
             receiver.push(&antennas, take).map_err(receiver_error)
         })
@@ -137,7 +137,7 @@ impl Receiver {
     /// list of Cell
     ///     Delayed SSBs; see `push`.
     fn finish(&self, py: Python<'_>) -> PyResult<Vec<Py<Cell>>> {
-        self.hear(py, |receiver, take| {
+        self.process(py, |receiver, take| {
             receiver.finish(take).map_err(receiver_error)
         })
     }
@@ -172,7 +172,7 @@ impl Receiver {
 
 impl Receiver {
     /// Calls the receiver and returns the received SSBs.
-    fn hear(
+    fn process(
         &self,
         py: Python<'_>,
         call: impl FnOnce(&mut Core, &mut dyn FnMut(&TrackedSsb)) -> PyResult<()> + Send,
@@ -186,7 +186,7 @@ impl Receiver {
             call(&mut receiver, &mut |ssb| {
                 let view = self.view.as_ref();
                 let view = view.and_then(|it| it.of_blocks(&ssb.blocks, &ssb.noise_variance));
-                cells.push(Cell::heard(ssb, ssb_freq_hz, spacing, base, view));
+                cells.push(Cell::of_tracked(ssb, ssb_freq_hz, spacing, base, view));
             })?;
             PyResult::Ok(cells)
         })?;
@@ -197,8 +197,8 @@ impl Receiver {
 fn check_finite(antennas: &[&[Complex32]]) -> PyResult<()> {
     for (channel, samples) in antennas.iter().enumerate() {
         if let Some(sample) = samples.iter().position(|x| !x.is_finite()) {
-            let said = format!("sample {sample} of channel {channel} is not finite");
-            return Err(RecordingError::new_err(said));
+            let text = format!("sample {sample} of channel {channel} is not finite");
+            return Err(RecordingError::new_err(text));
         }
     }
     Ok(())

@@ -101,8 +101,8 @@ fn campaign(sound: &[(String, Drive)], only: &str) {
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let mut number = |otherwise: u64| {
-        let told = arguments.next();
-        told.map_or(otherwise, |it| it.parse().unwrap())
+        let argument = arguments.next();
+        argument.map_or(otherwise, |it| it.parse().unwrap())
     };
     let (seeds, first) = (number(20), number(1));
     let only = std::env::var("ONLY").unwrap_or_default();

@@ -12,8 +12,8 @@ use super::simulator::{Drive, Kind};
 /// expected diagnosis.
 pub type Misconfiguration = (&'static str, fn(&mut Drive, &mut ChaCha8Rng) -> Vec<String>);
 
-fn words(said: &[&str]) -> Vec<String> {
-    said.iter().map(|it| (*it).to_owned()).collect()
+fn words(text: &[&str]) -> Vec<String> {
+    text.iter().map(|it| (*it).to_owned()).collect()
 }
 
 fn odometry(drive: &mut Drive, distance: f64, yaw_rate: Option<f64>) {

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use onboard::geometry::{Pose, wrap_angle};
 use onboard::localize::{AngleMeasurement, MeasurementKind};
-use onboard::observation::{OdometrySample, SensedSsb};
+use onboard::observation::{OdometrySample, SsbDetection};
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -150,8 +150,8 @@ fn places(path: &[Pose], size_m: Option<f64>, rng: &mut ChaCha8Rng) -> Vec<[f64;
             [by.x_m - aside_m * sin, by.y_m + aside_m * cos]
         };
         let is_free = |it: &[f64; 3]| (it[0] - x_m).hypot(it[1] - y_m) > 4.0;
-        let is_beside = |it: &Pose| (it.x_m - x_m).hypot(it.y_m - y_m) > 1.5;
-        if places.iter().all(is_free) && path.iter().all(is_beside) {
+        let is_clear = |it: &Pose| (it.x_m - x_m).hypot(it.y_m - y_m) > 1.5;
+        if places.iter().all(is_free) && path.iter().all(is_clear) {
             places.push([x_m, y_m, height_m]);
         }
     }
@@ -237,7 +237,7 @@ pub fn drive(kind: Kind, seed: u64, guarded: bool) -> Drive {
                 phase_rad = uniform(rng, -PI, PI);
             }
             angles.push(LoggedAngle {
-                ssb: SensedSsb {
+                ssb: SsbDetection {
                     pci: 10 + number as u16,
                     ssb_index: 0,
                     time_s: step as f64 / rate_hz,

@@ -189,7 +189,7 @@ impl Drive {
         Some(0.5 * (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
     }
 
-    fn judge(&self, located: &LocatedDrive) -> String {
+    fn summary(&self, located: &LocatedDrive) -> String {
         let (mut ok, mut beyond, mut all, mut nees) = (0, 0, 0, 0.0);
         let mut nees_heading = 0.0;
         for pose in &located.poses {
@@ -351,7 +351,7 @@ fn report(label: &str, drive: &Drive, located: &LocatedDrive) {
     println!(
         "{:10} {label:18} {} {why}",
         drive.name,
-        drive.judge(located)
+        drive.summary(located)
     );
     print_remarks(located);
     print_minutes(drive, &located.poses);
@@ -379,13 +379,17 @@ fn main() {
         if only.as_ref().is_some_and(|only| *only != drive.name) {
             continue;
         }
-        let told = if drive.name.starts_with("litw") {
+        let vehicle = if drive.name.starts_with("litw") {
             LITW
         } else {
             MRCLAM
         };
         if wants("configured") {
-            report("configured", &drive, &drive.locate(told, drive.start, true));
+            report(
+                "configured",
+                &drive,
+                &drive.locate(vehicle, drive.start, true),
+            );
         }
         if wants("defaults") {
             report(
@@ -395,10 +399,10 @@ fn main() {
             );
         }
         if wanted.iter().any(|it| it == "parts") {
-            parts(&drive, told);
+            parts(&drive, vehicle);
         }
         if wants("faults") {
-            faults(&drive, told);
+            faults(&drive, vehicle);
         }
     }
     if wants("street") && only.is_none() {
@@ -410,7 +414,7 @@ fn main() {
 }
 
 /// Locates parts of the drive from several starts, for comparison with the whole drive.
-fn parts(drive: &Drive, told: &str) {
+fn parts(drive: &Drive, vehicle: &str) {
     const LENGTH_S: f64 = 300.0;
     let end_s = drive.truth.last().map_or(0.0, |last| last.time_s);
     let mut from_s = 30.0;
@@ -429,20 +433,20 @@ fn parts(drive: &Drive, told: &str) {
         report(
             &format!("from {from_s} s"),
             &part,
-            &part.locate(told, part.start, false),
+            &part.locate(vehicle, part.start, false),
         );
         from_s += 90.0;
     }
 }
 
-fn faults(drive: &Drive, told: &str) {
-    let good = drive.locate(told, drive.start, false);
+fn faults(drive: &Drive, vehicle: &str) {
+    let good = drive.locate(vehicle, drive.start, false);
     let end_s = f64::INFINITY;
     let compare = |label: &str, drive: &Drive, start: Pose, from_s: f64| {
         if std::env::var("FAULT").is_ok_and(|fault| !label.contains(&fault)) {
             return;
         }
-        let bad = drive.locate(told, start, false);
+        let bad = drive.locate(vehicle, start, false);
         let (is, was) = (
             drive.rms_m(&bad.poses, from_s, end_s),
             drive.rms_m(&good.poses, from_s, end_s),
@@ -487,8 +491,8 @@ fn faults(drive: &Drive, told: &str) {
         .retain(|it| !(at_s..at_s + 60.0).contains(&it.measured.time_s));
     // Recovery within 30 s of the first angle after the interruption.
     let mut times_s = deaf.angles.angles.iter().map(|it| it.measured.time_s);
-    let heard_s = times_s.find(|time_s| *time_s > at_s).unwrap_or(at_s);
-    compare("a minute deaf", &deaf, drive.start, heard_s + 30.0);
+    let received_s = times_s.find(|time_s| *time_s > at_s).unwrap_or(at_s);
+    compare("a minute deaf", &deaf, drive.start, received_s + 30.0);
     for factor in [1.1, 0.9] {
         let scaled = edit(&mut |_, sample| {
             sample.distance_m *= factor;

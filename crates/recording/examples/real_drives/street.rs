@@ -125,7 +125,7 @@ pub fn ten_odometers(folder: &Path) {
         let base = Drive::read(folder, angles, "odometry.csv");
         for map in [true, false] {
             let mut poses = vec![];
-            let (mut rms_m, mut shares, mut heard) = (vec![], [0.0; 4], 0);
+            let (mut rms_m, mut shares, mut aoa_estimates) = (vec![], [0.0; 4], 0);
             for seed in 0..10 {
                 let mut drive = base.clone();
                 if map {
@@ -135,7 +135,7 @@ pub fn ten_odometers(folder: &Path) {
                 let vehicle = format!("{STREET}{more}");
                 let located = drive.locate(&vehicle, drive.start, false);
                 rms_m.push(drive.rms_m(&located.poses, f64::NEG_INFINITY, f64::INFINITY));
-                heard += located.aoa_estimates.len();
+                aoa_estimates += located.aoa_estimates.len();
                 poses.extend_from_slice(&located.poses);
                 for pose in &located.poses {
                     let Some(truth) = drive.true_pose(pose.estimate.time_s) else {
@@ -154,7 +154,7 @@ pub fn ten_odometers(folder: &Path) {
             }
             rms_m.sort_by(f64::total_cmp);
             println!(
-                "street {label:12} {} rms {:.3} (worst {:.3}) in 95 % {:.3} ok {:.3} beyond while ok {:.1e} angles {heard} {}",
+                "street {label:12} {} rms {:.3} (worst {:.3}) in 95 % {:.3} ok {:.3} beyond while ok {:.1e} angles {aoa_estimates} {}",
                 if map { "map   " } else { "no map" },
                 0.5 * (rms_m[4] + rms_m[5]),
                 rms_m[9],

@@ -44,7 +44,7 @@ pub fn write_drive_mcap(file: &Path, drive: &LocatedDrive) -> Result<(), Recordi
 fn write(file: BufWriter<File>, drive: &LocatedDrive) -> Result<(), McapError> {
     let mut writer = McapWriter::new(file)?;
     let mut aoa_estimates = drive.aoa_estimates.iter().peekable();
-    let mut lately: Vec<&AngleResult> = Vec::new();
+    let mut recent: Vec<&AngleResult> = Vec::new();
     let mut remarks = drive.remarks.as_slice();
     let mut diagnosed_s = f64::NEG_INFINITY;
     let mut smoothed = drive.smoothed.iter().peekable();
@@ -52,7 +52,7 @@ fn write(file: BufWriter<File>, drive: &LocatedDrive) -> Result<(), McapError> {
         let time_s = pose.estimate.time_s;
         while let Some(angle_result) = aoa_estimates.next_if(|it| it.ssb.time_s <= time_s) {
             writer.verdict(VERDICT_TOPIC, angle_result)?;
-            lately.push(angle_result);
+            recent.push(angle_result);
         }
         if pose.searching.is_none() {
             writer.odometry(POSE_TOPIC, Frames::MAP, &pose.estimate, &twist(pose))?;
@@ -62,11 +62,11 @@ fn write(file: BufWriter<File>, drive: &LocatedDrive) -> Result<(), McapError> {
         }
         if time_s - diagnosed_s >= DIAGNOSTIC_PERIOD_S {
             let known = remarks.partition_point(|remark| remark.time_s <= time_s);
-            let (told, later) = remarks.split_at(known);
-            writer.diagnostics(time_s, &[diagnosis(pose, &lately), input(told)])?;
+            let (current, later) = remarks.split_at(known);
+            writer.diagnostics(time_s, &[diagnosis(pose, &recent), input(current)])?;
             diagnosed_s = time_s;
             remarks = later;
-            lately.clear();
+            recent.clear();
         }
     }
     for angle_result in aoa_estimates {
@@ -107,13 +107,13 @@ fn input(remarks: &[Remark]) -> DiagnosticStatus {
     }
 }
 
-fn diagnosis(pose: &LocatedPose, lately: &[&AngleResult]) -> DiagnosticStatus {
-    let accepted = lately
+fn diagnosis(pose: &LocatedPose, recent: &[&AngleResult]) -> DiagnosticStatus {
+    let accepted = recent
         .iter()
         .filter(|angle_result| angle_result.verdict.accepted)
         .count();
     let state = pose.estimate.integrity.map(|integrity| integrity.state);
-    let (level, message) = match (accepted, lately.len()) {
+    let (level, message) = match (accepted, recent.len()) {
         _ if pose.searching.is_some() => (DiagnosticLevel::Warn, "searching for the first pose"),
         _ if state == Some(IntegrityState::Unavailable) => {
             (DiagnosticLevel::Error, "the position is not reliable")
@@ -134,14 +134,14 @@ fn diagnosis(pose: &LocatedPose, lately: &[&AngleResult]) -> DiagnosticStatus {
         (few, all) if 2 * few < all => (DiagnosticLevel::Warn, "most angles rejected"),
         _ => (DiagnosticLevel::Ok, "angles accepted"),
     };
-    let mut cells: Vec<u16> = lately
+    let mut cells: Vec<u16> = recent
         .iter()
         .map(|angle_result| angle_result.ssb.pci)
         .collect();
     cells.sort_unstable();
     cells.dedup();
     let mut values = vec![
-        ("angles".to_owned(), lately.len().to_string()),
+        ("angles".to_owned(), recent.len().to_string()),
         ("accepted".to_owned(), accepted.to_string()),
         ("cells".to_owned(), format!("{cells:?}")),
     ];
@@ -161,7 +161,7 @@ fn diagnosis(pose: &LocatedPose, lately: &[&AngleResult]) -> DiagnosticStatus {
         values.push(("hypotheses".to_owned(), hypotheses.to_string()));
     }
     let mut refused = BTreeMap::new();
-    for angle_result in lately.iter().filter(|it| !it.verdict.accepted) {
+    for angle_result in recent.iter().filter(|it| !it.verdict.accepted) {
         *refused
             .entry(angle_result.verdict.reason.name())
             .or_insert(0u32) += 1;

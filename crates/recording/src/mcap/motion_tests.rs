@@ -80,9 +80,12 @@ fn assert_right(motion: &Motion, tolerance_m: f64, what: &str) {
     assert_eq!(motion.speeds_mps.len(), readings.len());
 }
 
-fn assert_said(motion: &Motion, says: &str) {
-    let said: Vec<&String> = motion.notes.iter().chain(&motion.doubts).collect();
-    assert!(said.iter().any(|it| it.contains(says)), "{says}: {said:?}");
+fn assert_remark(motion: &Motion, expected: &str) {
+    let remarks: Vec<&String> = motion.notes.iter().chain(&motion.doubts).collect();
+    assert!(
+        remarks.iter().any(|it| it.contains(expected)),
+        "{expected}: {remarks:?}"
+    );
 }
 
 #[test]
@@ -103,10 +106,10 @@ fn correctly_filled_messages_are_not_reported() {
 fn a_twist_without_a_sign_gets_the_sign_of_the_pose() {
     let motion = found(|_, it| it.linear_mps[0] = it.linear_mps[0].abs());
     assert_right(&motion, 2e-3, "unsigned");
-    assert_said(&motion, "twist.twist.linear.x has the wrong sign");
+    assert_remark(&motion, "twist.twist.linear.x has the wrong sign");
     let motion = found(|_, it| it.linear_mps[0] = -it.linear_mps[0]);
     assert_right(&motion, 2e-3, "opposite sign");
-    assert_said(&motion, "twist.twist.linear.x has the wrong sign");
+    assert_remark(&motion, "twist.twist.linear.x has the wrong sign");
 }
 
 #[test]
@@ -126,7 +129,7 @@ fn a_twist_in_the_frame_of_the_pose_is_rotated() {
     for more_rad in [0.0, 1.2, 2.7, -1.9] {
         let motion = turned_by(more_rad);
         assert_right(&motion, 2e-3, "of the map");
-        assert_said(&motion, "twist.twist.linear is in the frame of the pose");
+        assert_remark(&motion, "twist.twist.linear is in the frame of the pose");
     }
 }
 
@@ -134,13 +137,13 @@ fn a_twist_in_the_frame_of_the_pose_is_rotated() {
 fn speeds_are_derived_from_poses_and_distances_from_twists() {
     let motion = found(|_, it| it.linear_mps = [0.0, 0.0]);
     assert_right(&motion, 2e-3, "pose alone");
-    assert_said(&motion, "twist.twist.linear.x is not filled");
+    assert_remark(&motion, "twist.twist.linear.x is not filled");
     let motion = found(|_, it| it.linear_mps = [f64::NAN; 2]);
     assert_right(&motion, 2e-3, "pose alone, twist not a number");
     for place in [[0.0; 2], [7.0, 5.0], [f64::NAN; 2]] {
         let motion = found(|_, it| (it.position_m, it.heading_rad) = (place, Some(0.0)));
         assert_right(&motion, 2e-3, "twist alone");
-        assert_said(&motion, "pose.pose.position never changes");
+        assert_remark(&motion, "pose.pose.position never changes");
         assert!(!motion.has_both);
     }
     let motion = found(|k, it| it.position_m = if k == 99 { [500.0, 0.0] } else { [0.0; 2] });
@@ -162,7 +165,7 @@ fn single_invalid_values_are_ignored() {
         it.linear_mps[1] = f64::NAN;
     });
     assert_right(&motion, 2e-3, "speeds missing");
-    assert_said(&motion, "not finite in 16 messages");
+    assert_remark(&motion, "not finite in 16 messages");
     let motion = found(|k, it| {
         if k % 3 == 1 {
             it.heading_rad = None;
@@ -179,7 +182,7 @@ fn without_an_orientation_the_twist_gives_the_sign() {
     for heading_rad in [0.0, 1.5, -2.5] {
         let motion = found(|_, it| it.heading_rad = Some(heading_rad));
         assert_right(&motion, 2e-3, "constant orientation");
-        assert_said(&motion, "does not move along the heading");
+        assert_remark(&motion, "does not move along the heading");
     }
     let motion = found(|_, it| it.heading_rad = it.heading_rad.map(|it| it + 1.57));
     assert_right(&motion, 2e-3, "orientation off by a quarter of a turn");
@@ -200,7 +203,7 @@ fn a_constant_orientation_on_a_winding_road_is_not_used() {
     };
     let readings: Vec<Reading> = (0..1000).map(step).collect();
     let motion = motion(&readings, Filled::new(readings.iter()));
-    assert_said(&motion, "does not move along the heading");
+    assert_remark(&motion, "does not move along the heading");
     // Length of a sine: mean of the root of 1 + 0.09 cos², approximately 1 + 0.09/4 − 3 · 0.09²/64.
     let length_m = motion.distances_m.last().unwrap() / (0.05 * 999.0);
     assert!(
@@ -224,8 +227,8 @@ fn lateral_motion_is_reported() {
         }
     });
     assert_right(&motion, 5e-2, "sideways");
-    assert_said(&motion, "across the heading");
-    assert_said(&motion, "twist.twist.linear.y is not 0");
+    assert_remark(&motion, "across the heading");
+    assert_remark(&motion, "twist.twist.linear.y is not 0");
 }
 
 #[test]

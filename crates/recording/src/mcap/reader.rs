@@ -106,7 +106,7 @@ pub fn read_odometry_mcap(
         imus: &imus,
         is_straight: motion.is_straight,
     }
-    .tell(&mut log, imu_topic)?;
+    .set_yaw_rates(&mut log, imu_topic)?;
     Ok(log)
 }
 
@@ -274,13 +274,17 @@ struct Turning<'a> {
 
 impl Turning<'_> {
     /// Sets the yaw rate of the samples and adds a remark on its source.
-    fn tell(&self, log: &mut OdometryLog, asked: Option<&str>) -> Result<(), RecordingError> {
+    fn set_yaw_rates(
+        &self,
+        log: &mut OdometryLog,
+        imu_topic: Option<&str>,
+    ) -> Result<(), RecordingError> {
         let times_s: Vec<f64> = log.samples.iter().map(|sample| sample.time_s).collect();
         let by_twist: Vec<Option<f64>> = self.readings.iter().map(|it| it.yaw_rate_radps).collect();
-        let twist_tells = by_twist.iter().flatten().any(|rate| *rate != 0.0);
+        let twist_turns = by_twist.iter().flatten().any(|rate| *rate != 0.0);
         let mut remarks = Vec::new();
-        let mut told = None;
-        if let Some((imu, gyroscope)) = self.imu(asked, twist_tells, &mut remarks)? {
+        let mut found = None;
+        if let Some((imu, gyroscope)) = self.imu(imu_topic, twist_turns, &mut remarks)? {
             let rates = gyroscope.rates(&times_s);
             let source = format!("angular_velocity.z of {imu}");
             if rates.iter().any(Option::is_some) {
@@ -288,35 +292,35 @@ impl Turning<'_> {
                     0 => String::new(),
                     count => format!("; {count} of its messages are left out"),
                 };
-                told = Some((
+                found = Some((
                     rates,
                     format!("{source}, whose z axis is assumed to point up{but}"),
                 ));
             } else {
                 let why = self.apart(&times_s, gyroscope);
-                if asked.is_some() {
+                if imu_topic.is_some() {
                     let allowed = "both must be stamped by one clock, in their headers";
                     return Err(RecordingError::value(self.bag, imu, why, allowed));
                 }
                 remarks.push(OdometryIssue::Unused { source, why });
             }
         }
-        if told.is_none() && twist_tells {
+        if found.is_none() && twist_turns {
             // Only an alternative source requires a remark.
             let others: Vec<&str> = self.imus.keys().map(String::as_str).collect();
-            let said = format!(
+            let source = format!(
                 "twist.angular.z of {}; --imu-topic selects that of {}",
                 self.topic,
                 others.join(" or ")
             );
-            let said = if others.is_empty() {
+            let source = if others.is_empty() {
                 String::new()
             } else {
-                said
+                source
             };
-            told = Some((by_twist, said));
+            found = Some((by_twist, source));
         }
-        if told.is_none() {
+        if found.is_none() {
             let headings: Vec<Option<f64>> =
                 self.readings.iter().map(|it| it.heading_rad).collect();
             let mut rates = rates_of_headings(&times_s, &headings);
@@ -325,10 +329,10 @@ impl Turning<'_> {
                 rates.fill(Some(0.0));
             }
             if rates.iter().any(Option::is_some) {
-                told = Some((rates, format!("pose.orientation of {}", self.topic)));
+                found = Some((rates, format!("pose.orientation of {}", self.topic)));
             }
         }
-        if let Some((rates, from)) = told {
+        if let Some((rates, from)) = found {
             for (sample, rate) in log.samples.iter_mut().zip(rates) {
                 sample.yaw_rate_radps = rate;
             }
@@ -346,30 +350,30 @@ impl Turning<'_> {
     /// Returns the requested or required IMU with its topic; unusable IMUs are reported as remarks.
     fn imu(
         &self,
-        asked: Option<&str>,
-        twist_tells: bool,
+        imu_topic: Option<&str>,
+        twist_turns: bool,
         remarks: &mut Vec<OdometryIssue>,
     ) -> Result<Option<(&str, &Gyroscope)>, RecordingError> {
-        if let Some(asked) = asked {
-            let Some((topic, gyroscope)) = self.imus.get_key_value(asked) else {
+        if let Some(imu_topic) = imu_topic {
+            let Some((topic, gyroscope)) = self.imus.get_key_value(imu_topic) else {
                 return Err(RecordingError::Missing {
                     file: self.bag.display().to_string(),
-                    key: asked.to_owned(),
+                    key: imu_topic.to_owned(),
                     allowed: "there must be sensor_msgs/msg/Imu in CDR on it".to_owned(),
                 });
             };
-            if let Some(why) = says_nothing(gyroscope) {
+            if let Some(why) = without_information(gyroscope) {
                 let allowed = "it must have an IMU with a known angular velocity";
-                return Err(RecordingError::value(self.bag, asked, why, allowed));
+                return Err(RecordingError::value(self.bag, imu_topic, why, allowed));
             }
             return Ok(Some((topic, gyroscope)));
         }
-        if twist_tells {
+        if twist_turns {
             return Ok(None);
         }
         let mut usable = Vec::new();
         for (topic, gyroscope) in self.imus {
-            if let Some(why) = says_nothing(gyroscope) {
+            if let Some(why) = without_information(gyroscope) {
                 let source = topic.clone();
                 let why = why.to_owned();
                 remarks.push(OdometryIssue::Unused { source, why });
@@ -406,7 +410,7 @@ impl Turning<'_> {
 }
 
 /// Returns the reason why a gyroscope is unusable; `None` for a usable one.
-fn says_nothing(gyroscope: &Gyroscope) -> Option<&'static str> {
+fn without_information(gyroscope: &Gyroscope) -> Option<&'static str> {
     if gyroscope.len() < 2 {
         Some("without an angular velocity that is known, finite and in order of time")
     } else if gyroscope.is_silent() {
@@ -429,13 +433,13 @@ fn decode_odometry(message: &[u8]) -> Option<Reading> {
     let covariance: [f64; 36] = decoder.f64s()?;
     let variance = covariance[35];
     let is_observed = variance.is_nan() || (0.0..UNOBSERVED).contains(&variance);
-    let is_told = yaw_rate_radps.is_finite() && is_observed;
+    let is_given = yaw_rate_radps.is_finite() && is_observed;
     Some(Reading {
         time_s,
         position_m: [x_m, y_m],
         heading_rad: yaw_rad(orientation),
         linear_mps: [x_mps, y_mps],
-        yaw_rate_radps: is_told.then_some(yaw_rate_radps),
+        yaw_rate_radps: is_given.then_some(yaw_rate_radps),
     })
 }
 

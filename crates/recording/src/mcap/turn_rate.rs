@@ -174,12 +174,12 @@ mod tests {
         let late = (200..=300).map(|k| (0.01 * f64::from(k), -0.5));
         let gyroscope = read(early.chain(late));
         let times_s: Vec<f64> = (0..=8).map(|k| 0.5 * f64::from(k)).collect();
-        let told = gyroscope.rates(&times_s);
+        let rates = gyroscope.rates(&times_s);
         let close = |found: Option<f64>, to: f64| (found.unwrap() - to).abs() < 1e-12;
-        assert!(close(told[1], 0.5) && close(told[2], 0.5));
-        assert_eq!(told[3..=4], [None, None]);
-        assert!(close(told[5], -0.5) && close(told[6], -0.5));
-        assert_eq!(told[7..], [None, None]);
+        assert!(close(rates[1], 0.5) && close(rates[2], 0.5));
+        assert_eq!(rates[3..=4], [None, None]);
+        assert!(close(rates[5], -0.5) && close(rates[6], -0.5));
+        assert_eq!(rates[7..], [None, None]);
         assert_eq!(Gyroscope::default().rates(&times_s), vec![None; 9]);
         assert!(gyroscope.rates(&[]).is_empty());
     }

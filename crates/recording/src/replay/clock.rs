@@ -103,9 +103,9 @@ pub fn angle_time_offset(given: &Drive<'_>) -> Result<Option<AngleTimeOffset>, R
     let odometer = &mut given.vehicle.to_mut().odometer;
     odometer.scale_std = DOUBTED_SCALE_STDS * scale_std;
     let of = |late_s: f64| {
-        let mut meant = given.clone();
-        meant.vehicle.to_mut().receiver.angle_time_offset_s += late_s;
-        screened(&meant)
+        let mut corrected = given.clone();
+        corrected.vehicle.to_mut().receiver.angle_time_offset_s += late_s;
+        screened(&corrected)
     };
     let log_likelihood =
         |of: Option<Evidence>| of.map_or(f64::NEG_INFINITY, |it| it.relative_log_likelihood);
@@ -145,8 +145,8 @@ pub fn angle_time_offset(given: &Drive<'_>) -> Result<Option<AngleTimeOffset>, R
             candidate_s: found_s,
         }));
     }
-    let beside = likelihood(found_s - ASIDE_S)? + likelihood(found_s + ASIDE_S)?;
-    let curvature = (2.0 * at_best - beside) / (ASIDE_S * ASIDE_S);
+    let neighbours = likelihood(found_s - ASIDE_S)? + likelihood(found_s + ASIDE_S)?;
+    let curvature = (2.0 * at_best - neighbours) / (ASIDE_S * ASIDE_S);
     // The standard deviation is limited to the spacing of the search grid.
     let left_std_s = curvature.max(0.0).sqrt().recip().min(GRID_S);
     Ok(Some(AngleTimeOffset {
@@ -195,7 +195,7 @@ mod tests {
 
     use onboard::geometry::wrap_angle;
     use onboard::localize::{AngleMeasurement, MeasurementKind};
-    use onboard::observation::{OdometrySample, SensedSsb};
+    use onboard::observation::{OdometrySample, SsbDetection};
     use onboard::radio_head::RadioHead;
     use onboard::settings::{Shipped, Site, TomlFile as _, Vehicle};
     use rand::{RngExt, SeedableRng};
@@ -221,7 +221,7 @@ mod tests {
         let vehicle = Vehicle::from_library("tugger", &Shipped).unwrap();
         let (site, mut vehicle) = as_stated(&site, &vehicle);
         vehicle.start.pose = Some(site.build_road().unwrap().unwrap().pose(0.0));
-        let heads = RadioHead::heard(&site, &vehicle);
+        let heads = RadioHead::received_by(&site, &vehicle);
         // Predicts exact angles.
         let mut exact = plain_filter(&site, &vehicle).unwrap();
         let (mut odometry, mut angles) = (OdometryLog::default(), vec![]);
@@ -251,7 +251,7 @@ mod tests {
                 let predicted_rad = -exact.innovation(head, &measured).unwrap().residual;
                 let noise: f64 = random.sample(StandardNormal);
                 measured.phase_rad = wrap_angle(predicted_rad + SIGMA_RAD * noise);
-                let ssb = SensedSsb {
+                let ssb = SsbDetection {
                     pci: head.pci,
                     ssb_index: head.ssb_index,
                     time_s,

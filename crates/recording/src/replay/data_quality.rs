@@ -36,8 +36,8 @@ pub fn warnings(
     };
     let [start_s, _] = odometry_s;
     let inside = |it: &&LoggedAngle| odometry.covers(it.measured.time_s);
-    let heard: Vec<&LoggedAngle> = angles.iter().filter(inside).collect();
-    if !angles.is_empty() && heard.is_empty() {
+    let received: Vec<&LoggedAngle> = angles.iter().filter(inside).collect();
+    if !angles.is_empty() && received.is_empty() {
         let times_s = angles.iter().map(|it| it.measured.time_s);
         return Err(ReplayError::Clocks {
             odometry_s,
@@ -47,7 +47,7 @@ pub fn warnings(
             ],
         });
     }
-    let outside = angles.len() - heard.len();
+    let outside = angles.len() - received.len();
     if outside > 0 {
         let text = format!("{outside} angles lie outside of the odometry's time; check the clocks");
         warnings.push((start_s, text));
@@ -78,8 +78,8 @@ pub fn warnings(
     warnings.extend(without_array(site, angles).map(|text| (start_s, text)));
 
     let turns = |it: &&LoggedAngle| {
-        let told_rad = [it.measured.phase_rad, it.measured.angle_rad];
-        told_rad.iter().any(|told_rad| told_rad.abs() > TAU)
+        let angles_rad = [it.measured.phase_rad, it.measured.angle_rad];
+        angles_rad.iter().any(|angles_rad| angles_rad.abs() > TAU)
     };
     let beyond = angles.iter().filter(turns).count();
     if 10 * beyond > angles.len() {
@@ -110,7 +110,7 @@ pub fn warnings(
         warnings.push((start_s, text));
     }
 
-    let times_s = heard.iter().map(|it| it.measured.time_s);
+    let times_s = received.iter().map(|it| it.measured.time_s);
     let mut before_s = start_s;
     for time_s in times_s.chain(odometry.samples.last().map(|it| it.time_s)) {
         if time_s - before_s > SILENCE_S {

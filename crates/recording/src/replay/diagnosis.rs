@@ -117,7 +117,7 @@ pub fn diagnose(given: &Drive<'_>, located: &LocatedDrive) -> Result<Vec<Diagnos
 
 /// Returns the drive with as many angles as the diagnosis needs, in order of time.
 pub fn spread<'a>(given: &Drive<'a>) -> Drive<'a> {
-    let heads = RadioHead::heard(&given.site, &given.vehicle);
+    let heads = RadioHead::received_by(&given.site, &given.vehicle);
     let mut given = given.clone();
     let angles = given.angles.to_mut();
     let sends = |it: &LoggedAngle| {
@@ -173,11 +173,11 @@ fn better_explanations(
 ) -> Result<Vec<Diagnosis>, ReplayError> {
     let mut likely = Vec::new();
     for hypothesis in hypotheses {
-        let meant = hypothesis.correct(given);
-        if !is_plausible(&meant) {
+        let corrected = hypothesis.correct(given);
+        if !is_plausible(&corrected) {
             continue;
         }
-        let Some(evidence) = screened(&meant)? else {
+        let Some(evidence) = screened(&corrected)? else {
             continue;
         };
         if evidence.log_likelihood.is_finite() {
@@ -189,31 +189,38 @@ fn better_explanations(
         .first()
         .map_or(0.0, |(log_likelihood, _)| *log_likelihood);
     let close = |it: &(f64, Hypothesis)| best - it.0 < CLOSE;
-    let mut judged = Vec::new();
+    let mut confirmed_hypotheses = Vec::new();
     for (_, hypothesis) in likely.into_iter().take_while(close).take(CONFIRMED) {
-        let meant = hypothesis.correct(given);
-        let Some(evidence) = confirmed(&meant)? else {
+        let corrected = hypothesis.correct(given);
+        let Some(evidence) = confirmed(&corrected)? else {
             continue;
         };
         let log_odds = evidence.log_likelihood - as_given.log_likelihood - hypothesis.penalty;
         let fits = evidence.all.refused_share() < MOST_REFUSED
             && 2 * evidence.all.misfits < as_given.all.misfits;
         if log_odds > LOG_ODDS && fits {
-            judged.push((log_odds, hypothesis, evidence));
+            confirmed_hypotheses.push((log_odds, hypothesis, evidence));
         }
     }
-    judged.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let best = judged.first().map_or(0.0, |(log_odds, ..)| *log_odds);
-    judged.retain(|(log_odds, ..)| best - log_odds < LOG_ODDS);
+    confirmed_hypotheses.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let best = confirmed_hypotheses
+        .first()
+        .map_or(0.0, |(log_odds, ..)| *log_odds);
+    confirmed_hypotheses.retain(|(log_odds, ..)| best - log_odds < LOG_ODDS);
     // A hypothesis with a free parameter explains everything that one without explains, so that the
     // latter is preferred.
-    if judged.iter().any(|(_, it, _)| it.penalty == 0.0) {
-        judged.retain(|(_, it, _)| it.penalty == 0.0);
+    if confirmed_hypotheses
+        .iter()
+        .any(|(_, it, _)| it.penalty == 0.0)
+    {
+        confirmed_hypotheses.retain(|(_, it, _)| it.penalty == 0.0);
     } else {
-        judged.truncate(1);
+        confirmed_hypotheses.truncate(1);
     }
-    let best = judged.first().map_or(0.0, |(log_odds, ..)| *log_odds);
-    judged.retain(|(log_odds, ..)| best - log_odds < AS_LIKELY);
+    let best = confirmed_hypotheses
+        .first()
+        .map_or(0.0, |(log_odds, ..)| *log_odds);
+    confirmed_hypotheses.retain(|(log_odds, ..)| best - log_odds < AS_LIKELY);
     let diagnosis = |(_, hypothesis, evidence): (f64, Hypothesis, Evidence)| Diagnosis {
         is_of_start: hypothesis.subject == Subject::Start,
         is_harmless: !is_lost && apart_m(&as_given.path, &evidence.path) < HARMLESS_M,
@@ -221,11 +228,11 @@ fn better_explanations(
             "{:.0} % of the angles contradict the configuration, but only {:.0} % if {}; check {}",
             100.0 * as_given.all.misfit_share(),
             100.0 * evidence.all.misfit_share(),
-            hypothesis.meant,
+            hypothesis.text,
             hypothesis.check
         ),
     };
-    Ok(judged.into_iter().map(diagnosis).collect())
+    Ok(confirmed_hypotheses.into_iter().map(diagnosis).collect())
 }
 
 /// Returns all hypotheses of a drive.
@@ -283,36 +290,36 @@ fn wrong_yaw_rate(
 ) -> Result<Option<Diagnosis>, ReplayError> {
     let is_constant = yaw_rate::constant_radps(&given.odometry.samples).is_some();
     // Off the road, the heading is the integrated yaw rate, unless the yaw rate is constant.
-    let tells_heading = is_on_road(given) || is_constant;
-    let told_per_turned = if tells_heading && !located.is_lost_for_long() {
-        yaw_rate::told_per_turned(&located.poses)
+    let gives_heading = is_on_road(given) || is_constant;
+    let measured_per_true = if gives_heading && !located.is_lost_for_long() {
+        yaw_rate::measured_per_true(&located.poses)
     } else {
         None
     };
-    let is_it = |factor: f64| match told_per_turned {
-        Some(told) => is_constant || yaw_rate::is_about(told, factor),
+    let is_it = |factor: f64| match measured_per_true {
+        Some(ratio) => is_constant || yaw_rate::is_about(ratio, factor),
         None => is_constant && !is_sound,
     };
     let mut hypotheses = yaw_rate_hypotheses(given).into_iter();
     let Some((_, hypothesis)) = hypotheses.find(|(factor, _)| is_it(*factor)) else {
         return Ok(None);
     };
-    let meant = hypothesis.correct(given);
-    let evidence = confirmed(&meant)?;
+    let corrected = hypothesis.correct(given);
+    let evidence = confirmed(&corrected)?;
     let is_worse = |it: &Evidence| as_given.log_likelihood - it.log_likelihood > LOG_ODDS;
     // Without any yaw rate, the localizer may be lost as well.
     if evidence.as_ref().map_or(!is_constant, is_worse) {
         return Ok(None);
     }
     let is_near = |it: &Evidence| apart_m(&as_given.path, &it.path) < HARMLESS_M;
-    let turned = told_per_turned.map_or(
+    let turned = measured_per_true.map_or(
         String::from("the angles contradict the configuration"),
-        |told| format!("yaw_rate_radps is {told:.2} times the yaw rate of the vehicle"),
+        |ratio| format!("yaw_rate_radps is {ratio:.2} times the yaw rate of the vehicle"),
     );
     Ok(Some(Diagnosis {
         is_of_start: false,
         is_harmless: is_sound && evidence.as_ref().is_some_and(is_near),
-        text: format!("{turned}: {}; check {}", hypothesis.meant, hypothesis.check),
+        text: format!("{turned}: {}; check {}", hypothesis.text, hypothesis.check),
     }))
 }
 

@@ -35,12 +35,12 @@ const HALVINGS: usize = 3;
 /// Errors of [`screened`].
 pub fn reversed_parts(given: &Drive<'_>) -> Result<Option<Hypothesis>, ReplayError> {
     let samples = &given.odometry.samples;
-    let tells_direction = samples.iter().any(|it| it.speed_mps < 0.0)
+    let gives_direction = samples.iter().any(|it| it.speed_mps < 0.0)
         || samples.windows(2).any(|pair| match pair {
             [a, b] => b.distance_m < a.distance_m,
             _ => false,
         });
-    if tells_direction {
+    if gives_direction {
         return Ok(None);
     }
     let parts = parts(samples);

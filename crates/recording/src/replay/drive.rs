@@ -123,17 +123,17 @@ impl<'a> Replay<'a> {
     ///
     /// # Errors
     /// [`ReplayError::Custom`].
-    pub fn hear<T: HasSsb>(&mut self, mut ssbs: &[T]) -> Result<(), ReplayError> {
+    pub fn process<T: HasSsb>(&mut self, mut ssbs: &[T]) -> Result<(), ReplayError> {
         while !ssbs.is_empty() {
             let (burst, later) = ssbs.split_at(first_burst(ssbs));
             let time_s = burst.first().map_or(f64::NAN, |first| first.ssb().time_s);
             self.odometry_until(time_s)?;
             let mut source = Burst(burst);
-            let heard = self.onboard.process_burst(time_s, &mut source);
-            let heard = heard.map_err(ReplayError::Custom)?;
+            let result = self.onboard.process_burst(time_s, &mut source);
+            let result = result.map_err(ReplayError::Custom)?;
             self.drive
                 .aoa_estimates
-                .extend_from_slice(heard.aoa_estimates);
+                .extend_from_slice(result.aoa_estimates);
             let ranges = self.onboard.ranges().iter().map(|it| LocatedRange {
                 range: LoggedRange {
                     pci: it.head.pci,

@@ -42,7 +42,7 @@ pub enum Subject {
 /// Hypothesis about the configuration of a drive.
 pub struct Hypothesis {
     /// Text after "the angles fit if …".
-    pub meant: String,
+    pub text: String,
     /// Text after "check …".
     pub check: String,
     pub subject: Subject,
@@ -67,14 +67,14 @@ enum Correction {
 }
 
 impl Hypothesis {
-    fn new(meant: impl Into<String>, check: impl Into<String>, correction: Correction) -> Self {
+    fn new(text: impl Into<String>, check: impl Into<String>, correction: Correction) -> Self {
         let subject = match correction {
             Correction::Start(_) => Subject::Start,
             Correction::Head(..) | Correction::Exchange(..) => Subject::RadioHeads,
             _ => Subject::Drive,
         };
         Self {
-            meant: meant.into(),
+            text: text.into(),
             check: check.into(),
             subject,
             penalty: 0.0,
@@ -84,14 +84,14 @@ impl Hypothesis {
 
     /// Creates a hypothesis with a different odometry and its penalty.
     pub fn of_odometry(
-        meant: String,
+        text: String,
         check: &'static str,
         penalty: f64,
         odometry: OdometryLog,
     ) -> Self {
         Self {
             penalty,
-            ..Self::new(meant, check, Correction::Log(Box::new(odometry)))
+            ..Self::new(text, check, Correction::Log(Box::new(odometry)))
         }
     }
 
@@ -100,16 +100,16 @@ impl Hypothesis {
         let mut drive = given.clone();
         match self.correction {
             Correction::Log(ref log) => drive.odometry = Cow::Owned(log.as_ref().clone()),
-            Correction::Angle(meant) => {
+            Correction::Angle(text) => {
                 let angles = drive.angles.to_mut().iter_mut();
-                angles.for_each(|angle| meant(angle, &given.vehicle));
+                angles.for_each(|angle| text(angle, &given.vehicle));
             }
-            Correction::Odometry(meant) => {
-                drive.odometry.to_mut().samples.iter_mut().for_each(meant);
+            Correction::Odometry(text) => {
+                drive.odometry.to_mut().samples.iter_mut().for_each(text);
             }
-            Correction::Heads(meant) => {
+            Correction::Heads(text) => {
                 for head in &mut drive.site.to_mut().radio_heads {
-                    head.position_m = meant(head.position_m);
+                    head.position_m = text(head.position_m);
                 }
             }
             Correction::Head(number, [x_m, y_m]) => {
@@ -129,10 +129,10 @@ impl Hypothesis {
                 }
             }
             Correction::Mounting(by_rad) => drive.vehicle.to_mut().array.mounting_rad += by_rad,
-            Correction::Vehicle(meant) => meant(drive.vehicle.to_mut()),
-            Correction::Start(meant) => {
+            Correction::Vehicle(text) => text(drive.vehicle.to_mut()),
+            Correction::Start(text) => {
                 let start = &mut drive.vehicle.to_mut().start;
-                start.pose = start.pose.map(|pose| meant(&given.site, pose));
+                start.pose = start.pose.map(|pose| text(&given.site, pose));
             }
         }
         drive
@@ -156,7 +156,7 @@ pub fn of_radio_heads(site: &Site) -> Vec<Hypothesis> {
         let name = name_of(site, head);
         let [x_m, y_m, _] = head.position_m;
         let key = "radio_heads.position_m";
-        let ways = [
+        let changes = [
             (
                 format!("x and y of {name} are exchanged"),
                 format!("the order in its {key}: x, y, height"),
@@ -173,10 +173,10 @@ pub fn of_radio_heads(site: &Site) -> Vec<Hypothesis> {
                 [x_m, -y_m],
             ),
         ];
-        for (meant, check, place_m) in ways {
+        for (text, check, place_m) in changes {
             if place_m != [x_m, y_m] {
                 hypotheses.push(Hypothesis::new(
-                    meant,
+                    text,
                     check,
                     Correction::Head(number, place_m),
                 ));
@@ -205,7 +205,7 @@ pub fn of_radio_heads(site: &Site) -> Vec<Hypothesis> {
 pub fn moved(site: &Site, number: usize, place: Point) -> Option<Hypothesis> {
     let head = site.radio_heads.get(number)?;
     let [x_m, y_m, _] = head.position_m;
-    let meant = format!(
+    let text = format!(
         "{} is near ({:.1}, {:.1}) m, {:.1} m from its position in the site file",
         name_of(site, head),
         place.x_m,
@@ -216,7 +216,7 @@ pub fn moved(site: &Site, number: usize, place: Point) -> Option<Hypothesis> {
     let correction = Correction::Head(number, [place.x_m, place.y_m]);
     Some(Hypothesis {
         penalty: FREEDOM_LOG_ODDS,
-        ..Hypothesis::new(meant, check, correction)
+        ..Hypothesis::new(text, check, correction)
     })
 }
 
@@ -241,10 +241,10 @@ pub fn robot() -> Hypothesis {
 pub fn of_yaw_rate(constant_radps: Option<f64>) -> Vec<(f64, Hypothesis)> {
     if let Some(radps) = constant_radps {
         let radps = radps + 0.0; // a negative zero is zero
-        let meant = format!("yaw_rate_radps, which is {radps} throughout, is not a measurement");
+        let text = format!("yaw_rate_radps, which is {radps} throughout, is not a measurement");
         let correction = Correction::Odometry(|it| it.yaw_rate_radps = None);
         let check = "the source of the yaw rate, and its column";
-        return vec![(0.0, Hypothesis::new(meant, check, correction))];
+        return vec![(0.0, Hypothesis::new(text, check, correction))];
     }
     vec![
         (
@@ -382,7 +382,7 @@ pub fn of_drive() -> Vec<Hypothesis> {
             Correction::Start(other_side),
         ),
     ];
-    let new = |(meant, check, correction)| Hypothesis::new(meant, check, correction);
+    let new = |(text, check, correction)| Hypothesis::new(text, check, correction);
     table.into_iter().map(new).collect()
 }
 

@@ -66,7 +66,7 @@ pub fn plain_filter(site: &Site, vehicle: &Vehicle) -> Result<Ekf, ReplayError> 
         position_std_m: vehicle.start.position_std_m,
         heading_std_rad: vehicle.start.heading_std_rad,
     };
-    let heads = RadioHead::heard(site, vehicle);
+    let heads = RadioHead::received_by(site, vehicle);
     let road = site.build_road()?.filter(|_| vehicle.follows_road());
     let mut config = EkfConfig::new(site, vehicle);
     config.correlated_noise.is_found = false;
@@ -111,7 +111,7 @@ pub fn replay_angles(
     angles: &[LoggedAngle],
     used: Option<&[bool]>,
 ) -> Result<Vec<Step>, ReplayError> {
-    let heads = RadioHead::heard(site, vehicle);
+    let heads = RadioHead::received_by(site, vehicle);
     let mut odometry = odometry.samples.iter().peekable();
     let measurand = vehicle.array.measurand();
     let most_lost = (MOST_LOST * angles.len() as f64) as usize;

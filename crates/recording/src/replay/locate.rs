@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use onboard::geometry::Pose;
 use onboard::localize::UpdateReason;
 use onboard::localize::ekf::EkfConfig;
-use onboard::observation::SensedSsb;
+use onboard::observation::SsbDetection;
 use onboard::receive::ReceiverConfig;
 use onboard::settings::{IntegritySettings, Site, Vehicle, WakeUpSettings};
 use onboard::{AngleResult, Custom};
@@ -67,7 +67,7 @@ pub fn locate_angles(
     for (time_s, text) in warnings(site, &vehicle, odometry, &angles)? {
         replay.remark(time_s, text);
     }
-    replay.hear(&angles)?;
+    replay.process(&angles)?;
     explain(&mut replay, site, &vehicle, odometry, &logged)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
@@ -95,47 +95,47 @@ pub fn locate_recording(
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     let file = recording.data_file().display().to_string();
     let config = ReceiverConfig::new(site, &vehicle);
-    let (mut heard_s, mut together) = (None, false);
+    let (mut angles_s, mut together) = (None, false);
     let gaps = receive_recording(config, recording, start_time_s, |ssbs| {
         for it in ssbs {
-            let [first_s, _] = heard_s.unwrap_or([it.ssb.time_s; 2]);
-            heard_s = Some([first_s, it.ssb.time_s]);
+            let [first_s, _] = angles_s.unwrap_or([it.ssb.time_s; 2]);
+            angles_s = Some([first_s, it.ssb.time_s]);
             together |= odometry.covers(it.ssb.time_s);
         }
-        replay.hear(ssbs)
+        replay.process(ssbs)
     })?;
-    if let (Some(odometry_s), Some(angles_s), false) = (odometry.interval_s(), heard_s, together) {
+    if let (Some(odometry_s), Some(angles_s), false) = (odometry.interval_s(), angles_s, together) {
         return Err(ReplayError::Clocks {
             odometry_s,
             angles_s,
         });
     }
-    if heard_s.is_none() {
+    if angles_s.is_none() {
         return Err(ReplayError::NoSsb { file });
     }
-    let mut heard: Vec<LoggedAngle> = replay
+    let mut received: Vec<LoggedAngle> = replay
         .aoa_estimates()
         .iter()
         .filter_map(as_logged)
         .collect();
-    let mut heard_by = in_time(&vehicle);
+    let mut timed_vehicle = in_time(&vehicle);
     let mut late = if defines_times(recording) {
         None
     } else {
-        angle_time_offset(&as_given(site, &heard_by, odometry, &heard))?
+        angle_time_offset(&as_given(site, &timed_vehicle, odometry, &received))?
     };
     if let Some(found) = &mut late {
-        let chosen = as_chosen(&heard_by);
-        *found = resolved(*found, site, &chosen, start, odometry, &heard)?;
+        let chosen = as_chosen(&timed_vehicle);
+        *found = resolved(*found, site, &chosen, start, odometry, &received)?;
     }
     if let Some(late) = late {
-        heard = earlier(&heard, late.found_s);
+        received = earlier(&received, late.found_s);
         vehicle.receiver.angle_time_offset_std_s = Some(late.left_std_s);
-        heard_by = in_time(&vehicle);
-        let chosen = as_chosen(&heard_by);
+        timed_vehicle = in_time(&vehicle);
+        let chosen = as_chosen(&timed_vehicle);
         replay = Replay::new(site, &chosen, start, Custom::default(), odometry)?;
         replay.set_back(late.found_s);
-        replay.hear(&heard)?;
+        replay.process(&received)?;
     }
     for gap in gaps {
         let text = format!(
@@ -149,7 +149,7 @@ pub fn locate_recording(
     for warning in recording.warnings() {
         replay.remark(f64::NEG_INFINITY, warning.to_string());
     }
-    explain(&mut replay, site, &heard_by, odometry, &heard)?;
+    explain(&mut replay, site, &timed_vehicle, odometry, &received)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 
@@ -171,7 +171,7 @@ fn resolved(
     // The prior includes the candidate of the search, so that it does not bias the estimate.
     vehicle.receiver.angle_time_offset_std_s = Some(late.left_std_s.max(late.candidate_s.abs()));
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
-    replay.hear(angles)?;
+    replay.process(angles)?;
     let drive = replay.finish()?;
     let is_suspect = drive.suspicions().next().is_some();
     let estimate = drive.constants.map(|it| it.angle_time_offset_s);
@@ -226,7 +226,7 @@ fn as_given<'a>(
 /// corrected.
 fn as_logged(angle_result: &AngleResult) -> Option<LoggedAngle> {
     let measured = angle_result.measured?;
-    let ssb = SensedSsb {
+    let ssb = SsbDetection {
         time_s: measured.time_s,
         ..angle_result.ssb
     };
@@ -259,14 +259,14 @@ fn finish(
 ) -> Result<LocatedDrive, ReplayError> {
     let mut drive = replay.finish()?;
     if smooth {
-        drive.smoothed = look_back(site, vehicle, start, odometry, &drive.aoa_estimates)?;
+        drive.smoothed = smoothed_poses(site, vehicle, start, odometry, &drive.aoa_estimates)?;
     }
     Ok(drive)
 }
 
 /// Processes the drive once more with smoothing. Angles of a radio head that was found faulty are
 /// omitted until it was valid again, so that integrity monitoring is not needed.
-fn look_back(
+fn smoothed_poses(
     site: &Site,
     vehicle: &Vehicle,
     start: Pose,
@@ -298,6 +298,6 @@ fn look_back(
     angles.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));
     let mut replay = Replay::new(site, &unguarded, start, Custom::default(), odometry)?;
     replay.keep_journal();
-    replay.hear(&angles)?;
+    replay.process(&angles)?;
     replay.smoothed()
 }

@@ -65,13 +65,13 @@ pub fn gathered(mut remarks: Vec<Remark>) -> Vec<Remark> {
             }
         }
     }
-    let told = gathered.into_iter().map(|(mut remark, more)| {
+    let remarks = gathered.into_iter().map(|(mut remark, more)| {
         if more > 0 {
             remark.text = format!("{} (and {more} more like this)", remark.text);
         }
         remark
     });
-    told.collect()
+    remarks.collect()
 }
 
 /// Located drive.
@@ -143,13 +143,13 @@ mod tests {
             time_s,
             text: text.to_owned(),
         };
-        let told = gathered(vec![
+        let merged = gathered(vec![
             remark(3.0, "at 3 s: off by -0.5 m"),
             remark(2.0, "no angle"),
             remark(1.0, "at 1.25 s: off by 2 m"),
             remark(4.0, "at 4 s: off by 7 m"),
         ]);
-        let texts: Vec<&str> = told.iter().map(|it| it.text.as_str()).collect();
+        let texts: Vec<&str> = merged.iter().map(|it| it.text.as_str()).collect();
         let first = "at 1.25 s: off by 2 m (and 2 more like this)";
         assert_eq!(texts, [first, "no angle"]);
     }

@@ -59,7 +59,7 @@ pub fn triangulate(drive: &Drive<'_>, head: HeadId, path: &[Option<Pose>]) -> Op
             };
             Some(Sighted {
                 kind: measured.kind,
-                from: pose.beside(forward_m, left_m),
+                from: pose.point_at(forward_m, left_m),
                 axis_rad,
                 phase_rad: measured.phase_rad,
                 variance: measured.phase_sigma_rad.powi(2) + PATH_STD_RAD.powi(2),

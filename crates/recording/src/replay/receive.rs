@@ -65,7 +65,7 @@ pub fn receive_recording(
     let block = ((BLOCK_S * rate_hz) as u64).max(1);
     let mut raw = Vec::new();
     let (mut gaps, mut unreported_gap_s) = (Vec::new(), 0.0);
-    let mut hear = |stream: &mut SampleStream| {
+    let mut pass_bursts = |stream: &mut SampleStream| {
         while let Some(first) = stream.burst().first() {
             let before_s = first.ssb.time_s;
             let burst = stream.burst();
@@ -90,10 +90,10 @@ pub fn receive_recording(
             let time_s = start_time_s + sample as f64 / rate_hz;
             stream.push(time_s, &antennas).map_err(&failed)?;
             at += count;
-            hear(&mut stream)?;
+            pass_bursts(&mut stream)?;
         }
     }
     stream.break_off().map_err(&failed)?;
-    hear(&mut stream)?;
+    pass_bursts(&mut stream)?;
     Ok(gaps)
 }

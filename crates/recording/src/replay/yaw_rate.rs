@@ -28,17 +28,17 @@ pub fn constant_radps(samples: &[OdometrySample]) -> Option<f64> {
 
 /// Returns the turn according to the yaw rate divided by the turn of the located vehicle. Returns
 /// `None` if the vehicle hardly turned or the two are uncorrelated.
-pub fn told_per_turned(poses: &[LocatedPose]) -> Option<f64> {
-    let (mut told_turned, mut turned_turned) = (0.0, 0.0);
+pub fn measured_per_true(poses: &[LocatedPose]) -> Option<f64> {
+    let (mut cross_sum, mut true_square) = (0.0, 0.0);
     // Turn since the first pose, and its minimum and maximum.
     let (mut heading_rad, mut least_rad, mut most_rad) = (0.0, 0.0_f64, 0.0_f64);
-    let mut told_told = 0.0;
+    let mut measured_square = 0.0;
     let mut window = (poses.first()?, 0.0);
     for pair in poses.windows(2) {
         let [from, to] = pair else { continue };
         let step_s = to.estimate.time_s - from.estimate.time_s;
         window.1 += to.yaw_rate_radps? * step_s;
-        let (since, told) = window;
+        let (since, measured) = window;
         if to.estimate.time_s - since.estimate.time_s < WINDOW_S {
             continue;
         }
@@ -46,21 +46,21 @@ pub fn told_per_turned(poses: &[LocatedPose]) -> Option<f64> {
             to.estimate.pose.heading_rad,
             since.estimate.pose.heading_rad,
         );
-        let turned = wrap_angle(now - before);
-        told_turned += told * turned;
-        turned_turned += turned * turned;
-        told_told += told * told;
-        heading_rad += turned;
+        let driven = wrap_angle(now - before);
+        cross_sum += measured * driven;
+        true_square += driven * driven;
+        measured_square += measured * measured;
+        heading_rad += driven;
         (least_rad, most_rad) = (least_rad.min(heading_rad), most_rad.max(heading_rad));
         window = (to, 0.0);
     }
-    let correlation2 = told_turned * told_turned / (told_told * turned_turned);
-    let is_told =
-        most_rad - least_rad > LEAST_TURNED_RAD && (told_told == 0.0 || correlation2 > 0.5);
-    is_told.then_some(told_turned / turned_turned)
+    let correlation2 = cross_sum * cross_sum / (measured_square * true_square);
+    let is_determined =
+        most_rad - least_rad > LEAST_TURNED_RAD && (measured_square == 0.0 || correlation2 > 0.5);
+    is_determined.then_some(cross_sum / true_square)
 }
 
 /// Whether the ratio is close to a factor.
-pub fn is_about(told_per_turned: f64, factor: f64) -> bool {
-    (told_per_turned - factor).abs() < ABOUT * factor.abs()
+pub fn is_about(measured_per_true: f64, factor: f64) -> bool {
+    (measured_per_true - factor).abs() < ABOUT * factor.abs()
 }

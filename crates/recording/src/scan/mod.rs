@@ -16,4 +16,4 @@ pub use onboard::receive::array_view::{ArraySetup, ArrayView, FoundAngle, View, 
 pub use scanner::{Scan, ScanSettings, scan};
 pub use search_scope::{Places, SearchScope};
 pub use segments::scan_recording;
-pub use ssb_search::{FoundSsb, SsbSearch, SsbSearchConfig};
+pub use ssb_search::{ScannedSsb, SsbSearch, SsbSearchConfig};

@@ -8,7 +8,7 @@ use super::diagnosis::{ChannelFault, ExchangeVotes, add_tone, faults_of_samples}
 use super::error::ScanError;
 use super::iq_source::IqSource;
 use super::search_scope::{Places, SearchScope};
-use super::ssb_search::{BLOCK_S, FALSE_ALARM, FoundSsb, SsbSearch, SsbSearchConfig};
+use super::ssb_search::{BLOCK_S, FALSE_ALARM, ScannedSsb, SsbSearch, SsbSearchConfig};
 use onboard::receive::array_view::ArraySetup;
 
 /// Durations of the search for unknown frequencies in seconds: the usual SSB period, and the
@@ -39,7 +39,7 @@ pub struct ScanSettings {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Scan {
     /// SSBs in order of time.
-    pub ssbs: Vec<FoundSsb>,
+    pub ssbs: Vec<ScannedSsb>,
     /// Faults of the receive channels.
     pub faults: Vec<ChannelFault>,
     /// Scope of the search.
@@ -181,8 +181,8 @@ fn given_candidates(
     spacing: Option<SubcarrierSpacing>,
 ) -> Vec<SsbCandidate> {
     // A given spacing may cause an error; an assumed one is omitted if it is impossible.
-    let guessed = SubcarrierSpacing::of_range(ssb_freq_hz).into_iter();
-    let possible = guessed.filter(|one| spacing.is_none() && one.base_rate_hz() <= rate_hz);
+    let likely = SubcarrierSpacing::of_range(ssb_freq_hz).into_iter();
+    let possible = likely.filter(|one| spacing.is_none() && one.base_rate_hz() <= rate_hz);
     let candidate = |spacing| SsbCandidate {
         ssb_freq_hz,
         spacing,
@@ -229,16 +229,16 @@ impl BandSearch {
             _ => ScanError::NoCentreFrequency { file: file.clone() },
         };
         let mut antennas = Vec::new();
-        let mut looked_at = 0;
+        let mut examined = 0;
         let mut candidates = Vec::new();
         for window_s in WINDOWS_S {
             let samples = |duration_s: f64| source.length().min((duration_s * rate_hz) as u64);
             let count = samples(window_s) as usize;
             let off_raster = samples(OFF_RASTER_BUDGET / (rate_hz * rate_hz)) as usize;
-            if count == looked_at || !candidates.is_empty() {
+            if count == examined || !candidates.is_empty() {
                 break;
             }
-            looked_at = count;
+            examined = count;
             source.read(0, count, &mut antennas)?;
             let slices: Vec<&[Complex32]> = antennas.iter().map(Vec::as_slice).collect();
             let mut finds = match self.centre_hz {

@@ -71,7 +71,7 @@ impl SsbSearchConfig {
 
 /// SSB of a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FoundSsb {
+pub struct ScannedSsb {
     /// Cell, SSB index, payload, frequency offset and strength.
     pub ssb: DetectedSsb,
     /// First sample of the SSB including its cyclic prefix, at the sample rate of the recording.
@@ -96,7 +96,7 @@ pub struct FoundSsb {
 }
 
 /// Array response of one SSB.
-struct Seen {
+struct SsbResponse {
     pci: Pci,
     sample_start: f64,
     view: Option<View>,
@@ -116,10 +116,10 @@ pub struct SsbSearch {
     view: Option<Box<dyn ArrayView>>,
     base: Vec<Vec<Complex32>>,
     /// Array responses of the SSBs of one block.
-    seen: Vec<Seen>,
+    seen: Vec<SsbResponse>,
     votes: ExchangeVotes,
     tones: Vec<Tone>,
-    found: Vec<FoundSsb>,
+    found: Vec<ScannedSsb>,
 }
 
 impl SsbSearch {
@@ -164,7 +164,7 @@ impl SsbSearch {
     /// # Errors
     /// [`ScanError`] for a different number of antennas, different lengths, less than one SSB, or
     /// samples that are not finite.
-    pub fn search(&mut self, antennas: &[&[Complex32]]) -> Result<&[FoundSsb], ScanError> {
+    pub fn search(&mut self, antennas: &[&[Complex32]]) -> Result<&[ScannedSsb], ScanError> {
         let first = antennas.first().map_or(0, |samples| samples.len());
         if let Some(other) = antennas.iter().find(|samples| samples.len() != first) {
             let other = other.len();
@@ -250,7 +250,7 @@ impl SsbSearch {
                 if let Some(view) = &view {
                     votes.vote(view);
                 }
-                seen.push(Seen {
+                seen.push(SsbResponse {
                     pci: ssb.pci,
                     sample_start: ssb.sample_start,
                     view,
@@ -273,7 +273,7 @@ impl SsbSearch {
         }
         let ratio = self.ratio;
         self.found.extend(found.iter().map(|ssb| {
-            let same = |it: &Seen| it.pci == ssb.pci && it.sample_start == ssb.sample_start;
+            let same = |it: &SsbResponse| it.pci == ssb.pci && it.sample_start == ssb.sample_start;
             let seen = seen
                 .iter()
                 .position(same)
@@ -283,7 +283,7 @@ impl SsbSearch {
                     let covariance = Some(it.channel_covariance);
                     (it.view, it.channel, covariance, it.noise_variance)
                 });
-            FoundSsb {
+            ScannedSsb {
                 sample_start: ssb.sample_start * ratio,
                 sample_count: SSB_SAMPLES as f64 * ratio,
                 ssb_freq_hz: config.ssb_freq_hz,
@@ -300,7 +300,7 @@ impl SsbSearch {
     }
 
     /// Returns the SSBs found so far in order of time.
-    pub(super) fn found(&self) -> &[FoundSsb] {
+    pub(super) fn found(&self) -> &[ScannedSsb] {
         &self.found
     }
 

@@ -390,27 +390,27 @@ impl Recording {
         for (DataFile { extent, file }, channels) in
             self.files.iter_mut().zip(channels.chunks_mut(per_file))
         {
-            let place = Place {
+            let span = FileSpan {
                 extent,
                 start,
                 count,
                 datatype: self.datatype,
             };
-            place.read(file, &mut self.block, channels)?;
+            span.read(file, &mut self.block, channels)?;
         }
         Ok(())
     }
 }
 
 /// Segment of one data file.
-struct Place<'a> {
+struct FileSpan<'a> {
     extent: &'a Extent,
     start: u64,
     count: usize,
     datatype: Datatype,
 }
 
-impl Place<'_> {
+impl FileSpan<'_> {
     fn read(
         &self,
         file: &mut File,

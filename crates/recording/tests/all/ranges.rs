@@ -52,15 +52,15 @@ fn invalid_ranges_are_reported_one_by_one() {
     let log = log_of("ranges-bad", &rows.join("\n")).unwrap();
     let ranges: Vec<f64> = log.ranges.iter().map(|it| it.measured.value).collect();
     assert_eq!(ranges, [7.0, 5.0, 6.0]);
-    let said: Vec<&str> = log.remarks.iter().map(|it| it.1.as_str()).collect();
-    assert_eq!(said.len(), 5);
+    let remarks: Vec<&str> = log.remarks.iter().map(|it| it.1.as_str()).collect();
+    assert_eq!(remarks.len(), 5);
     assert!(
-        said[0].contains("line 4") && said[0].contains("range_m"),
+        remarks[0].contains("line 4") && remarks[0].contains("range_m"),
         "{}",
-        said[0]
+        remarks[0]
     );
     let times = "time_s decreases 1 times, first from 1 to 0.5 s";
-    assert!(said[4].contains(times), "{}", said[4]);
+    assert!(remarks[4].contains(times), "{}", remarks[4]);
 }
 
 #[test]
@@ -91,18 +91,18 @@ fn settings_that_contradict_the_log_are_rejected() {
         let located = locate_ranges(&plant, &carrier, StartChoice::AsSet, &odometry, log);
         located.unwrap_err().to_string()
     };
-    let said = locate(&delays, "[ranging]\nsigma_m = 1.0\nkind = \"two-way\"\n");
+    let message = locate(&delays, "[ranging]\nsigma_m = 1.0\nkind = \"two-way\"\n");
     assert!(
-        said.contains("ranging.kind") && said.contains("one-way"),
-        "{said}"
+        message.contains("ranging.kind") && message.contains("one-way"),
+        "{message}"
     );
-    let said = locate(&delays, "");
-    assert!(said.contains("ranging.sigma_m"), "{said}");
+    let message = locate(&delays, "");
+    assert!(message.contains("ranging.sigma_m"), "{message}");
     let alone = format!("{SITE}clock_group = 3\n");
-    let said = Site::from_toml(&alone, "site.toml", &Files)
+    let message = Site::from_toml(&alone, "site.toml", &Files)
         .unwrap_err()
         .to_string();
-    assert!(said.contains("clock_group"), "{said}");
+    assert!(message.contains("clock_group"), "{message}");
 }
 
 const VEHICLE: &str = "name = \"robot\"\ndrive = \"differential\"\n\

@@ -13,7 +13,7 @@ use onboard::geometry::Pose;
 use onboard::localize::{
     AngleMeasurement, MeasurementKind, PoseEstimate, UpdateReason, UpdateResult,
 };
-use onboard::observation::{OdometrySample, SensedSsb};
+use onboard::observation::{OdometrySample, SsbDetection};
 use recording::mcap::{Frames, Twist};
 use recording::{
     LoggedAngle, McapWriter, OdometryIssue, OdometryLog, RecordingError, TimedPose, read_angle_log,
@@ -88,9 +88,9 @@ fn bad_odometry_rows_are_reported_one_by_one_and_the_rest_is_kept() {
             .all(|remark| !remark.to_string().is_empty())
     );
 
-    let said = log.remarks[2].to_string();
+    let text = log.remarks[2].to_string();
     assert_eq!(
-        said,
+        text,
         "odometry line 6: left out, distance_m is missing or not finite"
     );
 
@@ -136,7 +136,7 @@ fn odometry_csv_of_any_kind_is_read() {
 #[test]
 fn missing_csv_columns_are_reported_with_those_found() {
     let file = common::scratch("odometry-named").join("odo.csv");
-    for (text, said) in [
+    for (text, expected) in [
         (
             "",
             "`time_s` is missing; the first line must name the columns time_s; the file is empty",
@@ -151,7 +151,7 @@ fn missing_csv_columns_are_reported_with_those_found() {
     ] {
         fs::write(&file, text).unwrap();
         let error = read_odometry_csv(&file).unwrap_err().to_string();
-        assert!(error.contains(said), "{error}");
+        assert!(error.contains(expected), "{error}");
     }
 }
 
@@ -204,9 +204,9 @@ fn odometry_is_read_from_mcap() {
     let log = read_odometry_mcap(&file, Some("/odom"), None).unwrap();
     let mut rates = log.samples.iter().map(|sample| sample.yaw_rate_radps);
     assert!(rates.all(|rate| rate == Some(0.0)));
-    let said: Vec<String> = log.remarks.iter().map(ToString::to_string).collect();
+    let remarks: Vec<String> = log.remarks.iter().map(ToString::to_string).collect();
     assert_eq!(
-        said,
+        remarks,
         ["odometry: yaw_rate_radps is taken from pose.orientation of /odom"]
     );
 }
@@ -311,7 +311,7 @@ fn mcap_files_without_the_one_topic_are_refused() {
 fn angle_logs_round_trip_and_invalid_lines_are_omitted() {
     let file = common::scratch("angles").join("angles.csv");
     let angle = |time_s: f64| LoggedAngle {
-        ssb: SensedSsb {
+        ssb: SsbDetection {
             pci: 7,
             ssb_index: 2,
             time_s,
@@ -352,7 +352,7 @@ fn angles_are_read_from_the_verdicts_of_mcap_and_those_without_an_angle_passed_o
     let file = folder.join("drive.mcap");
     let verdict = |time_s: f64, angle: Option<(f64, bool)>| {
         let (phase_rad, resolved) = angle.unzip();
-        let ssb = SensedSsb {
+        let ssb = SsbDetection {
             pci: 300,
             ssb_index: 7,
             time_s,
@@ -374,13 +374,13 @@ fn angles_are_read_from_the_verdicts_of_mcap_and_those_without_an_angle_passed_o
             wake_up_time_s: 0.02,
         }
     };
-    let told = [
+    let results = [
         verdict(1.5, Some((0.25, true))),
         verdict(1.52, None),
         verdict(1.54, Some((-0.5, false))),
     ];
     let mut writer = McapWriter::compressed(File::create(&file).unwrap()).unwrap();
-    for angle_result in &told {
+    for angle_result in &results {
         writer.verdict("/access_av/verdicts", angle_result).unwrap();
     }
     writer.finish().unwrap();
@@ -392,7 +392,7 @@ fn angles_are_read_from_the_verdicts_of_mcap_and_those_without_an_angle_passed_o
         let [first, second] = &read.angles[..] else {
             panic!("{read:?}");
         };
-        for (found, expected) in [(first, &told[0]), (second, &told[2])] {
+        for (found, expected) in [(first, &results[0]), (second, &results[2])] {
             assert_eq!(
                 (found.ssb.pci, found.ssb.ssb_index, found.ssb.snr_db),
                 (300, 7, 12.5)

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use recording::Recording;
 use recording::scan::{
-    ArraySetup, ChannelFault, FoundSsb, SampleBlock, ScanError, ScanSettings, SsbSearch,
+    ArraySetup, ChannelFault, SampleBlock, ScanError, ScanSettings, ScannedSsb, SsbSearch,
     SsbSearchConfig, scan,
 };
 use serde_json::Value;
@@ -91,7 +91,7 @@ fn a_generated_burst_is_found_with_its_angle() {
     let antennas = half_frame(0.7, 1);
     let found = scan(&mut block(&antennas), &known()).unwrap();
     assert_eq!((found.ssbs.len(), found.faults.len()), (1, 0));
-    let FoundSsb {
+    let ScannedSsb {
         ssb,
         sample_start,
         angle,
@@ -291,13 +291,13 @@ fn a_scan_reports_its_scope() {
     let antennas = noise(38_400, 20.0, &mut ChaCha8Rng::seed_from_u64(3));
     let mut source = block(&antennas);
     source.centre_frequency_hz = Some(3_699.84e6);
-    let looked = |found: recording::scan::Scan| -> Vec<String> {
+    let scopes = |found: recording::scan::Scan| -> Vec<String> {
         assert!(found.ssbs.is_empty());
         found.searched.iter().map(ToString::to_string).collect()
     };
     let found = scan(&mut source, &ScanSettings::default()).unwrap();
     assert_eq!(
-        looked(found),
+        scopes(found),
         [
             "15 kHz spacing, 3 points of the synchronization raster, the first 5 ms of 4 channels",
             "15 kHz spacing, any frequency from 3697.800 to 3701.880 MHz, the first 5 ms of 1 channel",
@@ -305,13 +305,13 @@ fn a_scan_reports_its_scope() {
             "30 kHz spacing, any frequency from 3699.600 to 3700.080 MHz, the first 5 ms of 1 channel",
         ]
     );
-    let told = ScanSettings {
+    let settings = ScanSettings {
         spacing: Some(SubcarrierSpacing::Khz30),
         ..known()
     };
-    let found = scan(&mut block(&antennas), &told).unwrap();
+    let found = scan(&mut block(&antennas), &settings).unwrap();
     assert_eq!(
-        looked(found),
+        scopes(found),
         ["30 kHz spacing, SSB at 3700.800 MHz ± 15.0 kHz, the first 5 ms of 4 channels"]
     );
 }
@@ -388,7 +388,7 @@ fn every_annotated_recording_is_scanned_without_prior_knowledge() {
         let found = scan(&mut recording, &ScanSettings::default()).unwrap();
         for annotation in &annotations {
             let truth = &annotation.other["nr:ssb"];
-            let near = |found: &&FoundSsb| {
+            let near = |found: &&ScannedSsb| {
                 // At 46.08 Msps, the annotation has the resolution of the base rate.
                 (found.sample_start - annotation.sample_start as f64).abs() < 6.0
             };
@@ -440,7 +440,7 @@ fn semi_real_angles_are_as_accurate_as_bartlett_with_perfect_timing() {
     let path = dir.join("captures/semireal4_singtel-n1_day1_array1");
     let mut recording = Recording::open(path).unwrap();
     let annotations = recording.annotations().to_vec();
-    let (mut ours, mut bartletts) = (0.0, 0.0);
+    let (mut estimates, mut bartletts) = (0.0, 0.0);
     for annotation in &annotations {
         let truth = &annotation.other["aoa:truth"];
         let spacing_wavelengths = truth["element_spacing_wavelengths"].as_f64().unwrap();
@@ -455,7 +455,7 @@ fn semi_real_angles_are_as_accurate_as_bartlett_with_perfect_timing() {
         };
         let found = scan(&mut recording, &settings).unwrap();
         let near =
-            |found: &&FoundSsb| (found.sample_start - annotation.sample_start as f64).abs() < 6.0;
+            |found: &&ScannedSsb| (found.sample_start - annotation.sample_start as f64).abs() < 6.0;
         let angle = found.ssbs.iter().find(near).unwrap().angle.unwrap();
         let angle = angle.from_row().unwrap();
         let azimuth_deg = 90.0 - angle.angle_rad.to_degrees();
@@ -490,8 +490,8 @@ fn semi_real_angles_are_as_accurate_as_bartlett_with_perfect_timing() {
             .unwrap();
         let true_deg = truth["azimuth_from_broadside_deg"].as_f64().unwrap();
         println!("truth {true_deg:.1}, ours {azimuth_deg:.2}, Bartlett {bartlett_deg:.1}");
-        ours += (azimuth_deg - true_deg).abs();
+        estimates += (azimuth_deg - true_deg).abs();
         bartletts += (bartlett_deg - true_deg).abs();
     }
-    assert!(ours <= 1.3 * bartletts, "{ours} {bartletts}");
+    assert!(estimates <= 1.3 * bartletts, "{estimates} {bartletts}");
 }

@@ -71,11 +71,11 @@ impl RicianPropagation {
             .map(|_| {
                 // A uniform direction on the sphere has a uniform cosine to any axis (Archimedes).
                 let cosine = 2.0 * rng.random::<f64>() - 1.0;
-                let beside = (1.0 - cosine * cosine).sqrt();
+                let sine = (1.0 - cosine * cosine).sqrt();
                 Ray {
                     cosine,
                     start: Complex64::cis(rng.random::<f64>() * TAU),
-                    left: beside * (TAU * turns.random::<f64>()).cos(),
+                    left: sine * (TAU * turns.random::<f64>()).cos(),
                     // An exponential distribution has equal mean and standard deviation, both the
                     // delay spread.
                     delay_s: -spread_s * (1.0 - delays.random::<f64>()).ln(),

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use num_complex::Complex64;
 use onboard::link_budget::LinkBudget;
-use onboard::observation::{MAX_ELEMENTS, SensedSsb, SsbObservation};
+use onboard::observation::{MAX_ELEMENTS, SsbDetection, SsbObservation};
 use onboard::radio_head::RadioHead;
 use onboard::settings::ReceiverSettings;
 use rand::{Rng, RngExt};
@@ -31,14 +31,14 @@ pub struct HeadChannel {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reception {
     /// Quantities that the receiver measures without an angle estimate.
-    pub ssb: SensedSsb,
+    pub ssb: SsbDetection,
     gains: [Complex64; MAX_ELEMENTS],
     elements: usize,
 }
 
 impl Reception {
     /// Whether the SSB has power. Without a traced path there is no signal to detect.
-    pub fn is_heard(&self) -> bool {
+    pub fn is_received(&self) -> bool {
         self.ssb.snr_db > f64::NEG_INFINITY
     }
 
@@ -115,7 +115,7 @@ impl HeadChannel {
     /// Returns the SSB with the mean SNR `snr_db` at the array, including fading.
     pub fn receive(&mut self, vehicle: &VehicleState, snr_db: f64) -> Reception {
         let mut reception = Reception {
-            ssb: SensedSsb {
+            ssb: SsbDetection {
                 pci: self.head.pci,
                 ssb_index: self.head.ssb_index,
                 time_s: vehicle.time_s,

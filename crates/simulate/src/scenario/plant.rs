@@ -448,8 +448,8 @@ mod tests {
         ] {
             let text = BENDS.replace("[fleet]", &format!("[prices]\n{price}\n[fleet]"));
             let plant = Plant::from_toml(&text, "mine.toml", &Shipped).unwrap();
-            let told = plant.warnings().unwrap();
-            let written: Vec<_> = told.iter().map(ToString::to_string).collect();
+            let warnings = plant.warnings().unwrap();
+            let written: Vec<_> = warnings.iter().map(ToString::to_string).collect();
             assert!(
                 written.iter().any(|it| it.contains(hint)),
                 "{price}: {written:?}"

@@ -15,7 +15,7 @@ const BYTES_PER_BURST: f64 = 1300.0;
 /// Memory of a step of a run, including its table row, in bytes.
 const BYTES_PER_STEP: f64 = 500.0;
 /// Memory of an SSB of a run, including its table row, in bytes.
-const BYTES_PER_LOOK: f64 = 400.0;
+const BYTES_PER_ANGLE: f64 = 400.0;
 
 /// Upper bounds of the duration, computation and memory of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +25,7 @@ pub struct DriveSize {
     /// Number of SSB bursts.
     pub bursts: f64,
     /// Number of SSBs of all radio heads.
-    pub looks: f64,
+    pub angles: f64,
     /// Number of odometry samples.
     pub odometry_samples: f64,
 }
@@ -50,26 +50,26 @@ impl DriveSize {
         Self {
             duration_s,
             bursts,
-            looks: bursts * site.radio_heads.len() as f64,
+            angles: bursts * site.radio_heads.len() as f64,
             odometry_samples: duration_s * vehicle.odometer.rate_hz,
         }
     }
 
     /// Returns the memory of `runs` simultaneous runs in bytes.
     pub fn bytes(&self, runs: usize) -> f64 {
-        let of_run = self.bursts * BYTES_PER_STEP + self.looks * BYTES_PER_LOOK;
+        let of_run = self.bursts * BYTES_PER_STEP + self.angles * BYTES_PER_ANGLE;
         self.bursts * BYTES_PER_BURST + runs as f64 * of_run
     }
 
     /// Rejects a drive that needs too much time or memory.
     pub(super) fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
-        let (hours, looks, gigabytes) =
-            (self.duration_s / 3600.0, self.looks, self.bytes(1) * 1e-9);
-        let most = self.looks.max(self.odometry_samples);
+        let (hours, angles, gigabytes) =
+            (self.duration_s / 3600.0, self.angles, self.bytes(1) * 1e-9);
+        let most = self.angles.max(self.odometry_samples);
         check.that(
             most <= MOST_LOOKS && self.bytes(1) <= MOST_BYTES,
             "motion",
-            format!("a drive of {hours:.1} h, {looks:.1e} SSBs and {gigabytes:.1} GB"),
+            format!("a drive of {hours:.1} h, {angles:.1e} SSBs and {gigabytes:.1} GB"),
             &format!(
                 "at most {MOST_LOOKS:.0e} SSBs or odometry samples and {:.1} GB are allowed \
                  without allow_large = true (--allow-large); shorten the road or the stops, or \

@@ -82,8 +82,8 @@ impl Antennas {
         }
         let [along, left] = towards;
         let (sin, cos) = bias_rad.sin_cos();
-        let beside = [along * cos - left * sin, along * sin + left * cos];
-        self.redirect(towards, beside, gains);
+        let displaced = [along * cos - left * sin, along * sin + left * cos];
+        self.redirect(towards, displaced, gains);
     }
 }
 

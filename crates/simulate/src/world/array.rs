@@ -109,7 +109,7 @@ impl TrueArray {
         match self.settings.position_m {
             // Fast path: called for every SSB.
             [0.0, 0.0, _] => vehicle.pose.point(),
-            [forward_m, left_m, _] => vehicle.pose.beside(forward_m, left_m),
+            [forward_m, left_m, _] => vehicle.pose.point_at(forward_m, left_m),
         }
     }
 

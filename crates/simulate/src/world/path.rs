@@ -49,7 +49,7 @@ impl Path {
 
     /// Returns the true state at the reception of a signal with the time stamp `time_s`. The
     /// reception was `angle_time_offset_s` before the time stamp.
-    pub fn heard_at(&self, time_s: f64, angle_time_offset_s: f64) -> VehicleState {
+    pub fn at_reception(&self, time_s: f64, angle_time_offset_s: f64) -> VehicleState {
         VehicleState {
             time_s,
             ..self.at(time_s - angle_time_offset_s)

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use onboard::localize::{AngleMeasurement, MeasurementKind};
-use onboard::observation::{OdometrySample, SensedSsb};
+use onboard::observation::{OdometrySample, SsbDetection};
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Check, Shipped, TomlFile, UncertaintySettings, WakeUpSettings};
 use onboard::{Custom, Pipeline};
@@ -59,7 +59,7 @@ fn drive(scenario: &Scenario) -> u32 {
     let road = scenario.path(Check { file: "test" }).unwrap();
     let (site, vehicle) = (&scenario.site, &scenario.vehicle);
     let motion = MotionProfile::new(&scenario.motion, vehicle, road.length_m());
-    let heads = RadioHead::heard(site, vehicle);
+    let heads = RadioHead::received_by(site, vehicle);
     let simulation = simulation(scenario);
     let platform = simulation.platform();
     let start = road.pose(0.0);
@@ -90,7 +90,7 @@ fn drive(scenario: &Scenario) -> u32 {
                 0.0
             };
             burst.push(LoggedAngle {
-                ssb: SensedSsb {
+                ssb: SsbDetection {
                     pci: head.pci,
                     ssb_index: head.ssb_index,
                     time_s,
@@ -107,8 +107,8 @@ fn drive(scenario: &Scenario) -> u32 {
                 },
             });
         }
-        let heard = onboard.process_burst(time_s, &mut Burst(&burst)).unwrap();
-        let aoa_estimates = heard.aoa_estimates.iter();
+        let result = onboard.process_burst(time_s, &mut Burst(&burst)).unwrap();
+        let aoa_estimates = result.aoa_estimates.iter();
         accepted += aoa_estimates.filter(|it| it.verdict.accepted).count() as u32;
         std::hint::black_box(onboard.pose(time_s)).unwrap();
         accepted > 0

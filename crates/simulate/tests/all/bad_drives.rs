@@ -99,8 +99,8 @@ fn a_drive_without_errors_has_no_remarks() {
     let located = drive.locate();
     assert_eq!(located.remarks, []);
     assert!(drive.worst(&located) < 4.5);
-    let told = drive.diagnoses(&located);
-    assert!(told.contains("no remarks") && !told.contains("1 remark"));
+    let report = drive.diagnoses(&located);
+    assert!(report.contains("no remarks") && !report.contains("1 remark"));
 }
 
 #[test]
@@ -131,12 +131,12 @@ fn bad_odometry_is_reported_and_ignored() {
         "line 304: left out, distance_m `zero` is not a number".to_owned(),
     ];
     assert_eq!(texts.len(), expected.len(), "{texts:?}");
-    let told = drive.diagnoses(&located);
+    let report = drive.diagnoses(&located);
     for (text, expected) in texts.iter().zip(&expected) {
         assert!(text.contains(expected), "{text}: {expected}");
-        assert!(told.contains(text), "{text}");
+        assert!(report.contains(text), "{text}");
     }
-    assert!(told.contains("1 remark"));
+    assert!(report.contains("1 remark"));
     // The state equals the state without the erroneous samples.
     assert_eq!(located.poses, sound.poses);
 }
@@ -168,8 +168,8 @@ fn a_gap_and_a_reset_of_the_odometer_are_reported_and_bridged() {
         "{}",
         texts[1]
     );
-    let told = drive.diagnoses(&located);
-    assert!(texts.iter().all(|text| told.contains(text)));
+    let report = drive.diagnoses(&located);
+    assert!(texts.iter().all(|text| report.contains(text)));
     let worst = drive.worst(&located);
     assert!(worst < 4.5, "{worst}");
 }
@@ -204,10 +204,10 @@ fn bad_angles_are_reported_and_ignored() {
         "line 604: left out, phase_sigma_rad -0.1 is not above 0 (and 1 more like this)",
     ];
     assert_eq!(texts.len(), expected.len(), "{texts:?}");
-    let told = drive.diagnoses(&located);
+    let report = drive.diagnoses(&located);
     for (text, expected) in texts.iter().zip(&expected) {
         assert!(text.contains(expected), "{text}: {expected}");
-        assert!(told.contains(text), "{text}");
+        assert!(report.contains(text), "{text}");
     }
     // Each readable angle gets its own verdict.
     let refused = |reason| {
@@ -219,7 +219,7 @@ fn bad_angles_are_reported_and_ignored() {
     assert_eq!(refused(UpdateReason::UnknownRadioHead), 1);
     // The repeated angle is left out before the localizer could reject it as too late.
     assert_eq!(refused(UpdateReason::TooLate), 0);
-    assert!(told.contains("refused: unknown radio head"));
+    assert!(report.contains("refused: unknown radio head"));
     assert_eq!(located.poses, sound.poses);
 }
 

@@ -22,7 +22,7 @@ fn read(text: &str) -> Result<Scenario, SettingsError> {
 }
 
 /// Asserts that the error names the file, the key and what is allowed.
-fn assert_says(outcome: Result<Scenario, SettingsError>, key: &str, allowed: &str) {
+fn assert_message(outcome: Result<Scenario, SettingsError>, key: &str, allowed: &str) {
     let message = outcome.unwrap_err().to_string();
     assert!(message.starts_with("plant.toml: "), "{message}");
     assert!(message.contains(&format!("`{key}`")), "{message}");
@@ -32,27 +32,27 @@ fn assert_says(outcome: Result<Scenario, SettingsError>, key: &str, allowed: &st
 #[test]
 fn misspelt_keys_get_the_nearest_known_key() {
     let nearest = "did you mean `rician_k_db`?";
-    assert_says(
+    assert_message(
         with_line("rician_k_db =", "rician_kdb ="),
         "site.rician_kdb",
         nearest,
     );
     let nearest = "did you mean `t_max_ms`?";
-    assert_says(
+    assert_message(
         with_line("position_uncertainty_m = 1.0", "tmax_ms = 240.0"),
         "vehicle.wake_up.trigger.tmax_ms",
         nearest,
     );
     let nearest = "did you mean `channel`?";
-    assert_says(with_line("[channel]", "[chanel]"), "chanel", nearest);
+    assert_message(with_line("[channel]", "[chanel]"), "chanel", nearest);
 }
 
 #[test]
 fn wrong_units_are_unknown_keys() {
     let outcome = with_line("period_ms = 20.0", "period_s = 0.02");
-    assert_says(outcome, "site.ssb.period_s", "did you mean `period_ms`?");
+    assert_message(outcome, "site.ssb.period_s", "did you mean `period_ms`?");
     let outcome = with_line("top_speed_kmh = 15.0", "top_speed_mps = 4.2");
-    assert_says(
+    assert_message(
         outcome,
         "vehicle.top_speed_mps",
         "did you mean `top_speed_kmh`?",
@@ -62,19 +62,19 @@ fn wrong_units_are_unknown_keys() {
 #[test]
 fn wrong_types_are_reported_with_the_expected_type() {
     let outcome = with_line("carrier_mhz = 3500.0", "carrier_mhz = \"3.5 GHz\"");
-    assert_says(outcome, "site.carrier_mhz", "expected f64");
+    assert_message(outcome, "site.carrier_mhz", "expected f64");
     let outcome = with_line("either_direction = false", "either_direction = 0");
-    assert_says(
+    assert_message(
         outcome,
         "vehicle.start.either_direction",
         "expected a boolean",
     );
     let outcome = with_line("method = \"music\"", "method = \"musik\"");
-    assert_says(outcome, "vehicle.estimator.method", "did you mean `music`?");
+    assert_message(outcome, "vehicle.estimator.method", "did you mean `music`?");
     let outcome = with_line("policy = \"pid\"", "policy = \"pdi\"");
-    assert_says(outcome, "vehicle.wake_up.trigger", "did you mean `pid`?");
+    assert_message(outcome, "vehicle.wake_up.trigger", "did you mean `pid`?");
     let outcome = with_line("offset_db = 3.0", "offset = 3.1");
-    assert_says(
+    assert_message(
         outcome,
         "vehicle.wake_up.snr_set_point.offset",
         "did you mean `offset_db`?",
@@ -84,17 +84,17 @@ fn wrong_types_are_reported_with_the_expected_type() {
 #[test]
 fn numbers_must_be_finite_and_in_range() {
     let finite = "finite";
-    assert_says(
+    assert_message(
         with_line("length_m = 300.0", "length_m = nan"),
         "site.road.segments[0].length_m",
         finite,
     );
-    assert_says(
+    assert_message(
         with_line("width_m = 5.0", "width_m = inf"),
         "site.road.width_m",
         finite,
     );
-    assert_says(
+    assert_message(
         with_line("length_m = 300.0", "length_m = -3"),
         "site.road.segments[0].length_m",
         "is -3; it must be between 0.000001 and 100000",
@@ -168,7 +168,7 @@ fn numbers_must_be_finite_and_in_range() {
             "vehicle.wake_up.trigger.snr_scale_db",
         ),
     ] {
-        assert_says(with_line(line, bad), key, "must");
+        assert_message(with_line(line, bad), key, "must");
     }
     let position = [("vehicle.start.position_std_m", (-1).into())];
     let outcome = shipped("paper").with_overrides(position, &Shipped);
@@ -179,17 +179,17 @@ fn numbers_must_be_finite_and_in_range() {
 
 #[test]
 fn a_guess_of_the_road_must_be_straight() {
-    assert_says(
+    assert_message(
         with_line("surveyed = true", "surveyed = false"),
         "site.road.segments[0].turn_rad",
         "an unsurveyed segment must be straight",
     );
-    assert_says(
+    assert_message(
         with_line("surveyed = true", "surveyed = \"no\""),
         "site.road.segments[0].surveyed",
         "expected a boolean",
     );
-    assert_says(
+    assert_message(
         with_line("surveyed = true", "surveyd = false"),
         "site.road.segments[0].surveyd",
         "did you mean `surveyed`?",
@@ -202,16 +202,16 @@ fn a_guess_of_the_road_must_be_straight() {
 fn contradictions_are_reported_with_both_sides() {
     let bound = "position_uncertainty_m = 1.0";
     let outcome = with_line(bound, "base_ms = 250.0\nt_max_ms = 240.0");
-    assert_says(outcome, "vehicle.wake_up.trigger.t_max_ms", "base_ms, 250");
+    assert_message(outcome, "vehicle.wake_up.trigger.t_max_ms", "base_ms, 250");
     let outcome = with_line(bound, "base_ms = 250.0\nposition_uncertainty_m = 1.0");
     let key = "vehicle.wake_up.trigger.position_uncertainty_m";
-    assert_says(outcome, key, "t_max of 240.0 ms");
+    assert_message(outcome, key, "t_max of 240.0 ms");
     let outcome = with_line("pilots = \"blind\"", "pilots = \"pss+sss\"");
-    assert_says(outcome, "vehicle.estimator.method", "receiver.pilots");
+    assert_message(outcome, "vehicle.estimator.method", "receiver.pilots");
     let outcome = with_line("stops = []", "stops = [{ at_m = 301, dwell_s = 1 }]");
-    assert_says(outcome, "motion.stops[0].at_m", "300.0 m");
+    assert_message(outcome, "motion.stops[0].at_m", "300.0 m");
     let twice = "[site.road]\npolyline_m = [[0, 0], [9, 0]]\nsegments = [{ length_m = 1 }]";
-    assert_says(
+    assert_message(
         read(&format!("{NAMES}{HEAD}{twice}")),
         "site.road",
         "only one of",
@@ -241,27 +241,27 @@ fn with_heads(heads: &str) -> Result<Scenario, SettingsError> {
 fn radio_heads_need_distinct_positions_and_names() {
     let apart = "{ position_m = [50, 20, 0] }, { position_m = [50, -20, 0], pci = 1 }";
     assert!(with_heads(apart).is_ok());
-    assert_says(with_heads(""), "site.radio_heads", "1 to 1000");
+    assert_message(with_heads(""), "site.radio_heads", "1 to 1000");
     let on_road = "{ position_m = [50, 2.4, 0] }";
-    assert_says(
+    assert_message(
         with_heads(on_road),
         "site.radio_heads[0].position_m",
         "on the road, 50.0 m along it",
     );
     let together = "{ position_m = [50, 20, 0] }, { position_m = [50, 20, 0], pci = 1 }";
-    assert_says(
+    assert_message(
         with_heads(together),
         "site.radio_heads[1].position_m",
         "same position",
     );
     let namesakes = "{ position_m = [50, 20, 0] }, { position_m = [50, -20, 0] }";
-    assert_says(
+    assert_message(
         with_heads(namesakes),
         "site.radio_heads[1].pci",
         "same pci and ssb_index",
     );
     let in_the_plane = "{ position_m = [50, 20] }";
-    assert_says(
+    assert_message(
         with_heads(in_the_plane),
         "site.radio_heads[0].position_m",
         "an array of length 3",
@@ -270,13 +270,13 @@ fn radio_heads_need_distinct_positions_and_names() {
 
 #[test]
 fn missing_parts_are_reported() {
-    assert_says(
+    assert_message(
         read(&format!("{NAMES}{HEAD}site.road.width_m = 4.0")),
         "site.road",
         "`segments`, `polyline_m`",
     );
-    assert_says(read("name = 'plant'"), "site", "missing");
-    assert_says(
+    assert_message(read("name = 'plant'"), "site", "missing");
+    assert_message(
         with_heads("{ pci = 3 }"),
         "site.radio_heads[0].position_m",
         "missing",
@@ -292,7 +292,7 @@ fn missing_parts_are_reported() {
 #[test]
 fn a_site_without_a_road_requires_a_path() {
     let roaming = format!("{NAMES}{HEAD}");
-    assert_says(read(&roaming), "motion.path", "add `motion.path`");
+    assert_message(read(&roaming), "motion.path", "add `motion.path`");
     let path = "motion.path.segments = [{ length_m = 100 }]";
     assert!(read(&format!("{roaming}{path}")).is_ok());
 }
@@ -300,17 +300,17 @@ fn a_site_without_a_road_requires_a_path() {
 #[test]
 fn a_vehicle_without_radio_heads_is_rejected() {
     let heads = "{ position_m = [50, 20, 0], pci = 7 }";
-    let hears = |list: &str| {
+    let receives = |list: &str| {
         let names = NAMES.replace("vehicle = 'carrier'\n", "");
         read(&format!(
             "{names}{ROAD}site.radio_heads = [{heads}]\n\
              vehicle = {{ extends = 'carrier', receiver.pci_allow_list = [{list}] }}"
         ))
     };
-    assert!(hears("7").is_ok());
+    assert!(receives("7").is_ok());
     let key = "vehicle.receiver.pci_allow_list";
-    assert_says(hears(""), key, "remove it to receive all radio heads");
-    assert_says(hears("7, 8"), &format!("{key}[1]"), "must have this pci");
+    assert_message(receives(""), key, "remove it to receive all radio heads");
+    assert_message(receives("7, 8"), &format!("{key}[1]"), "must have this pci");
 }
 
 #[test]

@@ -11,7 +11,7 @@ use onboard::localize::OdometryResult;
 use onboard::localize::{
     AngleMeasurement, Localizer, PoseEstimate, UpdateReason, UpdateResult, copy_into,
 };
-use onboard::observation::{OdometrySample, SensedSsb, SsbObservation};
+use onboard::observation::{OdometrySample, SsbDetection, SsbObservation};
 use onboard::radio_head::RadioHead;
 use onboard::thermal::ThermalNoise;
 use onboard::wake_up::{Situation, WakeUpPolicy};
@@ -139,7 +139,7 @@ impl WakeUpPolicy for Strongest {
     fn decide(
         &mut self,
         now: &Situation<'_>,
-        sensed: &[SensedSsb],
+        sensed: &[SsbDetection],
         chosen: &mut [bool],
     ) -> Result<f64, BoxError> {
         // The expected SNR differs from the measured one by shadowing and scatter.
@@ -182,9 +182,9 @@ fn a_custom_policy_selects_radio_heads() {
 }
 
 /// Custom estimator that modifies the angle of a built-in one.
-struct Retold<F>(Box<dyn AngleEstimator>, F);
+struct ModifiedEstimator<F>(Box<dyn AngleEstimator>, F);
 
-impl<F> AngleEstimator for Retold<F>
+impl<F> AngleEstimator for ModifiedEstimator<F>
 where
     F: FnMut(f64, f64) -> Result<Option<EstimatedAngle>, BoxError> + Send,
 {
@@ -203,14 +203,17 @@ where
     }
 }
 
-fn retold<F>(scenario: &Scenario, tell: F) -> Result<RunRecord, SimulationError>
+fn run_modified<F>(scenario: &Scenario, modify: F) -> Result<RunRecord, SimulationError>
 where
     F: Fn(f64, f64) -> Result<Option<EstimatedAngle>, BoxError> + Clone + Send + Sync + 'static,
 {
     let vehicle = scenario.vehicle.clone();
     let custom = move |_| {
         Ok(Custom {
-            estimator: Some(Box::new(Retold(built_in(&vehicle)?, tell.clone()))),
+            estimator: Some(Box::new(ModifiedEstimator(
+                built_in(&vehicle)?,
+                modify.clone(),
+            ))),
             ..Custom::default()
         })
     };
@@ -228,7 +231,7 @@ fn an_estimator_without_a_standard_deviation_gets_the_bound_at_its_snr() {
             resolved: true,
         }))
     };
-    let record = retold(&scenario, bare).unwrap();
+    let record = run_modified(&scenario, bare).unwrap();
     let bound = ThermalNoise::new(&scenario.site, &scenario.vehicle);
     for angle_result in &record.aoa_estimates {
         let measured = angle_result.measured.unwrap();
@@ -259,7 +262,7 @@ fn a_likelihood_gives_the_same_position_as_its_angle() {
         });
         Ok(Some(EstimatedAngle::LogLikelihood(log.collect())))
     };
-    let record = retold(&scenario, likelihood).unwrap();
+    let record = run_modified(&scenario, likelihood).unwrap();
     for (found, expected) in record.aoa_estimates.iter().zip(&built_in.aoa_estimates) {
         let (found, expected) = (found.measured.unwrap(), expected.measured.unwrap());
         assert!(wrap_angle(found.phase_rad - expected.phase_rad).abs() < 1e-6);
@@ -280,13 +283,13 @@ fn a_likelihood_gives_the_same_position_as_its_angle() {
 #[test]
 fn an_estimator_may_return_nothing_or_fail() {
     let scenario = unguarded("paper-real-odometry-2");
-    let record = retold(&scenario, |_, _| Ok(None)).unwrap();
+    let record = run_modified(&scenario, |_, _| Ok(None)).unwrap();
     for angle_result in &record.aoa_estimates {
         assert_eq!(angle_result.measured, None);
         assert_eq!(angle_result.verdict.reason, UpdateReason::Unusable);
     }
     for nonsense in [EstimatedAngle::LogLikelihood(Vec::new()), not_finite()] {
-        let record = retold(&scenario, move |_, _| Ok(Some(nonsense.clone()))).unwrap();
+        let record = run_modified(&scenario, move |_, _| Ok(Some(nonsense.clone()))).unwrap();
         let reasons = record.aoa_estimates.iter().map(|it| it.verdict.reason);
         assert!(
             reasons
@@ -294,7 +297,7 @@ fn an_estimator_may_return_nothing_or_fail() {
                 .all(|reason| reason == UpdateReason::Unusable)
         );
     }
-    let error = retold(&scenario, |_, _| Err("no eigenvectors".into())).unwrap_err();
+    let error = run_modified(&scenario, |_, _| Err("no eigenvectors".into())).unwrap_err();
     assert!(
         matches!(&error, SimulationError::Custom(it) if it.to_string() == "no eigenvectors"),
         "{error}"

@@ -40,20 +40,20 @@ fn drive(scenario: &Scenario, run: u64) -> RunRecord {
 
 /// Error of the electrical angle of one SSB, and the standard deviation reported by the receiver.
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+struct AngleError {
     driven_m: f64,
     error_rad: f64,
     sigma_rad: f64,
 }
 
-impl Seen {
+impl AngleError {
     fn normalised(&self) -> f64 {
         self.error_rad / self.sigma_rad
     }
 }
 
 /// Returns one error per SSB.
-fn errors(scenario: &Scenario, record: &RunRecord) -> Vec<Seen> {
+fn errors(scenario: &Scenario, record: &RunRecord) -> Vec<AngleError> {
     let [x_m, y_m, _] = scenario.site.radio_heads[0].position_m;
     let head = Point::new(x_m, y_m);
     let mut driven_m = vec![0.0];
@@ -67,7 +67,7 @@ fn errors(scenario: &Scenario, record: &RunRecord) -> Vec<Seen> {
         let truth = record.steps[step].truth;
         let angle_rad = truth.point().bearing_rad(head) - truth.heading_rad;
         let phase_rad = TAU * scenario.vehicle.array.spacing_wavelengths * angle_rad.cos();
-        Seen {
+        AngleError {
             driven_m: driven_m[step],
             error_rad: wrap_angle(measured.phase_rad - phase_rad),
             sigma_rad: measured.phase_sigma_rad,
@@ -93,9 +93,10 @@ fn noise_gives_equal_angle_errors_with_samples_and_snapshots() {
             errors(&scenario, &record)
         };
         let (snapshots, iq) = (by("snapshots"), by("iq"));
-        let relative = |errors: &[Seen]| mean_square(errors.iter().map(Seen::normalised));
-        let sigma = |errors: &[Seen]| mean_square(errors.iter().map(|it| it.sigma_rad));
-        let square = |errors: &[Seen]| mean_square(errors.iter().map(|it| it.error_rad));
+        let relative =
+            |errors: &[AngleError]| mean_square(errors.iter().map(AngleError::normalised));
+        let sigma = |errors: &[AngleError]| mean_square(errors.iter().map(|it| it.sigma_rad));
+        let square = |errors: &[AngleError]| mean_square(errors.iter().map(|it| it.error_rad));
         let ratio = square(&iq) / square(&snapshots);
         // The variance of n Gaussian errors has a relative standard deviation of √(2/n). The limit
         // is four standard deviations of the ratio.
@@ -161,14 +162,14 @@ fn scatter_with_a_delay_spread_is_averaged_over_the_band_and_included_in_sigma()
         all
     };
     let (flat, spread) = (of(0.0), of(1e9 * spread_s));
-    let square = |errors: &[Seen]| mean_square(errors.iter().map(|it| it.error_rad));
+    let square = |errors: &[AngleError]| mean_square(errors.iter().map(|it| it.error_rad));
     // Error variance due to scatter in a flat channel: 1/(2 K A) with A = N(N² − 1)/12. For a plain
     // sum over the band, it is multiplied by the mean of 1/(1 + j2πfτ) over all frequency
     // differences f.
     let once = 1.0 / (2.0 * 10f64.powf(0.1 * k_db) * 5.0);
     let x = TAU * bandwidth_hz * spread_s;
     let plain = once * (2.0 * x.atan() / x - (1.0 + x * x).ln() / (x * x));
-    let normalised = mean_square(spread.iter().map(Seen::normalised));
+    let normalised = mean_square(spread.iter().map(AngleError::normalised));
     println!(
         "{} SSBs: RMSE {:.4} rad flat, {:.4} at 300 ns, plain sum {:.4}; normalised {normalised:.3}",
         spread.len(),
@@ -237,14 +238,14 @@ fn several_cells_with_blind_snapshots_and_poor_hardware_are_located() {
     let scenario = scenario("iq", 30.0, &more);
     let record = drive(&scenario, 4);
     for pci in [1, 400] {
-        let heard = record
+        let received = record
             .aoa_estimates
             .iter()
             .filter(|it| it.ssb.pci == pci)
             .count();
         assert!(
-            heard * 100 > record.steps.len() * 99,
-            "{pci}: {heard} of {}",
+            received * 100 > record.steps.len() * 99,
+            "{pci}: {received} of {}",
             record.steps.len()
         );
     }

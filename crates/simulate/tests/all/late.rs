@@ -3,7 +3,7 @@
 use crate::common;
 use onboard::geometry::Pose;
 use onboard::localize::{PoseEstimate, UpdateReason};
-use onboard::observation::{OdometrySample, SensedSsb};
+use onboard::observation::{OdometrySample, SsbDetection};
 use onboard::settings::WakeUpSettings;
 use onboard::wake_up::{Situation, WakeUpPolicy};
 use onboard::{BoxError, Custom, Pipeline};
@@ -97,8 +97,8 @@ fn take(onboard: &mut Pipeline, arrival: &Arrival<'_>) -> usize {
         }
         Arrival::Burst(burst) => {
             let time_s = burst[0].ssb.time_s;
-            let heard = onboard.process_burst(time_s, &mut Burst(burst)).unwrap();
-            let aoa_estimates = heard.aoa_estimates.iter();
+            let result = onboard.process_burst(time_s, &mut Burst(burst)).unwrap();
+            let aoa_estimates = result.aoa_estimates.iter();
             aoa_estimates.filter(|it| it.verdict.accepted).count()
         }
     }
@@ -182,8 +182,8 @@ fn ssbs_older_than_the_buffer_are_too_late_and_change_nothing() {
                 Arrival::Burst(burst) if burst[0] == drive.bursts[400][0] => {
                     let now_s = burst[0].ssb.time_s + 1.0;
                     let before = onboard.pose(now_s).unwrap();
-                    let heard = onboard.process_burst(burst[0].ssb.time_s, &mut Burst(burst));
-                    let aoa_estimates = heard.unwrap().aoa_estimates.iter();
+                    let result = onboard.process_burst(burst[0].ssb.time_s, &mut Burst(burst));
+                    let aoa_estimates = result.unwrap().aoa_estimates.iter();
                     late.extend(aoa_estimates.map(|it| (it.verdict.accepted, it.verdict.reason)));
                     assert_eq!(onboard.pose(now_s).unwrap(), before);
                 }
@@ -228,7 +228,7 @@ impl WakeUpPolicy for Until {
     fn decide(
         &mut self,
         _: &Situation<'_>,
-        _: &[SensedSsb],
+        _: &[SsbDetection],
         chosen: &mut [bool],
     ) -> Result<f64, BoxError> {
         chosen.fill(true);

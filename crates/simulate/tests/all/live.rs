@@ -4,7 +4,7 @@ use std::path::Path;
 
 use num_complex::Complex32;
 use onboard::live::{
-    AngleObservation, Continuity, LiveError, Outcome, Reason, State, StreamConfig,
+    AngleObservation, AngleRecord, Continuity, LiveError, Reason, State, StreamConfig,
 };
 use onboard::observation::{MeasurementKind, OdometrySample};
 use onboard::settings::{FixedSettings, Platform, Site, Vehicle, WakeUpSettings};
@@ -99,7 +99,7 @@ fn drive(
     odometry: &OdometryLog,
     samples: &[Vec<Complex32>],
     block: usize,
-) -> Vec<Outcome> {
+) -> Vec<AngleRecord> {
     let mut outcomes = Vec::new();
     let mut odometry = odometry.samples.iter().peekable();
     let mut from = 0;
@@ -116,10 +116,10 @@ fn drive(
         };
         assert_eq!(taken.unwrap(), first);
         from += block;
-        outcomes.extend(std::iter::from_fn(|| live.next_outcome()));
+        outcomes.extend(std::iter::from_fn(|| live.next_angle_record()));
     }
     live.flush().unwrap();
-    outcomes.extend(std::iter::from_fn(|| live.next_outcome()));
+    outcomes.extend(std::iter::from_fn(|| live.next_angle_record()));
     outcomes
 }
 
@@ -206,7 +206,7 @@ fn live_processing_allocates_nothing_after_initialisation() {
     let half = samples[0].len() / block / 2;
     let mut odometry = recorded.odometry.samples.iter().peekable();
     let mut feed = |from: usize, to: usize| {
-        let mut heard = 0;
+        let mut received = 0;
         for number in from..to {
             let (from, to) = (number * block, (number + 1) * block);
             let end_s = to as f64 / RATE_HZ;
@@ -218,17 +218,17 @@ fn live_processing_allocates_nothing_after_initialisation() {
                 *antenna = &samples[from..to];
             }
             live.samples(from as f64 / RATE_HZ, &antennas).unwrap();
-            while live.next_outcome().is_some() {
-                heard += 1;
+            while live.next_angle_record().is_some() {
+                received += 1;
             }
             std::hint::black_box(live.status(end_s).unwrap());
         }
-        heard
+        received
     };
     feed(0, half);
-    let mut heard = 0;
-    let count = allocations(|| heard = feed(half, 2 * half));
-    assert!(heard > 40, "{heard}");
+    let mut received = 0;
+    let count = allocations(|| received = feed(half, 2 * half));
+    assert!(received > 40, "{received}");
     assert_eq!(count, 0);
 }
 
@@ -372,7 +372,7 @@ fn drive_asleep(
             }
         }
         received.extend(
-            std::iter::from_fn(|| live.next_outcome()).map(|it| it.angle_result.ssb.time_s),
+            std::iter::from_fn(|| live.next_angle_record()).map(|it| it.angle_result.ssb.time_s),
         );
         number += STEP;
         counted += STEP;

@@ -115,9 +115,9 @@ fn a_recorded_drive_is_located() {
             measured: it.measured.unwrap(),
         })
         .collect();
-    let mut stranger = angles[20];
-    stranger.ssb.pci = 999;
-    angles.insert(20, stranger);
+    let mut unknown_head = angles[20];
+    unknown_head.ssb.pci = 999;
+    angles.insert(20, unknown_head);
     let file = dir.join("angles.csv");
     write_angle_log(&file, &angles).unwrap();
     let mut angles = read_angle_log(&file).unwrap();
@@ -154,11 +154,11 @@ fn a_continuous_recording_is_scanned_and_located_equally() {
     let mut recording = Recording::open(&made.recording).unwrap();
     assert!((made.samples as f64 / 3.84e6 - 0.52).abs() < 1e-3);
 
-    let told = ScanSettings {
+    let settings = ScanSettings {
         ssb_freq_hz: Some(3.5e9),
         ..ScanSettings::default()
     };
-    let found = scan(&mut recording, &told).unwrap();
+    let found = scan(&mut recording, &settings).unwrap();
     let annotations = recording.annotations();
     for annotation in annotations {
         let near = found.ssbs.iter().any(|found| {

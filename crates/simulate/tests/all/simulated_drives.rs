@@ -4,7 +4,7 @@ use crate::common;
 use std::f64::consts::PI;
 
 use onboard::estimator::{AngleEstimator, EstimatedAngle};
-use onboard::observation::{SensedSsb, SsbObservation};
+use onboard::observation::{SsbDetection, SsbObservation};
 use onboard::wake_up::{Situation, WakeUpPolicy};
 use onboard::{AngleResult, BoxError, Custom};
 use simulate::{Campaign, CampaignOptions, Simulation, SimulationError, Step};
@@ -154,7 +154,7 @@ impl WakeUpPolicy for Failing {
     fn decide(
         &mut self,
         now: &Situation<'_>,
-        _: &[SensedSsb],
+        _: &[SsbDetection],
         _: &mut [bool],
     ) -> Result<f64, BoxError> {
         if now.time_s > 0.0 {

@@ -75,9 +75,9 @@ fn during_the_search_all_ssbs_are_received_and_no_pose_is_valid() {
         .unwrap();
     assert!(found.step.time_s > 0.0 && until > 10, "{found:?}");
     // During the search, both radio heads are received at each SSB, for every policy.
-    let looked = |step: &&onboard::AngleResult| step.ssb.time_s < found.step.time_s;
+    let before_found = |step: &&onboard::AngleResult| step.ssb.time_s < found.step.time_s;
     assert_eq!(
-        record.aoa_estimates.iter().filter(looked).count(),
+        record.aoa_estimates.iter().filter(before_found).count(),
         2 * until
     );
     for step in &record.steps[..until] {

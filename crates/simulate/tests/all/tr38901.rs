@@ -205,12 +205,12 @@ fn clusters_are_correlated_over_metres_only() {
     // clusters in the beam.
     let beam = |channel: &Tr38901Propagation, along_m: f64| {
         // An average over two wavelengths removes the fading of single rays.
-        let looks = (0..24).map(|look| {
-            let gains = gains(channel, along_m + 0.0071 * f64::from(look));
+        let gains_db = (0..24).map(|number| {
+            let gains = gains(channel, along_m + 0.0071 * f64::from(number));
             let total: f64 = gains.iter().map(Complex64::norm_sqr).sum();
             gains.iter().sum::<Complex64>().norm_sqr() / total
         });
-        looks.sum::<f64>() / 24.0
+        gains_db.sum::<f64>() / 24.0
     };
     let lags_m = [0.0, 2.0, 30.0];
     let mut pairs = vec![Vec::new(); lags_m.len()];
@@ -268,18 +268,18 @@ fn a_blocked_line_of_sight_returns() {
 
 #[test]
 fn oracle_nlos_rejection_removes_ssbs_without_line_of_sight() {
-    let told = ChannelSettings {
+    let rejecting = ChannelSettings {
         oracle_nlos_rejection: true,
         ..ChannelSettings::default()
     };
-    let (mut heard, mut expected, mut places) = (0.0, 0.0, 0.0);
+    let (mut received, mut expected, mut places) = (0.0, 0.0, 0.0);
     for run in 0..40 {
-        let [mut told, mut all] =
-            [&told, &ChannelSettings::default()].map(|it| along_a_road("umi", it, run));
+        let [mut rejecting, mut all] =
+            [&rejecting, &ChannelSettings::default()].map(|it| along_a_road("umi", it, run));
         // The line of sight exists at some of these positions.
         for along_m in (800..1200).map(f64::from) {
             let sight = sight(along_m);
-            let [here, of_all] = [&mut told, &mut all].map(|it| it.next_gain_db(&sight));
+            let [here, of_all] = [&mut rejecting, &mut all].map(|it| it.next_gain_db(&sight));
             let place = LinkGeometry {
                 level_m: sight.distance_m,
                 head_m: 10.0,
@@ -289,15 +289,15 @@ fn oracle_nlos_rejection_removes_ssbs_without_line_of_sight() {
             expected += environment("umi").line_of_sight_probability(&place);
             if here > f64::NEG_INFINITY {
                 assert_eq!(here.to_bits(), of_all.to_bits());
-                heard += 1.0;
+                received += 1.0;
             }
         }
     }
     // Eight correlation distances in each of 40 drives: a standard deviation of at most 0.5/√320.
     // The limit is three of them.
-    let (heard, expected): (f64, f64) = (heard / places, expected / places);
-    println!("{heard:.3} of the way, {expected:.3} expected");
-    assert!((heard - expected).abs() < 0.084 && expected > 0.2);
+    let (received, expected): (f64, f64) = (received / places, expected / places);
+    println!("{received:.3} of the way, {expected:.3} expected");
+    assert!((received - expected).abs() < 0.084 && expected > 0.2);
 }
 
 #[test]
@@ -320,9 +320,12 @@ fn a_drive_is_reproducible_and_works_with_samples() {
             head.ssb_index = index as u8;
         }
         let samples = run(&by_samples, 4, 0);
-        let heard = [&record, &samples].map(|it| it.aoa_estimates.len());
-        println!("{model}: {heard:?} angles");
-        assert!(heard.iter().all(|count| *count > 20), "{model}: {heard:?}");
+        let angles = [&record, &samples].map(|it| it.aoa_estimates.len());
+        println!("{model}: {angles:?} angles");
+        assert!(
+            angles.iter().all(|count| *count > 20),
+            "{model}: {angles:?}"
+        );
         // The mean SNR depends on the position only, not on the fidelity.
         for (a, b) in record.steps.iter().zip(&samples.steps) {
             assert_eq!(a.snr_db, b.snr_db);

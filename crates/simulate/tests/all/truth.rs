@@ -43,8 +43,8 @@ fn draw(scenario: &Scenario, run: u64) -> Truth {
 fn departures(scenario: &Scenario, truth: &Truth) -> Vec<(&'static str, f64, f64)> {
     let (site, vehicle) = (&scenario.site, &scenario.vehicle);
     let by_head = |index: usize, axis: usize| {
-        let [true_m, believed_m] = [&truth.site, site].map(|it| it.radio_heads[index].position_m);
-        true_m[axis] - believed_m[axis]
+        let [true_m, nominal_m] = [&truth.site, site].map(|it| it.radio_heads[index].position_m);
+        true_m[axis] - nominal_m[axis]
     };
     let by_array_m =
         |axis: usize| truth.vehicle.array.position_m[axis] - vehicle.array.position_m[axis];
@@ -77,11 +77,11 @@ fn departures(scenario: &Scenario, truth: &Truth) -> Vec<(&'static str, f64, f64
             truth.vehicle.receiver.angle_time_offset_s - vehicle.receiver.angle_time_offset_s,
             0.02,
         ),
-        ("start, x", truth.told_start.x_m - at_start.x_m, 0.5),
-        ("start, y", truth.told_start.y_m - at_start.y_m, 0.5),
+        ("start, x", truth.given_start.x_m - at_start.x_m, 0.5),
+        ("start, y", truth.given_start.y_m - at_start.y_m, 0.5),
         (
             "start, heading",
-            truth.told_start.heading_rad - at_start.heading_rad,
+            truth.given_start.heading_rad - at_start.heading_rad,
             0.05,
         ),
     ]
@@ -136,7 +136,7 @@ fn heights_and_values_without_a_standard_deviation_are_nominal() {
     let certain = unguarded("paper-real-odometry-2");
     let truth = draw(&certain, 3);
     assert_eq!(truth.site, certain.site);
-    assert_eq!(truth.told_start, truth.path.at(0.0).pose);
+    assert_eq!(truth.given_start, truth.path.at(0.0).pose);
 }
 
 #[test]
@@ -165,7 +165,7 @@ fn std_factor_scales_all_deviations_and_draw_none_removes_them() {
     let none = uncertain(&[("truth.sample_errors", false.into())]);
     let truth = draw(&none, 1);
     assert_eq!((&truth.site, &truth.vehicle), (&none.site, &none.vehicle));
-    assert_eq!(truth.told_start, truth.path.at(0.0).pose);
+    assert_eq!(truth.given_start, truth.path.at(0.0).pose);
 }
 
 #[test]
@@ -233,11 +233,11 @@ fn deviations_change_the_simulated_signals() {
     let sample = truth.odometer.sample(there).unwrap();
     assert!((sample.distance_m - 1.1 * there.along_m).abs() < 1e-9);
     assert!((sample.speed_mps - 1.1 * there.speed_mps).abs() < 1e-9);
-    let heard = truth.path.heard_at(50.0, 0.2);
-    assert!((there.along_m - heard.along_m - 0.2 * there.speed_mps).abs() < 1e-9);
-    assert_eq!(heard.time_s, 50.0);
+    let received = truth.path.at_reception(50.0, 0.2);
+    assert!((there.along_m - received.along_m - 0.2 * there.speed_mps).abs() < 1e-9);
+    assert_eq!(received.time_s, 50.0);
     let sight = truth.array.line_of_sight(&there, &truth.heads[0]);
-    let eye = there.pose.beside(2.0, 0.0);
+    let eye = there.pose.point_at(2.0, 0.0);
     assert!((sight.distance_m - eye.distance_m(truth.heads[0].position)).abs() < 1e-9);
 
     let road = value("[{ length_m = 120.0, turn_rad = 0.0 }]");
@@ -254,7 +254,7 @@ fn deviations_change_the_simulated_signals() {
 fn angles_with_late_time_stamps_refer_to_earlier_positions() {
     const LATE_S: f64 = 0.2;
     for fidelity in ["snapshots", "iq"] {
-        for told_s in [0.0, LATE_S] {
+        for configured_s in [0.0, LATE_S] {
             let scenario = changed(
                 "paper-real-odometry-2",
                 [
@@ -263,7 +263,7 @@ fn angles_with_late_time_stamps_refer_to_earlier_positions() {
                     ("site.rician_k_db", 90.0.into()),
                     // A different SSB index gives a different reception time.
                     ("site.radio_heads[1].ssb_index", 2.into()),
-                    ("vehicle.receiver.angle_time_offset_s", told_s.into()),
+                    ("vehicle.receiver.angle_time_offset_s", configured_s.into()),
                     ("truth.vehicle.receiver.angle_time_offset_s", LATE_S.into()),
                 ],
             );
@@ -272,7 +272,7 @@ fn angles_with_late_time_stamps_refer_to_earlier_positions() {
             for angle_result in &common::run(&scenario, 9, 0).aoa_estimates {
                 let measured = angle_result.measured.unwrap();
                 // The vehicle subtracts the specified time offset.
-                assert_eq!(measured.time_s, angle_result.ssb.time_s - told_s);
+                assert_eq!(measured.time_s, angle_result.ssb.time_s - configured_s);
                 let head = truth.heads.iter().find(|it| it.pci == angle_result.ssb.pci);
                 let phase_at = |time_s| {
                     let there = truth.path.at(time_s);
@@ -290,8 +290,8 @@ fn angles_with_late_time_stamps_refer_to_earlier_positions() {
             let (found_s, std_s) = (sum / information, information.sqrt().recip());
             assert!(std_s < 0.05 * LATE_S, "{fidelity}: {std_s}");
             assert!(
-                (found_s - (LATE_S - told_s)).abs() < 4.0 * std_s,
-                "{fidelity}, told {told_s}: {found_s} ± {std_s}"
+                (found_s - (LATE_S - configured_s)).abs() < 4.0 * std_s,
+                "{fidelity}, configured {configured_s}: {found_s} ± {std_s}"
             );
         }
     }
@@ -299,7 +299,7 @@ fn angles_with_late_time_stamps_refer_to_earlier_positions() {
 
 #[test]
 fn invalid_deviations_are_rejected() {
-    for (name, key, value, told, allowed) in [
+    for (name, key, value, rejected_key, allowed) in [
         (
             "yard",
             "truth.sample_error",
@@ -418,7 +418,8 @@ fn invalid_deviations_are_rejected() {
             .unwrap_err();
         let message = refused.to_string();
         assert!(
-            message.starts_with("yard with overrides: ") && message.contains(&format!("`{told}`")),
+            message.starts_with("yard with overrides: ")
+                && message.contains(&format!("`{rejected_key}`")),
             "{key}: {message}"
         );
         assert!(message.contains(allowed), "{key}: {message}");

@@ -1,6 +1,8 @@
 //! Whole recordings through the receivers.
 
-use nr_ssb::receiver::{Receiver, ReceiverConfig, Seen, TrackedSsb, Window, WindowReceiver};
+use nr_ssb::receiver::{
+    ReceivedBeam, Receiver, ReceiverConfig, TrackedSsb, Window, WindowReceiver,
+};
 use nr_ssb::{Complex32, Tone};
 
 /// Samples of each block of a stream.
@@ -33,7 +35,7 @@ pub fn windows<const A: usize>(
     config: ReceiverConfig,
     (first, count): (usize, usize),
     samples: &[Vec<Complex32>],
-    take: &mut dyn FnMut(Seen<'_, A>),
+    take: &mut dyn FnMut(ReceivedBeam<'_, A>),
 ) -> Vec<Tone> {
     let rate_hz = config.search.spacing.base_rate_hz();
     let [length, period] = [0.005, 0.02].map(|it| (it * rate_hz) as usize);

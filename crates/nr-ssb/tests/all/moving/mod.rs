@@ -55,7 +55,7 @@ pub fn summary(errors: &[Error]) -> Summary {
 
 /// Errors of one SSB.
 #[derive(Debug, Clone, Copy)]
-pub struct Heard {
+pub struct SsbErrors {
     /// Delay of the first path in seconds.
     pub delay: Error,
     pub multipath: Multipath,
@@ -182,10 +182,10 @@ impl Moving {
             cell,
         };
         // The search has 10 dB at least, so that it succeeds.
-        let told = moving.snr_db;
-        moving.snr_db = told.max(10.0);
+        let snr_db = moving.snr_db;
+        moving.snr_db = snr_db.max(10.0);
         let (samples, start) = moving.window();
-        moving.snr_db = told;
+        moving.snr_db = snr_db;
         moving.tracker = detected(&config, &moving.cell, &samples, start);
         moving
     }
@@ -256,7 +256,7 @@ impl Moving {
     }
 
     /// Receives the SSB that is transmitted `sleep_s` after the last one.
-    pub fn next(&mut self, sleep_s: f64) -> Option<Heard> {
+    pub fn next(&mut self, sleep_s: f64) -> Option<SsbErrors> {
         let rate_hz = self.cell.spacing.base_rate_hz();
         let elapsed = (sleep_s * rate_hz).round();
         self.sent_at += elapsed;
@@ -274,7 +274,7 @@ impl Moving {
             let gain = self.cell.gains[antenna];
             Complex64::new(gain.re.into(), gain.im.into())
         });
-        let (phase_rad, phase_sigma_rad) = observed.phase_toward(&response);
+        let (phase_rad, phase_sigma_rad) = observed.phase_for_response(&response);
         let turn = phase_rad - self.phase(seen.phase.reference_start);
         let wavelength_m = LIGHT_M_S / SSB_FREQ_HZ;
         let frequency_bound = match seen.range_rate.source {
@@ -283,7 +283,7 @@ impl Moving {
         };
         // A power of unity is −20 lg 256 dB of full scale.
         let power_bound = 10.0 / std::f64::consts::LN_10 * 2.0 * phase_bound;
-        Some(Heard {
+        Some(SsbErrors {
             delay: Error {
                 value: (seen.delay.first_path_start - self.start()) / rate_hz,
                 sigma: seen.delay.sigma_s,

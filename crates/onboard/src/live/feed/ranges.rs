@@ -77,7 +77,7 @@ impl Live {
             let what = "the standard deviation of a range";
             return Err(invalid(what, sigma, "it must be positive"));
         }
-        self.hear_angles()?;
+        self.process_angles()?;
         let newest = self.onboard.newest_odometry();
         let time_s = self.clocks.accept_burst("range", range.time_s, newest)?;
         self.see(time_s);

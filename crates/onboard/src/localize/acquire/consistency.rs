@@ -41,7 +41,7 @@ struct HeadStatistics {
     ssb_index: u8,
     refused: f64,
     surprise: f64,
-    heard: u32,
+    received: u32,
     /// Index of its last angle among all angles.
     last: u32,
 }
@@ -54,7 +54,7 @@ impl ConsistencyMonitor {
             ssb_index: head.ssb_index,
             refused: 0.0,
             surprise: 0.0,
-            heard: 0,
+            received: 0,
             last: 0,
         };
         Self {
@@ -81,8 +81,8 @@ impl ConsistencyMonitor {
             return;
         };
         head.last = self.angles;
-        head.heard = head.heard.saturating_add(1);
-        let weight = WEIGHT.max(1.0 / f64::from(head.heard));
+        head.received = head.received.saturating_add(1);
+        let weight = WEIGHT.max(1.0 / f64::from(head.received));
         head.refused += weight * (refused - head.refused);
         head.surprise += weight * (capped - head.surprise);
     }
@@ -90,7 +90,7 @@ impl ConsistencyMonitor {
     /// Resets all statistics.
     pub fn reset(&mut self) {
         for head in &mut self.heads {
-            head.heard = 0;
+            head.received = 0;
         }
         self.angles = 0;
     }
@@ -99,7 +99,7 @@ impl ConsistencyMonitor {
     /// enough angles.
     fn off(&self, refused: f64) -> Option<f64> {
         let is_recent =
-            |it: &&HeadStatistics| it.heard > 0 && self.angles.saturating_sub(it.last) < RECENT;
+            |it: &&HeadStatistics| it.received > 0 && self.angles.saturating_sub(it.last) < RECENT;
         let recent = || self.heads.iter().filter(is_recent);
         let off = recent().filter(|it| it.refused > refused || it.surprise > SURPRISED);
         (self.angles >= LEAST).then(|| off.count() as f64 / recent().count().max(1) as f64)

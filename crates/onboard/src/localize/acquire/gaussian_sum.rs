@@ -35,7 +35,7 @@ const BEHIND: f64 = 25.0;
 const FOUND_STD_M: f64 = 0.4;
 
 /// Maximum probability of the opposite direction of travel for a located vehicle.
-const OTHER_WAY: f64 = 1e-5;
+const MAX_OPPOSITE_ODDS: f64 = 1e-5;
 
 /// Maximum standard deviation of the heading for a located vehicle without a road (rad).
 const FOUND_STD_RAD: f64 = 0.2;
@@ -313,7 +313,7 @@ impl GaussianSum {
         // their likelihoods would not be comparable.
         if let Some((best, others)) = self.hypotheses.split_first_mut() {
             for it in others {
-                it.ekf.hear_as(&best.ekf);
+                it.ekf.copy_noise_state(&best.ekf);
             }
         }
         first
@@ -322,7 +322,7 @@ impl GaussianSum {
     /// Sets the noise model of another filter to that of the hypotheses.
     pub(super) fn teach(&self, ekf: &mut Ekf) {
         if let Some(best) = self.hypotheses.first() {
-            ekf.hear_as(&best.ekf);
+            ekf.copy_noise_state(&best.ekf);
         }
     }
 
@@ -449,18 +449,18 @@ impl GaussianSum {
         }
         let mut one = self.hypotheses.first()?.clone();
         let best = one.log_likelihood;
-        let mut other_way = 0.0;
+        let mut opposite = 0.0;
         for hypothesis in self.hypotheses.iter().skip(1) {
             if hypothesis.road == one.road {
                 one.absorb(hypothesis);
             } else {
-                other_way += (hypothesis.log_likelihood - best).exp();
+                opposite += (hypothesis.log_likelihood - best).exp();
             }
         }
         if !one.ekf.is_with_bias() {
             one.ekf.begin_bias(self.multipath_bias_probability);
         }
-        (other_way < OTHER_WAY).then_some(one.ekf)
+        (opposite < MAX_OPPOSITE_ODDS).then_some(one.ekf)
     }
 
     /// Returns the mean over all hypotheses, weighted by their likelihoods, and a covariance that
@@ -544,7 +544,7 @@ mod tests {
         let site = Site::from_library("trip-2", &Shipped).unwrap();
         let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
         let config = EkfConfig::new(&site, &vehicle);
-        let heads = RadioHead::heard(&site, &vehicle);
+        let heads = RadioHead::received_by(&site, &vehicle);
         let map = site.build_road().unwrap().unwrap();
         let start_m = rng.random::<f64>() * 200.0;
         let mut search = GaussianSum::from_scratch(config, Some(map.clone()), false, &heads);

@@ -23,7 +23,7 @@ const HEADINGS: usize = 8;
 const HEADING_STD_RAD: f64 = TAU / (2 * HEADINGS) as f64;
 
 /// Distance after which the search ends without a result (m).
-const LONGEST_WAY_M: f64 = 60.0;
+const MAX_DRIVEN_M: f64 = 60.0;
 
 /// Log-likelihood ratio of another heading above which the solution is in doubt: odds of 20.
 const DOUBT: f64 = 3.0;
@@ -134,7 +134,7 @@ impl HeadingSearch {
 
     /// Whether the search has ended without a result.
     pub fn is_over(&self, solution: &Ekf) -> bool {
-        let way_m = solution.driven_m() - self.begun_m;
-        way_m > LONGEST_WAY_M && !self.doubts()
+        let driven_m = solution.driven_m() - self.begun_m;
+        driven_m > MAX_DRIVEN_M && !self.doubts()
     }
 }

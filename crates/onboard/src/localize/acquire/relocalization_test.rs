@@ -53,9 +53,9 @@ clone_in_place! {
         of_filter: f64,
         /// Distance driven at the start of the search, and since then (m).
         since_m: f64,
-        pub way_m: f64,
+        pub driven_m: f64,
         /// Time of the last angle, and duration of reception (s).
-        heard_s: f64,
+        received_s: f64,
         pub listened_s: f64,
         /// Number of angles, number of independent ones, and distance driven at the last
         /// independent angle of each radio head (m).
@@ -80,8 +80,8 @@ impl RelocalizationTest {
             confirmed_at: f64::NEG_INFINITY,
             of_filter: 0.0,
             since_m: ekf.driven_m(),
-            way_m: 0.0,
-            heard_s: f64::NEG_INFINITY,
+            driven_m: 0.0,
+            received_s: f64::NEG_INFINITY,
             listened_s: 0.0,
             angles: 0,
             independent: 0,
@@ -137,18 +137,18 @@ impl RelocalizationTest {
 
     /// Processes an angle, before the filter does.
     pub fn update(&mut self, ekf: &Ekf, head: &RadioHead, measured: &AngleMeasurement) {
-        self.way_m = ekf.driven_m() - self.since_m;
-        let silence_s = measured.time_s - self.heard_s;
+        self.driven_m = ekf.driven_m() - self.since_m;
+        let silence_s = measured.time_s - self.received_s;
         if silence_s < SILENCE_S {
             self.listened_s += silence_s.max(0.0);
         }
-        self.heard_s = measured.time_s;
+        self.received_s = measured.time_s;
         let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
         let number = self.search.heads().iter().position(is_it);
         if let Some(last_m) = number.and_then(|number| self.independent_m.get_mut(number)) {
             self.angles = self.angles.saturating_add(1);
-            if self.way_m - *last_m >= INDEPENDENT_M {
-                *last_m = self.way_m;
+            if self.driven_m - *last_m >= INDEPENDENT_M {
+                *last_m = self.driven_m;
                 self.independent = self.independent.saturating_add(1);
             }
         }
@@ -224,7 +224,7 @@ impl RelocalizationTest {
     }
 
     /// Returns the minimum distance driven before a result is accepted (m).
-    pub const fn least_way_m(&self) -> f64 {
+    pub const fn min_driven_m(&self) -> f64 {
         if self.may_mislead {
             INDEPENDENT_M
         } else {

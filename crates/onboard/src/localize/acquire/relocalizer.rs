@@ -49,14 +49,14 @@ const MOST_NEARBY_M: f64 = 10.0;
 const REST_S: f64 = 10.0;
 
 /// Distance after which a confirmation with few angles ends (m).
-const LONG_WAY_M: f64 = 100.0;
+const LONG_DISTANCE_M: f64 = 100.0;
 
 /// Standard deviation of the start position (m) in the search for the heading with ranges.
 const START_STD_M: f64 = 1.0;
 
 /// Configuration that is constant during a drive.
 #[derive(Debug)]
-struct Setup {
+struct DriveConfig {
     road: Option<Road>,
     heads: Vec<RadioHead>,
     integrity: Option<IntegritySettings>,
@@ -89,11 +89,11 @@ impl Clone for Solution {
 
 impl Solution {
     /// Creates the solution of a filter whose position was given, or found at `found_s`.
-    fn new(ekf: Ekf, setup: &Setup, found_s: Option<f64>) -> Self {
-        match setup.integrity {
+    fn new(ekf: Ekf, drive_config: &DriveConfig, found_s: Option<f64>) -> Self {
+        match drive_config.integrity {
             Some(settings) => Self::Monitored(Box::new(IntegrityMonitor::new(
                 &ekf,
-                &setup.heads,
+                &drive_config.heads,
                 settings,
                 found_s,
             ))),
@@ -186,7 +186,7 @@ clone_in_place! {
     /// Built-in localizer.
     #[derive(Debug)]
     pub struct Relocalizer {
-        setup: Arc<Setup>,
+        drive_config: Arc<DriveConfig>,
         phase: Phase,
         /// Search for the initial pose; `None` once the pose is known.
         search: Option<GaussianSum>,
@@ -219,7 +219,7 @@ impl Relocalizer {
         };
         let mut made = Self::new(phase, road, heads, integrity);
         made.heading = HeadingSearch::new(&ekf, heads, START_STD_M);
-        made.solution = Some(Solution::new(ekf, &made.setup, None));
+        made.solution = Some(Solution::new(ekf, &made.drive_config, None));
         made
     }
 
@@ -250,7 +250,7 @@ impl Relocalizer {
             rests_until_s: f64::NEG_INFINITY,
             recovered: None,
             keeps_journal: false,
-            setup: Arc::new(Setup {
+            drive_config: Arc::new(DriveConfig {
                 road,
                 heads: heads.to_vec(),
                 integrity,
@@ -261,7 +261,7 @@ impl Relocalizer {
 
     /// Tracks with the result of a search at time `now_s`.
     fn track(&mut self, found: Ekf, now_s: f64) {
-        let mut solution = Solution::new(found, &self.setup, Some(now_s));
+        let mut solution = Solution::new(found, &self.drive_config, Some(now_s));
         if self.keeps_journal {
             solution.keep_journal();
         }
@@ -289,7 +289,7 @@ impl Relocalizer {
         let ekf = solution.ekf();
         let Some(search) = &self.heading else {
             if solution.is_contradicted() && now_s >= self.rests_until_s {
-                self.heading = HeadingSearch::new(ekf, &self.setup.heads, NEARBY_M);
+                self.heading = HeadingSearch::new(ekf, &self.drive_config.heads, NEARBY_M);
                 self.rests_until_s = now_s + REST_S;
             }
             return;
@@ -310,8 +310,8 @@ impl Relocalizer {
     /// Starts the search of all starts other than the given one; if all of them are nearby, the
     /// usual search.
     fn begin_of_start(&mut self, now_s: f64) {
-        let heads = self.setup.heads.as_slice();
-        let (true, Some(solution)) = (self.setup.road.is_none(), &self.solution) else {
+        let heads = self.drive_config.heads.as_slice();
+        let (true, Some(solution)) = (self.drive_config.road.is_none(), &self.solution) else {
             return self.begin(Phase::Confirming, now_s);
         };
         if !GaussianSum::serves_as_stated(heads) {
@@ -320,7 +320,7 @@ impl Relocalizer {
         let given = solution.ekf();
         let mut search = GaussianSum::as_stated(given.config(), heads);
         search.resume(given);
-        let settings = self.setup.integrity.unwrap_or_default();
+        let settings = self.drive_config.integrity.unwrap_or_default();
         self.test = Some(RelocalizationTest::of_start(search, given, &settings));
         self.phase = Phase::Confirming;
     }
@@ -358,12 +358,12 @@ impl Relocalizer {
     /// Returns a nearby search, or one in the area of the radio heads. It is wide immediately if
     /// both regions are equal.
     fn search_about(&self, solution: &Solution, now_s: f64, is_wide: bool) -> Option<GaussianSum> {
-        let (ekf, heads) = (solution.ekf(), self.setup.heads.as_slice());
+        let (ekf, heads) = (solution.ekf(), self.drive_config.heads.as_slice());
         let mut config = *ekf.config();
         if config.measured_noise_scale.is_some() {
             config.set_noise_scale(Some(solution.noise_scale()));
         }
-        let road = self.setup.road.as_ref();
+        let road = self.drive_config.road.as_ref();
         let mut search = match road {
             Some(_) => GaussianSum::new(config, road.cloned(), true, heads),
             None if heads.len() < LEAST_HEADS => return None,
@@ -400,8 +400,8 @@ impl Relocalizer {
             doubts_start: self.doubts_start(),
             agrees: is(&|it| it.agrees_with(solution.ekf())),
             is_just_reported: is(&|it| it.reported_s == odometry_s),
-            has_moved: is(&|it| it.way_m >= it.least_way_m()),
-            has_moved_far: is(&|it| it.way_m > LONG_WAY_M),
+            has_moved: is(&|it| it.driven_m >= it.min_driven_m()),
+            has_moved_far: is(&|it| it.driven_m > LONG_DISTANCE_M),
             is_patient: is(&|it| it.listened_s > PATIENCE_S),
         }
     }
@@ -491,8 +491,8 @@ impl Localizer for Relocalizer {
         }
         let begun_s = solution.begun_s();
         let verdict = solution.update(head, measured);
-        let (has_begun_anew, noise_scale) = (solution.begun_s() > begun_s, solution.noise_scale());
-        if has_begun_anew && self.is_lost() && !self.is_of_start() {
+        let (has_restarted, noise_scale) = (solution.begun_s() > begun_s, solution.noise_scale());
+        if has_restarted && self.is_lost() && !self.is_of_start() {
             // The filter that was lost has been replaced.
             self.end_search();
             self.consistency.reset();
@@ -520,11 +520,12 @@ impl Localizer for Relocalizer {
     }
 
     fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
-        let quantile = &self.setup.quantile;
+        let quantile = &self.drive_config.quantile;
         let Some(solution) = &self.solution else {
             let mut estimate = self.search.as_ref().ok_or("no search")?.pose(time_s);
             let level_m = quantile.radius(estimate.principal_variances());
-            estimate.integrity = (self.setup.integrity).map(|_| Integrity::unavailable(level_m));
+            estimate.integrity =
+                (self.drive_config.integrity).map(|_| Integrity::unavailable(level_m));
             return Ok(estimate);
         };
         let of_start = self.test.as_ref().filter(|it| it.is_of_start());
@@ -536,8 +537,8 @@ impl Localizer for Relocalizer {
             let searched = test.search.pose(time_s);
             // In a search along the whole road or in the whole area, the best position may be far
             // away.
-            let is_near =
-                self.setup.road.is_none() && self.phase == Phase::Relocalizing { wide: false };
+            let is_near = self.drive_config.road.is_none()
+                && self.phase == Phase::Relocalizing { wide: false };
             if is_near && test.refutes {
                 (estimate.pose, estimate.covariance) = (searched.pose, searched.covariance);
             } else {

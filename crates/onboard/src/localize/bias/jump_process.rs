@@ -73,7 +73,7 @@ pub struct JumpHypotheses {
     /// Probability density of the angle (1/rad).
     pub density: f64,
     pub kept: JumpHypothesis,
-    pub anew: JumpHypothesis,
+    pub redrawn: JumpHypothesis,
     /// Probability of each level given this angle, and given the distance alone.
     levels: [f64; LEVELS],
     predicted_levels: [f64; LEVELS],
@@ -147,7 +147,7 @@ impl JumpProcess {
         let predicted_levels = self.predicted_levels(travelled_m);
         let stays = kept(travelled_m);
         let repetition = share(travelled_m).recip();
-        let (kept_residual, anew_residual) = (seen.residual - value_rad, seen.residual);
+        let (kept_residual, redrawn_residual) = (seen.residual - value_rad, seen.residual);
         let mut weights = [[0.0; LEVELS]; 2];
         // Inverse of the variance of an angle, and the part of a new bias in it.
         let (mut inverse, mut of_value) = ([[0.0; LEVELS]; 2], [0.0; LEVELS]);
@@ -155,7 +155,7 @@ impl JumpProcess {
         for (level, value) in VARIANCES.into_iter().enumerate() {
             for (hypothesis, share, residual, variance) in [
                 (0, stays, kept_residual, known),
-                (1, 1.0 - stays, anew_residual, value),
+                (1, 1.0 - stays, redrawn_residual, value),
             ] {
                 let once = Innovation {
                     residual,
@@ -169,8 +169,8 @@ impl JumpProcess {
             of_value[level] = value * inverse[1][level];
             left[level] = value - value * of_value[level];
         }
-        let [kept, anew] = [0, 1].map(|hypothesis| weights[hypothesis].iter().sum::<f64>());
-        let density = kept + anew;
+        let [kept, redrawn] = [0, 1].map(|hypothesis| weights[hypothesis].iter().sum::<f64>());
+        let density = kept + redrawn;
         let total = density.max(f64::MIN_POSITIVE);
         let hypothesis = |hypothesis: usize, share: f64, residual: f64| {
             let (gain, variance) = moments(&weights[hypothesis], &inverse[hypothesis]);
@@ -181,22 +181,23 @@ impl JumpProcess {
                 narrowing: gain - residual * residual * variance,
             }
         };
-        let square = anew_residual * anew_residual;
+        let square = redrawn_residual * redrawn_residual;
         let (of_value_mean, of_value_variance) = moments(&weights[1], &of_value);
         let together = covariance(&weights[1], &inverse[1], &of_value).0;
         let mut levels = predicted_levels;
         if density > 0.0 {
-            for (level, (kept, anew)) in levels.iter_mut().zip(weights[0].iter().zip(weights[1])) {
-                *level = (kept + anew) / total;
+            for (level, (kept, redrawn)) in levels.iter_mut().zip(weights[0].iter().zip(weights[1]))
+            {
+                *level = (kept + redrawn) / total;
             }
         }
         JumpHypotheses {
             density,
             kept: hypothesis(0, kept, kept_residual),
-            anew: hypothesis(1, anew, anew_residual),
+            redrawn: hypothesis(1, redrawn, redrawn_residual),
             levels,
             predicted_levels,
-            mean_rad: anew_residual * of_value_mean,
+            mean_rad: redrawn_residual * of_value_mean,
             variance: moments(&weights[1], &left).0 + square * of_value_variance,
             narrowing: of_value_mean - square * together,
         }
@@ -205,12 +206,12 @@ impl JumpProcess {
     /// Updates the probabilities of the levels with an angle and its hypotheses, `travelled_m`
     /// after the previous one.
     pub fn learn(&mut self, travelled_m: f64, hypotheses: &JumpHypotheses) {
-        let by_way_and_angle = hypotheses
+        let by_distance_and_angle = hypotheses
             .predicted_levels
             .into_iter()
             .zip(hypotheses.levels);
-        for (level, (by_way, by_angle)) in self.levels.iter_mut().zip(by_way_and_angle) {
-            *level = by_way + share(travelled_m) * (by_angle - by_way);
+        for (level, (by_distance, by_angle)) in self.levels.iter_mut().zip(by_distance_and_angle) {
+            *level = by_distance + share(travelled_m) * (by_angle - by_distance);
         }
     }
 

@@ -36,10 +36,10 @@ impl<'a> MixtureUpdate<'a> {
     /// Creates the update for the hypotheses of an angle, given the previous mean of the bias and
     /// its covariance with the angle.
     pub fn new(hypotheses: &'a JumpHypotheses, value_rad: f64, cross_with_angle: f64) -> Self {
-        let all = [&hypotheses.kept, &hypotheses.anew];
+        let all = [&hypotheses.kept, &hypotheses.redrawn];
         let steps = all.map(|hypothesis| hypothesis.residual * hypothesis.gain);
         // The covariance of a mixture is the mean covariance plus the covariance of the means.
-        let both = hypotheses.kept.share * hypotheses.anew.share;
+        let both = hypotheses.kept.share * hypotheses.redrawn.share;
         let square = |of: usize| both * steps[of] * steps[of] - all[of].share * all[of].narrowing;
         let kept_rad = value_rad + steps[0] * cross_with_angle;
         Self {
@@ -69,11 +69,11 @@ impl<'a> MixtureUpdate<'a> {
 
     /// Returns the covariance of the bias with another quantity.
     pub fn value_covariance(&self, before: f64, with: CrossCovariance) -> f64 {
-        let (kept, anew) = (&self.hypotheses.kept, &self.hypotheses.anew);
+        let (kept, redrawn) = (&self.hypotheses.kept, &self.hypotheses.redrawn);
         kept.share * (before - kept.narrowing * self.cross_with_angle * with[0])
-            - anew.share * self.hypotheses.narrowing * with[1]
+            - redrawn.share * self.hypotheses.narrowing * with[1]
             + kept.share
-                * anew.share
+                * redrawn.share
                 * self.apart_rad
                 * (self.steps[0] * with[0] - self.steps[1] * with[1])
     }
@@ -81,15 +81,15 @@ impl<'a> MixtureUpdate<'a> {
     /// Returns the mean of the bias.
     pub fn value_mean(&self) -> f64 {
         self.hypotheses.kept.share * self.kept_rad
-            + self.hypotheses.anew.share * self.hypotheses.mean_rad
+            + self.hypotheses.redrawn.share * self.hypotheses.mean_rad
     }
 
     /// Returns the variance of the bias, which was `before`.
     pub fn value_variance(&self, before: f64) -> f64 {
-        let (kept, anew) = (&self.hypotheses.kept, &self.hypotheses.anew);
+        let (kept, redrawn) = (&self.hypotheses.kept, &self.hypotheses.redrawn);
         kept.share * (before - kept.narrowing * self.cross_with_angle * self.cross_with_angle)
-            + anew.share * self.hypotheses.variance
-            + kept.share * anew.share * self.apart_rad * self.apart_rad
+            + redrawn.share * self.hypotheses.variance
+            + kept.share * redrawn.share * self.apart_rad * self.apart_rad
     }
 }
 
@@ -190,9 +190,9 @@ impl MultipathBias {
         let alone = belief.variance_along(row);
         let with_bias = alone + error.along(row);
         let known = 2.0 * error.along(row) + self.covariance(head, head);
-        let [kept, anew] =
+        let [kept, redrawn] =
             (error.size).expected_gains(travelled_m, alone + variance, known.max(-alone));
-        let reduction = kept * with_bias * with_bias + anew * alone * alone;
+        let reduction = kept * with_bias * with_bias + redrawn * alone * alone;
         (alone * alone / reduction - alone).max(variance)
     }
 
@@ -259,7 +259,7 @@ impl MultipathBias {
             *covariance = change.value_covariance(*covariance, cross_with_angle);
         }
         if let Some(journal) = journal {
-            self.tell(journal, head, row, &cross_with_angle, hypotheses);
+            self.note(journal, head, row, &cross_with_angle, hypotheses);
         }
         for i in 0..STATES {
             belief.mean[i] += change.step(cross_with_angle[i]);
@@ -303,7 +303,7 @@ impl MultipathBias {
     /// mixture is at least that of these measurements, because `T M⁻¹ Tᵀ` is jointly convex in `T`
     /// and `M` (Boyd and Vandenberghe, Convex Optimization, 3.1.7). The difference is process
     /// noise.
-    fn tell(
+    fn note(
         &self,
         journal: &mut Journal<STATES>,
         head: usize,
@@ -324,7 +324,7 @@ impl MultipathBias {
             (cross_with_angle.iter().copied())
                 .chain(self.heads.iter().map(|it| it.cross_with_angle))
         };
-        let (kept, anew) = (&hypotheses.kept, &hypotheses.anew);
+        let (kept, redrawn) = (&hypotheses.kept, &hypotheses.redrawn);
         // Effect of the first measurement on the second: correction of its residual and reduction
         // of its variance.
         let (mut less, mut corrected) = (0.0, 0.0);
@@ -337,17 +337,17 @@ impl MultipathBias {
             less = with_measured / total;
             corrected = less * residual;
         }
-        if anew.share > 0.0 && anew.narrowing > 0.0 {
+        if redrawn.share > 0.0 && redrawn.narrowing > 0.0 {
             let total = known - less * with_measured
-                + (anew.narrowing.recip() - known).max(0.0) / anew.share;
-            let residual = anew.residual * anew.gain / anew.narrowing - corrected;
+                + (redrawn.narrowing.recip() - known).max(0.0) / redrawn.share;
+            let residual = redrawn.residual * redrawn.gain / redrawn.narrowing - corrected;
             let gain = all().map(|[measured, alone]| (alone - less * measured) / total);
             if total > 0.0 {
                 journal.measured(row, None, gain, residual, total);
             }
         }
-        let beside = hypotheses.narrowing / (1.0 - known * anew.narrowing);
-        let by_state = row.map(|by| -anew.share * beside * by);
+        let scale = hypotheses.narrowing / (1.0 - known * redrawn.narrowing);
+        let by_state = row.map(|by| -redrawn.share * scale * by);
         journal.redrawn(head, kept.share, &by_state);
     }
 
@@ -437,10 +437,16 @@ mod tests {
     }
 
     /// Processes an angle of a radio head like the filter.
-    fn take(errors: &mut MultipathBias, belief: &mut Belief, head: usize, way_m: f64, rad: f64) {
+    fn take(
+        errors: &mut MultipathBias,
+        belief: &mut Belief,
+        head: usize,
+        travelled_m: f64,
+        rad: f64,
+    ) {
         let seen = belief.innovation(rad - belief.mean[0], &row(), OWN_VARIANCE);
-        let hypotheses = errors.weigh(head, way_m, &seen, &row()).unwrap();
-        errors.take(belief, head, way_m, &row(), &hypotheses, None);
+        let hypotheses = errors.weigh(head, travelled_m, &seen, &row()).unwrap();
+        errors.take(belief, head, travelled_m, &row(), &hypotheses, None);
     }
 
     const ALL: usize = STATES + 2;
@@ -480,27 +486,27 @@ mod tests {
         before: &Gaussian<ALL>,
         levels: [f64; LEVELS],
         head: usize,
-        way_m: f64,
+        travelled_m: f64,
         rad: f64,
     ) -> Gaussian<ALL> {
         let mut whole_row = [0.0; ALL];
         (whole_row[0], whole_row[STATES + head]) = (1.0, 1.0);
-        let changes = 1.0 - (-way_m / LEVEL_M).exp();
-        let stays = (-way_m / VALUE_M).exp();
+        let changes = 1.0 - (-travelled_m / LEVEL_M).exp();
+        let stays = (-travelled_m / VALUE_M).exp();
         let mut parts = vec![];
         for (level, value) in levels.into_iter().zip(VARIANCES) {
             let probability = level + changes * (1.0 / LEVELS as f64 - level);
-            let mut anew = *before;
-            anew.mean[STATES + head] = 0.0;
+            let mut redrawn = *before;
+            redrawn.mean[STATES + head] = 0.0;
             for i in 0..ALL {
-                anew.covariance[i][STATES + head] = 0.0;
-                anew.covariance[STATES + head][i] = 0.0;
+                redrawn.covariance[i][STATES + head] = 0.0;
+                redrawn.covariance[STATES + head][i] = 0.0;
             }
-            anew.covariance[STATES + head][STATES + head] = value;
-            for (probable, mut decorrelate) in [(stays, *before), (1.0 - stays, anew)] {
+            redrawn.covariance[STATES + head][STATES + head] = value;
+            for (probable, mut decorrelate) in [(stays, *before), (1.0 - stays, redrawn)] {
                 let residual = rad - decorrelate.mean[0] - decorrelate.mean[STATES + head];
                 let once = decorrelate.innovation(residual, &whole_row, OWN_VARIANCE + value);
-                let repeated = OWN_VARIANCE + value / share(way_m);
+                let repeated = OWN_VARIANCE + value / share(travelled_m);
                 decorrelate.update(residual, &whole_row, repeated);
                 parts.push((probable * probability * once.density(), decorrelate));
             }
@@ -531,7 +537,7 @@ mod tests {
         (motion[0][1], motion[1][1]) = (0.3, 0.9);
         let mut whole_motion = identity::<ALL>();
         (whole_motion[0][1], whole_motion[1][1]) = (0.3, 0.9);
-        for (head, way_m, rad) in [
+        for (head, travelled_m, rad) in [
             (0, f64::INFINITY, 0.4),
             (1, f64::INFINITY, -0.2),
             (0, 0.08, 0.43),
@@ -541,8 +547,8 @@ mod tests {
             (1, 0.3, 0.1),
         ] {
             let levels = errors.heads[head].size.levels;
-            let expected = mixture(&whole(&belief, &errors), levels, head, way_m, rad);
-            take(&mut errors, &mut belief, head, way_m, rad);
+            let expected = mixture(&whole(&belief, &errors), levels, head, travelled_m, rad);
+            take(&mut errors, &mut belief, head, travelled_m, rad);
             assert_same(&whole(&belief, &errors), &expected);
             // A motion of the state, and a measurement of the state alone.
             let mut expected = whole(&belief, &errors);
@@ -570,9 +576,9 @@ mod tests {
     }
 
     impl Drawn {
-        fn after(&mut self, way_m: f64, random: &mut ChaCha8Rng) -> f64 {
+        fn after(&mut self, travelled_m: f64, random: &mut ChaCha8Rng) -> f64 {
             let happens = |within_m: f64, random: &mut ChaCha8Rng| {
-                random.random::<f64>() > (-way_m / within_m).exp()
+                random.random::<f64>() > (-travelled_m / within_m).exp()
             };
             if happens(LEVEL_M, random) {
                 self.level = VARIANCES[random.random_range(0..LEVELS)].sqrt();
@@ -592,7 +598,7 @@ mod tests {
         // Two radio heads, with an angle of each every 0.3 m: the short-lived error is independent
         // between angles.
         let mut random = ChaCha8Rng::seed_from_u64(5);
-        for (way_m, bound_m) in [(2.0, 0.3), (20.0, 0.1)] {
+        for (travelled_m, bound_m) in [(2.0, 0.3), (20.0, 0.1)] {
             let (mut nees, mut square, mut within) = (0.0, 0.0, 0);
             for _ in 0..RUNS {
                 let (mut errors, mut belief) = (MultipathBias::new(2, EVEN), unknown());
@@ -604,7 +610,7 @@ mod tests {
                 for head in &mut drawn {
                     head.value_rad = head.level * random.sample::<f64, _>(StandardNormal);
                 }
-                for predict_measurement in 0..(way_m / SOON_M) as usize {
+                for predict_measurement in 0..(travelled_m / SOON_M) as usize {
                     for (head, drawn) in drawn.iter_mut().enumerate() {
                         let since_m = if predict_measurement == 0 {
                             f64::INFINITY
@@ -623,9 +629,9 @@ mod tests {
             let runs = f64::from(RUNS);
             // A mixture is not Gaussian: its tails are heavier than those of its covariance.
             let within = f64::from(within) / runs;
-            assert!(within > 0.87, "{way_m} m: {within}");
-            assert!(nees / runs < 2.0, "{way_m} m: {}", nees / runs);
-            assert!((square / runs).sqrt() < bound_m, "{way_m} m");
+            assert!(within > 0.87, "{travelled_m} m: {within}");
+            assert!(nees / runs < 2.0, "{travelled_m} m: {}", nees / runs);
+            assert!((square / runs).sqrt() < bound_m, "{travelled_m} m");
         }
     }
 

@@ -95,10 +95,10 @@ impl MultipathBias {
         to: impl Fn(usize, usize, f64) -> (usize, usize, f64),
     ) {
         for (one, head) in heads.clone().enumerate() {
-            for (other, beside) in heads.clone().enumerate() {
+            for (other, second) in heads.clone().enumerate() {
                 let group = head.clock.group;
-                if one == other || (group.is_some() && group == beside.clock.group) {
-                    let (row, column, covariance) = to(one, other, std(&head) * std(&beside));
+                if one == other || (group.is_some() && group == second.clock.group) {
+                    let (row, column, covariance) = to(one, other, std(&head) * std(&second));
                     self.add_to(row, column, covariance);
                 }
             }

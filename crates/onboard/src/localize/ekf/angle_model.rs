@@ -31,18 +31,21 @@ impl ArrayModel {
     /// `travelled_m` are averaged, relative to independent angles.
     ///
     /// Scatter from all directions has a flat spectrum over the distance travelled, of one cycle
-    /// per wavelength to either side. The line of sight is a line in it, at the cosine `toward` of
+    /// per wavelength to either side. The line of sight is a line in it, at the cosine `direction_cosine` of
     /// the angle between the line of sight and the direction of travel. Sampling folds the spectrum
     /// at multiples of 1/Δ. The average cannot remove the part that is folded onto the line:
-    /// `λ/(2Δ)` times the number of integers m with `|m λ/Δ − toward| < 1`. Up to half a wavelength
+    /// `λ/(2Δ)` times the number of integers m with `|m λ/Δ − direction_cosine| < 1`. Up to half a wavelength
     /// this is one independent angle per half wavelength; for large distances it tends to 1.
-    pub fn correlation(&self, travelled_m: f64, toward: f64) -> f64 {
+    pub fn correlation(&self, travelled_m: f64, direction_cosine: f64) -> f64 {
         if !travelled_m.is_finite() {
             return 1.0;
         }
         // At standstill there is no new information, but the variance must remain finite.
         let spacing = (travelled_m.abs() / self.wavelength_m).max(5e-10);
-        let (first, last) = (spacing * (toward - 1.0), spacing * (toward + 1.0));
+        let (first, last) = (
+            spacing * (direction_cosine - 1.0),
+            spacing * (direction_cosine + 1.0),
+        );
         // The line itself, m = 0, is within the band.
         let copies = (last.ceil() - first.floor() - 1.0).max(1.0);
         copies / (2.0 * spacing)
@@ -108,7 +111,7 @@ pub struct AngleModel {
     /// Distance of the radio head from the array (m).
     pub range_m: f64,
     /// Cosine of the angle between the line of sight and the direction of travel.
-    pub toward: f64,
+    pub direction_cosine: f64,
     /// Variance (rad²) of the angle due to the surveyed positions of radio head and array. It is
     /// constant while the radio head is received from the same side.
     pub survey_variance: f64,
@@ -118,7 +121,7 @@ pub struct AngleModel {
     turn: [f64; STATES],
     /// Derivative of the position by each state, towards the radio head and to the left of that
     /// direction.
-    steps: [[f64; STATES]; 2],
+    position_rows: [[f64; STATES]; 2],
     /// Horizontal distance of the radio head (m).
     ground_m: f64,
     /// First and second derivative by α, both negated; for a uniform linear array `2π (d/λ) cos ε`
@@ -145,7 +148,7 @@ pub(super) struct LineOfSight {
     /// Cosine of the angle between the horizontal line of sight and the vehicle's forward axis.
     along: f64,
     /// Steps of the array by each state, towards the radio head and to the left of that direction.
-    pub steps: [[f64; STATES]; 2],
+    pub position_rows: [[f64; STATES]; 2],
     /// Change in the bearing by each state.
     pub bearing_row: [f64; STATES],
 }
@@ -161,7 +164,7 @@ impl LineOfSight {
         array: &ArrayModel,
     ) -> Option<Self> {
         let [forward_m, left_m, up_m] = array.position_m;
-        let eye = pose.beside(forward_m, left_m);
+        let eye = pose.point_at(forward_m, left_m);
         let place = head.position.moved(DATUM.map(|state| mean[state]));
         let ground_m = eye.distance_m(place);
         let range_m = ground_m.hypot(head.height_m - up_m);
@@ -172,19 +175,19 @@ impl LineOfSight {
         let (left, ahead) = (bearing_rad - frame.direction_rad).sin_cos();
         // A turn on the spot moves the array.
         let (aside, along) = (bearing_rad - pose.heading_rad).sin_cos();
-        let mut steps = [[0.0; STATES]; 2];
-        steps[0][ALONG] = ahead * frame.stretch;
-        steps[0][ACROSS] = left;
-        steps[0][HEADING] = aside * forward_m - along * left_m;
-        steps[1][ALONG] = -left * frame.stretch;
-        steps[1][ACROSS] = ahead;
-        steps[1][HEADING] = along * forward_m + aside * left_m;
-        for step in &mut steps {
+        let mut position_rows = [[0.0; STATES]; 2];
+        position_rows[0][ALONG] = ahead * frame.stretch;
+        position_rows[0][ACROSS] = left;
+        position_rows[0][HEADING] = aside * forward_m - along * left_m;
+        position_rows[1][ALONG] = -left * frame.stretch;
+        position_rows[1][ACROSS] = ahead;
+        position_rows[1][HEADING] = along * forward_m + aside * left_m;
+        for entry in &mut position_rows {
             // In a bend the heading changes with the distance.
-            step[ALONG] += frame.curvature_per_m * step[HEADING];
+            entry[ALONG] += frame.curvature_per_m * entry[HEADING];
         }
         // A step to the left of the line of sight decreases the bearing.
-        let mut bearing_row = steps[1].map(|step| -step / ground_m);
+        let mut bearing_row = position_rows[1].map(|entry| -entry / ground_m);
         // A step of the radio head east or north.
         let (north, east) = bearing_rad.sin_cos();
         (bearing_row[DATUM[0]], bearing_row[DATUM[1]]) = (-north / ground_m, east / ground_m);
@@ -193,13 +196,13 @@ impl LineOfSight {
             ground_m,
             range_m,
             along,
-            steps,
+            position_rows,
             bearing_row,
         })
     }
 
     /// Cosine of the elevation.
-    pub fn level(&self) -> f64 {
+    pub fn cos_elevation(&self) -> f64 {
         self.ground_m / self.range_m
     }
 }
@@ -233,18 +236,22 @@ impl AngleModel {
         array: &ArrayModel,
     ) -> Option<Self> {
         let sight = LineOfSight::new(head, pose, frame, mean, array)?;
-        let level = sight.level();
+        let cos_elevation = sight.cos_elevation();
         let azimuth = sight.bearing_rad - pose.heading_rad - mean[MOUNTING];
-        let value = array.measurand.value_rad(azimuth, level);
+        let value = array.measurand.value_rad(azimuth, cos_elevation);
         // Derivatives by the azimuth (first and second), by cos ε and by the phase.
-        let (slopes, by_level, by_phase) = match array.measurand {
+        let (slopes, by_cos_elevation, by_phase) = match array.measurand {
             Measurand::ElectricalAngle {
                 spacing_wavelengths,
                 ..
             } => {
                 let slope = std::f64::consts::TAU * spacing_wavelengths;
                 let (sin, cos) = azimuth.sin_cos();
-                ([slope * level * sin, slope * level * cos], slope * cos, 1.0)
+                (
+                    [slope * cos_elevation * sin, slope * cos_elevation * cos],
+                    slope * cos,
+                    1.0,
+                )
             }
             Measurand::Azimuth { .. } => ([-1.0, 0.0], 0.0, 0.0),
         };
@@ -254,25 +261,26 @@ impl AngleModel {
         turn[MOUNTING] = -1.0;
         let mut row = turn.map(|turn| -slopes[0] * turn);
         // A step towards the radio head increases its elevation: d cos ε = −sin² ε dρ/R.
-        let climb = by_level * (1.0 - level * level) / sight.range_m;
-        for (value, step) in row.iter_mut().zip(sight.steps[0]) {
-            *value -= climb * step;
+        let elevation_rate =
+            by_cos_elevation * (1.0 - cos_elevation * cos_elevation) / sight.range_m;
+        for (value, entry) in row.iter_mut().zip(sight.position_rows[0]) {
+            *value -= elevation_rate * entry;
         }
         row[PHASE] = by_phase;
         // A displacement of the radio head is the opposite displacement of the vehicle.
         let (north, east) = sight.bearing_rad.sin_cos();
-        row[DATUM[0]] += climb * east;
-        row[DATUM[1]] += climb * north;
+        row[DATUM[0]] += elevation_rate * east;
+        row[DATUM[1]] += elevation_rate * north;
         let survey_variance = head.position_std_m.powi(2) + array.position_std_m.powi(2);
         Some(Self {
             phase_rad: value + by_phase * mean[PHASE],
             row,
             range_m: sight.range_m,
-            toward: sight.along * level,
+            direction_cosine: sight.along * cos_elevation,
             survey_variance: (slopes[0] / sight.ground_m).powi(2) * survey_variance,
-            aperture: array.measurand.aperture(azimuth, level),
+            aperture: array.measurand.aperture(azimuth, cos_elevation),
             turn,
-            steps: sight.steps,
+            position_rows: sight.position_rows,
             ground_m: sight.ground_m,
             slopes,
         })
@@ -296,12 +304,12 @@ impl AngleModel {
             phase_rad: sight.bearing_rad + std::f64::consts::PI - own.azimuth_rad,
             row: sight.bearing_row,
             range_m: sight.range_m,
-            toward: sight.along * sight.level(),
+            direction_cosine: sight.along * sight.cos_elevation(),
             survey_variance: position_variance / sight.ground_m.powi(2)
                 + own.azimuth_std_rad.powi(2),
             aperture: f64::INFINITY,
             turn: sight.bearing_row,
-            steps: sight.steps,
+            position_rows: sight.position_rows,
             ground_m: sight.ground_m,
             slopes: [-1.0, 0.0],
         })
@@ -317,7 +325,7 @@ impl AngleModel {
     pub fn bend(&self, covariance: &Matrix<STATES>) -> SecondOrder {
         const BENT: [usize; 4] = [ALONG, ACROSS, HEADING, MOUNTING];
         let bent = |row: &[f64; STATES]| BENT.map(|state| row[state]);
-        let (turn, [ahead, left]) = (bent(&self.turn), self.steps.each_ref().map(bent));
+        let (turn, [ahead, left]) = (bent(&self.turn), self.position_rows.each_ref().map(bent));
         let with = |row: [f64; 4]| BENT.map(|state| dot(&bent(&covariance[state]), &row));
         let (with_turn, with_ahead, with_left) = (with(turn), with(ahead), with(left));
         let (gg, gr, gt) = (
@@ -454,7 +462,7 @@ mod tests {
             let kind = MeasurementKind::AngleAtHead;
             let model = AngleModel::of_kind(kind, &head, pose, &frame, &mean, &array).unwrap();
             let place = head.position.moved([x[3], x[4]]);
-            let bearing = place.bearing_rad(pose.beside(0.8, -0.3));
+            let bearing = place.bearing_rad(pose.point_at(0.8, -0.3));
             assert!(wrap_angle(model.phase_rad - (bearing - 0.7)).abs() < 1e-12);
             model
         };
@@ -591,24 +599,24 @@ mod tests {
     fn correlation_is_the_sum_of_the_scatters_autocorrelation() {
         // Autocorrelation sin(x)/x over the distance, times the Doppler phase of the line of sight;
         // Cesàro sum.
-        let summed = |wavelengths: f64, toward: f64| {
+        let summed = |wavelengths: f64, direction_cosine: f64| {
             let count = 4000;
             let terms = (1..count).map(|n| {
                 let x = std::f64::consts::TAU * wavelengths * f64::from(n);
                 let weight = 1.0 - f64::from(n) / f64::from(count);
-                2.0 * weight * x.sin() / x * (x * toward).cos()
+                2.0 * weight * x.sin() / x * (x * direction_cosine).cos()
             });
             1.0 + terms.sum::<f64>()
         };
         for wavelengths in [0.1, 0.3, 0.6, 0.75, 0.97, 1.4, 3.3, 12.2] {
-            for toward in [-0.9, -0.3, 0.0, 0.45, 0.8] {
+            for direction_cosine in [-0.9, -0.3, 0.0, 0.45, 0.8] {
                 let (found, expected) = (
-                    ARRAY.correlation(wavelengths * ARRAY.wavelength_m, toward),
-                    summed(wavelengths, toward),
+                    ARRAY.correlation(wavelengths * ARRAY.wavelength_m, direction_cosine),
+                    summed(wavelengths, direction_cosine),
                 );
                 assert!(
                     (found - expected).abs() < 0.02 * expected,
-                    "{wavelengths} {toward}: {found} {expected}"
+                    "{wavelengths} {direction_cosine}: {found} {expected}"
                 );
             }
         }

@@ -123,9 +123,9 @@ impl CorrelatedNoise {
     /// and over distance the sensor is the same. A turn exposes another part of the array to the
     /// radio head.
     pub(super) fn steps(&self, elapsed_s: f64, (travelled_m, turned_rad): (f64, f64)) -> f64 {
-        let by_way =
+        let by_distance =
             travelled_m.abs() / self.correlation_m + turned_rad.abs() / FORGETTING_TURN_RAD;
-        (elapsed_s.abs() / self.correlation_s).min(by_way)
+        (elapsed_s.abs() / self.correlation_s).min(by_distance)
     }
 
     /// Returns the equivalent independent variance (rad²) of an angle with the specified standard
@@ -227,18 +227,18 @@ impl EkfConfig {
             [gyroscope.noise_rad_per_sqrt_s, gyroscope.bias_std_radps]
         });
         let usual = if wheels { DIFFERENTIAL } else { ROAD };
-        let or_usual = |stated: f64, of: fn(&Usual) -> f64| {
-            if stated == 0.0 {
+        let or_usual = |specified: f64, of: fn(&Usual) -> f64| {
+            if specified == 0.0 {
                 of(&usual)
             } else {
-                stated.max(of(&ROAD))
+                specified.max(of(&ROAD))
             }
         };
         let odometer_scale_std = or_usual(odometer.scale_std, |it| it.odometer_scale_std);
         // A data sheet with scale and noise is complete; one of them alone does not make the rest
         // exact.
-        let is_told = odometer.scale_std > 0.0 && odometer.noise_m_per_sqrt_m > 0.0;
-        let walk: fn(&Usual) -> f64 = if is_told {
+        let is_specified = odometer.scale_std > 0.0 && odometer.noise_m_per_sqrt_m > 0.0;
+        let walk: fn(&Usual) -> f64 = if is_specified {
             |_| 0.0
         } else {
             |it| it.scale_per_sqrt_m
@@ -372,26 +372,29 @@ impl EkfConfig {
     }
 
     /// Returns the measured ratio of the variance relative to the ratio that the filter assumes.
-    pub fn unexpected_noise(&self, heard: f64) -> f64 {
+    pub fn unexpected_noise(&self, measured: f64) -> f64 {
         let expects = self.measured_noise_scale.is_some() || self.estimates_bias();
-        if expects { 1.0 } else { heard }
+        if expects { 1.0 } else { measured }
     }
 
     /// Returns the scatter variance (rad²) of an angle `travelled_m` after the previous one of the
     /// radio head, see [`ArrayModel::correlation`]. It is at least that of one angle: cancelling
     /// errors occur at one spacing and briefly. [`AngleModel`] contains the aperture and the cosine
-    /// `toward`.
-    pub fn scatter_variance(&self, travelled_m: f64, aperture: f64, toward: f64) -> f64 {
+    /// `direction_cosine`.
+    pub fn scatter_variance(&self, travelled_m: f64, aperture: f64, direction_cosine: f64) -> f64 {
         let scatter = (self.array.measurand).scatter_variance(self.rician_k, aperture);
-        let correlation = self.array.correlation(travelled_m, toward);
+        let correlation = self.array.correlation(travelled_m, direction_cosine);
         self.noise_scale() * scatter * correlation.max(1.0)
     }
 
     /// Returns the variance that several angles share: scatter, and the survey errors, which are
     /// constant until the radio head is received from another side, after about its distance.
     pub fn shared_variance(&self, travelled_m: f64, angle_model: &AngleModel) -> f64 {
-        let mut variance =
-            self.scatter_variance(travelled_m, angle_model.aperture, angle_model.toward);
+        let mut variance = self.scatter_variance(
+            travelled_m,
+            angle_model.aperture,
+            angle_model.direction_cosine,
+        );
         if angle_model.survey_variance > 0.0 {
             // At standstill there is no new information, but the variance must remain finite.
             let same_side = angle_model.range_m / travelled_m.abs().max(1e-9);
@@ -410,7 +413,7 @@ impl EkfConfig {
         Yaw {
             turn_rad: self.yaw_rate_bias_radps * duration_s,
             duration_s,
-            is_told: false,
+            is_measured: false,
             variance: UNKNOWN_TURN_RAD2 * length_m.abs() + UNKNOWN_TURN_RAD2 * duration_s,
         }
     }

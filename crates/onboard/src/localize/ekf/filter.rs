@@ -133,10 +133,10 @@ impl Ekf {
 
     pub(super) fn measure(&mut self, residual: f64, row: &[f64; STATES], variance: f64) {
         let journal = self.journal.as_mut();
-        let told = journal.map(|journal| (journal, self.belief.variance_along(row) + variance));
+        let record = journal.map(|journal| (journal, self.belief.variance_along(row) + variance));
         self.bias.update(&self.belief, residual, row, variance);
         let gain = self.belief.update(residual, row, variance);
-        if let Some((journal, total)) = told
+        if let Some((journal, total)) = record
             && total > 0.0
         {
             let gains = gain.into_iter().chain(self.bias.gains(total));

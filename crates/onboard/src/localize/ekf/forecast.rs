@@ -84,9 +84,9 @@ impl Ekf {
             ..bias
         };
         let (sigma, (travelled_m, _)) = (predicted.own_variance.sqrt(), predicted.moved);
-        let (aperture, toward) = (predicted.aperture, predicted.toward);
+        let (aperture, direction_cosine) = (predicted.aperture, predicted.direction_cosine);
         let noise = unbiased.variance(sigma, predicted.elapsed_s, predicted.moved)
-            + (self.config).scatter_variance(travelled_m, aperture, toward);
+            + (self.config).scatter_variance(travelled_m, aperture, direction_cosine);
         // A common error of many angles counts once.
         let lasting = self.systematic_variance(&predicted);
         Some(ExcludedInnovation {
@@ -166,8 +166,8 @@ impl Ekf {
             + self.config.shared_variance(travelled_m, &angle_model);
         // The biases are correlated with the state of the filter, not with that after other angles.
         let bias = &self.bias;
-        let (row, way_m) = (&angle_model.row, travelled_m.abs());
-        let variance = bias.equivalent_variance(&self.belief, number, way_m, row, variance);
+        let (row, distance_m) = (&angle_model.row, travelled_m.abs());
+        let variance = bias.equivalent_variance(&self.belief, number, distance_m, row, variance);
         if !variance.is_finite() {
             return None;
         }
@@ -271,9 +271,9 @@ impl Ekf {
             .collect()
     }
 
-    pub(super) fn ask(&mut self, time_s: f64) {
+    pub(super) fn record_output(&mut self, time_s: f64) {
         if let Some(journal) = &mut self.journal {
-            journal.asked(time_s, &self.belief, self.bias.state_covariance());
+            journal.output(time_s, &self.belief, self.bias.state_covariance());
         }
     }
 }

@@ -104,7 +104,7 @@ pub struct Yaw {
     /// Variance of the measurement (rad²).
     pub variance: f64,
     /// Whether a sample measured the turn; otherwise it is a guess.
-    pub is_told: bool,
+    pub is_measured: bool,
 }
 
 impl Step {
@@ -447,12 +447,12 @@ mod tests {
         for kappa in [0.0, 0.04, -0.1] {
             let made = step(&start, 0.9, kappa);
             for state in [ALONG, ACROSS, HEADING, CURVATURE, SCALE] {
-                let beside = |by: f64| {
+                let perturbed = |by: f64| {
                     let mut start = start;
                     start[state] += by;
                     step(&start, 0.9, kappa)
                 };
-                let (less, more) = (beside(-1e-6), beside(1e-6));
+                let (less, more) = (perturbed(-1e-6), perturbed(1e-6));
                 let slope = |less: f64, more: f64| (more - less) / 2e-6;
                 for row in 0..STATES {
                     let expected = slope(less.mean[row], more.mean[row]);
@@ -475,22 +475,22 @@ mod tests {
             turn_rad: 0.004,
             duration_s: 0.02,
             variance: 0.0,
-            is_told: true,
+            is_measured: true,
         };
         let step = |start: &[f64; STATES]| Step::turning(start, 0.1, &yaw, &MotionNoise::default());
-        for by in [ALONG, ACROSS, HEADING, SCALE, YAW_RATE_BIAS] {
-            let beside = |by_so_much: f64| {
+        for state in [ALONG, ACROSS, HEADING, SCALE, YAW_RATE_BIAS] {
+            let perturbed = |by: f64| {
                 let mut start = start;
-                start[by] += by_so_much;
+                start[state] += by;
                 step(&start).mean
             };
-            let (less, more) = (beside(-1e-5), beside(1e-5));
+            let (less, more) = (perturbed(-1e-5), perturbed(1e-5));
             for row in [ALONG, ACROSS, HEADING] {
                 let slope = (more[row] - less[row]) / 2e-5;
-                let found = step(&start).jacobian[row][by];
+                let found = step(&start).jacobian[row][state];
                 assert!(
                     (found - slope).abs() < 1e-6,
-                    "{row} by {by}: {found} {slope}"
+                    "{row} by {state}: {found} {slope}"
                 );
             }
         }

@@ -65,11 +65,11 @@ impl SampleInterval {
 
     /// Returns the part of the time since the previous sample that a new sample describes, in
     /// seconds: all of it, unless samples in between were lost.
-    pub fn told_s(&mut self, duration_s: f64) -> f64 {
+    pub fn covered_s(&mut self, duration_s: f64) -> f64 {
         if self.usual_s == 0.0 {
             self.usual_s = duration_s;
         }
-        let told_s = if duration_s > LOST * self.usual_s {
+        let covered_s = if duration_s > LOST * self.usual_s {
             self.usual_s
         } else {
             duration_s
@@ -78,7 +78,7 @@ impl SampleInterval {
         let shorter = f64::from(u8::from(duration_s < self.usual_s));
         // At a quantile, the weights above and below balance.
         self.usual_s *= 1.0 + GAIN * (QUANTILE * longer - (1.0 - QUANTILE) * shorter);
-        told_s
+        covered_s
     }
 }
 
@@ -91,16 +91,16 @@ mod tests {
         for every in [2, 3, 10] {
             let mut sample_interval = SampleInterval::default();
             // The first interval spans a lost sample.
-            sample_interval.told_s(0.04);
+            sample_interval.covered_s(0.04);
             let mut wrong = 0;
             for number in 0..1000 {
                 let lost = number % every == 0;
                 let duration_s = if lost { 0.04 } else { 0.02 };
-                let told_s = sample_interval.told_s(duration_s);
-                wrong += u32::from((told_s < 0.9 * duration_s) != lost);
+                let covered_s = sample_interval.covered_s(duration_s);
+                wrong += u32::from((covered_s < 0.9 * duration_s) != lost);
                 assert!(
-                    number < 100 || (told_s / 0.02 - 1.0).abs() < 0.1,
-                    "{told_s}"
+                    number < 100 || (covered_s / 0.02 - 1.0).abs() < 0.1,
+                    "{covered_s}"
                 );
             }
             assert!(wrong < 50, "every {every}: {wrong}");

@@ -42,7 +42,7 @@ const REFUSED_RADPS: f64 = 0.5;
 
 /// Random walk of the yaw rate during lost samples: spectral density of a white angular
 /// acceleration (rad²/s³), a change of 0.5 rad/s within half a second.
-const UNTOLD_TURN: f64 = 0.5;
+const YAW_RATE_WALK: f64 = 0.5;
 
 impl Ekf {
     /// Predicts the state with one odometry sample.
@@ -57,7 +57,7 @@ impl Ekf {
         };
         let Some(previous) = self.odometry else {
             self.odometry = Some(*sample);
-            self.ask(sample.time_s);
+            self.record_output(sample.time_s);
             return OdometryResult::First;
         };
         let duration_s = sample.time_s - previous.time_s;
@@ -87,33 +87,33 @@ impl Ekf {
         let before = previous.yaw_rate_radps.filter(credible);
         let rate = rate.or(before.filter(|_| refused.is_some()));
         // If samples were lost, the turn is unknown until the last of them was due.
-        let told_s = self.sample_interval.told_s(duration_s);
-        let untold_s = duration_s - told_s;
-        let mut told = reading;
-        if let (Some(rate), true) = (rate, untold_s > 0.0) {
-            told = reading.share(told_s / duration_s);
-            let guessed = (self.turns_as_told())
-                .then(|| self.guessed_yaw(before.unwrap_or(rate), rate, untold_s));
-            self.advance(reading.share(untold_s / duration_s), untold_s, guessed);
+        let covered_s = self.sample_interval.covered_s(duration_s);
+        let lost_s = duration_s - covered_s;
+        let mut covered = reading;
+        if let (Some(rate), true) = (rate, lost_s > 0.0) {
+            covered = reading.share(covered_s / duration_s);
+            let guessed = (self.follows_yaw_rate())
+                .then(|| self.guessed_yaw(before.unwrap_or(rate), rate, lost_s));
+            self.advance(reading.share(lost_s / duration_s), lost_s, guessed);
         }
         let yaw = rate.map(|rate| {
-            let mut yaw = self.yaw(rate, told.read_m, told_s);
-            let change_rad = (before.unwrap_or(rate) - rate) * told_s;
+            let mut yaw = self.yaw(rate, covered.read_m, covered_s);
+            let change_rad = (before.unwrap_or(rate) - rate) * covered_s;
             if refused.is_some() {
-                yaw.variance += (REFUSED_RADPS * told_s).powi(2);
-            } else if self.turns_as_told() {
+                yaw.variance += (REFUSED_RADPS * covered_s).powi(2);
+            } else if self.follows_yaw_rate() {
                 // The time of the rate's change between two samples is uniformly distributed.
                 yaw.variance += change_rad * change_rad / 12.0;
             }
             yaw
         });
-        let last_s = if yaw.is_some() { told_s } else { duration_s };
-        self.advance(told, last_s, yaw);
+        let last_s = if yaw.is_some() { covered_s } else { duration_s };
+        self.advance(covered, last_s, yaw);
         self.advance_ranges(reading_m, duration_s);
         if jumped {
             self.add_along_variance(self.config.coasting_variance(duration_s));
         }
-        self.ask(sample.time_s);
+        self.record_output(sample.time_s);
         if jumped {
             OdometryResult::DistanceJump { jump_m: moved_m }
         } else if let Some(radps) = refused {
@@ -199,7 +199,7 @@ impl Ekf {
         Yaw {
             turn_rad,
             duration_s,
-            is_told: true,
+            is_measured: true,
             variance: config.yaw_noise_rad_per_sqrt_s.powi(2) * duration_s
                 + config.yaw_noise_rad_per_sqrt_m.powi(2) * reading_m.abs()
                 + config.yaw_noise_rad_per_sqrt_rad.powi(2) * turn_rad.abs(),
@@ -210,18 +210,18 @@ impl Ekf {
     /// both, and a Brownian bridge.
     fn guessed_yaw(&self, from_radps: f64, to_radps: f64, duration_s: f64) -> Yaw {
         let change_rad = (to_radps - from_radps) * duration_s;
-        let wander = UNTOLD_TURN * duration_s.powi(3);
+        let wander = YAW_RATE_WALK * duration_s.powi(3);
         let most_rad = self.config.top_yaw_rate_radps * duration_s;
         Yaw {
             turn_rad: 0.5 * (from_radps + to_radps) * duration_s,
             duration_s,
-            is_told: false,
+            is_measured: false,
             variance: ((change_rad * change_rad).max(wander) / 12.0).min(most_rad * most_rad),
         }
     }
 
     /// Whether the yaw rate alone determines the heading.
-    fn turns_as_told(&self) -> bool {
+    fn follows_yaw_rate(&self) -> bool {
         self.config.drive == DriveKind::Differential || self.map.is_none()
     }
 
@@ -254,7 +254,7 @@ impl Ekf {
         let read_m = reading.read_m;
         if self.config.drive == DriveKind::Differential {
             let turn = yaw.unwrap_or_else(|| self.config.unknown_turn(read_m, duration_s));
-            if read_m == 0.0 && turn.turn_rad == 0.0 && turn.is_told {
+            if read_m == 0.0 && turn.turn_rad == 0.0 && turn.is_measured {
                 return Step::standing(&self.belief.mean); // the wheels do
             }
             return Step::turning(&self.belief.mean, read_m, &turn, &self.config.noise);
@@ -294,7 +294,7 @@ impl Ekf {
                 turn_rad: 0.0,
                 duration_s: 0.0,
                 variance: 0.0,
-                is_told: false,
+                is_measured: false,
             };
             return Step::turning(mean, read_m, &straight_on, &config.noise);
         }

@@ -88,12 +88,12 @@ impl Ekf {
     pub(in crate::localize) fn resume(&mut self, other: &Self) {
         self.odometry = other.odometry;
         self.driven_m = other.driven_m;
-        self.hear_as(other);
+        self.copy_noise_state(other);
     }
 
     /// Sets the white fraction of the angles' noise and the noise of the ranges to those of another
     /// filter of the same receiver.
-    pub(in crate::localize) const fn hear_as(&mut self, other: &Self) {
+    pub(in crate::localize) const fn copy_noise_state(&mut self, other: &Self) {
         self.white = other.white;
         self.range_noise = other.range_noise;
     }

@@ -52,7 +52,7 @@ pub(in crate::localize) struct PredictedMeasurement {
     pub own_variance: f64,
     /// See [`AngleModel`].
     pub aperture: f64,
-    pub toward: f64,
+    pub direction_cosine: f64,
     pub survey_variance: f64,
     /// Time, distance and heading change since the previous update with the radio head (s, m, rad).
     pub elapsed_s: f64,
@@ -147,7 +147,7 @@ impl Ekf {
             innovation,
             own_variance: sigma * sigma,
             aperture: angle_model.aperture,
-            toward: angle_model.toward,
+            direction_cosine: angle_model.direction_cosine,
             survey_variance: angle_model.survey_variance,
             elapsed_s,
             moved,
@@ -160,7 +160,11 @@ impl Ekf {
     /// Returns the variance of an angle's noise for a first angle of the radio head (rad²).
     pub(in crate::localize) fn first_variance(&self, predicted: &PredictedMeasurement) -> f64 {
         let config = &self.config;
-        let scatter = config.scatter_variance(f64::INFINITY, predicted.aperture, predicted.toward);
+        let scatter = config.scatter_variance(
+            f64::INFINITY,
+            predicted.aperture,
+            predicted.direction_cosine,
+        );
         predicted.own_variance + scatter
     }
 
@@ -268,11 +272,11 @@ impl Ekf {
         let mahalanobis2 = seen.mahalanobis2();
         let is_known = self.bias.is_large(predicted.head);
         let before = self.belief.mean;
-        let (way_m, journal) = (predicted.moved.0.abs(), self.journal.as_mut());
+        let (distance_m, journal) = (predicted.moved.0.abs(), self.journal.as_mut());
         (self.bias).take(
             &mut self.belief,
             predicted.head,
-            way_m,
+            distance_m,
             &predicted.row,
             hypotheses,
             journal,

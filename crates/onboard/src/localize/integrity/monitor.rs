@@ -55,16 +55,16 @@ impl Handover {
     }
 
     /// Returns the current pose of the previous solution; `None` after `patience_s`.
-    pub fn beside(&self, told: &PoseEstimate, patience_s: f64) -> Option<PoseEstimate> {
+    pub fn previous_pose(&self, estimate: &PoseEstimate, patience_s: f64) -> Option<PoseEstimate> {
         let [x_m, y_m, heading_rad] = self.apart;
-        (told.time_s - self.since_s <= patience_s).then_some(PoseEstimate {
+        (estimate.time_s - self.since_s <= patience_s).then_some(PoseEstimate {
             pose: Pose {
-                x_m: told.pose.x_m + x_m,
-                y_m: told.pose.y_m + y_m,
-                heading_rad: told.pose.heading_rad + heading_rad,
+                x_m: estimate.pose.x_m + x_m,
+                y_m: estimate.pose.y_m + y_m,
+                heading_rad: estimate.pose.heading_rad + heading_rad,
             },
             covariance: Some(self.covariance),
-            ..*told
+            ..*estimate
         })
     }
 }
@@ -187,7 +187,7 @@ impl IntegrityMonitor {
     ) -> UpdateResult {
         self.now_s = self.now_s.max(time_s);
         let odometry_s = self.ekf().time_s();
-        let (solution_id, told) = (self.solution_id(), self.ekf().pose(odometry_s));
+        let (solution_id, before) = (self.solution_id(), self.ekf().pose(odometry_s));
         let verdict = update(&mut self.bank);
         self.bank.judge(self.now_s);
         if let Some(bank) = self.bank.rebased(self.now_s) {
@@ -200,7 +200,7 @@ impl IntegrityMonitor {
         self.recover();
         self.hold_departure();
         if self.solution_id() != solution_id {
-            let handover = Handover::new(&told, &self.ekf().pose(odometry_s));
+            let handover = Handover::new(&before, &self.ekf().pose(odometry_s));
             self.handover = handover.or(self.handover);
         }
         verdict
@@ -271,7 +271,7 @@ impl IntegrityMonitor {
         pose.mix(mixture.map(|(probability, right)| (probability, right.pose(time_s))));
         pose.integrity = Some(self.integrity(time_s, others));
         let handover = self.handover.as_ref();
-        if let Some(handover) = handover.and_then(|it| it.beside(&pose, RECOVERY_S)) {
+        if let Some(handover) = handover.and_then(|it| it.previous_pose(&pose, RECOVERY_S)) {
             pose.cover(&handover);
         }
         let restarted = self.restarted.iter().map(|it| it.bank.nominal());
@@ -290,9 +290,9 @@ impl IntegrityMonitor {
         let mut hypotheses = self.hypotheses.borrow_mut();
         hypotheses.clear();
         hypotheses.extend(self.hypotheses_of(&self.bank, time_s).map(|(_, it)| it));
-        let told = self.ekf().pose(time_s);
+        let selected = self.ekf().pose(time_s);
         let other = |(probability, pose): (f64, PoseEstimate)| {
-            Hypothesis::new(probability, &pose, 1.0, &told)
+            Hypothesis::new(probability, &pose, 1.0, &selected)
         };
         hypotheses.extend(others.filter_map(other));
         let levels = self.level.solve(&hypotheses);
@@ -330,7 +330,7 @@ impl IntegrityMonitor {
         bank: &'a Bank,
         time_s: f64,
     ) -> impl Iterator<Item = (&'a Ekf, Hypothesis)> {
-        let told = bank.leader().pose(time_s);
+        let selected = bank.leader().pose(time_s);
         let measured_noise_scale = bank.noise_scale();
         let negligible = NEGLIGIBLE * self.level.risk();
         (bank.hypotheses())
@@ -338,7 +338,7 @@ impl IntegrityMonitor {
             .filter_map(move |(probability, right)| {
                 let pose = right.pose(time_s);
                 let noise_scale = right.config().unexpected_noise(measured_noise_scale);
-                let hypothesis = Hypothesis::new(probability, &pose, noise_scale, &told);
+                let hypothesis = Hypothesis::new(probability, &pose, noise_scale, &selected);
                 hypothesis.map(|it| (right, it))
             })
     }

@@ -38,19 +38,19 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
-    /// Creates the hypothesis that `right` is correct within `variance_ratio` times its covariance,
-    /// instead of `told`; `None` if `right` has no covariance.
+    /// Creates the hypothesis that `correct` is correct within `variance_ratio` times its covariance,
+    /// instead of `reported`; `None` if `correct` has no covariance.
     pub fn new(
         probability: f64,
-        right: &PoseEstimate,
+        correct: &PoseEstimate,
         variance_ratio: f64,
-        told: &PoseEstimate,
+        reported: &PoseEstimate,
     ) -> Option<Self> {
-        let [[xx, xy, _], [_, yy, _], _] = right.covariance?;
-        let (sin, cos) = told.pose.heading_rad.sin_cos();
+        let [[xx, xy, _], [_, yy, _], _] = correct.covariance?;
+        let (sin, cos) = reported.pose.heading_rad.sin_cos();
         let [x_m, y_m] = [
-            right.pose.x_m - told.pose.x_m,
-            right.pose.y_m - told.pose.y_m,
+            correct.pose.x_m - reported.pose.x_m,
+            correct.pose.y_m - reported.pose.y_m,
         ];
         let along = cos * cos * xx + 2.0 * cos * sin * xy + sin * sin * yy;
         let across = sin * sin * xx - 2.0 * cos * sin * xy + cos * cos * yy;
@@ -328,9 +328,9 @@ mod tests {
     }
 
     fn hypothesis(probability: f64, [x_m, y_m]: [f64; 2], covariance: [[f64; 2]; 2]) -> Hypothesis {
-        let told = estimate(1.0, -2.0, [[0.0; 2]; 2]);
-        let right = estimate(1.0 + x_m, -2.0 + y_m, covariance);
-        Hypothesis::new(probability, &right, 1.0, &told).unwrap()
+        let reported = estimate(1.0, -2.0, [[0.0; 2]; 2]);
+        let correct = estimate(1.0 + x_m, -2.0 + y_m, covariance);
+        Hypothesis::new(probability, &correct, 1.0, &reported).unwrap()
     }
 
     fn levels(risk: f64, hypotheses: &[Hypothesis]) -> Levels {

@@ -391,7 +391,8 @@ impl Bank {
             let is_faulty = faulty.get(head).is_some_and(|it| *it);
             is_faulty || statistic > CLEARED * noise.ratio_of(head).sqrt()
         };
-        self.subsets.hear(number, &self.heads, &self.nominal, keeps);
+        self.subsets
+            .prepare(number, &self.heads, &self.nominal, keeps);
     }
 
     fn update_subsets(&mut self, number: usize, head: &RadioHead, measured: &AngleMeasurement) {
@@ -596,7 +597,7 @@ mod tests {
         let mut config = EkfConfig::new(&site, &vehicle);
         // A filter that estimates biases has no test of single radio heads.
         config.multipath_bias_probability = 0.0;
-        let heads = RadioHead::heard(&site, &vehicle);
+        let heads = RadioHead::received_by(&site, &vehicle);
         let start = InitialPose {
             pose: Pose::default(),
             position_std_m: 0.1,

@@ -70,12 +70,12 @@ impl Ratio {
 impl NoiseScale {
     /// Creates the ratio for a number of radio heads.
     pub fn new(heads: usize) -> Self {
-        let heard = HeadNoise {
+        let head_noise = HeadNoise {
             last: None,
             ratio: None,
         };
         Self {
-            heads: vec![heard; heads],
+            heads: vec![head_noise; heads],
             of_all: Ratio::STATED,
         }
     }
@@ -91,17 +91,17 @@ impl NoiseScale {
 
     /// Adds an angle to radio head number `head`. Within a wavelength, scatter is identical.
     pub fn see(&mut self, head: usize, now: &ExcludedInnovation) {
-        let Some(heard) = self.heads.get_mut(head) else {
+        let Some(head_noise) = self.heads.get_mut(head) else {
             return;
         };
-        let Some(before) = heard.last else {
-            heard.last = Some(*now);
+        let Some(before) = head_noise.last else {
+            head_noise.last = Some(*now);
             return;
         };
         if now.place_wavelengths - before.place_wavelengths < 1.0 {
             return;
         }
-        heard.last = Some(*now);
+        head_noise.last = Some(*now);
         let seen = now.innovation;
         let belief = seen.variance - seen.measurement_variance;
         let expected = before.first_variance + now.first_variance + belief;
@@ -111,7 +111,7 @@ impl NoiseScale {
             differences: 0,
             ..self.of_all
         };
-        heard.ratio.get_or_insert(as_all).see(square);
+        head_noise.ratio.get_or_insert(as_all).see(square);
         self.of_all.see(square);
     }
 
@@ -121,8 +121,8 @@ impl NoiseScale {
     }
 
     fn of(&self, head: usize) -> Ratio {
-        let heard = self.heads.get(head).and_then(|it| it.ratio);
-        heard.unwrap_or(self.of_all)
+        let head_noise = self.heads.get(head).and_then(|it| it.ratio);
+        head_noise.unwrap_or(self.of_all)
     }
 
     /// Returns the ratio of a radio head.
@@ -159,7 +159,7 @@ mod tests {
     }
 
     /// Angles at a given distance in wavelengths, with these residuals.
-    fn heard(apart_wavelengths: f64, mut residual_rad: impl FnMut(i32) -> f64) -> NoiseScale {
+    fn estimated(apart_wavelengths: f64, mut residual_rad: impl FnMut(i32) -> f64) -> NoiseScale {
         let mut noise = NoiseScale::new(1);
         for number in 0..2000 {
             let place_wavelengths = apart_wavelengths * f64::from(number);
@@ -174,7 +174,7 @@ mod tests {
     /// Angles with residuals that alternate around a mean.
     fn after(mean_rad: f64, by_rad: f64, apart_wavelengths: f64) -> f64 {
         let sign = |number: i32| f64::from(1 - 2 * (number % 2));
-        heard(apart_wavelengths, |number| mean_rad + sign(number) * by_rad).ratio()
+        estimated(apart_wavelengths, |number| mean_rad + sign(number) * by_rad).ratio()
     }
 
     /// Means over many drives, each with a relative standard deviation of a tenth.
@@ -186,7 +186,7 @@ mod tests {
             [with_tails, core] = [0.0; 2];
             for seed in 0..drives {
                 let mut rng = ChaCha8Rng::seed_from_u64(u64::from(seed));
-                let noise = heard(2.0, |_| {
+                let noise = estimated(2.0, |_| {
                     let sound_rad = 0.2 * rng.sample::<f64, _>(StandardNormal);
                     if rng.random::<f64>() < outliers {
                         rng.random_range(-3.0..3.0)

@@ -179,7 +179,7 @@ impl Subsets {
 
     /// Prepares the filters for an angle of a radio head; `keeps` returns, from its statistic,
     /// whether the filters of a radio head must not end.
-    pub fn hear(
+    pub fn prepare(
         &mut self,
         head: usize,
         heads: &[RadioHead],
@@ -193,7 +193,7 @@ impl Subsets {
         if self.get(head, head).is_some() {
             return;
         }
-        while let Some(past) = self.longest_unheard(&keeps) {
+        while let Some(past) = self.longest_without_reception(&keeps) {
             self.end(past);
         }
         let ones = self.iter().filter(|it| it.is_of_one()).count();
@@ -241,7 +241,7 @@ impl Subsets {
 
     /// Returns the radio head with the longest time since reception, if that is not recent and
     /// enough others are monitored.
-    fn longest_unheard(&self, keeps: impl Fn(usize, f64) -> bool) -> Option<usize> {
+    fn longest_without_reception(&self, keeps: impl Fn(usize, f64) -> bool) -> Option<usize> {
         let last = |head: &usize| self.last.get(*head).copied().unwrap_or_default();
         let ones = (self.iter().filter(|it| it.is_of_one())).map(|it| it.without[0]);
         if ones.clone().count() < LEAST_WATCHED {
@@ -255,8 +255,8 @@ impl Subsets {
         };
         let ends =
             |head: &usize| self.angles - last(head) > LATELY && !keeps(*head, statistic(*head));
-        let unheard = ones.filter(ends);
-        unheard.min_by_key(last)
+        let unreceived = ones.filter(ends);
+        unreceived.min_by_key(last)
     }
 
     /// Ends the filters without a radio head.
@@ -319,22 +319,22 @@ mod tests {
         let heads: Vec<RadioHead> = (0..8).map(|pci| RadioHead { pci, ..known[0] }).collect();
         for keeps_first in [false, true] {
             let mut subsets = Subsets::new(heads.len());
-            let mut hear = |head: usize| {
-                subsets.hear(head, &heads, &ekf, |it, _| keeps_first && it == 0);
+            let mut prepare = |head: usize| {
+                subsets.prepare(head, &heads, &ekf, |it, _| keeps_first && it == 0);
                 subsets.clone()
             };
             for head in 0..4 {
-                hear(head);
+                prepare(head);
             }
             // One and two of five.
-            assert_eq!(hear(4).iter().count(), 5 + 10);
+            assert_eq!(prepare(4).iter().count(), 5 + 10);
             for _ in 0..10 {
                 for head in 1..5 {
-                    hear(head);
+                    prepare(head);
                 }
             }
             // The first one is not recent, and its filters end when another one is received.
-            let now = hear(5);
+            let now = prepare(5);
             assert_eq!(now.get(0, 0).is_some(), keeps_first);
             assert_eq!(now.get(3, 0).is_some(), keeps_first);
             assert!(now.get(1, 5).is_some());

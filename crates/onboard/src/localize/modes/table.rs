@@ -155,7 +155,7 @@ pub(in crate::localize) mod trip {
     pub(in crate::localize) fn trip_with_bias(probability: f64) -> (Vec<RadioHead>, Road, Ekf) {
         let site = Site::from_library("trip-4", &Shipped).unwrap();
         let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
-        let heads = RadioHead::heard(&site, &vehicle);
+        let heads = RadioHead::received_by(&site, &vehicle);
         let road = site.build_road().unwrap().unwrap();
         let start = InitialPose {
             pose: road.pose(0.0),
@@ -212,7 +212,7 @@ mod tests {
         /// Variance of the additional angle noise, relative to the specified variance.
         noise: f64,
         /// End of reception (s); 0 for none.
-        heard_until_s: f64,
+        received_until_s: f64,
         /// Prior probability of a bias.
         multipath_bias_probability: f64,
     }
@@ -239,11 +239,11 @@ mod tests {
                 speed_mps: 4.0 * reads,
                 yaw_rate_radps: None,
             });
-            if world.heard_until_s > 0.0 && time_s > world.heard_until_s {
+            if world.received_until_s > 0.0 && time_s > world.received_until_s {
                 continue;
             }
-            let way_m = 4.0 * time_s;
-            let truth = road.pose(way_m);
+            let along_m = 4.0 * time_s;
+            let truth = road.pose(along_m);
             for (number, head) in heads.iter().enumerate() {
                 let place = head.position.moved(world.moved_m);
                 let bearing_rad = truth.point().bearing_rad(place) - truth.heading_rad;
@@ -253,7 +253,7 @@ mod tests {
                 let seen = predicted.map(|it| bank.nominal().first_variance(&it));
                 let variance = SIGMA_RAD * SIGMA_RAD + world.noise * seen.unwrap_or(0.0);
                 let own_rad = variance.sqrt() * noise.sample::<f64, _>(StandardNormal);
-                let phase_rad = phase_rad + off_rad(number, way_m) + own_rad;
+                let phase_rad = phase_rad + off_rad(number, along_m) + own_rad;
                 bank.update(head, &angle(time_s, phase_rad));
             }
         }
@@ -350,12 +350,12 @@ mod tests {
     #[test]
     fn a_noisier_odometer_leaves_nine_times_its_variance() {
         let world = World {
-            heard_until_s: 1e-3,
+            received_until_s: 1e-3,
             ..World::default()
         };
         let (bank, _) = drive(&world, 10.2, EXACT);
-        let way_m = bank.nominal().driven_m();
-        let own_variance = way_m * bank.nominal().config().noise.odometer_m_per_sqrt_m.powi(2);
+        let driven_m = bank.nominal().driven_m();
+        let own_variance = driven_m * bank.nominal().config().noise.odometer_m_per_sqrt_m.powi(2);
         let variance = |ekf: &Ekf| ekf.belief().covariance[ALONG][ALONG];
         let (_, noisier) = bank.mode(SelectedHypothesis::NoisyOdometer).unwrap();
         let more = variance(noisier) - variance(bank.nominal());
@@ -415,7 +415,7 @@ mod tests {
         for scale in [-0.1, 0.1] {
             let world = World {
                 scale: (scale, 20.0),
-                heard_until_s: 20.0,
+                received_until_s: 20.0,
                 ..World::default()
             };
             let (bank, off_m) = drive(&world, 30.0, EXACT);
@@ -438,8 +438,8 @@ mod tests {
     #[test]
     fn a_correlated_bias_is_nominal() {
         // A new bias of each radio head every three metres, as caused by reflections.
-        let bias_rad = |head: usize, way_m: f64| {
-            let number = (way_m / 3.0).floor() as u64 * 4 + head as u64;
+        let bias_rad = |head: usize, along_m: f64| {
+            let number = (along_m / 3.0).floor() as u64 * 4 + head as u64;
             0.3 * ChaCha8Rng::seed_from_u64(number).sample::<f64, _>(StandardNormal)
         };
         let world = World {
@@ -479,7 +479,7 @@ mod tests {
         let mut site = Site::from_library("yard", &Shipped).unwrap();
         site.rician_k_db = 20.0;
         let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
-        let heads = RadioHead::heard(&site, &vehicle);
+        let heads = RadioHead::received_by(&site, &vehicle);
         let road = site.build_road().unwrap().unwrap();
         let start = InitialPose {
             pose: road.pose(0.0),

@@ -9,9 +9,9 @@
 #[path = "../../../../recording/tests/all/common/mod.rs"]
 mod files;
 
-use onboard::observation::SensedSsb;
+use onboard::observation::SsbDetection;
 use onboard::settings::{Shipped, TomlFile};
-use onboard::{BoxError, Custom, Observed, SsbSource};
+use onboard::{BoxError, Custom, SsbInput, SsbSource};
 use recording::{AngleLog, LoggedAngle, OdometryLog};
 use simulate::random::Streams;
 use simulate::scenario::Scenario;
@@ -104,12 +104,12 @@ pub fn logs(scenario: &Scenario, seed: u64) -> (OdometryLog, AngleLog, RunRecord
 pub struct Burst<'a>(pub &'a [LoggedAngle]);
 
 impl SsbSource for Burst<'_> {
-    fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
+    fn sense(&mut self, sensed: &mut Vec<SsbDetection>) -> Result<(), BoxError> {
         sensed.extend(self.0.iter().map(|angle| angle.ssb));
         Ok(())
     }
 
-    fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError> {
-        Ok(Observed::Angle(self.0[index].measured))
+    fn observe(&mut self, index: usize) -> Result<SsbInput<'_>, BoxError> {
+        Ok(SsbInput::Angle(self.0[index].measured))
     }
 }

@@ -112,12 +112,12 @@ impl Ekf {
     pub(super) fn distance(&self, seen: &Sighted<'_>, scale: f64) -> Distance {
         let sight = &seen.sight;
         // A step towards the radio head reduces the distance.
-        let level = scale * sight.level();
-        let mut row = sight.steps[0].map(|step| -level * step);
+        let cos_elevation = scale * sight.cos_elevation();
+        let mut row = sight.position_rows[0].map(|entry| -cos_elevation * entry);
         let (north, east) = sight.bearing_rad.sin_cos();
-        (row[DATUM[0]], row[DATUM[1]]) = (level * east, level * north);
+        (row[DATUM[0]], row[DATUM[1]]) = (cos_elevation * east, cos_elevation * north);
         // Second-order terms: a deviation to the side lengthens the distance.
-        let aside = scale * self.belief.variance_along(&sight.steps[1]) / sight.range_m;
+        let aside = scale * self.belief.variance_along(&sight.position_rows[1]) / sight.range_m;
         let coasted = row[ALONG].powi(2) * seen.ahead_variance;
         let (row, strayed) = seen.to_newest(row);
         Distance {

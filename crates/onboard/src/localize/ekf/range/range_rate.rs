@@ -28,10 +28,10 @@ impl Ekf {
         }
         let (sight, speed_mps) = (&seen.sight, self.speed_mps());
         let (aside, along) = (sight.bearing_rad - seen.pose.heading_rad).sin_cos();
-        let level = sight.level();
+        let cos_elevation = sight.cos_elevation();
         let yaw_rate_radps = odometry.yaw_rate_radps.unwrap_or(0.0) - seen.mean[YAW_RATE_BIAS];
         // Velocity towards the radio head in the plane: of the vehicle, and of its antenna.
-        let swing_m = sight.steps[0][HEADING];
+        let swing_m = sight.position_rows[0][HEADING];
         // Derivatives: the direction turns, and the elevation changes.
         let mut row = sight.bearing_row;
         row[HEADING] -= 1.0;
@@ -39,12 +39,12 @@ impl Ekf {
         // Second-order terms: an uncertain direction reduces the mean of its cosine.
         let bend = 0.5 * self.belief.variance_along(&row) * speed_mps * along;
         let closing_mps = speed_mps * along - bend + yaw_rate_radps * swing_m;
-        for (value, step) in row.iter_mut().zip(sight.steps[0]) {
-            let climb = (1.0 - level * level) / sight.range_m * step;
-            *value = level * speed_mps * aside * *value + climb * closing_mps;
+        for (value, entry) in row.iter_mut().zip(sight.position_rows[0]) {
+            let elevation_rate = (1.0 - cos_elevation * cos_elevation) / sight.range_m * entry;
+            *value = cos_elevation * speed_mps * aside * *value + elevation_rate * closing_mps;
         }
-        row[SCALE] += level * along * speed_mps / (1.0 + seen.mean[SCALE]);
-        row[YAW_RATE_BIAS] += level * swing_m;
+        row[SCALE] += cos_elevation * along * speed_mps / (1.0 + seen.mean[SCALE]);
+        row[YAW_RATE_BIAS] += cos_elevation * swing_m;
         let (row, strayed) = seen.to_newest(row);
         // The odometer measures the mean speed between two samples.
         let noise = &self.config.noise;
@@ -63,11 +63,11 @@ impl Ekf {
         let walked = wander / measured_s.max(LEAST_INTERVAL_S);
         // The radio heads of a burst share the error of the speed.
         let shared = self.heads.len().max(1) as f64;
-        let model_variance = (level * along).powi(2) * shared * speed_variance
+        let model_variance = (cos_elevation * along).powi(2) * shared * speed_variance
             + drift
             + strayed
             + walked
-            + 2.0 * (level * bend).powi(2);
+            + 2.0 * (cos_elevation * bend).powi(2);
         let rate = HeadState::RateOffset.number(seen.index, self.heads.len(), seen.model);
         let terms = [
             (DRIFT, 1.0),
@@ -76,7 +76,7 @@ impl Ekf {
             (RANGE_SCALE, 0.0),
         ];
         let state_mps = |number: usize| self.bias.range_state(number)[0];
-        let expected_mps = -level * closing_mps + state_mps(DRIFT) + state_mps(rate);
+        let expected_mps = -cos_elevation * closing_mps + state_mps(DRIFT) + state_mps(rate);
         Ok(self.predicted(
             &seen,
             measured.quantity,

@@ -9,7 +9,7 @@ use crate::standard::pci::Pci;
 
 /// SSB of a tracked cell, received by `A` antennas.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Tracked<const A: usize> {
+pub struct TrackerOutput<const A: usize> {
     /// Physical cell identity.
     pub pci: Pci,
     /// SSB index (beam) from the DM-RS; in a burst set of 64 the three high bits from its time.
