@@ -207,7 +207,7 @@ _CAUSES = {
     ),
     Cause.SUSPECTED: (
         "fault of a radio head, the array or the odometer suspected, now or recently",
-        "realistic standard deviations of array, odometer and radio heads, because errors within "
-        "them are no faults",
+        "realistic standard deviations of array, odometer and radio heads, because errors "
+        "within them are not faults",
     ),
 }

@@ -29,7 +29,7 @@ def codesign(
     """Compare tracker, policy and engine with the paper's adaptive point in each power mode.
 
     Energies of a trip include angle estimates and receiver. Ranges cover all parameter ranges of
-    the platform files. Second row of each mode: with the paper's energy per execution. Third row:
+    the platform files. Second row of each mode: with the paper's energy per estimate. Third row:
     with the energy of this project's cycles at the clock of the mode. The share is the energy
     relative to the paper's, at the worst end of the range.
     """

@@ -299,8 +299,8 @@ def explore(
     name = column(query.percent)
     ends = [best[name.replace("_error_m", f"_error_{end}_m")] for end in ("low", "high")]
     console.print(
-        f"Least energy: mode {best['mode']}, {best['energy_j']:.1f} J "
-        f"(energy per execution: {best['energy_provenance']}); {query.percent:g} % of errors "
+        f"Minimum energy: mode {best['mode']}, {best['energy_j']:.1f} J "
+        f"(energy per estimate: {best['energy_provenance']}); {query.percent:g} % of errors "
         f"within {best[name]:.3g} m (95 %: {ends_text(*ends)})."
     )
 
@@ -319,7 +319,7 @@ def fit(
         Path | None, typer.Option(help="Platform file to write with the fitted values.")
     ] = None,
 ) -> None:
-    """Fit the energy per execution of each mode and method to the paper's figures.
+    """Fit the energy per estimate of each mode and method to the paper's figures.
 
     Simulates the number of angle estimates of each setting, then solves for the energies that agree
     with the sums in the paper. The "fitted" values of the shipped platform come from this command.
@@ -334,7 +334,7 @@ def fit(
         fitted = study.fit_platform(
             interpretation, platform, runs=runs, seed=seed, threads=threads, progress=tick
         )
-    made = table(["mode", *map(label, METHODS)], title="Energy per execution in J, fitted")
+    made = table(["mode", *map(label, METHODS)], title="Energy per estimate in J, fitted")
     for mode in fitted.modes:
         energies = (mode.energy_per_execution_j[method] for method in METHODS)
         made.add_row(str(mode.number), *(f"{energy.value:.4f}" for energy in energies))

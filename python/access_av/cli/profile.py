@@ -45,7 +45,7 @@ def profile(
     """Measure time and energy of angle estimation on this computer, and write a platform file.
 
     For each power mode (nvpmodel, cpufreq, otherwise the present one), each method and the SSB
-    chain: wall and CPU time per execution, and the energy above idle with its interval (INA3221,
+    chain: wall and CPU time per estimate, and the energy above idle with its interval (INA3221,
     INA238 or RAPL). Without a sensor, the energy is reported as not measured. The original power
     mode is restored.
     """

@@ -116,7 +116,7 @@ def study(
     console.print(found.verdict)
     for number, place in enumerate(found.worst, start=1):
         console.print(
-            f"Worst place {number}: {place.along_m:.0f} m along the road, "
+            f"Worst position {number}: {place.along_m:.0f} m along the road, "
             f"{place.error_m:.2f} m: {place.why}."
         )
     if found.remedies:

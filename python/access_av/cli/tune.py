@@ -148,7 +148,8 @@ def tune(
         console.print(f"{directory.path / 'vehicle.toml'}", soft_wrap=True)
     if not is_kept:
         errors.print(
-            "missed: no set point of this policy meets the limits. More radio heads, a better "
+            "Limits not met: no parameters of this policy meet the limits. More radio heads, "
+            "a better "
             f"odometer or a surveyed road can help: access-av design plan {scenario}",
             style="red",
             soft_wrap=True,

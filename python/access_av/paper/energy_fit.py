@@ -67,11 +67,13 @@ class Freedom:
 
 # The minimum fit has one parameter: the power of MUSIC in mode 0, solved from its stated sum. It
 # depends on the clock like that of a busy core and is equal for all methods.
-NONE = Freedom("the power of a busy core by its clock, the same for all methods", 1, 1)
+NONE = Freedom("power of a busy core as a function of its clock, equal for all methods", 1, 1)
 FREEDOMS = {
-    "ratio": Freedom("one power ratio per method, the same in all modes", 2, 2),
-    "mode": Freedom("a power of its own in each mode, within what is stated of budgets", 7, 1),
-    "factor": Freedom("another ratio in modes 1 to 5, by one factor solved for", 1, 1),
+    "ratio": Freedom("one power ratio per method, equal in all modes", 2, 2),
+    "mode": Freedom("a separate power in each mode, within the published budgets", 7, 1),
+    "factor": Freedom(
+        "another power ratio in modes 1 to 5, with one factor that is solved from a claim", 1, 1
+    ),
 }
 SHIPPED = ("ratio", "mode")
 

@@ -212,7 +212,7 @@ def _saves_in_every_mode(outcome: Outcome) -> Finding:
     mode, method = min(savings, key=lambda key: np.atleast_1d(savings[key])[0])
     return Finding(
         np.min(np.broadcast_arrays(*savings.values()), axis=0),
-        note=f"Least against {label(method)} in mode {mode}.",
+        note=f"Minimum: saving against {label(method)} in mode {mode}.",
     )
 
 
@@ -227,7 +227,8 @@ def _most_in_mode_0(outcome: Outcome) -> Finding:
     most = max(adaptive, key=lambda mode: np.atleast_1d(adaptive[mode])[0])
     return Finding(
         np.min(np.broadcast_arrays(*ratios.values()), axis=0),
-        note=f"Mode 0 over the next: {each}. Adaptive MUSIC needs most estimates in mode {most}.",
+        note=f"Energy of mode 0 divided by that of the next mode: {each}. Adaptive MUSIC needs "
+        f"the most estimates in mode {most}.",
     )
 
 

@@ -214,7 +214,8 @@ def lead(study: Study) -> str:
     ]
     if saved and not both:
         sentences.append(
-            f"Mean saving of the accurate ones: {', '.join(saved)}. A saving within 10 % of the "
+            f"Mean saving of the interpretations that meet the accuracy claims: "
+            f"{', '.join(saved)}. A saving within 10 % of the "
             f"stated {of_claim(SAVING)} % counts as reproduced."
         )
     for half in both:
@@ -233,7 +234,8 @@ def lead(study: Study) -> str:
         else:
             sentences.append(
                 f"Under “{half.interpretation.title}” {t_max}, and Algorithm 1 "
-                f"{controller_text(half.controller)} compared with as many fixed wake-ups."
+                f"{controller_text(half.controller)} compared with an equal number of fixed "
+                f"wake-ups."
             )
     return " ".join(filter(None, [*sentences, bought_text(study)]))
 

@@ -220,7 +220,8 @@ def _where(study: Study) -> str:
     side_head = ("Radio head", "nearest point of the road", "distance and side of the road")
     return section(
         "Where is the error too large?",
-        f"Colour of the road: {study.percent:g} % percentile of the error within 5 m; "
+        f"Colour of the road: {study.percent:g}th percentile of the error within 5 m of each "
+        f"position; "
         f"{kept:.0%} of the road meet the target of the whole trip. Triangles: radio heads; "
         "squares: stops; diamonds: targets of positions and stretches; grey lines: walls; numbers: "
         f"worst positions. places.csv has each metre. Drawn to scale on a wide screen. {PLAYED}",
@@ -230,8 +231,8 @@ def _where(study: Study) -> str:
         + '<div class="charts">'
         + figure(
             "along",
-            "Levels are protection levels in state ok. The least RMS error is the lower bound for "
-            "any localizer. Dashed: the target.",
+            "Levels are protection levels in state ok. The minimum RMS error is the lower bound "
+            "for any localizer. Dashed: the target.",
             "Error along the road",
         )
         + figure(

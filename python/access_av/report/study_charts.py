@@ -153,9 +153,9 @@ def _at(study: Study, along_m: dict[str, float]) -> pl.DataFrame:
 def along_road(study: Study) -> Spec:
     """Returns the chart of error, protection level, bound and target along the road."""
     names = {
-        "target_error_m": f"{study.percent:g} % of errors within",
-        "median_error_m": "half of them within",
-        "level_m": "half of the levels within",
+        "target_error_m": f"{study.percent:g}th percentile of the error",
+        "median_error_m": "median error",
+        "level_m": "median protection level",
         "bound_m": "least RMS error",
     }
     rows = (
@@ -253,7 +253,7 @@ def ways_to_operate(study: Study) -> Spec:
         ),
         y=alt.Y(
             "error_m:Q",
-            title=f"{study.percent:g} % of errors within / m",
+            title=f"{study.percent:g}th percentile of the error / m",
             scale=alt.Scale(zero=False, nice=False, domain=y_domain),
         ),
         tooltip=["number:N", "way:N", "mode:N", "energy_j:Q", "error_m:Q"],

@@ -33,7 +33,7 @@ def operation_section(study: Study) -> str:
     """Returns the section on the recommended operating point, its rivals, and its energy."""
     point, day = study.point, study.day
     if point is None or day is None:
-        return section("How to operate it", "The vehicle’s platform has no figure of energy.", "")
+        return section("How to operate it", "The vehicle’s platform contains no energy.", "")
     boundary = energy_boundary(point.driven.scenario) or "unstated"
     found = point.driven.percentile(study.percent)
     text = (
@@ -136,8 +136,9 @@ def _composition(study: Study, point: Point, day: economy.Day) -> str:
     if day.idle_share is not None:
         text = (
             f"<p>Idle computers take {100.0 * day.idle_share:.4g} % of the fleet’s day. A computer "
-            "with less idle power, or one that serves other purposes too, reduces it. Estimator "
-            "and wake-up hardly do.</p>"
+            "with less idle power, or one that also serves other purposes, reduces this energy. "
+            "Estimator "
+            "and wake-up have little effect on it.</p>"
         )
     return f"<h3>Composition of the energy</h3>{text}" + table(head, rows, numbers=range(1, 4))
 

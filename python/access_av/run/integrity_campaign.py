@@ -128,9 +128,7 @@ def channels(names: Sequence[str]) -> dict[str, Overrides]:
             try:
                 found[name] = {"truth.site.rician_k_db": float(k_db)}
             except ValueError:
-                raise InputError(
-                    f"channel {name}: write a number, for example K=5 for a Rician K of 5 dB"
-                ) from None
+                raise InputError(f"channel {name}: write K=5 for a Rician K of 5 dB") from None
         else:
             found[name] = {"channel": {"model": name}}
     return found

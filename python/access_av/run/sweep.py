@@ -82,7 +82,7 @@ class Sweep(Result):
 
         name = f"p{self.percent:g}".replace(".", "_")
         columns = (f"{name}_error_m", f"{name}_error_low_m", f"{name}_error_high_m")
-        title = f"{self.percent:g} % of horizontal errors within / m"
+        title = f"{self.percent:g}th percentile of the horizontal error / m"
         return intervals(self.table, "variant", columns, title=title)
 
 

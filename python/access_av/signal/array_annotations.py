@@ -115,7 +115,7 @@ def _places(truth: dict[str, Any], channels: int) -> NDArray[np.float64] | None:
     )
     if not fine:
         raise InputError(
-            "`aoa:truth.element_places_wavelengths` must be a list of {channels} positions [x, "
+            f"`aoa:truth.element_places_wavelengths` must be a list of {channels} positions [x, "
             "y], one for each channel"
         )
     return np.array(places, dtype=float)

@@ -73,7 +73,7 @@ class Compared:
             return "identical to the baseline"
         delta, low, high = self.delta_m[place]
         if math.isinf(low):
-            return f"{delta:+.3f} m; no interval: it needs two or more {self.driven.rows}"
+            return f"{delta:+.3f} m; no interval: it needs at least two {self.driven.rows}"
         if math.isnan(delta):
             return "no difference: the baseline has no finite percentile"
         interval = f"{delta:+.3f} m (95 %: {low:+.3f} to {high:+.3f} m)"

@@ -129,7 +129,7 @@ def in_words(wake_up: Mapping[str, Any]) -> str:
         interval_ms = wake_up.get("interval_ms")
         return "as often as possible" if interval_ms is None else f"every {interval_ms:g} ms"
     named = {
-        "uncertainty": "by the vehicle's own error",
+        "uncertainty": "when the estimated error requires it",
         "pid": "by Algorithm 1",
         "gated": "gated by SNR",
     }

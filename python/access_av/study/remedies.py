@@ -80,9 +80,9 @@ def _remember(vehicle: Mapping[str, Any]) -> Remedy | None:
     if vehicle["odometer"]["scale_std"] <= REMEMBERED_SCALE_STD:
         return None
     what = (
-        "the odometer’s scale kept from the last trip, so that "
-        f"{100.0 * REMEMBERED_SCALE_STD:g} % of it are open, not "
-        f"{100.0 * vehicle['odometer']['scale_std']:g} %"
+        "odometer scale kept from the last trip: standard deviation "
+        "{100.0 * REMEMBERED_SCALE_STD:g} % instead of "
+        "{100.0 * vehicle['odometer']['scale_std']:g} %"
     )
     settings = {"vehicle.odometer.scale_std": REMEMBERED_SCALE_STD}
     return Remedy("remember the odometer’s scale", what, settings, "vehicle_settings", 1)
@@ -92,7 +92,7 @@ def _more_ssbs(site: Mapping[str, Any]) -> Remedy | None:
     period_ms = site["ssb"]["period_ms"]
     if 0.5 * period_ms < SHORTEST_PERIOD_MS:
         return None
-    what = f"SSBs every {0.5 * period_ms:g} ms, not every {period_ms:g} ms"
+    what = f"SSBs every {0.5 * period_ms:g} ms instead of every {period_ms:g} ms"
     return Remedy(
         "SSBs twice as often", what, {"site.ssb.period_ms": 0.5 * period_ms}, "cell_settings", 1
     )
@@ -126,7 +126,7 @@ def _survey(site: Mapping[str, Any]) -> Remedy | None:
     }
     if not settings:
         return None
-    what = f"places of the radio heads known to {100.0 * SURVEYED_STD_M:g} cm"
+    what = f"positions of the radio heads known to {100.0 * SURVEYED_STD_M:g} cm (σ)"
     return Remedy("survey the radio heads", what, settings, "survey", len(settings))
 
 

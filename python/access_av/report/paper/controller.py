@@ -62,7 +62,8 @@ def contribution(study: Study, specs: dict[str, Spec]) -> str:
         + figure("ablation", "RMS error with the constant minus RMS error with Algorithm 1, "
                  "equal runs; positive: Algorithm 1 helps. Lines are paired 95 % intervals.",
                  "Algorithm 1 compared with a constant with as many angle estimates")
-        + figure("front", "Down and left is better. The line is MUSIC at fixed intervals.",
+        + figure("front", "Points further down and left are better. The line is MUSIC at fixed "
+        "intervals.",
                  "Error against angle estimates")
         + "</div><details><summary>Every interpretation and mode as a table</summary>"
         + f"{details}</details>"
@@ -73,8 +74,8 @@ def fair(study: Study) -> str:
     """Returns the section that compares both methods with equal information."""
     names = {
         "paper": "the paper's interpretation",
-        "ours": "ours",
-        "one angle": "ours with one angle, at the start",
+        "ours": "proposed method",
+        "one angle": "proposed method with one angle, at the start",
         "bound": "bound: no localizer is better, with an angle at every SSB",
     }
     rows = [
@@ -110,7 +111,7 @@ def ours(study: Study) -> str:
     ]
     head = (
         "Mode",
-        "Angle estimates, ours / paper's",
+        "Angle estimates, proposed / paper's",
         "Energy / J",
         "Worst error / m",
         "RMS / m",
@@ -150,7 +151,7 @@ def _gain_chart(study: Study) -> Spec:
     )
     scale = alt.Scale(type="symlog", constant=0.05)
     span = base.mark_rule(strokeWidth=2).encode(
-        x=alt.X("low:Q", title="gain in RMS error / m", scale=scale), x2="high:Q"
+        x=alt.X("low:Q", title="reduction of the RMS error / m", scale=scale), x2="high:Q"
     )
     dots = base.mark_circle(size=40).encode(x="gain:Q")
     zero = alt.Chart(pl.DataFrame({"zero": [0.0]})).mark_rule(strokeDash=[4, 3]).encode(x="zero:Q")
@@ -188,7 +189,7 @@ def _front_chart(study: Study) -> Spec:
     ]  # fmt: skip
     rows += [
         {"what": OURS, "aoa_estimates": each.aoa_estimates, "rms": each.rms_error_m,
-         "name": f"ours, mode {each.mode}" + ("" if each.map else ", road unknown")}
+         "name": f"proposed, mode {each.mode}" + ("" if each.map else ", road unknown")}
         for each in study.proposed_vs_paper
     ]  # fmt: skip
     points = pl.DataFrame(rows).with_columns(pl.col(pl.Float64).round(4))
@@ -222,5 +223,6 @@ def _front_chart(study: Study) -> Spec:
     return finish(
         line + dots,
         height=320,
-        description="RMS error against angle estimates: fixed intervals, interpretations, ours",
+        description="RMS error against angle estimates: fixed intervals, interpretations, "
+        "proposed method",
     )

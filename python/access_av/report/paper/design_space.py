@@ -83,7 +83,7 @@ def queries(evaluation: Evaluation) -> str:
                 f"mode {first['mode']}: {first['energy_j']:.1f} J, RMS {first['rms_error_m']:.3f} m"
             )
         rows.append((escape(str(query)), modes, best))
-    return table(("Query (adaptive)", "Modes that meet it", "Least energy"), rows)
+    return table(("Query (adaptive)", "Modes that meet the query", "Minimum energy"), rows)
 
 
 def _asked() -> list[Query]:

@@ -27,17 +27,16 @@ def energy_text(evaluation: Evaluation) -> str:
     """Returns a paragraph on the energies and their sources."""
     free, solved = numbers(evaluation.freedoms)
     return escape(
-        "Energy of a trip is the number of angle estimates times the energy of one execution. "
-        f"Boundary: {evaluation.platform.energy_boundary}. Bars are ours; diamonds are the "
-        "values the paper states. "
+        "Energy of a trip is the number of angle estimates times the energy of one estimate. "
+        f"Boundary: {evaluation.platform.energy_boundary}. Bars: this simulation; diamonds: "
+        "values in the paper. "
         + (
-            "Energies per execution were fitted to those and to the paper’s statements about the "
-            f"rest, for each interpretation separately: {free} numbers are free, {solved} of them "
-            "solved for from stated figures. Agreement is therefore a check of the angle "
-            "estimates, not "
-            "of the power."
+            "The energies per estimate were fitted to these values and to the paper’s other "
+            f"statements, for each interpretation separately: {free} numbers are free, {solved} "
+            "of them solved from figures of the paper. Agreement is therefore a check of the "
+            "angle estimates, not of the power."
             if evaluation.refitted
-            else "Energies per execution are those of the platform file."
+            else "The energies per estimate are those of the platform file."
         )
         + _missing(evaluation)
     )
@@ -187,7 +186,7 @@ def _grouped_bars(evaluation: Evaluation, column: str, title: str, digits: str) 
                 alt.Tooltip("line:N", title="method"),
                 alt.Tooltip(f"{column}:Q", title=title, format=digits),
                 alt.Tooltip("base_wake_up_ms:Q", title="base wake-up time / ms"),
-                alt.Tooltip("energy_provenance:N", title="energy per execution"),
+                alt.Tooltip("energy_provenance:N", title="energy per estimate"),
             ],
         )
     )

@@ -101,7 +101,7 @@ def carbon_section(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
         f"Saved by {FLEET} vehicles in a year, mode {mode} / kg",
     )
     return (
-        figure("carbon-chart", title=f"{UNITS_NOT_BUILT} roadside units, not built")
+        figure("carbon-chart", title=f"{UNITS_NOT_BUILT} avoided roadside units")
         + table(head, rows, numbers=range(1, 5))
         + "".join(f'<p class="note">{name}. {escape(text)}</p>' for name, text in sources)
     )

@@ -144,12 +144,12 @@ def _provenance(evaluation: Evaluation) -> str:
                     escape(figure.source) if figure else "",
                 )
             )
-    head = ("Mode", "Method", "J per execution", "Provenance", "Source")
+    head = ("Mode", "Method", "J per estimate", "Provenance", "Source")
     return (
         f"<p>{escape(NO_FIGURES)}</p>"
         "<p>Errors, angle estimates and SNR are simulated by this version from the scenario below "
         "and the seed above. Prices and carbon factors are listed with their sources.</p>"
-        "<details><summary>Energy per execution, with its sources</summary>"
+        "<details><summary>Energy per estimate, with its sources</summary>"
         + table(head, rows, numbers=(2,))
         + "</details>"
         + source("Scenario, all defaults written out", evaluation.scenario.to_toml())

@@ -129,14 +129,14 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
     specs["overview"] = finish(
         promised + lines + dots + numbers,
         height=OVERVIEW_PX,
-        description="Worst error and average saving of each interpretation, and what the paper "
-        "promises",
+        description="Worst error and average saving of each interpretation, and the values that "
+        "the paper claims",
     )
     return figure(
         "overview",
-        "Each dot is an interpretation, its number that of the table below; the green field is "
-        "what the "
-        "paper promises of both. Accuracy and saving ask for a further claim each (a2, e3).",
+        "Each dot is an interpretation, with its number in the table below. In the green area, "
+        "the worst error (a1) and the mean saving (e4) are as claimed. Accuracy and saving each "
+        "require one further claim (a2, e3).",
     )
 
 
