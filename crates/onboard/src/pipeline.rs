@@ -1,4 +1,4 @@
-//! Pipeline on the vehicle.
+//! Pipeline on the vehicle: from SSBs and odometry to the pose.
 
 use crate::BoxError;
 use crate::estimator::{self, AngleEstimator};
@@ -21,7 +21,7 @@ use crate::thermal::ThermalNoise;
 use crate::wake_up::{self, Situation, WakeUpPolicy};
 use crate::walls::Walls;
 
-/// Pipeline on the vehicle. Nothing is allocated after initialisation.
+/// Pipeline on the vehicle. It allocates nothing after initialisation.
 pub struct Pipeline {
     visibility_model: VisibilityModel,
     thermal: ThermalNoise,
@@ -60,7 +60,7 @@ struct RangingUse {
 /// Number of measurements per SSB in addition to the angle.
 const RANGES_PER_SSB: usize = 3;
 
-/// Model that is constant during a drive.
+/// Radio heads that can be used at a position: not excluded, and in line of sight.
 struct VisibilityModel {
     heads: Vec<RadioHead>,
     /// Radio heads that the user has excluded.
@@ -73,8 +73,8 @@ struct VisibilityModel {
 }
 
 impl VisibilityModel {
-    /// Updates the radio heads in line of sight of the estimated position.
-    fn look(&mut self, time_s: f64, localizer: &OutOfSequenceBuffer) -> Result<(), BoxError> {
+    /// Updates the radio heads that are in line of sight of the estimated position.
+    fn update(&mut self, time_s: f64, localizer: &OutOfSequenceBuffer) -> Result<(), BoxError> {
         if self.walls.is_empty() || is_searching(localizer.localizer()) {
             return Ok(());
         }
@@ -195,7 +195,7 @@ pub enum OdometryDefect {
     SpeedSpike,
 }
 
-/// During a search for the pose, every angle is used.
+/// Whether the pose is being searched for, so that every angle is used.
 fn is_searching(localizer: &dyn Localizer) -> bool {
     localizer.hypotheses().is_some() || localizer.is_lost()
 }
@@ -390,7 +390,8 @@ impl Pipeline {
                 self.chosen.fill(true);
             }
             if !searching && !self.visibility_model.walls.is_empty() {
-                // The angle of a wave through a wall contains no information about the radio head.
+                // The angle of a wave through a wall does not indicate the direction of the radio
+                // head.
                 for (chosen, ssb) in self.chosen.iter_mut().zip(&self.sensed) {
                     *chosen &= now.head(ssb).is_some();
                 }
@@ -416,7 +417,8 @@ impl Pipeline {
                 }
                 self.monitor_angles(time_s)?;
             } else {
-                // Angles of a faulty array would displace the pose; dead reckoning does not.
+                // The angles of a faulty array would displace the pose; dead reckoning without
+                // angles does not.
                 self.follow_monitors()?;
             }
         }
@@ -461,7 +463,7 @@ impl Pipeline {
         self.localizer.update_range(head, measured)
     }
 
-    /// Receives every burst until angles have confirmed the pose again.
+    /// Requests every burst until angles have confirmed the pose again.
     pub fn await_confirmation(&mut self) {
         if let Some(monitors) = &mut self.monitors {
             monitors.await_confirmation();
@@ -503,7 +505,7 @@ impl Pipeline {
         let is_wanted = self.is_wanted(time_s);
         let newest_s = self.odometry.map_or(time_s, |sample| sample.time_s);
         self.visibility_model
-            .look(newest_s.max(time_s), &self.localizer)?;
+            .update(newest_s.max(time_s), &self.localizer)?;
         let now = self
             .visibility_model
             .at(time_s, self.odometry, &self.localizer);
@@ -540,7 +542,8 @@ impl Pipeline {
         Ok(())
     }
 
-    /// Removes the odometry state, because its clock or its distance restarts.
+    /// Discards the odometry state, because the clock or the distance of the odometry has
+    /// restarted.
     pub fn forget_odometry(&mut self) {
         self.odometry = None;
         if let Some(monitors) = &mut self.monitors {
@@ -586,7 +589,7 @@ impl Pipeline {
             let sigma_m = SPEED_OF_LIGHT_MPS * ranging.delay_sigma_s;
             RangeMeasurement::range(time_s, range_m, Some(sigma_m))
         });
-        // A rate of carrier phases has the same information as the phases.
+        // A rate derived from carrier phases contains the same information as the phases.
         let uses_rate = using.range_rate && !(using.carrier_phase && ranging.is_rate_of_phases);
         let rate = uses_rate.then(|| {
             let (rate_mps, sigma_mps) = (ranging.rate_mps, ranging.rate_sigma_mps);

@@ -246,7 +246,8 @@ mod tests {
 
     #[test]
     fn a_covariance_without_width_stays_positive_in_other_coordinates() {
-        // Heading and course cancel, so that the third variance is a rounding error.
+        // Heading and path direction cancel, so that the third variance is zero except for rounding
+        // errors.
         for curvature in [0.3, -0.07, 1e-3, 12.7] {
             let (cos, sin) = (0.3_f64.cos(), 0.3_f64.sin());
             let jacobian = [[cos, -sin, 0.0], [sin, cos, 0.0], [curvature, 0.0, 1.0]];

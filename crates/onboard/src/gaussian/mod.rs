@@ -1,5 +1,6 @@
 //! Gaussian distributions of fixed size: prediction, scalar updates, fixed-interval smoother and
-//! quantiles. Only the smoother allocates memory. The states have no meaning here.
+//! quantiles. Only the smoother allocates memory. The physical meaning of the states is defined by
+//! the callers.
 
 mod belief;
 mod quantile;

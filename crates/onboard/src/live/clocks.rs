@@ -7,17 +7,20 @@ use crate::localize::HISTORY_S;
 use crate::observation::{BURST_S, OdometrySample};
 use crate::time_unit::StreamTimes;
 
-/// Maximum lead of an angle without arrival times, in seconds: a gap of the odometry is shorter.
+/// Maximum time by which an angle may be ahead of the odometry if arrival times are unknown, in
+/// seconds. It exceeds the usual gaps of the odometry.
 const MAX_LEAD_WITHOUT_ARRIVALS_S: f64 = 10.0;
 
-/// Consecutive bursts whose times contradict the odometry's, from which on the clocks count as different.
+/// Number of consecutive bursts with times that contradict those of the odometry, after which the
+/// clocks are considered different.
 const DISAGREEING_BURSTS: u32 = 3;
 
-/// Time after the last such burst at which it no longer counts, in seconds.
+/// Duration after the last contradicting burst, in seconds, after which the contradiction is
+/// forgotten.
 const EXPIRY_S: f64 = 5.0;
 
-/// Maximum age of an angle relative to the last burst without a comparison of clocks, in seconds;
-/// the localizer rejects older ones.
+/// Maximum age of an angle relative to the previous burst for a comparison of the clocks, in
+/// seconds. The localizer rejects older angles.
 const MAX_ANGLE_DELAY_S: f64 = 1.0;
 
 /// Clocks of all sources.
@@ -30,7 +33,7 @@ pub struct Clocks {
     /// Clock of samples and angles.
     pub angles: TimeBase,
     last_odometry: Option<OdometrySample>,
-    /// Unit of the odometry's times, where arrival times do not show it.
+    /// Unit of the odometry's times, detected without arrival times.
     times: StreamTimes,
     disagreement: Option<Disagreement>,
     step: Option<ClockStep>,
@@ -41,7 +44,7 @@ struct Disagreement {
     bursts: u32,
     /// Time of the angles minus that of the odometry, in seconds.
     offset_s: f64,
-    /// Time of the newest odometry at the last of the bursts, in seconds.
+    /// Time of the newest odometry when the last contradicting burst arrived, in seconds.
     odometry_s: f64,
 }
 

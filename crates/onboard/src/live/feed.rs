@@ -32,13 +32,13 @@ use crate::radio_head::RadioHead;
 use crate::receive::ReceiverConfig;
 use crate::settings::{Boundary, Extent, Platform, Site, Vehicle};
 
-/// Maximum number of stored outcomes.
+/// Maximum number of stored results of angles.
 const OUTCOMES: usize = 256;
 
 /// Maximum number of angles of a burst.
 const ANGLES: usize = 64;
 
-/// SNR (dB) of an angle without one: sufficient for every policy.
+/// SNR that is assumed for an angle without one, in dB. It suffices for every wake-up policy.
 const UNSTATED_SNR_DB: f64 = 20.0;
 
 /// Angle that was estimated elsewhere.
@@ -98,7 +98,7 @@ pub struct Live {
     odometry_step: Option<ClockStep>,
     refused_burst: Option<LiveError>,
     confirmation: Confirmation,
-    /// Time of the localizer's last recovery.
+    /// Time of the localizer's last recovery, in seconds.
     recovered_s: Option<f64>,
     last_angle_s: Option<f64>,
     /// First SSB of the last burst: sample time and index.
@@ -112,7 +112,7 @@ pub struct Live {
     energy: Option<EnergyModel>,
     aoa_estimates: usize,
     bursts_received: usize,
-    /// Minimum and maximum of all times.
+    /// Earliest and latest time of the inputs, in seconds.
     interval_s: Option<[f64; 2]>,
 }
 
@@ -408,8 +408,8 @@ impl Live {
         self.process_angles()
     }
 
-    /// Returns the next outcome of an angle, oldest first. If there are more than 256 outcomes, the oldest
-    /// are lost.
+    /// Returns the result of the next angle, oldest first. If more than 256 results are stored, the
+    /// oldest are removed.
     pub fn next_angle_record(&mut self) -> Option<AngleRecord> {
         self.outcomes.pop_front()
     }
@@ -435,7 +435,7 @@ impl Live {
         counts.unwrap_or_default()
     }
 
-    /// Returns the pipeline, for its calibration and findings.
+    /// Returns the pipeline, which provides estimated constants and the results of the monitors.
     pub const fn onboard(&self) -> &Pipeline {
         &self.onboard
     }
@@ -488,7 +488,7 @@ impl Live {
         self.record_results(result)
     }
 
-    /// Stores the outcomes of a burst.
+    /// Stores the results of the angles of a burst.
     fn record_results(&mut self, result: Result<BurstSummary, BoxError>) -> Result<(), LiveError> {
         let BurstSummary {
             time_s,

@@ -1,16 +1,16 @@
-//! Results of angles and radio heads.
+//! Results of angles, and reception status of radio heads.
 
 use crate::localize::PoseEstimate;
 use crate::pipeline::AngleResult;
 use crate::radio_head::RadioHead;
 
-/// Angle with its result.
+/// Angle with its verdict, its residual and the resulting pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngleRecord {
     /// SSB, angle and verdict.
     pub angle_result: AngleResult,
-    /// Measured minus predicted angle for the pose after it: electrical angle, or azimuth of a
-    /// non-linear array, in radians; `None` without an angle or radio head.
+    /// Measured minus predicted angle for the pose after the update: electrical angle, or azimuth
+    /// of a non-linear array, in radians; `None` without an angle or radio head.
     pub residual_rad: Option<f64>,
     /// Pose after the burst, at the later of the burst and the newest odometry.
     pub after: PoseEstimate,

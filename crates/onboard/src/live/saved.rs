@@ -15,22 +15,25 @@ use crate::settings::Vehicle;
 /// Protection level in standard deviations: at 10⁻⁷ a horizontal error exceeds 5.3 of them.
 const SIGMAS_OF_LEVEL: f64 = 5.0;
 
-/// Largest growth of the position's standard deviation with which a saved pose is still resumed, in metres: beyond, a
-/// search over the site is more reliable than a search around the pose.
+/// Maximum growth of the position's standard deviation for which a saved pose is resumed, in
+/// metres. Above it, a search over the site is more reliable than a search around the pose.
 pub const MAX_GROWTH_M: f64 = 10.0;
 
-/// Relative standard deviation of a distance by the odometer's counter, with slip and unknown calibration.
+/// Relative standard deviation of a distance measured by the odometer's counter, including slip and
+/// an unknown calibration.
 const COUNTER_STD: f64 = 0.05;
 
-/// Standard deviation of the position of a vehicle whose counter stands still, in metres, and of its heading, in
-/// radians: it may have been pushed or turned on the spot.
+/// Standard deviations of the position (m) and the heading (rad) of a vehicle whose counter did not
+/// change: it may have been pushed or turned on the spot.
 const STANDING_STD_M: f64 = 0.05;
 const STANDING_STD_RAD: f64 = 0.02;
 
-/// Yaw change per distance, a standard deviation, in rad/m: half of the curvature of a bend of 3 m radius.
+/// Standard deviation of the yaw change per distance, in rad/m: half the curvature of a bend with a
+/// radius of 3 m.
 const TURN_STD_RAD_PER_M: f64 = 0.17;
 
-/// Learned standard deviations are increased by this factor, because a calibration ages and is correlated with the pose.
+/// Factor for the estimated standard deviations of a calibration, because it ages and is correlated
+/// with the pose.
 const CALIBRATION_FACTOR: f64 = 2.0;
 
 /// Estimated constant: value and standard deviation.
@@ -48,11 +51,11 @@ pub struct SavedState {
     pub position_std_m: f64,
     /// Standard deviation of the heading, in radians.
     pub heading_std_rad: f64,
-    /// Distance counter of the odometer, in metres; unknown where the odometry gives speeds only.
+    /// Distance counter of the odometer, in metres; `None` if the odometry contains speeds only.
     pub distance_m: Option<f64>,
     /// Speed in m/s.
     pub speed_mps: f64,
-    /// Yaw rate in rad/s, where known.
+    /// Yaw rate in rad/s, if it is measured.
     pub yaw_rate_radps: Option<f64>,
     /// Odometer scale: distance measured per distance driven, and its standard deviation.
     pub odometer_scale: Option<Calibration>,
@@ -73,17 +76,18 @@ pub struct SavedState {
 pub struct Resumption {
     /// Elapsed time in seconds.
     pub elapsed_s: f64,
-    /// Distance driven by the odometer's counter, in metres; `None` if it is unknown.
+    /// Distance driven according to the odometer's counter, in metres; `None` if it is unknown.
     pub driven_m: Option<f64>,
-    /// Standard deviation of the position after it, in metres.
+    /// Standard deviation of the position after the motion, in metres.
     pub position_std_m: f64,
-    /// Standard deviation of the heading after it, in radians.
+    /// Standard deviation of the heading after the motion, in radians.
     pub heading_std_rad: f64,
 }
 
 impl SavedState {
-    /// The motion since, if the state is `elapsed_s` seconds old and `sample` is the first odometry, for a vehicle of
-    /// this top speed. `None` if the position's standard deviation would grow by more than [`MAX_GROWTH_M`].
+    /// Returns the motion since this state was saved `elapsed_s` seconds ago; `sample` is the first
+    /// odometry after the restart. Returns `None` if the position's standard deviation would grow
+    /// by more than [`MAX_GROWTH_M`].
     pub fn resumption(
         &self,
         elapsed_s: f64,
@@ -102,7 +106,8 @@ impl SavedState {
                 let along_m = COUNTER_STD * distance_m;
                 (STANDING_STD_M.hypot(along_m).hypot(across_m), distance_m)
             }
-            // Anywhere within reach: half of it is the standard deviation along each axis of a disc.
+            // The position is anywhere within reach: the standard deviation of a disc along each
+            // axis is half its radius.
             None => (STANDING_STD_M.hypot(0.5 * reach_m), reach_m),
         };
         let turn_rad = STANDING_STD_RAD.hypot(TURN_STD_RAD_PER_M * distance_m);
@@ -115,8 +120,8 @@ impl SavedState {
         })
     }
 
-    /// Pose after the motion: the counted distance, or half of the way at the last speed where only that is known,
-    /// along an arc of the last yaw rate.
+    /// Returns the pose after the motion: along an arc of the last yaw rate, by the counted
+    /// distance. Without a counted distance, half the distance at the last speed is assumed.
     fn moved(&self, by: &Resumption) -> Pose {
         let distance_m = by.driven_m.unwrap_or(0.5 * self.speed_mps * by.elapsed_s);
         let turn_rad = self.yaw_rate_radps.unwrap_or(0.0) * by.elapsed_s;
@@ -127,7 +132,7 @@ impl SavedState {
 }
 
 impl Live {
-    /// The state to save; `None` as long as there is no pose, or the pose is searched for.
+    /// Returns the state to save; `None` before the first pose and during a search.
     ///
     /// # Errors
     /// [`LiveError::Custom`].
@@ -185,12 +190,13 @@ impl Live {
         }))
     }
 
-    /// Resumes a saved state that is `elapsed_s` seconds old, before its first odometry, `sample`, is taken in. Returns
-    /// the assumed motion, or `None` if the vehicle may have moved too far; nothing is changed then. Radio heads that
-    /// were excluded are excluded again; those found faulty must be found again.
+    /// Resumes a state that was saved `elapsed_s` seconds ago, before its first odometry, `sample`,
+    /// is processed. Returns the assumed motion, or `None` if the vehicle may have moved too far;
+    /// nothing is changed in this case. Excluded radio heads are excluded again. Faulty radio heads
+    /// must be identified again.
     ///
     /// # Errors
-    /// [`LiveError`] as of [`set_pose`](Self::set_pose).
+    /// Those of [`set_pose`](Self::set_pose).
     pub fn resume(
         &mut self,
         saved: &SavedState,
@@ -207,7 +213,7 @@ impl Live {
         vehicle.start.heading_std_rad = by.heading_std_rad;
         self.begin_at(&vehicle, saved.moved(&by))?;
         for &pci in &saved.excluded {
-            // The site may have lost the radio head.
+            // The radio head may have been removed from the site.
             if let Err(error) = self.exclude(pci)
                 && !matches!(error, LiveError::UnknownCell { .. })
             {
@@ -218,8 +224,8 @@ impl Live {
     }
 }
 
-/// The vehicle with the calibration that a saved state has learned, where the vehicle's file gives a standard deviation
-/// for it.
+/// Returns the vehicle with the saved calibration of all constants for which the vehicle file
+/// specifies a standard deviation.
 fn calibrated(vehicle: &Vehicle, saved: &SavedState) -> Vehicle {
     let mut vehicle = vehicle.clone();
     let take = |value: &mut f64, std: &mut f64, found: Option<Calibration>| {
@@ -301,9 +307,9 @@ mod tests {
         assert_eq!(stood.driven_m, Some(0.0));
         assert!(stood.position_std_m < 0.21, "{stood:?}");
         let drove = by(saved(Some(50.0)), 3.0, 54.5).unwrap();
-        // A bend of 6 m radius leads 4.5²/(2·6) = 1.7 m aside.
+        // A bend with a radius of 6 m displaces the vehicle laterally by 4.5²/(2·6) = 1.7 m.
         assert!((1.5..2.0).contains(&drove.position_std_m), "{drove:?}");
-        // The counter was set to zero.
+        // The counter was reset to zero.
         let unknown = by(saved(Some(50.0)), 3.0, 0.0).unwrap();
         assert_eq!(unknown.driven_m, None);
         assert_eq!(unknown, by(saved(None), 3.0, f64::NAN).unwrap());

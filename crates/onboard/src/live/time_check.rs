@@ -5,18 +5,19 @@
 
 use crate::time_unit::{MAX_TIME_S, TimeUnit};
 
-/// Maximum lead of a stamp over its expected time, in seconds. A transport that delays and then delivers a backlog
-/// stays below it, because each message of a backlog is compared with the message before.
+/// Maximum lead of a stamp over its expected time, in seconds. The messages of a backlog that is
+/// delivered at once stay below it, because each of them is compared with the message before.
 pub const MAX_LEAD_S: f64 = 1.0;
 
-/// Maximum time by which an angle may be ahead of the odometry, beyond the time since that arrived, in seconds.
+/// Maximum time by which an angle may be ahead of the newest odometry, in addition to the time
+/// since that odometry arrived, in seconds.
 pub const MAX_ANGLE_LEAD_S: f64 = 1.0;
 
 /// Number of consecutive messages, consistent with each other, that establish a new time base.
 pub const RUN: u32 = 5;
 
-/// Minimum time between the arrivals of the first and the last message of such a run, in seconds: the messages of a
-/// backlog that is sent again arrive within less.
+/// Minimum time between the arrivals of the first and the last message of such a run, in seconds.
+/// The messages of a backlog that is sent again arrive within a shorter time.
 const RUN_S: f64 = 0.2;
 
 /// Maximum difference between the durations of such a run by its stamps and by its arrivals, in seconds: jitter of
@@ -29,16 +30,18 @@ const MAX_SPACING_S: f64 = 1.0;
 /// Minimum time between the last accepted message and a new time base, in seconds.
 const MIN_ELAPSED_S: f64 = 1e-3;
 
-/// Maximum relative drift between the source's clock and the arrival clock, while clocks are slewed.
+/// Maximum relative drift between the source's clock and the arrival clock while clocks are
+/// adjusted gradually.
 const DRIFT: f64 = 1e-3;
 
 /// Minimum time since the last accepted message for a comparison of units, in seconds.
 const UNIT_WAIT_S: f64 = 0.05;
 
-/// Maximum relative deviation of a stamp's advance from a multiple of the elapsed time that names its unit.
+/// Maximum relative deviation of the ratio between a stamp's advance and the elapsed time from the
+/// ratio of a time unit.
 const UNIT_TOLERANCE: f64 = 0.1;
 
-/// The unit in which stamps advance by this ratio to the elapsed time.
+/// Returns the time unit for a ratio between the advance of the stamps and the elapsed time.
 fn unit_of_ratio(ratio: f64) -> Option<TimeUnit> {
     let is_near = |it: &TimeUnit| (ratio / it.per_second() - 1.0).abs() <= UNIT_TOLERANCE;
     TimeUnit::ALL.into_iter().find(is_near)
@@ -61,7 +64,7 @@ pub enum TimeDefect {
         /// Unit in which it is a Unix time.
         unit: Option<TimeUnit>,
     },
-    /// Advances in proportion to the elapsed time, but in another unit.
+    /// The stamps advance in proportion to the elapsed time, but in another unit.
     #[error("time_s advances by {ratio:.3e} per second; it must be in seconds{}", hint(Some(*unit)))]
     WrongUnit {
         /// The unit.
@@ -146,7 +149,7 @@ impl Stamp {
         Some(self.time_s - self.arrival_s?)
     }
 
-    /// Time since another message by the arrivals, in seconds.
+    /// Returns the time between the arrivals of `since` and of this message, in seconds.
     fn waited_s(&self, since: &Self) -> Option<f64> {
         Some((self.arrival_s? - since.arrival_s?).max(0.0))
     }
@@ -158,7 +161,7 @@ struct Run {
     first: Stamp,
     last: Stamp,
     count: u32,
-    /// Largest time stamp minus arrival time, in seconds.
+    /// Maximum of time stamp minus arrival time over the run, in seconds.
     lead_s: Option<f64>,
 }
 
@@ -212,7 +215,8 @@ impl Run {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TimeCheck {
     last: Option<Stamp>,
-    /// Largest time stamp minus arrival time of late, in seconds: that of the least delayed messages.
+    /// Maximum of time stamp minus arrival time over recent messages, in seconds: that of the
+    /// messages with the smallest delay.
     lead_s: Option<f64>,
     run: Option<Run>,
     /// Messages rejected since the last accepted one.
@@ -296,7 +300,8 @@ impl TimeCheck {
             self.accept(stamp);
             return Ok(TimeVerdict::NewBase { elapsed_s, step_s });
         }
-        // One stamp can be of any ratio; three in a row, none of which continues the one before, have it by their unit.
+        // One stamp may have any ratio. A unit is reported after three consecutive rejected stamps
+        // that are inconsistent with each other.
         let unit = waited_s
             .filter(|waited_s| self.rejected >= 3 && run.count == 1 && *waited_s >= UNIT_WAIT_S)
             .map(|waited_s| ahead_s / waited_s)
@@ -307,16 +312,18 @@ impl TimeCheck {
         }))
     }
 
-    /// Lead of a stamp, in seconds, over the later of two expectations: the last message plus the time waited, and the
-    /// least delayed messages of late.
+    /// Returns the lead of a stamp, in seconds, over its expected time: the later of the last stamp
+    /// plus the time since its arrival, and the arrival time plus the lead of the messages with the
+    /// smallest delay.
     fn lead_over_expected_s(&self, stamp: &Stamp, last: &Stamp) -> Option<f64> {
         let by_last_s = stamp.time_s - last.time_s - stamp.waited_s(last)?;
         let by_lead_s = stamp.lead_s()? - self.lead_s?;
         Some(by_last_s.min(by_lead_s))
     }
 
-    /// Step of the clock, in seconds: between the least delayed messages before and in the run, or without arrival
-    /// times as if no message had been lost between them.
+    /// Returns the step of the clock in seconds: the change of the lead of the messages with the
+    /// smallest delay. Without arrival times, the step is calculated as if no message had been
+    /// lost.
     fn step_s(&self, run: &Run, last: &Stamp) -> f64 {
         match (run.lead_s, self.lead_s) {
             (Some(after_s), Some(before_s)) => after_s - before_s,
@@ -342,7 +349,8 @@ mod tests {
 
     const PERIOD_S: f64 = 0.02;
 
-    /// A source at 50 Hz whose last accepted message is number 49, at 0.98 s plus `epoch_s`.
+    /// Returns the state after messages at 50 Hz, of which number 49 was accepted last, at 0.98 s
+    /// plus `epoch_s`.
     fn warm(epoch_s: f64) -> TimeCheck {
         let mut check = TimeCheck::default();
         for number in 0..50 {
@@ -448,7 +456,7 @@ mod tests {
         let mut check = warm(0.0);
         let verdict = check.next(8.98, Some(9.01), false);
         assert_eq!(verdict, Ok(TimeVerdict::Continues));
-        // Without arrival times every step ahead is one.
+        // Without arrival times, a step ahead cannot be distinguished from a gap, and is accepted.
         let mut check = TimeCheck::default();
         for time_s in [0.0, 0.02, 500.0] {
             assert!(check.next(time_s, None, false).is_ok());
@@ -480,7 +488,7 @@ mod tests {
     #[test]
     fn wrong_units_are_reported_and_never_become_a_time_base() {
         for unit in TimeUnit::ALL {
-            // Since the computer was switched on, and since 1970.
+            // Times since start-up of the computer, and since 1970.
             for epoch_s in [3.0, 1.7e9] {
                 let mut check = TimeCheck::default();
                 let mut named = false;

@@ -266,14 +266,14 @@ impl OutOfSequenceBuffer {
             std::mem::swap(spare, &mut self.localizer);
         }
         for (number, update) in burst.iter().enumerate().filter(|(_, it)| in_memory(it)) {
-            // In order, it would precede the first later event.
+            // In the order of times, the input precedes the first later one.
             let is_later = |event: &Event| event.time_s() > update.time_s();
             let place = (self.events.iter().skip(taken_in))
                 .position(is_later)
                 .map_or(self.events.len(), |place| taken_in + place);
             self.events.insert(place, update.event(Some(number)));
         }
-        // Copies after it do not contain it.
+        // Later copies do not contain the input.
         self.copies = from;
         for index in taken_in..self.events.len() {
             let Some(event) = self.events.get_mut(index) else {
@@ -320,8 +320,8 @@ impl OutOfSequenceBuffer {
         if last.is_none_or(|last| time_s - last.time_s < SPACING_S) {
             return;
         }
-        // In a replay, copies are stored at the same times as before, so that there is space for
-        // them.
+        // In a replay, copies are stored at the same times as before, so that their number does not
+        // exceed the capacity.
         if self.copies == COPIES && events == self.events.len() {
             self.drop_oldest();
         }
@@ -337,11 +337,11 @@ impl OutOfSequenceBuffer {
         }
     }
 
-    /// Removes the oldest copies if there are too many inputs since.
+    /// Removes the oldest copies if too many inputs are stored.
     fn forget(&mut self) {
         while self.events.len() > MOST_EVENTS && self.copies > 0 {
             if self.copies == 1 {
-                // More inputs at one time than can be stored: restart the history here.
+                // More inputs at one time than can be stored: the history restarts here.
                 self.events.clear();
                 self.copies = 0;
                 self.keep_copy(self.newest_s, 0);

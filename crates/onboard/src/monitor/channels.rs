@@ -1,10 +1,13 @@
-//! Receive channels, by the power of each and by the fit of the array's response to what they receive.
+//! Monitor of the receive channels, by the power of each channel and by the fit of the array
+//! response to the received signal.
 //!
-//! The best steering vector explains a share of the received power. Exchanged or inverted channels leave a larger
-//! residual than the channels put right. Cumulative sums (Page 1954) over SSBs compare the residual with that of each
-//! hypothesis: one pair exchanged, or one channel inverted. A dead channel has a small share of the power.
+//! The best steering vector explains a fraction of the received power. Exchanged or inverted
+//! channels leave a larger residual than the corrected channels. Cumulative sums (Page 1954) over
+//! SSBs compare the residual with that of each hypothesis: one pair of channels exchanged, or one
+//! channel inverted. A dead channel has a small fraction of the power.
 //!
-//! Only SSBs with independent fading count: of another radio head, or after a motion of [`FADING_M`].
+//! Only SSBs with independent fading count: of another radio head, or after a motion of
+//! [`FADING_M`].
 
 use std::f64::consts::TAU;
 
@@ -14,34 +17,38 @@ use super::fault::Fault;
 use crate::observation::{MAX_ELEMENTS, SsbObservation};
 use crate::settings::{Site, Vehicle};
 
-/// Motion in metres, and time in seconds, after which the fading of a radio head is independent: above one
-/// wavelength.
+/// Motion in metres, and time in seconds, after which the fading of a radio head is independent.
+/// The motion exceeds one wavelength.
 const FADING_M: f64 = 0.1;
 const FADING_S: f64 = 1.0;
 /// Minimum SNR of an SSB with all its snapshots, in dB.
 const LEAST_SNR_DB: f64 = 10.0;
-/// Steering vectors that the fit is searched among. Between two of them 0.3 % of the power are lost with 4 antennas.
+/// Number of steering vectors to which the signal is fitted. Between two of them, the loss of power
+/// is at most 0.3 % with 4 antennas.
 const DIRECTIONS: usize = 64;
-/// Maximum number of antennas for which hypotheses are compared: 36 of them.
+/// Maximum number of antennas for which hypotheses are compared; 8 antennas have 36 hypotheses.
 const MOST_ANTENNAS: usize = 8;
-/// Hypotheses at most.
+/// Maximum number of hypotheses.
 const MOST_HYPOTHESES: usize = MOST_ANTENNAS * (MOST_ANTENNAS - 1) / 2 + MOST_ANTENNAS;
-/// Residual share of power by errors of the calibration, in addition to that of the site's scatter.
+/// Fraction of the power in the residual due to calibration errors, in addition to that of the
+/// site's scatter.
 const CALIBRATION: f64 = 0.02;
-/// Maximum evidence of one SSB, for or against a hypothesis.
+/// Maximum evidence of one SSB for or against a hypothesis, in units of log-likelihood.
 const MOST_OF_ONE: f64 = 4.0;
-/// Drift of the sums: hypotheses that fit as well as the nominal channels gain no evidence.
+/// Drift of the sums per SSB, so that hypotheses with the same fit as the nominal channels gain no
+/// evidence.
 const DRIFT: f64 = 0.3;
 /// Threshold of the sums: false-alarm rate 1e-6 for each excursion from zero (Wald).
 const EVIDENCE: f64 = 13.8;
-/// Drift of the sum of a dead channel. Its SSBs add `ln(1/share)`, which has an exponential distribution in Rayleigh
-/// fading; the false-alarm rate is exp(−0.8 · threshold) for each excursion.
+/// Drift of the sum for a dead channel. Each SSB adds `ln(1/share)`, which has an exponential
+/// distribution in Rayleigh fading. The false-alarm rate is exp(−0.8 · threshold) for each
+/// excursion from zero.
 const DEAD_DRIFT: f64 = 2.0;
 const DEAD_EVIDENCE: f64 = 18.0;
-/// Maximum evidence of one SSB that a channel is dead: five SSBs are needed.
+/// Maximum evidence of one SSB for a dead channel, so that at least five SSBs are needed.
 const DEAD_MOST: f64 = 4.0;
 
-/// A fault of the channels, as a change of what they receive.
+/// Fault of the channels: a transformation of the received signals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Hypothesis {
     Exchanged(u8, u8),
@@ -58,9 +65,10 @@ impl Hypothesis {
         }
     }
 
-    /// Whether a row of antennas distinguishes the fault from no fault and from a fault with lower numbers. A change of
-    /// the electrical angle by π inverts every second channel; a change of its sign reverses the row. The product with
-    /// one of both is another single fault only in short rows.
+    /// Whether a linear array distinguishes the fault from the nominal channels and from a fault
+    /// with lower channel numbers. Inverting every second channel is equivalent to a change of the
+    /// electrical angle by π, and reversing the row to a change of its sign. In short rows, a fault
+    /// combined with one of these changes equals another single fault.
     const fn is_distinct(self, elements: u8) -> bool {
         match (self, elements) {
             (Self::Inverted(channel), 3) => channel == 0,
@@ -72,7 +80,7 @@ impl Hypothesis {
         }
     }
 
-    /// Puts a snapshot right.
+    /// Corrects a snapshot for the fault.
     fn correct(self, snapshot: &mut [Complex64]) {
         match self {
             Self::Exchanged(first, second) => snapshot.swap(first.into(), second.into()),
@@ -85,7 +93,7 @@ impl Hypothesis {
     }
 }
 
-/// When a radio head counted last.
+/// Last SSB of a radio head that was used.
 #[derive(Debug, Clone, Copy)]
 struct Counted {
     pci: u16,
@@ -94,20 +102,21 @@ struct Counted {
     distance_m: f64,
 }
 
-/// Monitors the channels of an array.
+/// Monitor of an array's channels.
 #[derive(Debug)]
 pub struct ChannelMonitor {
     elements: usize,
     gains: [Complex64; MAX_ELEMENTS],
-    /// Residual share of power that is expected of one direction.
+    /// Expected fraction of the power in the residual of one direction.
     scatter: f64,
-    /// Phase factors from one antenna to the next of each direction; empty of an array that is no row.
+    /// Phase factors between neighbouring antennas for each direction; empty for a non-linear
+    /// array.
     steps: Vec<Complex64>,
     hypotheses: Vec<(Hypothesis, f64)>,
     /// Evidence that each channel is dead.
     dead: [f64; MAX_ELEMENTS],
     is_dead: [bool; MAX_ELEMENTS],
-    /// The hypothesis that was accepted, and the evidence that it has ended.
+    /// Accepted hypothesis, and the evidence that the fault has ended.
     accepted: Option<(Hypothesis, f64)>,
     counted: Vec<Counted>,
 }
@@ -153,7 +162,8 @@ impl ChannelMonitor {
         }
     }
 
-    /// Takes in an SSB, received after this distance driven (m). Calls `change` for each fault that begins or ends.
+    /// Processes an SSB that was received at the driven distance `distance_m`. Calls `change` for
+    /// each fault that begins or ends.
     pub fn ssb(
         &mut self,
         observation: &SsbObservation,
@@ -182,7 +192,7 @@ impl ChannelMonitor {
         }
     }
 
-    /// Whether the fading of an SSB is independent of those before.
+    /// Whether the fading of an SSB is independent of that of previous SSBs.
     fn is_independent(&mut self, observation: &SsbObservation, distance_m: f64) -> bool {
         let ssb = observation.ssb;
         let now = Counted {
@@ -235,7 +245,7 @@ impl ChannelMonitor {
         }
     }
 
-    /// Compares the fit of the array's response with that after each hypothesis.
+    /// Compares the fit of the array response with the fit after the correction of each hypothesis.
     fn fit(&mut self, values: &[Complex64], total: f64, change: &mut dyn FnMut(Fault, bool)) {
         let nominal = self.residual(values, total, None);
         if let Some((hypothesis, evidence)) = self.accepted {
@@ -271,7 +281,8 @@ impl ChannelMonitor {
         }
     }
 
-    /// Share of the power that the best direction does not explain, after a hypothesis has been put right.
+    /// Returns the fraction of the power that the best direction does not explain, after the
+    /// correction of a hypothesis.
     fn residual(&self, values: &[Complex64], total: f64, hypothesis: Option<Hypothesis>) -> f64 {
         let mut powers = [0.0; DIRECTIONS];
         for snapshot in values.chunks_exact(self.elements) {
@@ -279,7 +290,8 @@ impl ChannelMonitor {
             let Some(corrected) = corrected.get_mut(..self.elements) else {
                 return 1.0;
             };
-            // The gains belong to the channels, so that they are taken off and put on again.
+            // The snapshots are calibrated. The fault affects the channels before calibration, so
+            // that the gains are applied, and removed again after the correction.
             for ((value, received), gain) in corrected.iter_mut().zip(snapshot).zip(self.gains) {
                 *value = received * gain;
             }
@@ -303,7 +315,8 @@ impl ChannelMonitor {
     }
 }
 
-/// A cumulative sum after another difference of residuals, as a multiple of the expected one.
+/// Returns a cumulative sum after an SSB. `difference` is a difference of residuals relative to the
+/// expected residual.
 fn cumulated(evidence: f64, difference: f64) -> f64 {
     let one = difference.clamp(-MOST_OF_ONE, MOST_OF_ONE);
     (evidence + one - DRIFT).max(0.0)

@@ -1,14 +1,16 @@
 //! Confirmation of a given or resumed pose by angles.
 
 /// Number of accepted angles minus rejected ones that confirms a pose. At a wrong position, one
-/// angle is accepted by chance with the probability of its gate, a few percent; five are not.
+/// angle is accepted by chance with a probability of a few percent (the width of its gate). Five of
+/// them are not.
 const CONFIRMING_ANGLES: u32 = 5;
 
-/// Number of different radio heads among them, if the site has them: one radio head confirms a
-/// direction only.
+/// Minimum number of different radio heads among the accepted angles, if the site has as many. One
+/// radio head confirms a direction only.
 const CONFIRMING_HEADS: usize = 2;
 
-/// Whether angles have confirmed the pose, and the evidence so far.
+/// Confirmation state of a pose: whether angles have confirmed it, and the evidence collected so
+/// far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Confirmation {
     is_confirmed: bool,
@@ -39,7 +41,7 @@ impl Confirmation {
         self.is_confirmed = true;
     }
 
-    /// Requires another confirmation of the pose.
+    /// Discards the confirmation, so that the pose must be confirmed again.
     pub fn restart(&mut self) {
         *self = Self::new(false, self.needed_heads);
     }

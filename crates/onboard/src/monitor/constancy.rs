@@ -7,23 +7,25 @@
 
 use crate::observation::OdometrySample;
 
-/// Minimum speed in m/s: slower wheels may repeat their speed because of the resolution.
+/// Minimum speed in m/s. Slower wheels may repeat their speed because of the resolution.
 const MOVING_MPS: f64 = 0.1;
 /// Maximum interval between two samples in seconds; a longer one interrupts the run.
 const MOST_S: f64 = 0.5;
 /// Minimum number of samples in motion from which the rate is estimated, and number at which all counts are halved.
 const LEAST_SAMPLES: u32 = 50;
 const MOST_SAMPLES: u32 = 400;
-/// Minimum share of samples at which a change alternates its sign. Independent noise has two thirds, a smooth motion
-/// almost none.
+/// Minimum fraction of samples at which the change alternates its sign. Independent noise has two
+/// thirds; a smooth motion has almost none.
 const ALTERNATING_SHARE: f64 = 0.2;
-/// Logarithm of the probability of a suspicious run without a fault, negative: 1e-6.
+/// Negative logarithm of the probability of a suspicious run without a fault: 1e-6.
 const EVIDENCE: f64 = 13.8;
 /// Minimum number of repetitions of a suspicious run.
 const LEAST_RUN: u32 = 5;
-/// Duration of a run in seconds from which on it counts as normal: a source without noise has replaced the odometer.
+/// Maximum duration of a run in seconds; a longer run is normal, because a source without noise has
+/// replaced the odometer.
 const MOST_RUN_S: f64 = 60.0;
-/// Maximum deviation of a repeated step of the distance: relative to that of the speed, and in metres.
+/// Maximum deviation of a repeated step of the distance: relative to the integrated speed, and in
+/// metres.
 const STEP_SHARE: f64 = 1e-3;
 const STEP_M: f64 = 1e-6;
 
@@ -37,10 +39,10 @@ pub struct Constancy {
     samples: u32,
     repeated: u32,
     alternating: u32,
-    /// Number of repetitions up to now, and time of the first of them in seconds.
+    /// Number of current repetitions, and time of the first of them in seconds.
     run: u32,
     run_since_s: f64,
-    /// Whether the current run is that of a fault, which does not change the estimated rate.
+    /// Whether the current run belongs to a fault, so that it does not change the estimated rate.
     is_fault: bool,
 }
 
@@ -119,7 +121,7 @@ impl Constancy {
 mod tests {
     use super::*;
 
-    /// Uniform numbers between −1 and 1 by a linear congruential generator.
+    /// Uniform random numbers between −1 and 1 (linear congruential generator).
     struct Noise(u64);
 
     impl Noise {
@@ -132,7 +134,8 @@ mod tests {
         }
     }
 
-    /// Times of suspicion within 120 s at 50 Hz, given the reported speed at a time (s).
+    /// Returns the times of suspicion within 120 s at 50 Hz, for a reported speed as a function of
+    /// time (s).
     fn suspicions(speed_mps: impl Fn(f64, &mut Noise) -> f64) -> Vec<f64> {
         let (mut monitor, mut noise) = (Constancy::default(), Noise(3));
         let (mut found, mut distance_m) = (Vec::new(), 0.0);
@@ -153,7 +156,8 @@ mod tests {
         found
     }
 
-    /// A trip: acceleration, cruise with a slow oscillation of 5 cm/s, braking, stop.
+    /// Returns the speed of a trip: acceleration, cruise with a slow oscillation of 5 cm/s,
+    /// braking, stop.
     fn true_mps(time_s: f64) -> f64 {
         let within_s = time_s % 40.0;
         let cruise_mps = 2.0 + 0.05 * (0.5 * within_s).sin();
@@ -169,7 +173,7 @@ mod tests {
         };
         let found = suspicions(noisy);
         assert!((20.0..20.25).contains(&found[0]), "{}", found[0]);
-        // It counts as normal after a minute.
+        // The run is normal after a minute.
         assert!(found.len() > 2900 && found.len() < 3100, "{}", found.len());
         // With a resolution of 2 cm/s, half of the samples are repetitions.
         let coarse = |time_s: f64, noise: &mut Noise| {
@@ -192,7 +196,7 @@ mod tests {
             moving => moving + 0.02 * noise.next(),
         };
         assert!(suspicions(noisy).is_empty());
-        // Without noise, at a constant cruise and with an oscillation.
+        // An odometer without noise, at constant speed and with an oscillation.
         assert!(suspicions(|time_s, _| true_mps(time_s).min(1.9)).is_empty());
         assert!(suspicions(|time_s, _| true_mps(time_s)).is_empty());
         // Every sample is sent twice.

@@ -1,26 +1,28 @@
-//! Distance and speed of the odometry, compared with each other.
+//! Consistency of the odometry's distance and speed.
 //!
-//! Both come from the same wheels. The difference of the distance's step and the integrated speed is summed
-//! with exponential forgetting; it exceeds a quarter of the distance driven only if one of them is wrong.
+//! Both are measured by the same wheels. The difference between the step of the distance and the
+//! integrated speed is summed with exponential forgetting. It exceeds a quarter of the distance
+//! driven only if one of them is wrong.
 
 use crate::observation::OdometrySample;
 
 /// Time constant of the sums, in seconds.
 const MEMORY_S: f64 = 1.0;
-/// Minimum summed difference of a fault, in metres: encoder steps and rounded speeds stay below it.
+/// Minimum summed difference of a fault, in metres. The resolution of encoders and of rounded
+/// speeds causes smaller differences.
 const LEAST_M: f64 = 0.15;
-/// Minimum summed difference of a fault, as a share of the summed distance. A wrong scale or noise stays below
-/// it; a frozen value has 1, half of the speed 0.5.
+/// Minimum summed difference of a fault, as a fraction of the summed distance. A wrong scale or
+/// noise causes smaller fractions; a frozen value has 1, and a halved speed has 0.5.
 const SHARE: f64 = 0.25;
-/// Bound of the summed difference, in multiples of the minimum of a fault.
+/// Maximum of the summed difference, in multiples of the minimum of a fault.
 const BOUND: f64 = 2.0;
-/// Maximum difference that one sample adds where the speed is zero, in metres: a counter that is reset once
-/// is no fault, because the localizer uses the speed instead.
+/// Maximum difference that one sample adds at zero speed, in metres. A counter that is reset once
+/// is no fault, because the localizer then uses the speed.
 const MOST_OF_ONE_M: f64 = 0.1;
-/// Duration of an interval in seconds beyond which the speed in between is not known.
+/// Maximum duration of an interval in seconds. In a longer interval, the speed is unknown.
 const MOST_S: f64 = 0.5;
 
-/// The sums.
+/// Exponentially weighted sums of distance and difference.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Contradiction {
     last: Option<OdometrySample>,
@@ -30,7 +32,7 @@ pub struct Contradiction {
 }
 
 impl Contradiction {
-    /// Takes in a sample. Returns whether distance and speed contradict each other.
+    /// Processes a sample. Returns whether distance and speed contradict each other.
     pub fn odometry(&mut self, sample: &OdometrySample) -> bool {
         let Some(last) = self.last.replace(*sample) else {
             return false;
@@ -48,10 +50,10 @@ impl Contradiction {
         self.driven_m =
             kept * self.driven_m + by_speed_m.abs().max(by_distance_m.abs().min(most_m));
         let threshold_m = LEAST_M + SHARE * self.driven_m;
-        // The sum is bounded, so that a large fault ends as soon as a small one.
+        // The sum is limited, so that large and small faults end after the same time.
         let bound_m = BOUND * threshold_m;
         self.difference_m = (kept * self.difference_m + difference_m).clamp(-bound_m, bound_m);
-        // A fault ends at half of the threshold, so that it is reported once.
+        // A fault ends at half of the threshold (hysteresis), so that it is reported once.
         let factor = if self.is_faulty { 0.5 } else { 1.0 };
         self.is_faulty = self.difference_m.abs() > factor * threshold_m;
         self.is_faulty
@@ -62,7 +64,7 @@ impl Contradiction {
 mod tests {
     use super::*;
 
-    /// Runs 10 s at 50 Hz. Returns the times at which the contradiction begins and ends.
+    /// Returns the times at which the contradiction begins and ends within 10 s at 50 Hz.
     fn changes(reading: impl Fn(f64, &mut OdometrySample)) -> Vec<f64> {
         let (mut monitor, mut changes, mut faulty) = (Contradiction::default(), Vec::new(), false);
         for number in 0..500 {

@@ -1,9 +1,10 @@
-//! Number of directions from which the signal of each radio head comes.
+//! Number of directions from which the signal of each radio head arrives.
 //!
-//! A second radio head with the same PCI and SSB index, or a reflection of similar power, adds a second plane wave. The
-//! covariance of the snapshots over a window of SSBs is fitted by one and by two plane waves. Diffuse scatter has no
-//! direction: averaged over its fading, two waves explain little more of it than one. The errors of the array are the
-//! same for every wave, and are part of the residual.
+//! A second radio head with the same PCI and SSB index, or a reflection of similar power, adds a
+//! second plane wave. One and two plane waves are fitted to the covariance of the snapshots over a
+//! window of SSBs. Diffuse scatter has no direction: averaged over its fading, two waves explain
+//! little more of it than one. The errors of the array are equal for both waves and part of the
+//! residual.
 
 use std::f64::consts::TAU;
 
@@ -15,33 +16,35 @@ use crate::settings::{Site, Vehicle};
 
 /// Number of SSBs in a window.
 const WINDOW: u32 = 8;
-/// Number of consecutive windows at which a second direction begins to be reported, and no longer is.
+/// Number of consecutive windows with a second direction after which it is reported, and without it
+/// after which the report ends.
 const BEGINS: u32 = 2;
 const ENDS: u32 = 4;
-/// Minimum motion in metres between two SSBs that count: the fading changes within half of a wavelength. At standstill,
-/// scatter is as constant as a second wave.
+/// Minimum motion in metres between two SSBs in a window. The fading changes within half a
+/// wavelength. At standstill, scatter is as constant as a second wave.
 const FADING_M: f64 = 0.03;
 /// Minimum SNR of an SSB with all its snapshots, in dB.
 const LEAST_SNR_DB: f64 = 13.0;
-/// Minimum share of the power of the second wave.
+/// Minimum fraction of the power in the second wave.
 const LEAST_SHARE: f64 = 0.15;
-/// Minimum ratio of the share of the second wave to the residual of both. Scatter has about 1, because two waves explain
-/// half of the three dimensions next to the first wave at most.
+/// Minimum ratio of the power of the second wave to the residual of both waves. Scatter has a ratio
+/// of about 1, because the second wave explains at most half of the three dimensions that the first
+/// wave leaves.
 const LEAST_RATIO: f64 = 4.0;
 /// Number of steering vectors.
 const DIRECTIONS: usize = 64;
-/// Maximum squared correlation of the steering vectors of two directions.
+/// Maximum squared correlation between the steering vectors of both directions.
 const MOST_CORRELATION: f64 = 0.8;
-/// Minimum Rician K of the site in dB. With stronger scatter, up to one false report in a run was measured: reflections
-/// resemble a second radio head over 16 SSBs.
+/// Minimum Rician K of the site in dB. With stronger scatter, up to one false report per run was
+/// measured, because reflections resemble a second radio head over 16 SSBs.
 const LEAST_K_DB: f64 = 13.0;
-/// Range of the number of antennas.
+/// Minimum and maximum number of antennas.
 const LEAST_ANTENNAS: usize = 3;
 const MOST_ANTENNAS: usize = 8;
 
 type Vector = [Complex64; MAX_ELEMENTS];
 
-/// Window of an SSB.
+/// Window of the SSBs of one radio head and SSB index.
 #[derive(Debug, Clone, Copy)]
 struct Window {
     pci: u16,
@@ -49,17 +52,17 @@ struct Window {
     distance_m: f64,
     count: u32,
     covariance: [Vector; MAX_ELEMENTS],
-    /// Consecutive windows with and without a second direction.
+    /// Number of consecutive windows with a second direction, and without one.
     with: u32,
     without: u32,
     is_reported: bool,
 }
 
-/// Counts the directions of each radio head.
+/// Monitor of the number of directions of each radio head.
 #[derive(Debug)]
 pub struct DirectionMonitor {
     elements: usize,
-    /// Steering vectors; empty for an array or a site without this test.
+    /// Steering vectors; empty if the array or the site does not support this test.
     steering: Vec<Vector>,
     /// Products of the covariance and the steering vectors.
     products: Vec<Vector>,
@@ -90,7 +93,8 @@ impl DirectionMonitor {
         }
     }
 
-    /// Processes an SSB that was received after this distance (m). Calls `change` for each fault that begins or ends.
+    /// Processes an SSB that was received at the driven distance `distance_m`. Calls `change` for
+    /// each fault that begins or ends.
     pub fn ssb(
         &mut self,
         observation: &SsbObservation,
@@ -147,7 +151,8 @@ impl DirectionMonitor {
         }
     }
 
-    /// Returns the index of the window of an SSB; `None` if its fading is that of the last one.
+    /// Returns the index of the SSB's window; `None` if its fading is not independent of the
+    /// previous SSB.
     fn window(&mut self, observation: &SsbObservation, distance_m: f64) -> Option<usize> {
         let ssb = observation.ssb;
         let is_same = |it: &Window| (it.pci, it.ssb_index) == (ssb.pci, ssb.ssb_index);
@@ -175,7 +180,8 @@ impl DirectionMonitor {
         is_independent.then_some(place)
     }
 
-    /// Returns the shares of the power that the best one and the best two plane waves leave.
+    /// Returns the fractions of the power that remain after the best fit of one and of two plane
+    /// waves.
     fn residuals(&mut self, covariance: &[Vector; MAX_ELEMENTS]) -> [f64; 2] {
         let elements = self.elements;
         let dot = |a: &Vector, b: &Vector| -> Complex64 {
@@ -197,7 +203,8 @@ impl DirectionMonitor {
             let power_a = dot(a, of_a).re / norm;
             one = one.max(power_a);
             for (b, of_b) in self.steering.iter().zip(&self.products).take(index) {
-                // Power in the plane of both vectors, by the inverse of their Gram matrix.
+                // Power in the plane of both vectors, calculated with the inverse of their Gram
+                // matrix.
                 let correlation = dot(a, b) / norm;
                 let independent = 1.0 - correlation.norm_sqr();
                 if independent < 1.0 - MOST_CORRELATION {
@@ -221,7 +228,7 @@ mod tests {
     use crate::observation::SsbDetection;
     use crate::settings::{Shipped, TomlFile};
 
-    /// Normal numbers by a linear congruential generator.
+    /// Normal random numbers (linear congruential generator).
     struct Noise(u64);
 
     impl Noise {
@@ -239,7 +246,8 @@ mod tests {
         }
     }
 
-    /// Changes within 400 SSBs, given the amplitudes of a second wave and of scatter; the motion between two SSBs is 4 cm.
+    /// Returns the changes within 400 SSBs, for given amplitudes of a second wave and of scatter.
+    /// The vehicle moves by 4 cm between two SSBs.
     fn changes(second: f64, scatter: f64) -> Vec<(u32, Fault, bool)> {
         let vehicle = Vehicle::from_library("tugger", &Shipped).unwrap();
         let mut site = Site::from_library("yard", &Shipped).unwrap();

@@ -1,7 +1,8 @@
-//! Localization without odometry, while the odometry is at fault.
+//! Localization without odometry during an odometry fault.
 //!
-//! A filter follows the angles. It is driven by its own speed, with a noise that covers any motion of the vehicle. Its
-//! pose is not valid for use, but it is near the vehicle when the odometry is right again.
+//! A filter follows the angles. Its odometry input is its own estimated speed, with process noise
+//! that covers any motion of the vehicle. Its pose must not be used, but is near the vehicle when
+//! the odometry becomes valid again.
 
 use std::sync::Arc;
 
@@ -12,26 +13,29 @@ use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::settings::{SettingsError, Site, Vehicle};
 
-/// Time in seconds in which the vehicle may have driven at top speed before the fault was detected.
+/// Duration in seconds for which the vehicle may have driven at top speed before the fault was
+/// detected.
 const UNDETECTED_S: f64 = 1.0;
 /// Standard deviation of the heading when the fault is detected, in radians.
 const HEADING_STD_RAD: f64 = 0.2;
-/// Noise of the distance in m/√m, and minimum speed in m/s that it is driven with: 0.8 m/√s at the least.
+/// Noise of the distance in m/√m, and minimum speed of the prediction in m/s; the noise is at least
+/// 0.8 m/√s.
 const NOISE_M_PER_SQRT_M: f64 = 1.5;
 const LEAST_MPS: f64 = 0.3;
-/// Noise of the heading in rad/√s: the yaw rate may be at fault, too.
+/// Noise of the heading in rad/√s, because the yaw rate may also be faulty.
 const NOISE_RAD_PER_SQRT_S: f64 = 0.3;
 /// Interval over which the speed is measured, in seconds.
 const SPEED_S: f64 = 0.5;
-/// Standard deviations of the protection level during a fault.
+/// Number of standard deviations in the protection level during a fault.
 const LEVEL_SIGMAS: f64 = 5.0;
-/// Ratio of the localizer's standard deviations after the fault to those of the filter without odometry.
+/// Ratio of the localizer's initial standard deviations after the fault to those of the filter
+/// without odometry.
 const MARGIN: f64 = 1.0;
-/// Minimum standard deviations of that start, in metres and radians.
+/// Minimum initial standard deviations after the fault, in metres and radians.
 const LEAST_STD_M: f64 = 0.3;
 const LEAST_STD_RAD: f64 = 0.05;
 
-/// Starts filters without odometry, and localizers after the fault.
+/// Factory of filters without odometry, and of localizers after the fault.
 #[derive(Debug)]
 pub struct Fallback {
     site: Site,
@@ -83,7 +87,7 @@ impl Fallback {
         )))
     }
 
-    /// Returns the motion that the filter is driven by, at the time of an odometry sample.
+    /// Returns the motion that predicts the filter, at the time of an odometry sample.
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometrySample {
         let duration_s =
             sample.time_s - self.last_s.replace(sample.time_s).unwrap_or(sample.time_s);
@@ -96,7 +100,7 @@ impl Fallback {
         }
     }
 
-    /// Measures the speed by the filter's pose after a burst.
+    /// Updates the measured speed with the filter's pose after a burst.
     pub fn received(&mut self, estimate: &PoseEstimate) {
         let (time_s, pose) = (estimate.time_s, estimate.pose);
         let (from_s, from) = *self.measured_from.get_or_insert((time_s, pose));
@@ -112,13 +116,14 @@ impl Fallback {
         self.measured_from = Some((time_s, pose));
     }
 
-    /// Protection level of a pose without odometry, in metres.
+    /// Returns the protection level of a pose without odometry, in metres.
     pub fn level_m(estimate: &PoseEstimate) -> f64 {
         let [largest, _] = estimate.principal_variances();
         LEVEL_SIGMAS * largest.sqrt()
     }
 
-    /// Starts the vehicle's localizer after the fault, where the filter without odometry is.
+    /// Creates the vehicle's localizer after the fault, at the position of the filter without
+    /// odometry.
     ///
     /// # Errors
     /// [`SettingsError`] when the site's road cannot be built.

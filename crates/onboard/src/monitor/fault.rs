@@ -7,7 +7,7 @@ use serde::Serialize;
 /// Maximum number of simultaneous faults.
 const MAX_FAULTS: usize = 8;
 
-/// A fault of a sensor of the vehicle.
+/// Fault of a sensor, a receive channel or a radio head.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case", tag = "fault")]
 pub enum Fault {
@@ -42,7 +42,7 @@ pub enum Fault {
     },
 }
 
-/// The part that a fault belongs to.
+/// Component to which a fault belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FaultSource {
@@ -55,7 +55,7 @@ pub enum FaultSource {
 }
 
 impl Fault {
-    /// Name for files and metrics.
+    /// Returns the name for files and metrics.
     pub const fn name(self) -> &'static str {
         match self {
             Self::OdometryFrozen => "odometry_frozen",
@@ -68,7 +68,7 @@ impl Fault {
         }
     }
 
-    /// The part that it belongs to; of exchanged channels, the first.
+    /// Returns the component of the fault; for exchanged channels, the first channel.
     pub const fn source(self) -> FaultSource {
         match self {
             Self::OdometryFrozen | Self::OdometryReversed | Self::OdometryContradictory => {
@@ -84,7 +84,7 @@ impl Fault {
         }
     }
 
-    /// Numbers of the channels, or PCI, for metrics; empty for the odometry.
+    /// Returns the channel numbers or the PCI, for metrics; empty for the odometry.
     pub fn subject(self) -> String {
         match self {
             Self::ExchangedChannels {
@@ -141,7 +141,7 @@ impl fmt::Display for Fault {
     }
 }
 
-/// A fault, and since when it is active.
+/// Active fault and time of its detection.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ActiveFault {
     /// The fault.
@@ -151,12 +151,12 @@ pub struct ActiveFault {
     pub since_s: f64,
 }
 
-/// The active faults, in order of detection.
+/// Active faults in order of detection.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ActiveFaults([Option<ActiveFault>; MAX_FAULTS]);
 
 impl ActiveFaults {
-    /// The active faults.
+    /// Returns the active faults.
     pub fn iter(&self) -> impl Iterator<Item = &ActiveFault> {
         self.0.iter().flatten()
     }
@@ -166,35 +166,35 @@ impl ActiveFaults {
         self.iter().next().is_none()
     }
 
-    /// Whether a fault is active.
+    /// Whether this fault is active.
     pub fn contains(&self, fault: Fault) -> bool {
         self.iter().any(|it| it.fault == fault)
     }
 
-    /// The first active fault of the odometry.
+    /// Returns the first active fault of the odometry.
     pub fn of_odometry(&self) -> Option<Fault> {
         let mut faults = self.iter().map(|it| it.fault);
         faults.find(|it| it.source() == FaultSource::Odometry)
     }
 
-    /// Whether the odometry or a receive channel is at fault: every burst is received until it ends.
+    /// Whether the odometry or a receive channel is faulty, so that every burst must be received.
     pub fn has_of_vehicle(&self) -> bool {
         self.iter()
             .any(|it| !matches!(it.fault.source(), FaultSource::RadioHead(_)))
     }
 
-    /// Whether a receive channel is at fault: the localizer then gets no angles.
+    /// Whether a receive channel is faulty, so that the localizer receives no angles.
     pub fn has_channel(&self) -> bool {
         self.iter()
             .any(|it| matches!(it.fault.source(), FaultSource::Channel(_)))
     }
 
-    /// Whether a fault makes every angle wrong: channels that are inverted or exchanged.
+    /// Whether a fault makes every angle wrong: inverted or exchanged channels.
     pub fn affects_angles(&self) -> bool {
         self.of_angles().is_some()
     }
 
-    /// The first active fault that makes every angle wrong.
+    /// Returns the first active fault that makes every angle wrong.
     pub fn of_angles(&self) -> Option<Fault> {
         let mut faults = self.iter().map(|it| it.fault);
         faults.find(|it| {
@@ -205,8 +205,8 @@ impl ActiveFaults {
         })
     }
 
-    /// Adds a fault that was detected at a time (s). A fault beyond the eighth is not kept, unless a fault of the vehicle
-    /// can replace that of a radio head.
+    /// Adds a fault detected at `since_s`. At most eight faults are stored; a fault of the vehicle
+    /// replaces one of a radio head if necessary.
     pub fn begin(&mut self, fault: Fault, since_s: f64) {
         if self.contains(fault) {
             return;

@@ -1,7 +1,7 @@
-//! Monitors of odometry and receive channels: they identify faults that no filter can tolerate.
+//! Monitors of odometry and receive channels. They identify faults that no filter tolerates.
 //!
-//! [`Pipeline`](crate::Pipeline) runs them where the vehicle has an integrity monitor. A fault of the odometry makes the
-//! pose unavailable until the odometry agrees with the angles again.
+//! [`Pipeline`](crate::Pipeline) uses them if the vehicle has integrity monitoring. During a fault
+//! of the odometry, the pose is unavailable until the odometry agrees with the angles again.
 
 mod channels;
 mod confirmation;
@@ -28,16 +28,16 @@ use crate::localize::{AngleUpdate, Ekf, UpdateReason};
 use crate::observation::{OdometrySample, SsbObservation};
 use crate::settings::{Site, Vehicle};
 
-/// A change of the localizer that a fault of the odometry requires.
+/// Change of the localizer that a fault of the odometry requires.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
-    /// The odometry is at fault: follow the angles alone.
+    /// The odometry is faulty: localize with angles only.
     Begin,
-    /// The odometry is right again.
+    /// The odometry is valid again.
     End,
 }
 
-/// All monitors of a vehicle, and the faults that they have identified.
+/// All monitors of a vehicle, and the identified faults.
 #[derive(Debug)]
 pub struct Monitors {
     contradiction: Contradiction,
@@ -47,18 +47,18 @@ pub struct Monitors {
     test: Option<Box<OdometryTest>>,
     channels: ChannelMonitor,
     directions: DirectionMonitor,
-    /// Confirmation of a given pose: until then every burst is received.
+    /// Confirmation of a given pose. Until it is confirmed, every burst is received.
     confirmation: Confirmation,
     distance_m: f64,
     /// Localization without odometry.
     pub fallback: Fallback,
     faults: ActiveFaults,
-    /// Whether the localizer is one without odometry.
+    /// Whether the current localizer works without odometry.
     is_without_odometry: bool,
 }
 
 impl Monitors {
-    /// The monitors of a vehicle at a site with this number of radio heads.
+    /// Creates the monitors of a vehicle at a site with this number of radio heads.
     pub fn new(site: &Site, vehicle: &Vehicle, heads: usize) -> Self {
         Self {
             contradiction: Contradiction::default(),
@@ -75,17 +75,17 @@ impl Monitors {
         }
     }
 
-    /// The active faults.
+    /// Returns the active faults.
     pub const fn faults(&self) -> &ActiveFaults {
         &self.faults
     }
 
-    /// Whether the localizer is one without odometry.
+    /// Whether the current localizer works without odometry.
     pub const fn is_without_odometry(&self) -> bool {
         self.is_without_odometry
     }
 
-    /// Starts again with another pose, for all that the odometry did before.
+    /// Restarts all comparisons after a change of the pose that the odometry does not explain.
     pub fn restart(&mut self) {
         if let Some(fault) = self.faults.of_odometry() {
             self.faults.end(fault);
@@ -103,7 +103,7 @@ impl Monitors {
         }
     }
 
-    /// Starts again with another odometry.
+    /// Restarts all monitors of the odometry, whose clock or distance has restarted.
     pub fn forget_odometry(&mut self) {
         self.contradiction = Contradiction::default();
         self.constancy = Constancy::default();
@@ -111,7 +111,7 @@ impl Monitors {
         self.restart();
     }
 
-    /// Takes in an odometry sample. Returns the sample for the localizer.
+    /// Processes an odometry sample. Returns the sample for the localizer.
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometrySample {
         if let Some(fault) = self.motion.odometry(sample)
             && self.faults.of_odometry().is_none()
@@ -138,7 +138,7 @@ impl Monitors {
         }
     }
 
-    /// Whether the burst at a time (s) is to be received, whatever the wake-up policy says.
+    /// Whether the burst at `time_s` must be received, independent of the wake-up policy.
     pub fn wants(&self, time_s: f64) -> bool {
         self.faults.has_of_vehicle()
             || !self.confirmation.is_confirmed()
@@ -146,12 +146,12 @@ impl Monitors {
             || self.motion.wants(time_s)
     }
 
-    /// Notes that the burst at a time (s) is received.
+    /// Records that the burst at `time_s` is received.
     pub const fn received(&mut self, time_s: f64) {
         self.motion.received(time_s);
     }
 
-    /// Takes in an SSB as the array received it.
+    /// Processes an SSB as received by the array.
     pub fn ssb(&mut self, observation: &SsbObservation) {
         let (faults, time_s) = (&mut self.faults, observation.ssb.time_s);
         let mut change = |fault, begins| {
@@ -165,8 +165,9 @@ impl Monitors {
         (self.directions).ssb(observation, self.distance_m, &mut change);
     }
 
-    /// Takes in the angles of a burst at a time (s), given the pose at the newer of odometry and burst, `None` while it is
-    /// searched for. `ekf` is the filter of the localizer, if the pose is known.
+    /// Processes the angles of a burst at `time_s`. `pose` is the pose at the newer of odometry and
+    /// burst, or `None` during a search. `ekf` is the filter of the localizer, if the pose is
+    /// known.
     pub fn angles(
         &mut self,
         time_s: f64,
@@ -199,7 +200,7 @@ impl Monitors {
         }
     }
 
-    /// Tests a suspicious odometry by the angles of a burst. Returns the fault that they show.
+    /// Tests a suspicious odometry with the angles of a burst. Returns the detected fault.
     fn test(&mut self, updates: &[AngleUpdate], ekf: Option<&Ekf>) -> Option<Fault> {
         if self.is_without_odometry || !self.constancy.is_suspicious() {
             return None;
@@ -213,14 +214,15 @@ impl Monitors {
         is_fault.then_some(Fault::OdometryFrozen)
     }
 
-    /// Ends the test of the odometry, if it runs. Returns the pose of its filter that does not depend on the odometry.
+    /// Ends the test of the odometry, if it is active. Returns the pose of its filter without
+    /// odometry.
     pub fn take_free_pose(&mut self) -> Option<Pose> {
         let test = self.test.take()?;
         let free = test.free();
         Some(free.pose(free.time_s()).pose)
     }
 
-    /// Returns the change of the localizer that is due.
+    /// Returns the pending change of the localizer.
     pub fn change(&mut self) -> Option<Change> {
         let is_faulty = self.faults.of_odometry().is_some();
         if is_faulty == self.is_without_odometry {

@@ -1,14 +1,16 @@
-//! Motion by the odometry, compared with the angles.
+//! Comparison of the odometry's motion with the angles.
 //!
-//! Each radio head has a reference: the residual of one of its angles, and the pose at that time. A later angle is
-//! predicted from there by the odometry. The residual changes by noise alone if the odometry is right, because
-//! errors of pose, survey and array are the same in both.
+//! Each radio head has a reference: the residual of one of its angles, and the pose at its time. A
+//! later angle is predicted from the reference with the odometry. If the odometry is correct, the
+//! residual changes by noise only, because the errors of pose, survey and array are common to both
+//! angles.
 //!
-//! * A stop or reversal beyond the friction of tyres is a fault at once.
-//! * Standstill: the squared change has a χ² distribution. The sum over the radio heads without the largest is
-//!   tested, so that one obstructed radio head raises no alarm.
-//! * Motion: the likelihood of the odometry is compared with that of a standing vehicle and of reversed motion, by a
-//!   cumulative sum for each radio head (Page 1954). The sum over the radio heads without the largest is tested.
+//! * A stop or reversal beyond the friction of tyres is a fault immediately.
+//! * Standstill: the squared change of the residual has a χ² distribution. The sum over all radio
+//!   heads except the largest is tested, so that one obstructed radio head causes no alarm.
+//! * Motion: the likelihood of the odometry is compared with that of a standing vehicle and of
+//!   reversed motion, by a cumulative sum for each radio head (Page 1954). The sum over all radio
+//!   heads except the largest is tested.
 
 use crate::expected_angle::ExpectedAngle;
 use crate::geometry::{Pose, wrap_angle};
@@ -18,22 +20,25 @@ use crate::radio_head::RadioHead;
 
 use super::fault::Fault;
 
-/// Interval of the bursts that are received at standstill, in seconds: two of them within the time to detect.
+/// Interval of the bursts that are received at standstill, in seconds, so that two of them are
+/// received within the required detection time.
 const STANDSTILL_INTERVAL_S: f64 = 0.5;
 /// Maximum speed of a standing vehicle, in m/s.
 const STANDING_MPS: f64 = 0.01;
-/// Minimum speed of a vehicle that does not stand, in m/s, where standstill is confirmed.
+/// Minimum speed for the confirmation of a standstill, in m/s.
 const LEAST_MOVING_MPS: f64 = 0.5;
 /// Maximum motion between two angles at standstill, in metres and radians.
 const STANDING_M: f64 = 0.02;
 const STANDING_RAD: f64 = 0.1;
-/// Standard deviation of an angle in addition to its noise, in radians: scatter that moves while the vehicle stands.
+/// Standard deviation of an angle at standstill in addition to its noise, in radians, due to
+/// scatterers that move.
 const STANDING_SIGMA_RAD: f64 = 0.02;
-/// Standard deviation of an angle on the move, in addition to its noise, in radians: the multipath
-/// changes.
+/// Standard deviation of an angle in motion in addition to its noise, in radians, due to changing
+/// multipath.
 const MOVING_SIGMA_RAD: f64 = 0.06;
-/// Maximum acceleration by the friction of tyres, in m/s², and minimum change of the speed that is compared with it, in
-/// m/s: a smaller one may be noise, or a small robot whose wheels are commanded in steps.
+/// Maximum acceleration due to the friction of tyres, in m/s², and minimum change of the speed that
+/// is compared with it, in m/s. A smaller change may be noise, or a step of the commanded wheel
+/// speed of a small robot.
 const FRICTION_MPS2: f64 = 10.0;
 const SUDDEN_MPS: f64 = 1.0;
 /// Normal quantile of the false-alarm rate of one test at standstill, 1e-6.
@@ -42,27 +47,29 @@ const QUANTILE: f64 = 4.753;
 const CONFIRMATIONS: u32 = 2;
 /// Threshold of one cumulative log-likelihood ratio: false-alarm rate 1e-6 for each excursion from zero (Wald).
 const EVIDENCE: f64 = 13.8;
-/// Maximum of one radio head's sum: with two radio heads, one of them can reach the threshold.
+/// Maximum of one radio head's sum. If there are two radio heads, one of them alone can reach the
+/// threshold.
 const MOST_EVIDENCE: f64 = 14.5;
-/// Drift of the sum at each angle: alternatives that fit as well as the odometry gain no evidence.
+/// Drift of the sum at each angle, so that hypotheses with the same fit as the odometry gain no
+/// evidence.
 const DRIFT: f64 = 0.25;
-/// Squared normalized residual from which on an angle counts as an outlier under a hypothesis.
+/// Squared normalised residual above which an angle is an outlier under a hypothesis.
 const OUTLIER: f64 = 9.0;
-/// Squared normalized difference between the hypotheses, from which on an angle is compared.
+/// Minimum squared normalised difference between the hypotheses for a comparison.
 const DISTINCT: f64 = 8.0;
-/// Maximum age of a reference on the move and at standstill, in seconds.
+/// Maximum age of a reference in motion and at standstill, in seconds.
 const MOVING_AGE_S: f64 = 2.0;
 const STANDING_AGE_S: f64 = 30.0;
-/// Time after which a single radio head whose angle jumped gets a new reference, in seconds.
+/// Time in seconds after which the only radio head gets a new reference if its angle has jumped.
 const JUMPED_S: f64 = 1.0;
-/// Jumps of the only radio head within [`STANDING_AGE_S`] that count as motion.
+/// Number of jumps of the only radio head within [`STANDING_AGE_S`] that indicate motion.
 const SINGLE_JUMPS: u32 = 3;
-/// Time without an angle that contradicts the odometry, in seconds, and number of angles that confirm it, at the end
-/// of a fault.
+/// Conditions for the end of a fault: duration without a contradicting angle, in seconds, and
+/// number of confirming angles.
 const CONFIRMED_S: f64 = 1.5;
 const CONFIRMED_ANGLES: u32 = 4;
 
-/// One radio head's reference.
+/// Reference angle of one radio head.
 #[derive(Debug, Clone, Copy)]
 struct Reference {
     head: RadioHead,
@@ -74,14 +81,14 @@ struct Reference {
     variance: f64,
     /// Evidence of a standing vehicle and of reversed motion.
     evidence: [f64; 2],
-    /// When its angle at standstill jumped, in seconds, and how often it did.
+    /// Time of the first jump of the angle at standstill, in seconds, and number of jumps.
     jumped_s: Option<f64>,
     jumps: u32,
-    /// Whether the next angle replaces it.
+    /// Whether the next angle replaces the reference.
     is_stale: bool,
 }
 
-/// An angle of a burst, reduced to what is compared.
+/// Angle of a burst with the quantities that are compared.
 #[derive(Debug, Clone, Copy)]
 struct BurstAngle {
     kind: MeasurementKind,
@@ -89,13 +96,13 @@ struct BurstAngle {
     time_s: f64,
     value_rad: f64,
     variance: f64,
-    /// Pose at its time by the localizer.
+    /// Pose of the localizer at the time of the angle.
     pose: Pose,
     distance_m: f64,
     yaw_rad: f64,
 }
 
-/// Sums over the radio heads of a burst.
+/// Statistics over the radio heads of a burst.
 #[derive(Debug, Default)]
 struct Burst {
     standing: u32,
@@ -103,28 +110,29 @@ struct Burst {
     largest: f64,
     good: u32,
     bad: u32,
-    /// Jumps of the radio head that was compared last.
+    /// Number of jumps of the radio head that was compared last.
     jumps: u32,
 }
 
-/// Compares the motion by the odometry with the angles.
+/// Monitor that compares the odometry's motion with the angles.
 #[derive(Debug)]
 pub struct MotionMonitor {
     expected_angle: ExpectedAngle,
     references: Vec<Reference>,
     last: Option<OdometrySample>,
     yaw_rad: f64,
-    /// Last speed other than standstill, without sign, in m/s.
+    /// Last speed other than zero, without sign, in m/s.
     moving_mps: f64,
     standing_since_s: Option<f64>,
     received_s: f64,
     suspicions: u32,
-    /// Since when no angle has contradicted the odometry, in seconds, and the angles that confirmed it since.
+    /// Time of the last angle that contradicts the odometry, in seconds, and number of confirming
+    /// angles since then.
     confirmed: (f64, u32),
 }
 
 impl MotionMonitor {
-    /// A monitor for this number of radio heads.
+    /// Creates a monitor for this number of radio heads.
     pub fn new(expected_angle: ExpectedAngle, heads: usize) -> Self {
         Self {
             expected_angle,
@@ -139,14 +147,14 @@ impl MotionMonitor {
         }
     }
 
-    /// Forgets all references, because the pose has changed by something other than motion.
+    /// Removes all references, because the pose has changed without motion.
     pub fn restart(&mut self) {
         self.references.clear();
         self.suspicions = 0;
         self.confirmed = (self.last.map_or(f64::NEG_INFINITY, |it| it.time_s), 0);
     }
 
-    /// Forgets the odometry, too, because its time or distance starts again.
+    /// Removes the odometry as well, because its time or distance restarts.
     pub fn forget(&mut self) {
         self.last = None;
         self.standing_since_s = None;
@@ -154,7 +162,8 @@ impl MotionMonitor {
         self.restart();
     }
 
-    /// Takes in an odometry sample. Returns the fault of a stop or a reversal that no tyre can do.
+    /// Processes an odometry sample. Returns a fault if the speed stops or reverses faster than the
+    /// friction of tyres permits.
     pub fn odometry(&mut self, sample: &OdometrySample) -> Option<Fault> {
         let last = self.last.replace(*sample).unwrap_or(*sample);
         let duration_s = sample.time_s - last.time_s;
@@ -183,7 +192,8 @@ impl MotionMonitor {
         fault
     }
 
-    /// Whether the burst at a time (s) is to be received: at standstill now and then, and while a fault is suspected.
+    /// Whether the burst at `time_s` must be received: periodically at standstill, and while a
+    /// fault is suspected.
     pub fn wants(&self, time_s: f64) -> bool {
         let due = |since_s: f64| {
             self.received_s < since_s || time_s - self.received_s >= STANDSTILL_INTERVAL_S - 1e-5
@@ -191,13 +201,13 @@ impl MotionMonitor {
         self.suspicions > 0 || self.standing_since_s.is_some_and(due)
     }
 
-    /// Notes that the burst at a time (s) is received.
+    /// Records that the burst at `time_s` is received.
     pub const fn received(&mut self, time_s: f64) {
         self.received_s = time_s;
     }
 
-    /// Compares the angles of a burst with the odometry, given the pose at the newest of odometry and burst; `None`
-    /// while it is not known. Returns the fault that they show.
+    /// Compares the angles of a burst with the odometry. `pose` is the pose at the newer of
+    /// odometry and burst; `None` if it is unknown. Returns the detected fault.
     pub fn angles(&mut self, updates: &[AngleUpdate], pose: Option<Pose>) -> Option<Fault> {
         let last = self.last?;
         let mut burst = Burst::default();
@@ -206,7 +216,7 @@ impl MotionMonitor {
             if !(measured.phase_rad.is_finite() && measured.phase_sigma_rad.is_finite()) {
                 continue;
             }
-            // The pose at the time of the angle.
+            // Pose at the time of the angle.
             let ahead_m = (last.time_s - measured.time_s).max(0.0) * last.speed_mps;
             if measured.kind.is_at_head() && update.head.array.is_none() {
                 continue;
@@ -223,7 +233,7 @@ impl MotionMonitor {
             };
             self.compare(&seen, pose.is_some(), &mut burst);
         }
-        self.judge_odometry(&burst, last.time_s);
+        self.update_confirmation(&burst, last.time_s);
         if burst.bad == 1 {
             self.forget_jump(last.time_s);
         }
@@ -252,13 +262,13 @@ impl MotionMonitor {
             .find_map(|(which, fault)| exceeds(which).then_some(fault))
     }
 
-    /// Whether the odometry has agreed with the angles long enough that its fault has ended.
+    /// Whether the odometry has agreed with the angles long enough to end its fault.
     pub fn is_confirmed(&self, time_s: f64) -> bool {
         let (since_s, angles) = self.confirmed;
         time_s - since_s >= CONFIRMED_S && angles >= CONFIRMED_ANGLES
     }
 
-    /// Compares an angle with its radio head's reference, which is replaced once it has served.
+    /// Compares an angle with the reference of its radio head, which is replaced after use.
     fn compare(&mut self, seen: &BurstAngle, has_pose: bool, burst: &mut Burst) {
         let sends = |it: &Reference| it.head.sends(seen.head.pci, seen.head.ssb_index);
         let Some(place) = self.references.iter().position(sends) else {
@@ -286,7 +296,7 @@ impl MotionMonitor {
         };
         let mut next = reference;
         let mut has_served = false;
-        // The fading of the last centimetres before a stop is not that of the standstill.
+        // The fading of the last centimetres before a stop differs from that at standstill.
         let is_of_motion = |since_s: f64| reference.time_s < since_s;
         if reference.is_stale || (stands && self.standing_since_s.is_some_and(is_of_motion)) {
             has_served = true;
@@ -294,7 +304,7 @@ impl MotionMonitor {
             let variance = seen.variance + reference.variance + 2.0 * STANDING_SIGMA_RAD.powi(2);
             let change = change_rad(moved_m, turned_rad);
             let squared = change.powi(2) / variance;
-            // An angle confirms the standstill if continued motion would have changed it.
+            // An angle confirms the standstill if a continued motion would have changed it.
             let driven_rad = change_rad(self.moving_mps * age_s, 0.0);
             let is_distinct = wrap_angle(driven_rad - change).powi(2) / variance >= DISTINCT;
             burst.standing += 1;
@@ -368,7 +378,8 @@ impl MotionMonitor {
         }
     }
 
-    /// Removes the reference of the only radio head whose angle at standstill has jumped for long: it is obstructed.
+    /// Marks the reference of the only radio head for replacement if its angle at standstill has
+    /// jumped for [`JUMPED_S`]: the radio head may be obstructed.
     fn forget_jump(&mut self, now_s: f64) {
         let has_jumped =
             |it: &&mut Reference| it.jumped_s.is_some_and(|at_s| now_s - at_s > JUMPED_S);
@@ -378,18 +389,19 @@ impl MotionMonitor {
         }
     }
 
-    /// Whether the angles of a burst show motion while the odometry stands.
+    /// Whether the angles of a burst show motion although the odometry reports standstill.
     fn is_moving(burst: &Burst) -> bool {
         if burst.standing > 1 {
             return burst.sum - burst.largest > chi_squared(f64::from(burst.standing - 1));
         }
-        // The only radio head may be obstructed: under motion its angle jumps again and again.
+        // The only radio head may be obstructed. In motion, its angle jumps repeatedly.
         burst.sum > chi_squared(1.0) && burst.jumps >= SINGLE_JUMPS
     }
 
-    /// Notes whether the angles of a burst contradict or confirm the odometry.
-    fn judge_odometry(&mut self, burst: &Burst, now_s: f64) {
-        // While the odometry stands, the vehicle's motion changes the angles of near radio heads first.
+    /// Records whether the angles of a burst contradict or confirm the odometry.
+    fn update_confirmation(&mut self, burst: &Burst, now_s: f64) {
+        // If the odometry reports standstill, a motion of the vehicle first changes the angles of
+        // near radio heads.
         let is_wrong = burst.bad > 1 || (burst.bad == 1 && (burst.good == 0 || burst.standing > 0));
         if is_wrong {
             self.confirmed = (now_s, 0);
@@ -399,8 +411,9 @@ impl MotionMonitor {
     }
 }
 
-/// Threshold of the sum of this number of cumulative sums. The height of an excursion from zero has at most an
-/// exponential distribution (Wald), so that twice the sum of n heights has a χ² distribution with 2n degrees of freedom.
+/// Returns the threshold for the sum of `sums` cumulative sums. The height of an excursion from
+/// zero has at most an exponential distribution (Wald), so that twice the sum of n heights has a χ²
+/// distribution with 2n degrees of freedom.
 fn evidence_threshold(sums: f64) -> f64 {
     if sums > 1.0 {
         0.5 * chi_squared(2.0 * sums)
@@ -409,7 +422,8 @@ fn evidence_threshold(sums: f64) -> f64 {
     }
 }
 
-/// Quantile of the χ² distribution at the false-alarm rate of one test (Wilson and Hilferty 1931).
+/// Returns the quantile of the χ² distribution at the false-alarm rate of one test (Wilson and
+/// Hilferty 1931).
 fn chi_squared(freedom: f64) -> f64 {
     let share = 2.0 / (9.0 * freedom);
     freedom * (1.0 - share + QUANTILE * share.sqrt()).powi(3)

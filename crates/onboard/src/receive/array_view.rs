@@ -122,7 +122,7 @@ impl<const A: usize> Viewer<A> {
         self.calibration.gains().map(|gain| scale / gain)
     }
 
-    /// Returns the angle from `used`, together with all blocks.
+    /// Returns the angle from the blocks `used`, together with all blocks.
     fn seen(&self, used: &[[Complex64; A]], blocks: &[[Complex64; A]]) -> Option<View> {
         let angle = if let Some(finder) = &self.finder {
             FoundAngle::Direction(finder.estimate_pilots(used, Some(1.0)).ok()?)

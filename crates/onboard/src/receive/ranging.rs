@@ -11,16 +11,17 @@ use crate::observation::SsbRanging;
 /// Duration of an SSB over which its own frequency offset is measured, in symbols.
 const SSB_SYMBOLS: f64 = 4.0;
 
-/// Converter of observables to delays without the position of the SSB in its burst.
+/// Converter of observables to delays relative to the first SSB.
 ///
-/// A vehicle does not know when a cell transmits, except by its SSBs: delays are relative to the
-/// first one, modulo the period of the bursts, of which the nearest to the previous delay is taken.
+/// The transmission time of a cell is known only through its SSBs. Delays are therefore relative to
+/// the first SSB, after subtraction of the SSB's position in its burst, and modulo the burst
+/// period. The multiple of the period is chosen so that the delay is nearest to the previous one.
 pub(super) struct RangingClock {
     numerology: Numerology,
     case: Case,
     base_rate_hz: f64,
     period_s: f64,
-    /// Reception time of the first SSB without its position in the burst, and the last delay (s).
+    /// Reception time of the first SSB minus its position in the burst, and the last delay (s).
     origin_s: Option<f64>,
     last_s: f64,
 }

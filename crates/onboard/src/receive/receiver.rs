@@ -44,8 +44,8 @@ pub struct ReceiverConfig {
     pub array: ArraySettings,
     /// Cells that are received; `None` for all.
     pub cells: Option<Vec<u16>>,
-    /// Cell and index of every transmitted SSB, if known. While all of them are received, no search
-    /// takes place. Empty if unknown.
+    /// Cell and index of every transmitted SSB; empty if unknown. While all of them are received,
+    /// no search is made.
     pub beams: Vec<(u16, u8)>,
     /// Interval of the search for further cells, in seconds.
     pub search_every_s: f64,

@@ -26,18 +26,20 @@ use num_complex::Complex64;
 use super::despread::{Despread, FFT_SIZE, GROUP, GROUPS};
 use crate::manifold::ArrayManifold;
 
-/// Grid of time constants, in samples at the base rate.
+/// Grid of decay time constants, in samples at the base rate.
 const DECAYS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
 /// Range of the line of sight's delay relative to the delay of the maximum power, in samples.
 const EARLIEST: f64 = -1.0;
 const LATEST: f64 = 0.5;
-/// Number of delays for each time constant, and of subsequent bisections of their spacing.
+/// Number of delays on the grid for each time constant, and number of subsequent bisections of
+/// their spacing.
 const DELAYS: usize = 6;
 const HALVINGS: i32 = 4;
 /// Threshold of the channel variation in standard deviations of the noise: exceeded by one of 10⁵
 /// SSBs of a flat channel.
 const VARIES: f64 = 5.0;
-/// Noise of a group without known elements relative to that of an element: no information.
+/// Noise of a group without known elements, relative to that of an element; large, because the
+/// group contains no information.
 const UNKNOWN: f64 = 1e9;
 
 type Band = [Complex64; GROUPS];
@@ -61,8 +63,8 @@ pub fn line_of_sight<const A: usize>(
     finder: Option<&DirectionFinder<ArrayManifold<A>, A>>,
 ) -> Option<LineOfSight<A>> {
     let channel = Channel::new(despread, 0);
-    // A delayed PSS of another cell with the same sequence resembles a path, so that the PSS alone
-    // is not sufficient evidence.
+    // The PSS of another cell with the same sequence resembles a delayed path, so that the symbols
+    // without the PSS must vary as well.
     let others = Channel::new(despread, 1);
     let others = if others.known() > 0.0 {
         others

@@ -76,13 +76,13 @@ impl Live {
         } else if let Some(offset_s) = self.clocks.disagreement_s(newest) {
             (State::Unavailable, Reason::ClocksDisagree { offset_s })
         } else {
-            self.judge(&estimate, now_s)
+            self.state_and_reason(&estimate, now_s)
         };
         Ok(status)
     }
 
     /// Returns state and reason of a pose with valid odometry.
-    fn judge(&self, estimate: &PoseEstimate, now_s: f64) -> (State, Reason) {
+    fn state_and_reason(&self, estimate: &PoseEstimate, now_s: f64) -> (State, Reason) {
         if let Some(places) = self.onboard.searching() {
             let reason = match self.last_angle_s {
                 None => Reason::NoAngle,

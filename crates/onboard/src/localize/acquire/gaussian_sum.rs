@@ -320,7 +320,7 @@ impl GaussianSum {
     }
 
     /// Sets the noise model of another filter to that of the hypotheses.
-    pub(super) fn teach(&self, ekf: &mut Ekf) {
+    pub(super) fn copy_noise_model_to(&self, ekf: &mut Ekf) {
         if let Some(best) = self.hypotheses.first() {
             ekf.copy_noise_state(&best.ekf);
         }
@@ -417,8 +417,9 @@ impl GaussianSum {
         })
     }
 
-    /// Returns the odds of the search to another position at which that position no longer keeps the vehicle from
-    /// being located: its contribution to the variances of position and heading is that of a located vehicle.
+    /// Returns the odds of another position, the one of `ekf`, above which that position prevents
+    /// the result of the search from being reported. With these odds, the contribution of the
+    /// position to the variances of position and heading equals the limits for a located vehicle.
     pub(super) fn odds_to_neglect(&self, ekf: &Ekf) -> f64 {
         let (here, there) = (
             Self::mixture(&self.hypotheses, f64::NEG_INFINITY, 0.0),

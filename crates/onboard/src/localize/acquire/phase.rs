@@ -112,7 +112,8 @@ impl Phase {
             Self::Relocalizing { .. } if is_ahead && !by.has_moved => Transition::Stay,
             Self::Relocalizing { .. } if is_ahead && by.is_found => Transition::TakeOver,
             Self::Relocalizing { .. } if by.is_merged && by.is_found => Transition::TakeOver,
-            // The search of a doubtful start continues until one of both is decided.
+            // The search that verifies a doubtful start continues until the given start or another
+            // one is confirmed.
             Self::Relocalizing { .. }
                 if is_confirmed || (!is_ahead && by.is_found && !by.is_of_start) =>
             {

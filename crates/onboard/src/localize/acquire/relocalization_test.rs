@@ -20,8 +20,8 @@ const LEAST_WAY_M: f64 = 0.5;
 /// the angle over this distance.
 const INDEPENDENT_M: f64 = 10.0;
 
-/// Maximum duration of a search with angles and without a result (s). A wrong start is one error for
-/// about this time.
+/// Maximum duration of a search with angles and without a result (s). The error of a wrong start
+/// lasts for about this duration.
 pub(super) const PATIENCE_S: f64 = 20.0;
 
 /// Maximum interval between angles that counts as time with angles (s).
@@ -161,7 +161,7 @@ impl RelocalizationTest {
         }
         self.search.update(head, measured);
         if let Some(given) = &mut self.given {
-            self.search.teach(given);
+            self.search.copy_noise_model_to(given);
         }
     }
 

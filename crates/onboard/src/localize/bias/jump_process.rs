@@ -48,7 +48,7 @@ pub fn share(travelled_m: f64) -> f64 {
     (travelled_m / SOON_M).clamp(LEAST_SHARE, 1.0)
 }
 
-/// Level of a radio head's bias: the probability of each level, now and a priori.
+/// Level of a radio head's bias: the probability of each level, current and prior.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JumpProcess {
     pub(super) levels: [f64; LEVELS],
@@ -60,8 +60,8 @@ pub struct JumpProcess {
 pub struct JumpHypothesis {
     /// Probability of the hypothesis.
     pub share: f64,
-    /// Residual `r` (rad), and `E 1/S` and `E 1/S − r² Var 1/S` over the levels for its variance S
-    /// (1/rad²). The gain is `P Hᵀ E 1/S`, and the covariance is
+    /// Residual `r` (rad); mean `E 1/S` of the inverse innovation variance over the levels
+    /// (1/rad²); and `E 1/S − r² Var 1/S` (1/rad²). The gain is `P Hᵀ E 1/S`, and the covariance is
     /// `P − P Hᵀ (E 1/S − r² Var 1/S) H P`.
     pub residual: f64,
     pub gain: f64,

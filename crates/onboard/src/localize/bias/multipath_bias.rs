@@ -226,7 +226,7 @@ impl MultipathBias {
     }
 
     /// Updates state and biases with an angle to a radio head and its jump hypotheses.
-    pub fn take(
+    pub fn update_with_angle(
         &mut self,
         belief: &mut Belief,
         head: usize,
@@ -446,7 +446,7 @@ mod tests {
     ) {
         let seen = belief.innovation(rad - belief.mean[0], &row(), OWN_VARIANCE);
         let hypotheses = errors.weigh(head, travelled_m, &seen, &row()).unwrap();
-        errors.take(belief, head, travelled_m, &row(), &hypotheses, None);
+        errors.update_with_angle(belief, head, travelled_m, &row(), &hypotheses, None);
     }
 
     const ALL: usize = STATES + 2;

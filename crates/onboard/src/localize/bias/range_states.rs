@@ -82,7 +82,7 @@ impl MultipathBias {
                 (number(one), number(other), covariance)
             });
         }
-        // A carrier phase determines its offset at first, so that no prior is needed.
+        // The first carrier phase determines the phase offset, so that no prior is needed.
     }
 
     /// Adds the covariance of a property of the radio heads' clocks with the standard deviation
@@ -206,7 +206,8 @@ impl MultipathBias {
         }
     }
 
-    /// Adds to the variance of a range state: its value jumped by an unknown amount.
+    /// Adds `variance` to the variance of a range state, because its value jumped by an unknown
+    /// amount.
     pub fn add_jump(&mut self, number: usize, variance: f64) {
         self.add_to(number, number, variance);
     }
@@ -228,7 +229,7 @@ impl MultipathBias {
 
     /// Updates state, biases and range states with a range: the Kalman update of the whole
     /// Gaussian.
-    pub fn take_range(
+    pub fn update_with_range(
         &mut self,
         belief: &mut Belief,
         row: &[f64; STATES],

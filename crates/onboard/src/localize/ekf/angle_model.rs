@@ -147,15 +147,16 @@ pub(super) struct LineOfSight {
     pub range_m: f64,
     /// Cosine of the angle between the horizontal line of sight and the vehicle's forward axis.
     along: f64,
-    /// Steps of the array by each state, towards the radio head and to the left of that direction.
+    /// Derivatives of the array's position by each state, towards the radio head and to the left of
+    /// that direction.
     pub position_rows: [[f64; STATES]; 2],
-    /// Change in the bearing by each state.
+    /// Derivatives of the bearing by each state.
     pub bearing_row: [f64; STATES],
 }
 
 impl LineOfSight {
-    /// Line of sight from the array of a vehicle at `pose`; `None` if the radio head is above the array or within it,
-    /// where it has no bearing.
+    /// Creates the line of sight from the array of a vehicle at `pose`; `None` if the radio head is
+    /// directly above the array or inside it, where its bearing is undefined.
     pub fn new(
         head: &RadioHead,
         pose: Pose,
@@ -173,7 +174,7 @@ impl LineOfSight {
         }
         let bearing_rad = eye.bearing_rad(place);
         let (left, ahead) = (bearing_rad - frame.direction_rad).sin_cos();
-        // A turn on the spot moves the array.
+        // The array is not at the odometer's reference point, so that a heading change moves it.
         let (aside, along) = (bearing_rad - pose.heading_rad).sin_cos();
         let mut position_rows = [[0.0; STATES]; 2];
         position_rows[0][ALONG] = ahead * frame.stretch;
@@ -183,12 +184,12 @@ impl LineOfSight {
         position_rows[1][ACROSS] = ahead;
         position_rows[1][HEADING] = along * forward_m + aside * left_m;
         for entry in &mut position_rows {
-            // In a bend the heading changes with the distance.
+            // In a bend, the heading changes with the distance along the road.
             entry[ALONG] += frame.curvature_per_m * entry[HEADING];
         }
-        // A step to the left of the line of sight decreases the bearing.
+        // A displacement to the left of the line of sight decreases the bearing.
         let mut bearing_row = position_rows[1].map(|entry| -entry / ground_m);
-        // A step of the radio head east or north.
+        // Derivatives by a displacement of the radio head to the east and north.
         let (north, east) = bearing_rad.sin_cos();
         (bearing_row[DATUM[0]], bearing_row[DATUM[1]]) = (-north / ground_m, east / ground_m);
         Some(Self {
@@ -201,16 +202,17 @@ impl LineOfSight {
         })
     }
 
-    /// Cosine of the elevation.
+    /// Returns the cosine of the elevation.
     pub fn cos_elevation(&self) -> f64 {
         self.ground_m / self.range_m
     }
 }
 
 impl AngleModel {
-    /// Model of an angle of this kind to a radio head, at a vehicle at `pose` with the state `mean`. `None` if the
-    /// radio head is above the array or within it, and for an angle measured at a radio head without an array.
-    /// [`bend`](Self::bend) corrects the prediction for the curvature at short distances.
+    /// Creates the model of an angle of the given kind to a radio head, for a vehicle at `pose`
+    /// with the state `mean`. Returns `None` if the radio head is directly above the array or
+    /// inside it, and for an angle measured at a radio head without an array. [`bend`](Self::bend)
+    /// corrects the prediction for the curvature at short distances.
     pub fn of_kind(
         kind: MeasurementKind,
         head: &RadioHead,
@@ -260,14 +262,15 @@ impl AngleModel {
         turn[HEADING] -= 1.0;
         turn[MOUNTING] = -1.0;
         let mut row = turn.map(|turn| -slopes[0] * turn);
-        // A step towards the radio head increases its elevation: d cos ε = −sin² ε dρ/R.
+        // A displacement towards the radio head increases its elevation: d cos ε = −sin² ε dρ/R.
         let elevation_rate =
             by_cos_elevation * (1.0 - cos_elevation * cos_elevation) / sight.range_m;
         for (value, entry) in row.iter_mut().zip(sight.position_rows[0]) {
             *value -= elevation_rate * entry;
         }
         row[PHASE] = by_phase;
-        // A displacement of the radio head is the opposite displacement of the vehicle.
+        // A displacement of the radio head has the effect of the opposite displacement of the
+        // vehicle.
         let (north, east) = sight.bearing_rad.sin_cos();
         row[DATUM[0]] += elevation_rate * east;
         row[DATUM[1]] += elevation_rate * north;
@@ -286,10 +289,11 @@ impl AngleModel {
         })
     }
 
-    /// Azimuth of the vehicle's array in the frame of the array of a radio head: the bearing from the radio head to
-    /// the vehicle, minus the azimuth of the head's array. It does not depend on the heading, except by the offset of the
-    /// vehicle's array from the odometer's point. The scatter of the channel is part of the measurement's own standard
-    /// deviation, so that the aperture is infinite here.
+    /// Creates the model of an azimuth measured by the array of a radio head: the bearing from the
+    /// radio head to the vehicle minus the azimuth of that array's axis. It does not depend on the
+    /// heading, except through the offset of the vehicle's antenna from the odometer's reference
+    /// point. The standard deviation of the measurement already contains the scatter of the
+    /// channel, so that the aperture is infinite.
     fn at_head(
         head: &RadioHead,
         pose: Pose,
@@ -316,12 +320,12 @@ impl AngleModel {
     }
 
     /// Returns the effect of the second derivative `D` of ω for a state covariance P: the mean of ω
-    /// differs by `½ tr(D P)` from its value at the mean state, and its variance is larger by
-    /// `½ tr(D P D P)` (Jazwinski, Stochastic Processes and Filtering Theory, 9.3). With g the
-    /// derivative of α, r and t the steps along and across the line of sight and R its length,
-    /// `D = −2π (d/λ) (cos α · g gᵀ − sin α / R² · (r tᵀ + t rᵀ))` for a uniform linear array, and
-    /// `−(r tᵀ + t rᵀ) / R²` for an azimuth. These terms are those of the plane; of the elevation,
-    /// only its cosine is included.
+    /// differs by `½ tr(D P)` from its value at the mean state, and its variance is larger by `½
+    /// tr(D P D P)` (Jazwinski, Stochastic Processes and Filtering Theory, 9.3). With g the
+    /// derivative of α, r and t the derivatives of the position along and across the line of sight
+    /// and R its length, `D = −2π (d/λ) (cos α · g gᵀ − sin α / R² · (r tᵀ + t rᵀ))` for a uniform
+    /// linear array, and `−(r tᵀ + t rᵀ) / R²` for an azimuth. These are the terms of the plane;
+    /// the elevation contributes its cosine only.
     pub fn bend(&self, covariance: &Matrix<STATES>) -> SecondOrder {
         const BENT: [usize; 4] = [ALONG, ACROSS, HEADING, MOUNTING];
         let bent = |row: &[f64; STATES]| BENT.map(|state| row[state]);
@@ -476,7 +480,7 @@ mod tests {
             down[i] -= 1e-5;
             expected[state] = (see(up).phase_rad - see(down).phase_rad) / 2e-5;
         }
-        // Neither mounting nor phase of the vehicle's array matters.
+        // Mounting angle and phase of the vehicle's array have no effect.
         for (state, (expected, row)) in expected.iter().zip(model.row).enumerate() {
             assert!(
                 (expected - row).abs() < 1e-8,
@@ -510,7 +514,7 @@ mod tests {
             )
             .unwrap()
         };
-        // A covariance without any symmetry of its own.
+        // Full covariance without special structure.
         let factor = [
             [2.0, 0.0, 0.0, 0.0],
             [0.7, 1.5, 0.0, 0.0],

@@ -108,8 +108,8 @@ pub struct CorrelatedNoise {
     pub std_rad: f64,
     /// Maximum time-correlated fraction of each angle's own variance.
     pub share: f64,
-    /// Whether this fraction is estimated while driving. It is not where likelihoods are compared,
-    /// because different estimates would weight the same angle differently.
+    /// Whether this fraction is estimated while driving. It is constant where likelihoods are
+    /// compared, because different estimates would weight the same angle differently.
     pub is_found: bool,
     /// Correlation time (s).
     pub correlation_s: f64,
@@ -160,13 +160,12 @@ const UNSTATED_ARRAY_STD_RAD: [f64; 2] = [0.005, 0.02];
 struct Usual {
     odometer_scale_std: f64,
     odometer_m_per_sqrt_m: f64,
-    /// Wheels start late, creep, and have a non-zero output at standstill, so that the noise also
-    /// depends on time.
+    /// Noise over time: wheels start with a delay, creep, and have a non-zero output at standstill.
     odometer_m_per_sqrt_s: f64,
     /// Wheel grip varies with the floor.
     scale_per_sqrt_m: f64,
     mounting_std_rad: f64,
-    /// At walking pace, turns reveal a time offset.
+    /// At walking pace, a time offset is observable in turns only.
     angle_time_offset_std_s: f64,
     /// Prior probability of a time-correlated (multipath) bias of a radio head's angles.
     multipath_bias_probability: f64,
@@ -243,7 +242,8 @@ impl EkfConfig {
         } else {
             |it| it.scale_per_sqrt_m
         };
-        // A wider track than specified measures a smaller heading change.
+        // If the track is wider than specified, the measured heading change is smaller than the
+        // true one.
         let track_share = |width_m| odometer.track_width_std_m / width_m;
         let track_share = odometer.track_width_m.map_or(0.0, track_share);
         let mounting_is_unstated = array.mounting_std_rad.is_none() && !wheels;
@@ -312,7 +312,8 @@ impl EkfConfig {
             slip_acceleration_mps2: 10.0 * vehicle.acceleration_mps2,
             may_slip: false,
             speed_noise_mps: odometer.speed_noise_mps,
-            // A fast lane keeping oscillation is possible, whatever maximum yaw rate is configured.
+            // A fast oscillation of the lane keeping is possible even if a lower maximum yaw rate
+            // is configured.
             top_yaw_rate_radps: (vehicle.top_yaw_rate_radps)
                 .max(SIGMAS_OF_SWING * keeping.pull_per_m() * vehicle.top_speed_mps()),
             yaw_noise_rad_per_sqrt_m: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_m),

@@ -87,7 +87,7 @@ impl Ekf {
         let (aperture, direction_cosine) = (predicted.aperture, predicted.direction_cosine);
         let noise = unbiased.variance(sigma, predicted.elapsed_s, predicted.moved)
             + (self.config).scatter_variance(travelled_m, aperture, direction_cosine);
-        // A common error of many angles counts once.
+        // An error that is common to many angles counts once.
         let lasting = self.systematic_variance(&predicted);
         Some(ExcludedInnovation {
             innovation: Innovation {

@@ -8,9 +8,9 @@ use crate::gaussian::{CERTAIN_SIGMAS, identity};
 const LEAST_LANE_STD: f64 = 1e-6;
 
 impl Ekf {
-    /// Returns the current position off the map. Beyond an end, the road probably continues
-    /// straight, as the map does. In a gap it certainly does not follow the guess, so that a
-    /// doubtful position counts as in the gap.
+    /// Returns the current position off the map. Beyond an end of the road, the road probably
+    /// continues straight, as in the map. In a gap it does not follow the interpolated road, so
+    /// that an uncertain position counts as inside the gap.
     fn off_map(&self) -> Option<OffMap> {
         let map = self.map.as_deref()?;
         let along_m = self.belief.mean[ALONG];
@@ -40,12 +40,12 @@ impl Ekf {
             self.belief.covariance[CURVATURE][CURVATURE] = self.config.curvature_variance();
         } else if was_off && !is_off {
             self.forget_curvature();
-            self.take_the_lane();
+            self.apply_lane_constraint();
         }
     }
 
-    /// Whether the vehicle may be in its lane, with the probability required for the use of an
-    /// angle.
+    /// Whether the vehicle may be in its lane, with the probability that is required for the use of
+    /// an angle.
     fn is_in_lane(&self) -> bool {
         let lane = self.config.lane_keeping.stationary();
         ([ACROSS, HEADING].into_iter().zip(lane)).all(|(state, lane_variance)| {
@@ -65,11 +65,11 @@ impl Ekf {
         self.bias.moved(&forget);
     }
 
-    /// Applies the lane constraint as a measurement. The state may contain information from the
-    /// same lane, a short distance before: in each direction, in units of the lane's standard
-    /// deviations, in which the state is independent, the combination is at most the better of
-    /// both.
-    fn take_the_lane(&mut self) {
+    /// Applies the lane constraint as a measurement. The state may already contain the lane
+    /// constraint of a position a short distance before. Along each principal axis of the
+    /// normalised covariance of lateral offset and heading, the updated variance is therefore the
+    /// smaller one of the state's and the lane's.
+    fn apply_lane_constraint(&mut self) {
         let lane = self.config.lane_keeping.stationary();
         let [offset_m, heading_rad] = lane.map(|variance| variance.sqrt().max(LEAST_LANE_STD));
         let covariance = &self.belief.covariance;

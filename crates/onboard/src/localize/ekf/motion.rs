@@ -128,8 +128,8 @@ impl Step {
         let phi = keeping.transition(driven);
 
         let mut f = identity();
-        // With the distance by the speeds: the noise of an odometer measurement is part of the
-        // residual to the yaw rate, and must not be part of its weight.
+        // The Jacobian uses the distance by the speeds: the noise of the odometer distance is part
+        // of the residual with respect to the yaw rate, and must not change its weight.
         f[ALONG][ACROSS] = driven * cos * curvature_per_m * stretch * stretch;
         f[ALONG][HEADING] = -driven * sin * stretch;
         f[ALONG][SCALE] = -driven * cos * stretch / scale;
@@ -160,7 +160,7 @@ impl Step {
         }
         turn_row[HEADING] -= 1.0;
         turn_row[ALONG] = road.slope_per_m2 * driven * cos * stretch;
-        // The road turns farther by the part that the odometer did not measure.
+        // The heading of the road also changes over the distance that the odometer did not measure.
         let turn_shared = std::array::from_fn(|i| q[HEADING][i] + curvature_per_m * q[ALONG][i]);
         Self {
             turn_rad: curvature_per_m * (mean[ALONG] - start[ALONG]) + mean[HEADING]
@@ -226,7 +226,8 @@ impl Step {
         f[CURVATURE][CURVATURE] = kept;
 
         let mut q = [[0.0; STATES]; STATES];
-        // Noise of the curvature and its integral, the heading (a step is short relative to both).
+        // Noise of the curvature, and of the heading as its integral. A step is short relative to
+        // the correlation distance and to the radius.
         let fresh = bend.curvature_per_m.powi(2) * (1.0 - kept * kept);
         q[CURVATURE][CURVATURE] = fresh;
         q[HEADING][CURVATURE] = fresh * length / 2.0;
@@ -235,7 +236,7 @@ impl Step {
             fresh * length * length / 3.0 + bend.steering_rad_per_sqrt_m.powi(2) * distance;
         let mut turn_shared = q[HEADING];
         let mut turn_variance = q[HEADING][HEADING];
-        // Distance that the odometer did not measure has the same direction and curvature.
+        // The distance error of the odometer has the direction and the curvature of the path.
         let spread = walk.odometer_m_per_sqrt_m.powi(2) * distance;
         let by_metre = [
             (ALONG, cos * stretch),
@@ -283,8 +284,8 @@ impl Step {
         };
         let after = before.along_chord(length, turn_rad);
         let step = [after.x_m - before.x_m, after.y_m - before.y_m];
-        // A heading change rotates the chord by half of it; the change of its length is of second
-        // order.
+        // A heading change rotates the chord by half that change; its effect on the chord's length
+        // is of second order.
         let by_turn = [-0.5 * step[1], 0.5 * step[0]];
 
         let mut f = identity();
@@ -346,8 +347,8 @@ impl Step {
         belief.spread(&self.jacobian, &self.noise);
     }
 
-    /// Returns a measurement after this step as a measurement of the state before it: the row, and
-    /// the additional variance.
+    /// Converts a measurement row after this step to the state before the step. Returns the row,
+    /// and the additional variance due to the noise of the step.
     pub fn seen_before(&self, row: &[f64; STATES]) -> ([f64; STATES], f64) {
         let (mut before, mut variance) = ([0.0; STATES], 0.0);
         for i in 0..STATES {

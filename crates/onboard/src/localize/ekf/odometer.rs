@@ -63,8 +63,8 @@ impl SampleInterval {
         self.usual_s
     }
 
-    /// Returns the part of the time since the previous sample that a new sample describes, in
-    /// seconds: all of it, unless samples in between were lost.
+    /// Returns the duration for which a new sample is representative, in seconds: the time since
+    /// the previous sample, or the usual interval if samples in between were lost.
     pub fn covered_s(&mut self, duration_s: f64) -> f64 {
         if self.usual_s == 0.0 {
             self.usual_s = duration_s;
@@ -76,7 +76,7 @@ impl SampleInterval {
         };
         let longer = f64::from(u8::from(duration_s > self.usual_s));
         let shorter = f64::from(u8::from(duration_s < self.usual_s));
-        // At a quantile, the weights above and below balance.
+        // At the quantile, the weighted changes in both directions balance.
         self.usual_s *= 1.0 + GAIN * (QUANTILE * longer - (1.0 - QUANTILE) * shorter);
         covered_s
     }

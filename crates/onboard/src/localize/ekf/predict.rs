@@ -12,7 +12,8 @@ use crate::settings::DriveKind;
 /// Maximum step with constant curvature of the road (m).
 const STEP_M: f64 = 1.0;
 
-/// Maximum number of steps: after a kilometre without odometry, nothing is known of bends.
+/// Maximum number of steps per sample. After a kilometre without odometry, the number of bends is
+/// unknown anyway.
 pub(super) const MOST_STEPS: f64 = 1000.0;
 
 /// Speeds above this multiple of the vehicle's top speed are replaced by it.
@@ -23,7 +24,8 @@ const WILD: f64 = 10.0;
 const SIGMAS_OF_SLIP: f64 = 5.0;
 pub(in crate::localize) const MOST_SLIP: f64 = 0.3;
 
-/// Range of the ratio of distance by the speeds to measured distance in which the former is used.
+/// Range of the ratio between the distance by the speeds and the measured distance in which the
+/// distance by the speeds is used.
 const DRIVEN_BY_READ: [f64; 2] = [0.5, 1e3];
 
 /// Random walk of the odometer scale if slip without a jump of the speed is possible (per √m).
@@ -82,11 +84,12 @@ impl Ekf {
         let read_radps = sample.yaw_rate_radps;
         let credible = |rate: &f64| rate.abs() <= self.config.top_yaw_rate_radps;
         let refused = read_radps.filter(|rate| !credible(rate));
-        // The vehicle continues its turn, or changes it within physical limits.
+        // If the yaw rate was rejected, the vehicle continues its turn, or changes it within
+        // physical limits.
         let rate = read_radps.filter(credible);
         let before = previous.yaw_rate_radps.filter(credible);
         let rate = rate.or(before.filter(|_| refused.is_some()));
-        // If samples were lost, the turn is unknown until the last of them was due.
+        // If samples were lost, the yaw rate is unknown until the last of the lost samples was due.
         let covered_s = self.sample_interval.covered_s(duration_s);
         let lost_s = duration_s - covered_s;
         let mut covered = reading;
@@ -102,7 +105,8 @@ impl Ekf {
             if refused.is_some() {
                 yaw.variance += (REFUSED_RADPS * covered_s).powi(2);
             } else if self.follows_yaw_rate() {
-                // The time of the rate's change between two samples is uniformly distributed.
+                // The yaw rate changed at an unknown time between two samples, which is uniformly
+                // distributed.
                 yaw.variance += change_rad * change_rad / 12.0;
             }
             yaw
@@ -154,10 +158,10 @@ impl Ekf {
         });
     }
 
-    /// Returns the measured distance, and the distance by the speeds. A measurement that is short
-    /// by chance, or by the increments of the wheel counter, is not more precise. With noise in
-    /// proportion to it, the odometer would be preferred to the yaw rate whenever it measures too
-    /// little.
+    /// Returns the measured distance and the distance by the speeds, which determines the noise. A
+    /// measured distance that is too short by chance, or because of the counter's resolution, is
+    /// not more precise. With noise in proportion to the measured distance, the odometer would
+    /// dominate the yaw rate whenever it measures too little.
     fn reading(&mut self, read_m: f64, driven_m: f64) -> Reading {
         self.unread_m += driven_m;
         if read_m == 0.0 {

@@ -46,7 +46,7 @@ pub(in crate::localize) struct PredictedMeasurement {
     pub excluded: bool,
     pub place_m: f64,
     pub row: [f64; STATES],
-    /// Innovation without the time-correlated bias, if that is estimated.
+    /// Innovation without the time-correlated bias, if the bias is estimated.
     pub innovation: Innovation,
     /// Variance of the angle's own noise (rad²).
     pub own_variance: f64,
@@ -54,7 +54,8 @@ pub(in crate::localize) struct PredictedMeasurement {
     pub aperture: f64,
     pub direction_cosine: f64,
     pub survey_variance: f64,
-    /// Time, distance and heading change since the previous update with the radio head (s, m, rad).
+    /// Time (s), distance (m) and heading change (rad) since the previous update with the radio
+    /// head.
     pub elapsed_s: f64,
     pub moved: (f64, f64),
     /// Variance due to odometry since its newest sample, and due to second-order terms of the
@@ -119,8 +120,8 @@ impl Ekf {
         let travelled_m = place_m - head.last_update_m;
         let shared = (self.config).shared_variance(travelled_m, &angle_model);
         let elapsed_s = measured.time_s - head.last_update_s;
-        // A turn of the vehicle shows the radio head to another part of its array, but not the vehicle to another part
-        // of the head's.
+        // A turn of the vehicle changes the direction relative to the vehicle's array, but not
+        // relative to the array of a radio head.
         let turned_rad = match measured.kind {
             MeasurementKind::Angle => self.turned_rad - head.last_update_rad,
             MeasurementKind::AngleAtHead => 0.0,
@@ -209,7 +210,8 @@ impl Ekf {
         Some(angle_model)
     }
 
-    /// Probability that an angle of this kind is of another lobe of the vehicle's array, where that is not negligible.
+    /// Returns the probability that an angle of this kind belongs to another lobe of the vehicle's
+    /// array, unless it is negligible.
     const fn wrong_lobe(&self, kind: MeasurementKind) -> Option<f64> {
         match kind {
             MeasurementKind::Angle => self.config.wrong_lobe,
@@ -258,22 +260,22 @@ impl Ekf {
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
     }
 
-    /// Updates state and biases with an angle. A large deviation is an outlier; that of a radio
-    /// head with a known large bias contains no information about the vehicle.
+    /// Updates state and biases with an angle. A large deviation is an outlier. A large deviation
+    /// of a radio head with a known large bias contains no information about the vehicle.
     fn update_with_bias(
         &mut self,
         predicted: &PredictedMeasurement,
         hypotheses: &JumpHypotheses,
         measured: &AngleMeasurement,
     ) -> UpdateResult {
-        // Gated with the maximum bias variance added.
+        // The gate includes the maximum variance of the bias.
         let mut seen = predicted.innovation;
         seen.variance += MOST_VARIANCE;
         let mahalanobis2 = seen.mahalanobis2();
         let is_known = self.bias.is_large(predicted.head);
         let before = self.belief.mean;
         let (distance_m, journal) = (predicted.moved.0.abs(), self.journal.as_mut());
-        (self.bias).take(
+        (self.bias).update_with_angle(
             &mut self.belief,
             predicted.head,
             distance_m,
@@ -292,46 +294,46 @@ impl Ekf {
     pub(super) fn correlated_noise(&self) -> CorrelatedNoise {
         let mut bias = self.config.correlated_noise;
         if bias.is_found {
-            bias.share = self.white.stays(bias.share);
+            bias.share = self.white.correlated_fraction(bias.share);
         }
         bias
     }
 
-    /// Learns the time-correlated fraction of a radio head's noise; `before` is the state before
+    /// Updates the time-correlated fraction of a radio head's noise; `before` is the state before
     /// the update.
-    fn learn_what_stays(&mut self, predicted: &PredictedMeasurement, before: &[f64; STATES]) {
+    fn update_white_fraction(&mut self, predicted: &PredictedMeasurement, before: &[f64; STATES]) {
         let stated = self.config.correlated_noise;
         let Some(head) = self.heads.get_mut(predicted.head) else {
             return;
         };
         if !(stated.is_found && stated.share > 0.0) {
-            return; // nobody asks
+            return; // the fraction is not estimated
         }
         let corrected = self.belief.mean.iter().zip(before).zip(&predicted.row);
         let corrected_rad: f64 = corrected
             .map(|((now, before), by)| by * (now - before))
             .sum();
-        let stays = stated.steps(predicted.elapsed_s, predicted.moved) < 1.0;
+        let is_correlated = stated.steps(predicted.elapsed_s, predicted.moved) < 1.0;
         let mut residual = Residual {
             residual_rad: predicted.innovation.residual,
             variance: predicted.own_variance,
         };
-        if let (true, Some(last)) = (stays, &head.last_residual) {
+        if let (true, Some(last)) = (is_correlated, &head.last_residual) {
             self.white.see(last, &residual);
         }
         residual.residual_rad -= corrected_rad;
         head.last_residual = Some(residual);
     }
 
-    /// Records the time and position of an update with a radio head, and learns from its angle,
-    /// which has updated the state `before`.
+    /// Records the time and position of an update with a radio head, and estimates its noise from
+    /// the angle; `before` is the state before the update.
     fn note_update(
         &mut self,
         predicted: &PredictedMeasurement,
         measured: &AngleMeasurement,
         before: &[f64; STATES],
     ) {
-        self.learn_what_stays(predicted, before);
+        self.update_white_fraction(predicted, before);
         self.keep_bounds();
         if let Some(head) = self.heads.get_mut(predicted.head) {
             head.kind = measured.kind;
@@ -373,8 +375,8 @@ mod tests {
         let normal =
             |x: f64, variance: f64| (-0.5 * x * x / variance).exp() / (TAU * variance).sqrt();
         for measured in [0.0, 0.6, 1.1, -1.4] {
-            // Bayes' rule by numerical integration over the state: correct, or anywhere on the
-            // circle.
+            // Bayes' rule by numerical integration over the state: the angle is correct, or
+            // uniformly distributed.
             let mut moments = [0.0; 3];
             for step in -60_000..60_000 {
                 let x = 1e-4 * f64::from(step);

@@ -5,9 +5,10 @@ use crate::geometry::wrap_angle;
 /// Number of differences that the prior counts as.
 const PRIOR_PAIRS: u32 = 16;
 
-/// Minimum weight of the newest difference: the estimate is kept for some minutes. It is common to
-/// all radio heads, because it belongs to their receiver; the differences of a single one would
-/// take as many times longer.
+/// Minimum weight of the newest difference, so that the estimate has a memory of some minutes. The
+/// estimate is common to all radio heads, because it is a property of the receiver; with the
+/// differences of one radio head only, its convergence would be slower in proportion to the number
+/// of radio heads.
 const LEAST_WEIGHT: f64 = 1.0 / 2048.0;
 
 /// Maximum squared deviation of a difference, and the mean square of a normal distribution
@@ -36,15 +37,15 @@ pub(super) struct Residual {
 
 impl WhiteNoiseFraction {
     /// Creates the estimate with a prior of the time-correlated fraction.
-    pub const fn new(stays: f64) -> Self {
+    pub const fn new(correlated_fraction: f64) -> Self {
         Self {
-            share: 1.0 - stays,
+            share: 1.0 - correlated_fraction,
             pairs: 0,
         }
     }
 
     /// Returns the time-correlated fraction, limited to `most`.
-    pub const fn stays(&self, most: f64) -> f64 {
+    pub const fn correlated_fraction(&self, most: f64) -> f64 {
         (1.0 - self.share).clamp(0.0, most)
     }
 
@@ -77,11 +78,12 @@ mod tests {
     fn found(share: f64, kept: f64, outliers: f64) -> WhiteNoiseFraction {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let (mut white, mut last) = (WhiteNoiseFraction::new(0.25), None);
-        let mut stays: f64 = rng.sample(StandardNormal);
+        let mut correlated_fraction: f64 = rng.sample(StandardNormal);
         for _ in 0..2000 {
             let [new, own]: [f64; 2] = [rng.sample(StandardNormal), rng.sample(StandardNormal)];
-            stays = kept * stays + (1.0 - kept * kept).sqrt() * new;
-            let mut residual_rad = STD_RAD * (share.sqrt() * stays + (1.0 - share).sqrt() * own);
+            correlated_fraction = kept * correlated_fraction + (1.0 - kept * kept).sqrt() * new;
+            let mut residual_rad =
+                STD_RAD * (share.sqrt() * correlated_fraction + (1.0 - share).sqrt() * own);
             if rng.random::<f64>() < outliers {
                 residual_rad = rng.random_range(-3.0..3.0);
             }
@@ -108,8 +110,8 @@ mod tests {
                 let (white, expected) = (found(share, kept, outliers).share, 1.0 - share * kept);
                 let scatter = 3.0 * (3.0 / 2000f64).sqrt() * expected;
                 let by_prior = f64::from(PRIOR_PAIRS) / 2000.0 * (0.75 - expected).abs();
-                // Their number has a standard deviation of its square root: a mean of a third of
-                // the limit, and a mean square of a fifth of its square.
+                // The number of outliers has a Poisson distribution: its standard deviation is its
+                // square root. Each adds a third of the limit on average.
                 let within = 2.0 * outliers * within_cut * 2000.0;
                 let by_outliers = (within / 3.0 + 3.0 * (within / 5.0).sqrt()) * MOST / 2000.0;
                 let most = scatter + (1.0 - OF_MOST) * expected + by_prior + by_outliers;
@@ -120,8 +122,11 @@ mod tests {
 
     #[test]
     fn the_correlated_fraction_does_not_exceed_the_configured_maximum() {
-        assert_eq!(WhiteNoiseFraction::new(0.25).stays(0.25), 0.25);
-        assert_eq!(found(0.8, 0.98, 0.0).stays(0.25), 0.25);
-        assert!(found(0.0, 0.0, 0.0).stays(0.25) < 0.12);
+        assert_eq!(
+            WhiteNoiseFraction::new(0.25).correlated_fraction(0.25),
+            0.25
+        );
+        assert_eq!(found(0.8, 0.98, 0.0).correlated_fraction(0.25), 0.25);
+        assert!(found(0.0, 0.0, 0.0).correlated_fraction(0.25) < 0.12);
     }
 }

@@ -189,13 +189,13 @@ impl IntegrityMonitor {
         let odometry_s = self.ekf().time_s();
         let (solution_id, before) = (self.solution_id(), self.ekf().pose(odometry_s));
         let verdict = update(&mut self.bank);
-        self.bank.judge(self.now_s);
+        self.bank.update_exclusions(self.now_s);
         if let Some(bank) = self.bank.rebased(self.now_s) {
             (self.bank, self.restarted) = (bank, None);
         }
         if let Some(restarted) = &mut self.restarted {
             update(&mut restarted.bank);
-            restarted.bank.judge(self.now_s);
+            restarted.bank.update_exclusions(self.now_s);
         }
         self.recover();
         self.hold_departure();
@@ -206,13 +206,14 @@ impl IntegrityMonitor {
         verdict
     }
 
-    /// Returns the identity of the solution: hypothesis, number of excluded radio heads, restart.
+    /// Returns the identity of the solution: hypothesis, number of excluded radio heads, time of
+    /// the restart.
     fn solution_id(&self) -> (SelectedHypothesis, usize, f64) {
         (self.bank.selected(), self.bank.faulty(), self.begun_s)
     }
 
-    /// Remembers a contradiction of the odometer scale until a filter has estimated the scale,
-    /// which a restarted filter has not.
+    /// Keeps the state that the odometer scale contradicts its specification until a filter has
+    /// estimated the scale. A restarted filter has not.
     fn hold_departure(&mut self) {
         let main = self.bank.nominal();
         self.has_departed =
@@ -356,8 +357,8 @@ mod tests {
 
     #[test]
     fn the_new_solution_covers_the_previous_one() {
-        // The odometer measures 1.5 times the distance, and a radio head is blocked later: neither
-        // explains the other.
+        // The odometer measures 1.5 times the distance, and a radio head is received by a
+        // reflection later. Neither fault explains the other.
         const READS: f64 = 1.5;
         const HIDDEN_S: f64 = 8.0;
         const OFF_RAD: f64 = -0.6;
@@ -418,7 +419,8 @@ mod tests {
             let is_wide = integrity.protection_level_m > settings.alert_limit_m;
             assert!(is_ok || is_wide, "{time_s} s: {integrity:?}");
         }
-        // The mode has become the nominal one, so that the bank has no other filter for it.
+        // The selected mode has become the nominal one, so that the bank has no separate filter for
+        // it.
         let selected = monitor.bank().selected();
         assert_eq!(selected, SelectedHypothesis::UncalibratedArray);
         assert!(monitor.bank().rebased(60.0).is_none());

@@ -136,7 +136,7 @@ impl Hypothesis {
 fn exp_of_negative(x: f64) -> f64 {
     /// 1.5 · 2⁵²: added to a number, it leaves the nearest integer in the lowest bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
-    /// Below about −708 the result is not a normal number.
+    /// Below about −708, the result is a subnormal number.
     const LEAST: f64 = -700.0;
     const TAYLOR: [f64; 7] = [
         1.0 / 720.0,
@@ -380,7 +380,7 @@ mod tests {
         );
     }
 
-    /// The fraction of drawn positions beyond the level equals the risk.
+    /// The fraction of simulated positions beyond the level equals the risk.
     #[test]
     fn hypotheses_share_the_risk() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -411,7 +411,8 @@ mod tests {
                 beyond[1] += u32::from(x.abs() > found.along_m);
                 beyond[2] += u32::from(y.abs() > found.across_m);
             }
-            // 2000 ± 45 by counting; rounding up by 0.2 %, and the bound of the tail, subtract 4 %.
+            // Expected count 2000 ± 45. Rounding up (0.2 %) and the bound of the tail reduce it by
+            // up to 4 %.
             for share in beyond.map(|count| f64::from(count) / (f64::from(draws) * risk)) {
                 assert!(
                     (0.89..1.07).contains(&share),

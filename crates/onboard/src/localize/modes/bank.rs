@@ -65,7 +65,7 @@ impl ModeFilter {
         modes.map(|mode| Self::new(mode, given, faults)).collect()
     }
 
-    /// Returns the part that is retained with another nominal filter.
+    /// Returns the part of the mode that is retained when another filter becomes the nominal one.
     fn carry(
         &mut self,
         carry: Carry,
@@ -81,7 +81,7 @@ impl ModeFilter {
         }
     }
 
-    /// Returns the odds of the mode to the nominal mode.
+    /// Returns the posterior odds of the mode relative to the nominal mode.
     fn odds(&self) -> f64 {
         self.ratio.odds(self.prior)
     }
@@ -408,7 +408,7 @@ impl Bank {
             if subset.without == [number; 2] {
                 self.noise.see(number, &seen);
             }
-            // At standstill, scatter is one measurement however often it is repeated.
+            // At standstill, repeated measurements have identical scatter and count as one.
             if seen.innovation.measurement_variance < 1.0 {
                 for (mine, test) in subset.without.iter().zip(&mut subset.tests) {
                     if *mine == number {
@@ -435,9 +435,9 @@ impl Bank {
         now_s - self.lost_s
     }
 
-    /// Excludes the faulty radio head if two others remain that agree without it, and readmits
-    /// radio heads that have become consistent again.
-    pub fn judge(&mut self, now_s: f64) {
+    /// Excludes the faulty radio head if at least two others remain and are consistent without it.
+    /// Readmits radio heads that have become consistent again.
+    pub fn update_exclusions(&mut self, now_s: f64) {
         for head in 0..self.heads.len() {
             let disagrees = self.statistic(head) > CLEARED;
             let Some(disagreed_s) = self.disagreed_s.get_mut(head) else {
@@ -449,8 +449,8 @@ impl Bank {
                 self.readmit(head);
             }
         }
-        // The exclusion of a wrong radio head is a fault itself, and must have the probability of
-        // the risk under a fault.
+        // The exclusion of a fault-free radio head is itself a fault; its probability must not
+        // exceed the risk under a fault.
         let head = self.settings.fault_probability.of_radio_head(false);
         let risk = (self.settings.risk_per_epoch() / head).min(MOST_UNDER_FAULT);
         let odds = -2.0 * risk.ln();
@@ -462,9 +462,9 @@ impl Bank {
         }
     }
 
-    /// Returns the faulty radio head if it is sufficiently more probable than any other: without
-    /// it, the maximum statistic of the others is below that without any other radio head by
-    /// `odds`, in twice the log-likelihood ratio.
+    /// Returns the faulty radio head if it is sufficiently more probable than every other one: the
+    /// maximum statistic of the others without it is lower, by at least `odds`, than without any
+    /// other radio head. Both are twice the log-likelihood ratio.
     fn faulty_head(&self, odds: f64) -> Option<usize> {
         let watched = || {
             self.sound()
@@ -488,7 +488,7 @@ impl Bank {
         (sure && least < DETECTED && self.statistic(head) > DETECTED).then_some(head)
     }
 
-    /// Returns the maximum statistic of a fault-free radio head without `left_out`.
+    /// Returns the maximum statistic of the fault-free radio heads if `left_out` is excluded.
     fn disagreement_without(&self, left_out: usize) -> f64 {
         (self.subsets.iter())
             .filter(|subset| !subset.is_of_one() && subset.lacks(left_out))

@@ -21,14 +21,14 @@ impl Ekf {
 /// Fraction of outliers with a uniformly distributed direction, unless scatter causes more.
 const OUTLIERS: f64 = 2e-3;
 
-/// Minimum odds to the nominal mode for the selection of a mode. The level covers every hypothesis,
-/// selected or not. With lower odds the position alternates between filters, which reduces
-/// availability (K = 5 dB: 91 instead of 94 %).
+/// Minimum odds to the nominal mode for the selection of a mode. The protection level covers every
+/// hypothesis, whether selected or not. With lower odds, the position alternates between filters,
+/// which reduces the availability (K = 5 dB: 91 % instead of 94 %).
 pub(super) const LEAST_ODDS: f64 = 100.0;
 
 /// Log-likelihood ratio at which a sequential test is decided, with an error probability of one in
-/// three million (e⁻¹⁵; Wald 1945), that of a radio head fault. Ratios of modes are limited to it,
-/// because further evidence must be forgotten eventually.
+/// three million (e⁻¹⁵; Wald 1945), the prior probability of a radio head fault. The ratios of
+/// modes are limited to it, so that later evidence can reverse the decision.
 pub(in crate::localize) const CERTAIN: f64 = 15.0;
 
 /// Log-likelihood ratio of a physically impossible jump of the speed: wheel slip, unless the
@@ -103,7 +103,7 @@ impl LikelihoodRatio {
         Self(self.0.max(other.0))
     }
 
-    /// Subtracts the excess of the largest ratio over certainty, so that any other mode can still
+    /// Subtracts the excess of the largest ratio over [`CERTAIN`], so that any other mode can still
     /// be selected later.
     pub const fn limit_by(&mut self, most: Self) {
         self.0 = (self.0 - (most.0 - CERTAIN).max(0.0)).max(-CERTAIN);
@@ -144,9 +144,9 @@ pub(in crate::localize) fn log_likelihood(
 }
 
 /// Returns the log-likelihood in which the uncertainty of a hypothesis reduces it: second-order
-/// terms and odometry are part of the prediction, not of the angle's noise. With
-/// [`Self::relative_log_likelihood`], a hypothesis that is uncertain enough to explain everything
-/// is not penalised.
+/// terms and odometry are part of the prediction, not of the angle's noise. In contrast,
+/// [`Self::relative_log_likelihood`] does not penalise a hypothesis that is so uncertain that it
+/// agrees with any angle.
 pub(in crate::localize) fn log_likelihood_as_stated(
     ekf: &Ekf,
     predicted: &Result<PredictedMeasurement, UpdateReason>,
@@ -185,9 +185,9 @@ pub(super) fn information_fraction(ekf: &Ekf, predicted: &PredictedMeasurement) 
     conditional_fraction(ekf, predicted)
 }
 
-/// Returns the fraction of an angle that is independent given the estimated biases: all of it, if
-/// the filter estimates them. The short-lived error is not reduced. For short sequential tests with
-/// a threshold that is measured for it.
+/// Returns the fraction of an angle that is independent given the estimated biases: 1 if the filter
+/// estimates biases. The short-lived error is not considered. This fraction is used by short
+/// sequential tests, whose threshold was measured with it.
 pub(super) fn conditional_fraction(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
     if predicted.hypotheses.is_some() {
         return 1.0;

@@ -89,7 +89,8 @@ impl NoiseScale {
         Self { heads, ..*self }
     }
 
-    /// Adds an angle to radio head number `head`. Within a wavelength, scatter is identical.
+    /// Adds an angle of radio head number `head`. Within a wavelength, scatter is identical, so
+    /// that the angle is ignored.
     pub fn see(&mut self, head: usize, now: &ExcludedInnovation) {
         let Some(head_noise) = self.heads.get_mut(head) else {
             return;
@@ -158,7 +159,7 @@ mod tests {
         }
     }
 
-    /// Angles at a given distance in wavelengths, with these residuals.
+    /// Returns the estimate for angles with these residuals, at equal distances in wavelengths.
     fn estimated(apart_wavelengths: f64, mut residual_rad: impl FnMut(i32) -> f64) -> NoiseScale {
         let mut noise = NoiseScale::new(1);
         for number in 0..2000 {
@@ -171,7 +172,7 @@ mod tests {
         noise
     }
 
-    /// Angles with residuals that alternate around a mean.
+    /// Returns the ratio for residuals that alternate around a mean.
     fn after(mean_rad: f64, by_rad: f64, apart_wavelengths: f64) -> f64 {
         let sign = |number: i32| f64::from(1 - 2 * (number % 2));
         estimated(apart_wavelengths, |number| mean_rad + sign(number) * by_rad).ratio()
@@ -205,7 +206,8 @@ mod tests {
                 );
             }
         }
-        // Nearly one of twelve differences contains an outlier: each adds its limited square.
+        // Nearly one of twelve differences contains an outlier, which contributes the limited
+        // square.
         assert!(
             core < 1.3 * 4.0 && with_tails > 1.3 * 4.0,
             "{core} {with_tails}"
@@ -218,7 +220,7 @@ mod tests {
         // Differences of 0.4 rad, with an expected 0.14 rad: 8 times the variance.
         let ratio = after(0.5, 0.2, 2.0);
         assert!((ratio - 8.0).abs() < 0.5, "{ratio}");
-        // A slow vehicle receives the same scatter again.
+        // A slow vehicle receives identical scatter repeatedly.
         assert_eq!(after(0.0, 0.2, 1e-3), 1.0);
     }
 

@@ -7,20 +7,23 @@ use crate::localize::ekf::Ekf;
 use crate::localize::out_of_sequence::AngleUpdate;
 use crate::observation::OdometrySample;
 
-/// Noise of the free filter's distance in m/√m. At 2 m/s it permits 0.17 m from one burst to the next, more than the
-/// 0.08 m by which a vehicle that stops differs from its odometry. Half of it delays the detection by 0.1 s.
+/// Noise of the free filter's distance in m/√m. At 2 m/s it permits a deviation of 0.17 m between
+/// two bursts. A vehicle that stops without the odometry's notice deviates by 0.08 m. Half of this
+/// noise delays the detection by 0.1 s.
 const FREE_M_PER_SQRT_M: f64 = 0.6;
-/// Threshold of the cumulative log-likelihood ratio: false-alarm rate 1e-3 for each excursion from zero (Wald). Together
-/// with the suspicion, which counts as evidence of 1e-3 although its own false-alarm rate is 1e-6, the rate is 1e-6.
+/// Threshold of the cumulative log-likelihood ratio: false-alarm rate 1e-3 for each excursion from
+/// zero (Wald). The test starts only after a suspicion with a false-alarm rate of at most 1e-3, so
+/// that the combined rate is at most 1e-6.
 const EVIDENCE: f64 = 6.9;
-/// Minimum distance between the poses of the filters in metres: errors of the angles that the filters do not model,
-/// such as strong multipath, stay below it.
+/// Minimum distance between the positions of both filters in metres. Angle errors that the filters
+/// do not model, such as strong multipath, cause smaller distances.
 const LEAST_M: f64 = 0.5;
-/// Maximum number of odometry samples that wait for a burst.
+/// Maximum number of odometry samples that are stored until the next burst.
 const MOST_WAITING: usize = 256;
 
-/// Two filters with equal start: one is driven by the odometry, the other one has a noise that permits any motion. Both
-/// model the correlated errors of the angles. A cumulative sum (Page 1954) compares the likelihoods of the angles.
+/// Two filters with a common start: one is predicted by the odometry; the other one has process
+/// noise that permits any motion. Both model the correlated errors of the angles. A cumulative sum
+/// (Page 1954) compares the likelihoods of the angles.
 #[derive(Debug, Clone)]
 pub struct OdometryTest {
     driven: Ekf,

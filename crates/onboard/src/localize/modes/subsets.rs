@@ -1,10 +1,11 @@
-//! Filters without one or two of the recently received radio heads, each with the tests of those
-//! radio heads: whether their angles agree with all other measurements.
+//! Filters without one or two of the recently received radio heads. Each filter has a test of every
+//! radio head that it does not use: whether the angles of that radio head agree with all other
+//! measurements.
 //!
 //! The filters without a radio head start at its first angle, as copies of filters that have used
 //! all others; before, they would be identical. They end if the radio head has not been received
-//! recently and others have, so that the cost depends on the radio heads in range, not on those of
-//! the site.
+//! recently and others have. The cost therefore depends on the number of radio heads in range, not
+//! on the number in the site.
 
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::Innovation;
@@ -68,11 +69,12 @@ impl HeadTest {
     }
 }
 
-/// Number of angles, of all radio heads, within which a radio head counts as recently received.
+/// Number of angles of all radio heads after which a radio head no longer counts as recently
+/// received.
 const LATELY: u64 = 32;
 
-/// Number of radio heads that keep their filters independent of the time since reception, because
-/// their previous angles may still contribute.
+/// Number of radio heads whose filters are kept regardless of the time since reception, because
+/// their previous angles may still contribute to the position.
 const LEAST_WATCHED: usize = 4;
 
 /// Minimum number of radio heads for filters without two of them: with two radio heads, the faulty one cannot be

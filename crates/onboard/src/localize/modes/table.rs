@@ -23,11 +23,11 @@ pub(in crate::localize) enum Carry {
 #[derive(Debug)]
 pub(in crate::localize) struct Mode {
     pub id: SelectedHypothesis,
-    /// Whether the mode is monitored, given this nominal filter.
+    /// Whether the mode is monitored, for a given nominal filter.
     pub applies: fn(&Ekf, &FaultProbability) -> bool,
     /// Prior probability.
     pub prior: fn(&EkfConfig, &FaultProbability) -> f64,
-    /// Modification of the nominal filter.
+    /// Changes that turn a copy of the nominal filter into the filter of the mode.
     pub alter: fn(&mut Ekf),
     /// Adaptation of the filter to the measured variance of the angles, as a multiple of the
     /// specified one.
@@ -35,8 +35,8 @@ pub(in crate::localize) struct Mode {
     /// Whether the mode is a fault; radio heads are then monitored for a second fault with the
     /// probability that no fault mode holds.
     pub is_fault: bool,
-    /// Restart of the filter when the vehicle starts to move or its speed jumps by a fraction, at
-    /// which a fault may begin.
+    /// Restarts the filter at a possible onset of the fault: when the vehicle starts to move, or
+    /// when its speed jumps by the given fraction.
     pub onset: Option<fn(&mut Ekf, f64)>,
     /// Part that is retained when a radio head is excluded.
     pub on_exclude: Carry,
@@ -44,7 +44,7 @@ pub(in crate::localize) struct Mode {
     pub on_rebase: Carry,
     /// Odds above which the mode becomes the nominal mode.
     pub becomes_nominal_at: Option<f64>,
-    /// Whether the mode explains contradicting angles without a lost vehicle.
+    /// Whether the mode explains contradicting angles, so that they do not imply a lost vehicle.
     pub misleads: bool,
 }
 
@@ -77,8 +77,8 @@ const SLIP: Mode = Mode {
 /// Modes, in the order of their filter updates.
 pub(in crate::localize) static TABLE: [Mode; 5] = [
     SLIP,
-    // With estimated biases, a bias explains the effect of slip. The likelihood ratio soon
-    // dominates this prior, and that of noisier angles.
+    // If biases are estimated, a bias can also explain the effect of slip. The likelihood ratio
+    // dominates this prior, and that of noisier angles, after a few angles.
     Mode {
         id: SelectedHypothesis::UncalibratedArray,
         applies: |nominal, _| {
@@ -90,14 +90,14 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
         becomes_nominal_at: Some(100.0),
         ..ROW
     },
-    // The wheels of a differential drive slip slightly with every metre.
+    // The wheels of a differential drive slip slightly over every metre.
     Mode {
         id: SelectedHypothesis::NoisyOdometer,
         applies: |nominal, _| {
             let config = nominal.config();
             config.drive == DriveKind::Road
         },
-        // 90 times as probable as slip, limited to 0.5.
+        // 90 times the probability of slip, at most 0.5.
         prior: |_, faults| (90.0 * faults.odometer).min(0.5),
         alter: |ekf| ekf.scale_odometer_noise(3.0),
         on_rebase: Carry::Nothing,
@@ -151,7 +151,7 @@ pub(in crate::localize) mod trip {
         trip_with_bias(0.0)
     }
 
-    /// Returns the same with a prior probability of a time-correlated bias.
+    /// Returns the trip with a prior probability of a time-correlated bias.
     pub(in crate::localize) fn trip_with_bias(probability: f64) -> (Vec<RadioHead>, Road, Ekf) {
         let site = Site::from_library("trip-4", &Shipped).unwrap();
         let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
@@ -220,9 +220,9 @@ mod tests {
     /// Final error of a filter (m).
     type Distance = Box<dyn Fn(&Ekf) -> f64>;
 
-    /// Drives past four radio heads until a time, with an additional angle error `off_rad` of radio
-    /// head and distance: returns the bank, and the errors of its selected filter and of a mode's
-    /// filter.
+    /// Drives past four radio heads until `until_s`, with the additional angle error `off_rad` as a
+    /// function of radio head and distance. Returns the bank, and the functions that yield the
+    /// position errors of its selected filter and of a mode's filter.
     fn drive(world: &World, until_s: f64, off_rad: impl Fn(usize, f64) -> f64) -> (Bank, Distance) {
         let (heads, road, ekf) = trip_with_bias(world.multipath_bias_probability);
         let mut bank = Bank::new(&ekf, &heads, &IntegritySettings::default(), 0.0);
@@ -286,7 +286,8 @@ mod tests {
         let (bank, off_m) = drive(&world, 60.0, EXACT);
         assert_eq!(bank.selected(), SelectedHypothesis::UncalibratedArray);
         assert!(off_m(bank.leader()) < 0.3);
-        // With its filter as the nominal one, there is no fault; the hypothesis is still reported.
+        // When its filter becomes the nominal one, there is no fault any more, but the hypothesis
+        // is still reported.
         let bank = bank.about_leading().unwrap();
         assert!(
             bank.leading().is_none() && bank.mode(SelectedHypothesis::UncalibratedArray).is_none()
@@ -311,7 +312,7 @@ mod tests {
             let std_m = found.covariance[state][state].sqrt();
             assert!(std_m < 0.3 && by_m.abs() < 4.0 * std_m, "{by_m} of {std_m}");
         }
-        // The mode is no reason to exclude a radio head, and remains after an exclusion.
+        // The mode does not cause the exclusion of a radio head, and remains after an exclusion.
         bank.exclude(0);
         assert!(
             bank.selected() == SelectedHypothesis::DisplacedSite
@@ -423,7 +424,7 @@ mod tests {
             assert!(odds > 0.1, "{odds}");
             let covariance = slip.pose(29.9).covariance.unwrap();
             let std_m = (covariance[0][0] + covariance[1][1]).sqrt();
-            // Slip of the size of the jump is one standard deviation.
+            // The standard deviation of the slip equals the size of the jump.
             assert!(
                 (off_m(slip) / std_m - 1.0).abs() < 0.3,
                 "{} of {std_m}",
@@ -437,7 +438,7 @@ mod tests {
 
     #[test]
     fn a_correlated_bias_is_nominal() {
-        // A new bias of each radio head every three metres, as caused by reflections.
+        // The bias of each radio head changes every three metres, as with reflections.
         let bias_rad = |head: usize, along_m: f64| {
             let number = (along_m / 3.0).floor() as u64 * 4 + head as u64;
             0.3 * ChaCha8Rng::seed_from_u64(number).sample::<f64, _>(StandardNormal)
@@ -453,7 +454,7 @@ mod tests {
         assert!(off_m(bank.leader()) < 1.0, "{}", off_m(bank.leader()));
     }
 
-    /// A bias of each radio head could also explain a displaced site plan.
+    /// The biases of all radio heads could also explain a displaced site plan.
     #[test]
     fn a_displaced_site_is_selected_although_biases_are_estimated() {
         let moved_m = [1.2, -1.6];
@@ -469,9 +470,10 @@ mod tests {
         assert!(off_m(bank.leader()) < off_m(bank.nominal()));
     }
 
-    /// Angles with independent errors at 50 Hz, along a straight far from the radio heads, contain
-    /// almost no information on slip. Correct odds exceed four times the prior in at most a quarter
-    /// of the runs (Ville's inequality). Odds that count dependent angles exceeded it 260 times.
+    /// Angles with independent errors at 50 Hz, on a straight road far from the radio heads,
+    /// contain almost no information about slip. Correct odds exceed four times the prior in at
+    /// most a quarter of the runs (Ville's inequality). Odds that count dependent angles exceeded
+    /// it by a factor of 260.
     #[test]
     fn frequent_angles_of_a_sound_odometer_are_no_evidence_for_slip() {
         const SCATTER_RAD: f64 = 0.03;

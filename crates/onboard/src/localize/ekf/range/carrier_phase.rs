@@ -14,9 +14,9 @@ use crate::localize::output::UpdateReason;
 use crate::radio_head::RadioHead;
 use crate::range::RangeMeasurement;
 
-/// Half a wavelength in standard deviations of the predicted phase that is required: the
-/// probability of a wrong number of wavelengths is 2e-9 per phase. With 4, a drive of some hundred
-/// phases contains a wrong one in 4 % of the cases.
+/// Minimum ratio of half a wavelength to the standard deviation of the predicted phase. With 6, the
+/// probability of a wrong number of wavelengths is 2e-9 per phase. With 4, 4 % of the drives with
+/// some hundred phases contain a wrong number.
 const RESOLVED: f64 = 6.0;
 
 /// Standard deviation of the phase offset at the start of a sequence (m): far above a wavelength,
@@ -75,7 +75,7 @@ impl Ekf {
         self.bias
             .reset_range_state(number, mean, UNKNOWN_OFFSET_M * UNKNOWN_OFFSET_M);
         // The phase equals its prediction: it relates the offset to pose and clock.
-        self.bias.take_range(
+        self.bias.update_with_range(
             &mut self.belief,
             &predicted.row,
             &predicted.terms,

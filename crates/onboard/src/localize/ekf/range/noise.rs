@@ -13,8 +13,8 @@ const LEVELS: usize = 8;
 /// Logarithm of the prior probability of a ratio relative to that of the next one closer to 1.
 const STEP_PRIOR: f64 = -0.5;
 
-/// Factor of previous evidence per range: a memory of 500 ranges, within which a vehicle leaves its
-/// surroundings.
+/// Factor of previous evidence per range. The memory of 500 ranges is shorter than the stay of a
+/// vehicle in one environment.
 const KEPT: f64 = 0.998;
 
 /// Maximum squared innovation in variances: single outliers are no noise.

@@ -111,12 +111,12 @@ impl Ekf {
     /// Returns the expected distance times `scale`.
     pub(super) fn distance(&self, seen: &Sighted<'_>, scale: f64) -> Distance {
         let sight = &seen.sight;
-        // A step towards the radio head reduces the distance.
+        // A displacement towards the radio head reduces the distance.
         let cos_elevation = scale * sight.cos_elevation();
         let mut row = sight.position_rows[0].map(|entry| -cos_elevation * entry);
         let (north, east) = sight.bearing_rad.sin_cos();
         (row[DATUM[0]], row[DATUM[1]]) = (cos_elevation * east, cos_elevation * north);
-        // Second-order terms: a deviation to the side lengthens the distance.
+        // Second-order term: a lateral deviation increases the distance.
         let aside = scale * self.belief.variance_along(&sight.position_rows[1]) / sight.range_m;
         let coasted = row[ALONG].powi(2) * seen.ahead_variance;
         let (row, strayed) = seen.to_newest(row);
@@ -160,7 +160,8 @@ impl Ekf {
 }
 
 impl Sighted<'_> {
-    /// Returns a row by the state at the newest odometry, and the variance of the step since then.
+    /// Converts a row to the state at the newest odometry. Returns the row, and the variance of the
+    /// step since then.
     pub fn to_newest(&self, row: [f64; STATES]) -> ([f64; STATES], f64) {
         (self.ahead.as_ref()).map_or((row, 0.0), |ahead| ahead.seen_before(&row))
     }
@@ -170,7 +171,7 @@ impl Sighted<'_> {
         let (model, lag_s) = (self.model, self.lag_s);
         let [_, head_wander] = model.head_clock(&self.head.clock);
         let wander = model.clock_wander_m_per_sqrt_s.powi(2) + head_wander.powi(2);
-        // A drift that walks during the lag.
+        // The clock drift has a random walk during the lag.
         wander * lag_s + model.drift_walk_mps_per_sqrt_s.powi(2) * lag_s.powi(3) / 3.0
     }
 }

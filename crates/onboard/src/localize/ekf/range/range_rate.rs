@@ -10,7 +10,7 @@ use crate::localize::output::UpdateReason;
 use crate::radio_head::RadioHead;
 use crate::range::RangeMeasurement;
 
-/// Minimum time between two odometry samples, and over which a rate is measured (s).
+/// Minimum duration between two odometry samples, and of the measurement of a rate (s).
 const LEAST_INTERVAL_S: f64 = 1e-4;
 
 impl Ekf {
@@ -30,13 +30,14 @@ impl Ekf {
         let (aside, along) = (sight.bearing_rad - seen.pose.heading_rad).sin_cos();
         let cos_elevation = sight.cos_elevation();
         let yaw_rate_radps = odometry.yaw_rate_radps.unwrap_or(0.0) - seen.mean[YAW_RATE_BIAS];
-        // Velocity towards the radio head in the plane: of the vehicle, and of its antenna.
+        // Velocity towards the radio head in the plane: sum of the vehicle's velocity and of the
+        // rotation of the antenna about the reference point.
         let swing_m = sight.position_rows[0][HEADING];
-        // Derivatives: the direction turns, and the elevation changes.
+        // Derivatives: the bearing and the elevation depend on the state.
         let mut row = sight.bearing_row;
         row[HEADING] -= 1.0;
         row[ALONG] -= seen.frame.curvature_per_m;
-        // Second-order terms: an uncertain direction reduces the mean of its cosine.
+        // Second-order term: uncertainty of the bearing reduces the mean of its cosine.
         let bend = 0.5 * self.belief.variance_along(&row) * speed_mps * along;
         let closing_mps = speed_mps * along - bend + yaw_rate_radps * swing_m;
         for (value, entry) in row.iter_mut().zip(sight.position_rows[0]) {
@@ -61,7 +62,7 @@ impl Ekf {
         let [_, head_wander] = seen.model.head_clock(&seen.head.clock);
         let wander = seen.model.clock_wander_m_per_sqrt_s.powi(2) + head_wander.powi(2);
         let walked = wander / measured_s.max(LEAST_INTERVAL_S);
-        // The radio heads of a burst share the error of the speed.
+        // The radio heads of a burst have a common speed error.
         let shared = self.heads.len().max(1) as f64;
         let model_variance = (cos_elevation * along).powi(2) * shared * speed_variance
             + drift

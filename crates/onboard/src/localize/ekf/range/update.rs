@@ -83,7 +83,7 @@ impl Ekf {
         {
             head.rejected_ranges = 0;
         }
-        self.bias.take_range(
+        self.bias.update_with_range(
             &mut self.belief,
             &predicted.row,
             &predicted.terms,
