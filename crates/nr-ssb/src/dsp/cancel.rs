@@ -11,7 +11,7 @@ use super::base_rate::{CYCLIC_PREFIX, SYMBOL_FFT, SYMBOL_SAMPLES};
 use crate::numeric::phasors::fill_phasors;
 use crate::standard::grid::{SUBCARRIERS, SYMBOLS, SsbGrid};
 
-/// Remodulator for the subtraction of an SSB.
+/// Remodulator that subtracts a received SSB from the samples.
 pub(crate) struct Canceller {
     fft: Arc<dyn Fft<f32>>,
     spectrum: Vec<Complex32>,

@@ -37,8 +37,9 @@ const BINS_PER_SUBCARRIER: usize = BLOCK / SYMBOL_FFT;
 const HOP: usize = BLOCK - SYMBOL_FFT;
 /// Minimum distance of two candidates of one PSS, in samples.
 const CANDIDATE_SPACING: usize = 12;
-/// Fraction of a block's energy that leaks into other windows: 5e-8 of the energy, times 240, with
-/// a margin that keeps the statistic below that of noise.
+/// Fraction of a block's energy that leaks into other windows due to the band limitation: 5e-8 of
+/// the energy, times 240, with a margin that keeps the statistic of a silent window below that of
+/// noise.
 const RINGING: f64 = 1.2e-5;
 /// Number of resource elements that share the energy of a window if the whole SSB band is occupied.
 const OCCUPIED: f32 = 240.0;
@@ -194,7 +195,7 @@ impl MatchedFilter {
         let pair_energy =
             |pair: &[Complex32; 2]| f64::from(pair[0].norm_sqr() + pair[1].norm_sqr());
         let (pairs, _) = self.block.as_chunks::<2>();
-        // Silence next to a signal contains the ringing of the band limitation.
+        // A silent window next to a signal contains the ringing of the band limitation.
         let silence = RINGING * pairs.iter().map(pair_energy).sum::<f64>();
         let mut energy: f64 = pairs[..SYMBOL_FFT / 2].iter().map(pair_energy).sum();
         let moves = pairs.iter().zip(&pairs[SYMBOL_FFT / 2..]);
@@ -299,7 +300,8 @@ fn add_power(even: &mut [f32], odd: &mut [f32], correlation: &[Complex32], inver
     }
 }
 
-/// Keeps the larger statistic and its hypothesis, without a branch, so that the loop is vectorised.
+/// Keeps the larger statistic and its hypothesis. The loop has no branch, so that the compiler
+/// vectorises it.
 fn keep_best(best: &mut [f32], index: &mut [u32], sum: &[f32], hypothesis: u32) {
     let n = sum.len();
     let (best, index) = (&mut best[..n], &mut index[..n]);

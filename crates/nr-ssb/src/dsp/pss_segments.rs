@@ -194,7 +194,7 @@ impl SegmentFilter {
             for (antenna, samples) in antennas.iter().enumerate() {
                 self.load(antenna, samples.get(start..).unwrap_or_default());
             }
-            // One more position, for the frequency halfway to it.
+            // One position more than needed, for the frequency halfway to it.
             for number in 0..=tile.positions {
                 let position = tile.first + number as isize;
                 self.correlate(tile, position, number);
@@ -465,9 +465,9 @@ mod tests {
             assert!(best.statistic > 60.0, "{best:?}");
         }
     }
-    /// At the edge of an empty band, where the power falls by 70 dB within a subcarrier, the
-    /// statistic is distributed as in noise: three powers of mean one exceed 40 with a probability
-    /// of 4e-15.
+    /// At the edge of an empty band, where the power decreases by 70 dB within a subcarrier, the
+    /// statistic is distributed as in noise: the sum of three powers of mean one exceeds 40 with a
+    /// probability of 4e-15.
     #[test]
     fn the_edge_of_an_empty_band_resembles_no_pss() {
         let mut planner = FftPlanner::new();

@@ -27,8 +27,8 @@ pub(crate) fn delay(rows: &[[Complex32; SUBCARRIERS]], reach: f64) -> f64 {
     refine(rows, best.1, 3)
 }
 
-/// Newton's method for the maximum of [`delay`] from a nearby start, with steps of at most 0.3
-/// samples. `N` sums over equal groups of subcarriers are as accurate as 240 subcarriers.
+/// Refines the maximum of [`delay`] by Newton's method from a nearby start, with steps of at most
+/// 0.3 samples. `N` sums over equal groups of subcarriers are as accurate as 240 subcarriers.
 pub(crate) fn refine<const N: usize>(
     rows: &[[Complex32; N]],
     start: f64,
@@ -47,10 +47,10 @@ pub(crate) fn refine<const N: usize>(
     delay
 }
 
-/// Returns the delay if it is within half a sample of zero and known within a tenth. The antennas
-/// are combined by their sums over the subcarriers. Groups of eight subcarriers are added, over
-/// which the phase changes by less than 0.1 rad. Both simplifications lose less than 0.1 % of the
-/// information.
+/// Returns the delay if it is within half a sample of zero and known to within a tenth of a sample.
+/// The antennas are combined by their sums over the subcarriers. Groups of eight subcarriers are
+/// added, over which the phase changes by less than 0.1 rad. Both simplifications lose less than
+/// 0.1 % of the information.
 pub(crate) fn refine_combined(rows: &[[Complex32; SUBCARRIERS]], near: f64) -> f64 {
     let mut combined = [[Complex32::ZERO; GROUPS]];
     for row in rows {
@@ -65,7 +65,7 @@ pub(crate) fn refine_combined(rows: &[[Complex32; SUBCARRIERS]], near: f64) -> f
     refine(&combined, near, 2)
 }
 
-/// Returns Σ a, in two strands.
+/// Returns Σ a as two partial sums, so that consecutive additions are independent.
 fn total<const N: usize>(a: &[Complex32; N]) -> Complex32 {
     let mut sums = [Complex32::ZERO; 2];
     for (i, z) in a.iter().enumerate() {

@@ -68,7 +68,7 @@ pub struct Tone {
 /// Returns the lines in the whole band of a recording, the strongest first; empty for a recording
 /// below one millisecond.
 pub fn tones<S: AsRef<[Complex32]>>(antennas: &[S], sample_rate_hz: f64) -> Vec<Tone> {
-    // The resolution of a receiver of 15 kHz subcarriers, or finer.
+    // Frames with the frequency resolution of a receiver for 15 kHz subcarriers, or finer.
     let frames = (sample_rate_hz / 3.84e6).ceil().clamp(1.0, 64.0) as usize;
     let count = antennas.len().min(MAX_ANTENNAS);
     let mut canceller = ToneCanceller::with_frame(FRAME * frames.next_power_of_two(), count);
@@ -86,22 +86,22 @@ struct Line {
     bin_power: f32,
 }
 
-/// Finds lines and subtracts them; owns all buffers.
+/// Detector and canceller of lines; owns all buffers.
 pub(crate) struct ToneCanceller {
     fft: Arc<dyn Fft<f32>>,
     frame: Vec<Complex32>,
     scratch: Vec<Complex32>,
     taper: Vec<f32>,
-    /// A frame of every antenna.
+    /// Frame of every antenna.
     work: Vec<Vec<Complex32>>,
-    /// Power per bin and frame, the frames of a bin side by side.
+    /// Power per bin and frame; the frames of a bin are adjacent in memory.
     powers: Vec<[f32; MOST_FRAMES]>,
     median: Vec<f32>,
     phasors: Vec<Complex32>,
     lines: Vec<Line>,
 }
 
-/// Examined samples: frames of equal length.
+/// Frames of equal length within the examined samples.
 #[derive(Clone, Copy)]
 struct Frames {
     first: usize,
@@ -111,7 +111,8 @@ struct Frames {
 }
 
 impl Frames {
-    /// Frames of `full` samples, or a shorter one, in the samples from `first` to `end`.
+    /// Creates frames of `full` samples, or one shorter frame, in the samples from `first` to
+    /// `end`; `None` if there are too few samples.
     fn new(first: usize, end: usize, full: usize) -> Option<Self> {
         let available = end.checked_sub(first)?;
         if (available as f64) < SHORTEST_FRAMES * full as f64 {
@@ -155,12 +156,12 @@ impl ToneCanceller {
         }
     }
 
-    /// Whether any line has to be subtracted.
+    /// Whether there are lines to subtract.
     pub(crate) fn is_needed(&self) -> bool {
         !self.lines.is_empty()
     }
 
-    /// Removes all lines.
+    /// Removes all lines from the state.
     pub(crate) fn forget(&mut self) {
         self.lines.clear();
     }
@@ -227,8 +228,8 @@ impl ToneCanceller {
         }
     }
 
-    /// Fits the amplitudes of all lines except line `without` to a range of samples, and subtracts
-    /// them on request. Returns the power of each line.
+    /// Fits the amplitudes of all lines except `without` to a range of samples, and subtracts the
+    /// lines if `subtract` is set. Returns the power of each line.
     fn fit(
         &mut self,
         antennas: &mut [Vec<Complex32>],
@@ -282,7 +283,7 @@ impl ToneCanceller {
         powers
     }
 
-    /// Copies a frame of every antenna to `work`, without the lines other than line `kept`.
+    /// Copies a frame of every antenna to `work`, and subtracts all lines except line `kept`.
     fn load<S: AsRef<[Complex32]>>(
         &mut self,
         antennas: &[S],
@@ -490,7 +491,7 @@ fn correlate(phasors: &[Complex32], samples: &[Complex32]) -> Complex64 {
         .sum()
 }
 
-/// Four-term Blackman–Harris taper (Harris 1978).
+/// Returns the four-term Blackman–Harris taper (Harris 1978).
 fn blackman_harris(length: usize) -> Vec<f32> {
     let weight = |n: usize| {
         let turn = TAU * (n as f64 + 0.5) / length as f64;
@@ -554,8 +555,8 @@ mod tests {
             .zip(clean.iter().flatten())
             .map(|(a, b)| (a - b).norm_sqr())
             .sum();
-        // Four amplitudes and frequencies per antenna and nine stretches: 72 degrees of freedom of unit noise, and
-        // as much again for frequencies that come from less than all samples.
+        // Four amplitudes and frequencies per antenna and nine stretches are 72 degrees of freedom
+        // of unit noise. Frequencies estimated from a part of the samples add at most as much.
         assert!(left < 4.0 * 72.0, "{left}");
     }
 
@@ -593,7 +594,7 @@ mod tests {
         spoiled[100].re = f32::NAN;
         canceller.detect(&[&spoiled[..]], 0);
         assert!(!canceller.is_needed());
-        // A frame of one SSB's length is enough for a strong tone.
+        // A frame with the length of one SSB is sufficient for a strong tone.
         let mut short = noise(6, 1100);
         add_tone(&mut short, 0.05, 1.0);
         canceller.detect(&[&short[..]], 0);

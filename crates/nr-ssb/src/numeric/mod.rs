@@ -1,4 +1,4 @@
-//! Arithmetic without knowledge of SSBs.
+//! Numerical functions that do not depend on SSBs.
 
 pub(crate) mod decibel;
 pub(crate) mod false_alarm;

@@ -10,8 +10,8 @@ pub(crate) fn wrap(angle_rad: f64) -> f64 {
 }
 
 /// Fills `phasors[n] = exp(j2π (first + n · step))`, with `first` and `step` in cycles. The
-/// recursion has four interleaved strands in double precision, which hides its latency and keeps
-/// its error below 1e-12.
+/// recursion has four interleaved lanes in double precision, which hides its latency and keeps its
+/// error below 1e-12.
 pub(crate) fn fill_phasors(phasors: &mut [Complex32], first: f64, step: f64) {
     const LANES: usize = 4;
     let stride = Complex64::cis(TAU * step * LANES as f64);

@@ -1,5 +1,5 @@
-//! Sums over arrays in several interleaved strands, so that an addition does not wait for the
-//! previous one.
+//! Sums over arrays with several interleaved partial sums (lanes), so that consecutive additions
+//! are independent.
 
 use num_complex::Complex32;
 

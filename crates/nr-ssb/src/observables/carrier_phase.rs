@@ -36,7 +36,7 @@ pub struct CarrierPhase {
     pub reference_start: f64,
 }
 
-/// Removal of the carrier resets.
+/// Factors that remove the carrier phase resets of the transmitter.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CarrierResets {
     case: Case,

@@ -43,10 +43,10 @@ const PRIOR_K_DB: [f64; 2] = [7.0, 8.0];
 const PRIOR_LG_SPREAD: [f64; 2] = [-7.4, 0.4];
 /// Probability of a single path before the first SSB.
 const FIRST_SINGLE: f64 = 0.5;
-/// Probability that multipath begins or ends from one SSB to the next.
+/// Probability that multipath appears or disappears between two successive SSBs.
 const CHANGE: f64 = 0.01;
-/// Share of independent observations of multipath: multipath of neighbouring antennas is correlated,
-/// and consists of few paths.
+/// Fraction of independent observations of multipath, because multipath of neighbouring antennas is
+/// correlated and consists of few paths.
 const INDEPENDENT: f64 = 0.4;
 /// Maximum probability of K < 0 dB for a separated first path.
 const WEAK: f64 = 0.1;
@@ -125,7 +125,7 @@ pub(crate) struct FirstPath {
 }
 
 impl FirstPath {
-    /// Creates the filter and the tables, so that no later call does.
+    /// Creates the filter and its tables, so that later calls do not compute them.
     pub(crate) fn new() -> Self {
         LazyLock::force(&BASES);
         Self {
@@ -302,7 +302,7 @@ fn eigenvectors(root: &[f64; GROUPS], direct: &Row, spread: f64) -> ([f64; MODES
             for (slot, row) in next.iter_mut().zip(&covariance) {
                 *slot = row.iter().zip(&vectors[mode]).map(|(c, x)| c * x).sum();
             }
-            // Twice, against the loss of orthogonality.
+            // Orthogonalised twice, because a single pass loses orthogonality by rounding errors.
             for _ in 0..2 {
                 remove(&mut next, direct);
                 for earlier in &vectors[..mode] {

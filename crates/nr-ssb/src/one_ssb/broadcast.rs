@@ -216,7 +216,7 @@ fn moved(payload: BchPayload, half_frames: i32) -> BchPayload {
     result
 }
 
-/// The configured size of burst sets, or the size in the bands at this frequency.
+/// Returns the configured burst set size, or the size in the bands at this frequency.
 fn size(
     spacing: SubcarrierSpacing,
     configured: Option<Lmax>,

@@ -27,7 +27,7 @@ pub(crate) struct Best<T> {
     pub(crate) phase: Complex32,
 }
 
-/// The 1008 SSS, kept because a search tries 336 of them per candidate.
+/// Sequences of all 1008 SSS, stored because a search correlates with 336 of them per candidate.
 pub(crate) struct SssTable(Vec<[f32; SYNC_LEN]>);
 
 impl SssTable {
@@ -129,10 +129,10 @@ pub(crate) fn dmrs_hypothesis(
 }
 
 /// Returns the PSS statistic for noise with any correlation over the antennas: `127 cᴴ R⁻¹ c` with
-/// `c` the despread antennas and `R` the sample covariance of their 127 elements. In noise 127 times
-/// a beta distribution, whose tail is thinner than that of a sum of unit exponentials, one per
-/// antenna. (The statistic of the search is a plain sum over the antennas. It treats interference
-/// from one direction as independent at each antenna.)
+/// `c` the despread antennas and `R` the sample covariance of their 127 elements. In noise it is
+/// 127 times a variable with a beta distribution, whose tail is thinner than that of a sum of unit
+/// exponentials, one per antenna. (The statistic of the search is a plain sum over the antennas,
+/// which assumes that interference is independent between antennas.)
 pub(crate) fn pss_statistic(n_id_2: u8, grids: &[ReceivedGrid]) -> f32 {
     let chips = pss(n_id_2);
     let rows = grids

@@ -30,12 +30,12 @@ const OSCILLATOR: f64 = 1e-6;
 const COARSE_AT_0_DB: f64 = 0.04;
 /// ... and its minimum at high SNR, due to echoes beyond the cyclic prefix.
 const COARSE_AT_BEST: f64 = 0.01;
-/// Penalty of a point off the synchronization raster, of a point off the global frequency raster,
-/// and of a frequency that is not a multiple of 5 kHz, in squared standard deviations.
+/// Penalties in squared standard deviations: of a point off the synchronization raster, of a point
+/// off the global frequency raster, and of a frequency that is not a multiple of 5 kHz.
 const RASTER_PREFERENCE: f64 = 16.0;
-/// Transmitters off the rasters usually have multiples of this frequency.
+/// Frequencies of transmitters off the rasters are usually multiples of this frequency.
 const SET_BY_HAND_HZ: f64 = 5e3;
-/// Finest multiples of transmitters off the rasters, in Hz; less frequent.
+/// Smallest unit of the frequencies of transmitters off the rasters, in Hz; less frequent.
 const FINEST_HZ: f64 = 1e3;
 
 /// Returns the prior penalty of a frequency in squared standard deviations: zero for a frequency of

@@ -22,7 +22,7 @@ pub(crate) struct PointSearch {
 }
 
 impl PointSearch {
-    /// `false_alarm` is the probability of a false cell at one point.
+    /// Creates the search; `false_alarm` is the probability of a false cell at one point.
     pub(crate) fn new(
         spacing: SubcarrierSpacing,
         rate_hz: f64,

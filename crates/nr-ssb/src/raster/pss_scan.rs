@@ -14,14 +14,14 @@ use crate::standard::numerology::SubcarrierSpacing;
 
 /// Grid of PSS frequencies relative to the recording's centre.
 pub(super) const OFFSET_UNIT_HZ: f64 = 15e3;
-/// Expected number of maxima due to noise. Each costs a search over the duration of three SSBs;
-/// four times as many recover half of the loss due to the addition of powers.
+/// Expected number of maxima due to noise. Each requires a search over the duration of three SSBs.
+/// Four times as many would recover half of the loss due to the addition of powers.
 const NOISE_CANDIDATES: f64 = 16.0;
 /// Maximum number of offsets that are searched.
 const MOST_OFFSETS: usize = 24;
-/// Number of lags per thread and chunk, at the base rate, ...
+/// Number of lags per thread and chunk, at the base rate.
 const CHUNK: usize = 4 * HOP;
-/// ... and samples before and after, for the front end's filter and the PSS itself.
+/// Additional samples before and after a chunk, for the front end's filter and the PSS itself.
 const BEFORE: usize = 256;
 const AFTER: usize = 512;
 
@@ -30,9 +30,9 @@ pub(super) struct PssDetection {
     statistic: f32,
     /// First sample of the PSS in the recording.
     pub(super) sample: f64,
-    /// Offset from the recording's centre, in steps of half a subcarrier, ...
+    /// Offset from the recording's centre in Hz, in steps of half a subcarrier.
     pub(super) received_hz: f64,
-    /// ... and the nearest multiple of 15 kHz.
+    /// Multiple of 15 kHz nearest to `received_hz`.
     offset_hz: f64,
 }
 

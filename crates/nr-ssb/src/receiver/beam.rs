@@ -12,9 +12,10 @@ pub(super) struct Beam<const A: usize> {
     pub pci: Pci,
     pub ssb_index: u8,
     pub tracker: Tracker<A>,
-    /// Expected start of the next SSB ...
+    /// Expected start of the next SSB, in samples.
     pub next_start: f64,
-    /// ... its number of periods after the last received one, and the position of that.
+    /// Number of periods between the last received SSB and the expected one, and start of the last
+    /// received SSB.
     periods: f64,
     last_seen: f64,
     /// Whether the beam was received since a search detected it.
@@ -34,7 +35,7 @@ impl<const A: usize> Beam<A> {
         })
     }
 
-    /// Records a received SSB; the next one is expected a period later.
+    /// Records a received SSB. The next one is expected one period later.
     pub fn seen(&mut self, start: f64, period: f64) {
         (self.last_seen, self.periods, self.is_followed) = (start, 0.0, true);
         self.skip(1.0, period);

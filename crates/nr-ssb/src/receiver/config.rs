@@ -3,7 +3,7 @@
 use crate::search::{SearchConfig, SearchError};
 use crate::standard::numerology::SubcarrierSpacing;
 
-/// Maximum frequency offset in subcarriers: beyond it, the filter attenuates PSS and SSS.
+/// Maximum frequency offset in subcarriers. At larger offsets, the filter attenuates PSS and SSS.
 const MOST_SUBCARRIERS: f64 = 15.0;
 
 /// Receiver configuration.
@@ -19,7 +19,8 @@ pub struct ReceiverConfig {
     pub oscillator_ppm: f64,
     /// Interval at which all samples of a period are searched for new cells and beams.
     pub search_every_s: f64,
-    /// Minimum duration, and at least eight SSBs, of missed reception before a beam is removed.
+    /// Minimum duration without reception before a beam is removed, in seconds; at least eight SSBs
+    /// must be missed.
     pub lost_after_s: f64,
     /// Cells that are received; `None` for all.
     pub cells: Option<Vec<u16>>,
@@ -31,8 +32,8 @@ pub struct ReceiverConfig {
 }
 
 impl ReceiverConfig {
-    /// SSBs around `ssb_freq_hz` every 20 ms, oscillators of 20 ppm, PBCH decoding, a search every
-    /// second, and removal of beams after two seconds.
+    /// Returns the configuration for SSBs around `ssb_freq_hz` every 20 ms, with oscillators of 20
+    /// ppm, PBCH decoding, a search every second, and removal of beams after two seconds.
     pub fn new(ssb_freq_hz: f64, spacing: SubcarrierSpacing, antennas: usize) -> Self {
         Self {
             search: SearchConfig {

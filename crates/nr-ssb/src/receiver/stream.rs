@@ -153,7 +153,7 @@ impl<const A: usize> StreamReceiver<A> {
         self.start + self.base[0].len() as i64
     }
 
-    /// Continues at this sample of the base rate after silence: an SSB may begin there.
+    /// Continues at this sample of the base rate, after silence. An SSB may begin at it.
     fn go_on_at(&mut self, number: i64) {
         for samples in &mut self.base {
             samples.clear();

@@ -16,13 +16,13 @@ use crate::dsp::tones::Tone;
 use crate::search::{SearchError, Searcher};
 use crate::track::{Tracker, TrackerOutput};
 
-/// Number of samples required on either side of an SSB, at the base rate: half a cyclic prefix and
-/// the range of the filter.
+/// Number of samples required on either side of an SSB, at the base rate: half a cyclic prefix, and
+/// the length of the filter.
 pub(super) const GUARD: f64 = 16.0;
 /// Time after which an unsuccessful search over all offsets restarts, and after which missing beams
 /// are searched for, in seconds.
 const LOST_INTERVAL_S: f64 = 0.1;
-/// Period (s) per frequency offset of a burst's search without beams, and maximum number of
+/// Period (s) per frequency offset that is searched in a burst without beams, and maximum number of
 /// offsets.
 const PERIOD_OF_OFFSET_S: f64 = 0.04;
 const MOST_OFFSETS: f64 = 4.0;
@@ -79,7 +79,7 @@ pub struct WindowReceiver<const A: usize> {
     /// success since then.
     offset_hz: f64,
     failed_searches: u32,
-    /// Total number of unreported missing samples.
+    /// Total duration of unreported missing samples, in samples.
     unreported_gap: f64,
     /// Position of the last tone measurement (samples), and the samples without tones.
     tones_measured: f64,
