@@ -80,7 +80,7 @@ pub struct OutputHealth {
 }
 
 impl OutputHealth {
-    /// An output that works and has written nothing.
+    /// Creates the health of a working output that has written nothing.
     pub fn new(name: &'static str) -> Self {
         Self {
             name,
@@ -174,12 +174,12 @@ impl OutputHealth {
         self.dropped.fetch_add(records, Ordering::Relaxed);
     }
 
-    /// Number of lost records.
+    /// Returns the number of lost records.
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
     }
 
-    /// Takes the changes since the last call.
+    /// Returns the changes since the last call, and removes them.
     pub fn take_changes(&self) -> VecDeque<Change> {
         std::mem::take(&mut self.lock().changes)
     }

@@ -191,7 +191,7 @@ impl Histogram {
     }
 }
 
-/// Upper end of a bucket (s).
+/// Returns the upper end of a bucket (s).
 fn upper_s(place: usize) -> f64 {
     MIN_S * 10f64.powf((place + 1) as f64 / PER_DECADE as f64)
 }

@@ -6,12 +6,12 @@ use std::time::{Duration, Instant};
 
 use sd_notify::NotifyState;
 
-/// Reports that everything is open.
+/// Notifies the service manager that the node is ready.
 pub fn ready() {
     notify(NotifyState::Ready);
 }
 
-/// Reports that the node ends.
+/// Notifies the service manager that the node ends.
 pub fn stopping() {
     notify(NotifyState::Stopping);
 }

@@ -1,7 +1,8 @@
 //! Conversion of a configured number of antennas to a compile-time constant.
 
-/// Evaluates `$body` with the constant `$N` equal to `$count`, which a checked vehicle has between
-/// 2 and [`MAX_ELEMENTS`](crate::observation::MAX_ELEMENTS); a larger one counts as that.
+/// Evaluates `$body` with the constant `$N` equal to `$count`. A checked vehicle has a count
+/// between 2 and [`MAX_ELEMENTS`](crate::observation::MAX_ELEMENTS); larger counts are treated as
+/// the maximum.
 macro_rules! for_elements {
     ($count:expr, $N:ident => $body:expr) => {
         for_elements!($count, $N => $body; 3 4 5 6 7 8 9 10 11 12 13 14 15)

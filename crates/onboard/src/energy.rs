@@ -188,7 +188,8 @@ impl EnergyModel {
     }
 }
 
-/// Cost of one estimate: the value of the power mode, otherwise cycles at its clock frequency.
+/// Cost of one estimate: the measured value of the power mode, otherwise the cycles of the method
+/// at the mode's clock frequency.
 struct CostPerEstimate {
     energy_j: f64,
     time_s: f64,
@@ -328,8 +329,8 @@ mod tests {
         let platform = Platform::from_toml(CONTROLLED, "test", &Shipped).unwrap();
         let model = model(&platform, Extent::Value);
         let energy = model.run_energy(10, 100, 10.0);
-        // Core power 0.5 W · 2³ = 4 W; an estimate takes 2 ms of it, a burst 1 ms of it and 10 ms
-        // of 1 W.
+        // The core power is 0.5 W · 2³ = 4 W. An estimate takes 2 ms of it; a burst takes 1 ms of
+        // it, and 10 ms of the receiver's 1 W.
         assert!(
             (energy.aoa_estimates_j - 10.0 * 8e-3).abs() < 1e-12,
             "{energy:?}"

@@ -52,7 +52,7 @@ pub struct Area {
 }
 
 impl Area {
-    /// Creates the square with this centre.
+    /// Creates the square with the centre `middle`.
     pub fn around(middle: Point, half_side_m: f64) -> Self {
         Self {
             from: Point::new(middle.x_m - half_side_m, middle.y_m - half_side_m),
@@ -60,8 +60,9 @@ impl Area {
         }
     }
 
-    /// Returns the bounding box of points, extended by a quarter of its longer side; a shorter side
-    /// is as long as the longer one, because radio heads in a row serve the area on both sides.
+    /// Returns the bounding box of points, extended by a quarter of its longer side. Its shorter
+    /// side is made equal to the longer one, because radio heads in a row serve the area on both
+    /// sides.
     pub fn about(points: impl Iterator<Item = Point>) -> Self {
         let [none, all] = [f64::INFINITY, f64::NEG_INFINITY].map(|it| Point::new(it, it));
         let (from, to) = points.fold((none, all), |(from, to), point| {

@@ -50,8 +50,8 @@ impl OdometrySample {
             && self.yaw_rate_radps.is_none_or(f64::is_finite)
     }
 
-    /// Whether sums of the values keep their resolution, so that one wrong value has no effect
-    /// later.
+    /// Whether the values are small enough that sums of them keep their resolution, so that one
+    /// wrong value does not affect later sums.
     pub fn is_in_range(&self) -> bool {
         self.distance_m.abs() <= MAX_DISTANCE_M
             && self.speed_mps.abs() <= MAX_RATE
@@ -59,7 +59,7 @@ impl OdometrySample {
     }
 }
 
-/// Identity and SNR of an SSB, measured before its angle is estimated.
+/// Detection of an SSB: identity, time and SNR, available before the angle is estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SsbDetection {
     /// Physical cell identity, 0..=1007 (TS 38.211, 7.4.2.1).
@@ -72,28 +72,29 @@ pub struct SsbDetection {
     pub snr_db: f64,
 }
 
-/// Delay, range rate, carrier phase and power of an SSB, by the clock of the receiver. Delay, rate
-/// and phase contain the clocks of vehicle and radio head.
+/// Delay, range rate, carrier phase and power of an SSB according to the clock of the receiver.
+/// Delay, rate and phase contain the clock errors of vehicle and radio head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SsbRanging {
     /// Delay of the first path in seconds, relative to a constant that is common to all cells.
     pub delay_s: f64,
-    /// Its standard deviation in seconds: noise and multipath.
+    /// Standard deviation of the delay in seconds, including noise and multipath.
     pub delay_sigma_s: f64,
     /// Whether the first path may be weaker than the others, or blocked; the standard deviation of
     /// the delay then does not cover its error.
     pub is_first_path_uncertain: bool,
     /// Rate of the pseudorange in m/s, positive if the distance increases.
     pub rate_mps: f64,
-    /// Its standard deviation in m/s: noise and multipath.
+    /// Standard deviation of the rate in m/s, including noise and multipath.
     pub rate_sigma_mps: f64,
     /// Duration over which the rate is measured, in seconds.
     pub rate_interval_s: f64,
-    /// Whether the rate is a difference of carrier phases, with which it shares its information.
+    /// Whether the rate is a difference of carrier phases, so that rate and phases contain the same
+    /// information.
     pub is_rate_of_phases: bool,
     /// Carrier phase of the first antenna in radians.
     pub phase_rad: f64,
-    /// Its standard deviation in radians: noise and multipath.
+    /// Standard deviation of the carrier phase in radians, including noise and multipath.
     pub phase_sigma_rad: f64,
     /// Power per resource element of all paths, mean over the antennas, in dBFS.
     pub ss_rsrp_dbfs: f64,
@@ -168,12 +169,12 @@ impl SsbObservation {
         self.elements = other.elements;
     }
 
-    /// Number of antennas.
+    /// Returns the number of antennas.
     pub const fn elements(&self) -> usize {
         self.elements
     }
 
-    /// Number of snapshots.
+    /// Returns the number of snapshots.
     pub fn count(&self) -> usize {
         self.values.len() / self.elements
     }
@@ -205,7 +206,8 @@ pub enum MeasurementKind {
 }
 
 impl MeasurementKind {
-    /// Kind of an angle that was measured at a radio head, or at the vehicle.
+    /// Returns the kind of an angle that was measured at a radio head (`is_at_head`) or on the
+    /// vehicle.
     pub const fn of_angle(is_at_head: bool) -> Self {
         if is_at_head {
             Self::AngleAtHead

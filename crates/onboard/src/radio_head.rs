@@ -19,9 +19,9 @@ pub struct RadioHead {
     pub position_std_m: f64,
     /// Equivalent isotropically radiated power (EIRP) in dBm: transmit power plus antenna gain.
     pub eirp_dbm: f64,
-    /// Its array, where it measures angles.
+    /// Array of the radio head, if it measures angles.
     pub array: Option<HeadArraySettings>,
-    /// Its clock, for one-way delays.
+    /// Clock of the radio head, for one-way delays.
     pub clock: HeadClock,
 }
 

@@ -94,29 +94,30 @@ pub struct RangeModel {
     pub is_one_way: bool,
     /// Standard deviation of the noise (m), if it is specified.
     pub sigma_m: Option<f64>,
-    /// Antenna relative to the odometer's reference point `[forward, left, up]` (m).
+    /// Position of the ranging antenna relative to the odometer's reference point `[forward, left,
+    /// up]` (m).
     pub position_m: [f64; 3],
-    /// Antenna of the carrier phases: the first one of the array.
+    /// Position of the antenna whose carrier phases are used, the first one of the array (m).
     pub phase_position_m: [f64; 3],
     /// Standard deviation of the relative scale error, which all radio heads share.
     pub scale_std: f64,
-    /// Standard deviation of the offset of each radio head (m) ...
+    /// Standard deviation of the offset of each radio head (m).
     pub offset_std_m: f64,
-    /// ... and its random walk (m/√m).
+    /// Random walk of the offset of each radio head (m/√m).
     pub offset_walk_m_per_sqrt_m: f64,
-    /// Standard deviation of the vehicle clock's offset (m) ...
+    /// Standard deviation of the vehicle clock's offset (m).
     pub clock_std_m: f64,
-    /// ... and its random walk (m/√s).
+    /// Random walk of the vehicle clock's offset (m/√s).
     pub clock_wander_m_per_sqrt_s: f64,
-    /// Standard deviation of the vehicle clock's drift (m/s) ...
+    /// Standard deviation of the vehicle clock's drift (m/s).
     pub drift_std_mps: f64,
-    /// ... and its random walk (m/s/√s).
+    /// Random walk of the vehicle clock's drift (m/s/√s).
     pub drift_walk_mps_per_sqrt_s: f64,
     /// Wavelength of the carrier (m).
     pub wavelength_m: f64,
-    /// Whether range rates are used ...
+    /// Whether range rates are used.
     pub uses_range_rate: bool,
-    /// ... and carrier phases.
+    /// Whether carrier phases are used.
     pub uses_carrier_phase: bool,
 }
 

@@ -124,7 +124,8 @@ impl OdometryTimes {
     }
 }
 
-/// Time unit of a stream of odometry, judged by its first intervals. Uses no memory but its own.
+/// Detector of the time unit of a stream of odometry, from its first intervals. It allocates no
+/// memory.
 #[derive(Debug, Clone, Default)]
 pub struct StreamTimes {
     last: Option<OdometrySample>,

@@ -327,7 +327,8 @@ pub struct OdometryCollector {
 }
 
 impl OdometryCollector {
-    /// For items of a kind, "line" or "message", whose quantities have these names.
+    /// Creates a collector for items of a kind, "line" or "message", whose quantities have the
+    /// names of `fields`.
     pub const fn new(kind: &'static str, fields: OdometryFields) -> Self {
         Self {
             kind,

@@ -91,7 +91,7 @@ impl MeasurementTraces {
         self.methods
             .contains(&other.scenario().vehicle.estimator.method)
             && grid_deg(&self.simulation) == grid_deg(other)
-            && self.simulation.world().sounds_like(other.world())
+            && self.simulation.world().has_equal_signals(other.world())
     }
 
     /// Runs the campaign of a simulation for which the traces are valid.

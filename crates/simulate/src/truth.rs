@@ -102,12 +102,12 @@ impl World {
 
     /// Whether the vehicle receives equal signals in another environment in each run. Both
     /// environments are assumed to use the propagation of their scenario.
-    pub(crate) fn sounds_like(&self, other: &Self) -> bool {
+    pub(crate) fn has_equal_signals(&self, other: &Self) -> bool {
         let besides = |scenario: &Scenario| Scenario {
             name: String::new(),
             description: String::new(),
             site: self.site.clone(),
-            vehicle: what_it_is(&scenario.vehicle),
+            vehicle: physical_properties(&scenario.vehicle),
             truth: TruthSettings {
                 std_factor: scenario.truth.factor(),
                 ..TruthSettings::default()
@@ -115,7 +115,7 @@ impl World {
             ..scenario.clone()
         };
         self.site == other.site
-            && what_it_is(&self.vehicle) == what_it_is(&other.vehicle)
+            && physical_properties(&self.vehicle) == physical_properties(&other.vehicle)
             && self.road == other.road
             && besides(&self.scenario) == besides(&other.scenario)
     }
@@ -200,7 +200,7 @@ impl World {
 
 /// Returns the physical properties of a vehicle, with default estimator, localizer, wake-up policy
 /// and computer.
-fn what_it_is(vehicle: &Vehicle) -> Vehicle {
+fn physical_properties(vehicle: &Vehicle) -> Vehicle {
     Vehicle {
         name: String::new(),
         description: String::new(),

@@ -1,4 +1,5 @@
-//! Gives every record to every output. An output that fails or is slow does not affect the others.
+//! Distribution of every record to every output. An output that fails or is slow does not affect
+//! the others.
 
 use std::sync::Arc;
 
@@ -15,7 +16,7 @@ pub struct Lane {
     pub health: Arc<OutputHealth>,
 }
 
-/// Gives every record to every output.
+/// Distributor of every record to every output.
 pub struct Distributor {
     lanes: Vec<Lane>,
     /// Whether a full queue of a working output makes the pipeline wait, as in playback; otherwise the oldest
@@ -24,7 +25,7 @@ pub struct Distributor {
 }
 
 impl Distributor {
-    /// A distributor to outputs with these names.
+    /// Creates a distributor to outputs with these names.
     pub fn new(names: &[&'static str], waits: bool) -> Self {
         let lane = |name: &&'static str| Lane {
             queue: Arc::default(),
@@ -41,12 +42,12 @@ impl Distributor {
         self.waits
     }
 
-    /// Queue and health of each output.
+    /// Returns the queue and health of each output.
     pub fn lanes(&self) -> &[Lane] {
         &self.lanes
     }
 
-    /// Gives a record to every output.
+    /// Puts a record into the queue of every output.
     pub fn put(&self, record: Record) {
         let record = Arc::new(record);
         for lane in &self.lanes {
@@ -58,7 +59,7 @@ impl Distributor {
         }
     }
 
-    /// Ends all queues: no more records will be put.
+    /// Closes all queues, so that no more records are accepted.
     pub fn close(&self) {
         self.lanes.iter().for_each(|it| it.queue.close());
     }
@@ -73,7 +74,7 @@ impl Distributor {
         self.lanes.iter().map(|it| it.health.dropped()).sum()
     }
 
-    /// Takes the failures and recoveries since the last call.
+    /// Returns the failures and recoveries since the last call, and removes them.
     pub fn changes(&self) -> Vec<Change> {
         if !self.waits {
             // A reader of a playback may pause it.

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use rustix::fs::OFlags;
 
-/// A buffer of this size is written before the next flush, in bytes.
+/// Number of buffered bytes above which the buffer is written before the next flush.
 const BUFFER_BYTES: usize = 1 << 16;
 /// Interval at which a file is checked for having been deleted or replaced.
 const CHECK: Duration = Duration::from_millis(500);
@@ -56,7 +56,7 @@ impl GrowingFile {
         Self::create_with_end(path, &[])
     }
 
-    /// As [`create`](Self::create), with this end.
+    /// Creates a file like [`create`](Self::create), with the given end.
     ///
     /// # Errors
     /// Those of the file system, with the name of the file.
@@ -180,7 +180,7 @@ impl Tail {
         self.shared.is_final.store(true, Ordering::Relaxed);
     }
 
-    /// As [`GrowingFile::check_exists`].
+    /// Fails under the conditions of [`GrowingFile::check_exists`].
     ///
     /// # Errors
     /// If the file was deleted or replaced.

@@ -14,12 +14,12 @@ use super::vda5050::VdaPosition;
 use crate::health::OutputStatus;
 use crate::inbox::Level;
 
-/// Names of all states.
+/// Returns the names of all states.
 fn state_names() -> Vec<&'static str> {
     State::ALL.iter().map(|it| it.name()).collect()
 }
 
-/// Names of all selected hypotheses, and null.
+/// Returns the names of all selected hypotheses, and null.
 fn hypothesis_names() -> Vec<Option<&'static str>> {
     let names = SelectedHypothesis::ALL.iter().map(|it| Some(it.name()));
     names.chain([None]).collect()
@@ -251,7 +251,7 @@ pub struct HeadMessage {
 }
 
 impl HeadMessage {
-    /// The radio head at `now_s`.
+    /// Creates the message of a radio head at the time `now_s`.
     pub fn new(status: &HeadStatus, now_s: f64) -> Self {
         let age_s = |since_s: Option<f64>| since_s.map(|it| (now_s - it).max(0.0));
         Self {

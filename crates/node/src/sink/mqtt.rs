@@ -1,4 +1,4 @@
-//! The position object of VDA 5050 to an MQTT broker.
+//! Output of the position object of VDA 5050 to an MQTT broker.
 
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::thread::{self, JoinHandle};
@@ -18,10 +18,11 @@ use crate::settings::MqttOutput;
 const KEEP_ALIVE: Duration = Duration::from_secs(2);
 /// Maximum time to wait for the broker to accept a connection, or to acknowledge the last message.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Without any record for this long, the pipeline has ended or hangs: the vehicle is reported as not localized.
-/// A working pipeline gives a record at least once a second.
+/// Maximum time without a record, after which the pipeline has ended or hangs, and the vehicle is
+/// reported as not localized. A working pipeline provides at least one record per second.
 const SILENCE: Duration = Duration::from_millis(1500);
-/// Maximum number of messages that wait for the broker; further ones are left out, because the next pose is newer.
+/// Maximum number of messages that wait for the broker. Further messages are dropped, because the
+/// next pose is newer.
 const CAPACITY: usize = 8;
 
 /// Result of the network thread.
@@ -46,7 +47,7 @@ pub struct Mqtt {
     last_s: f64,
     /// Newest pose; the origin of the map before the first one.
     pose: Pose,
-    /// Whether the last published message said that the vehicle is localized.
+    /// Whether the last published message reported the vehicle as localized.
     reported_localized: bool,
     last_record: Instant,
 }

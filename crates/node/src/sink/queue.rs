@@ -1,4 +1,4 @@
-//! Records that wait for one output: bounded.
+//! Bounded queue of records for one output.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -17,7 +17,7 @@ struct Waiting {
     is_closed: bool,
 }
 
-/// A queue from the pipeline to one output.
+/// Queue from the pipeline to one output.
 #[derive(Default)]
 pub struct Queue {
     waiting: Mutex<Waiting>,

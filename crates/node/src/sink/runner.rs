@@ -1,4 +1,4 @@
-//! Runs each output on a thread of its own, and retries an output that has failed.
+//! Threads of the outputs, with retries of a failed output.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -24,9 +24,9 @@ const FIRST_RETRY: Duration = Duration::from_millis(250);
 /// Maximum time between retries, so that an output works again within 5 s after the cause has
 /// ended.
 const MAX_RETRY: Duration = Duration::from_secs(2);
-/// Maximum time that the start of the node waits for the outputs. One that takes longer opens later.
+/// Maximum time for which the start of the node waits for the outputs. A slower output opens later.
 const START_PATIENCE: Duration = Duration::from_millis(500);
-/// Time that an output may take to finish after the last record, if it does not make progress.
+/// Maximum time for an output to finish after the last record without progress.
 const END_PATIENCE: Duration = Duration::from_secs(5);
 
 /// Creates the outputs of the settings; nothing is opened.
@@ -101,7 +101,7 @@ impl Running {
                 if done != progress.1 {
                     progress = (Instant::now(), done);
                 }
-                // In playback the reader of an output sets the pace.
+                // In playback, the reader of an output determines the speed.
                 let gives_up = !self.records.waits() || !status.ok;
                 if gives_up && progress.0.elapsed() > END_PATIENCE {
                     lane.health
@@ -134,7 +134,7 @@ struct Retry {
 struct Runner {
     sink: Box<dyn Sink>,
     lane: Lane,
-    /// Whether the output is open; it works once a flush has succeeded after that.
+    /// Whether the output is open. It works once a flush has succeeded after opening.
     is_open: bool,
     retry: Retry,
     /// Records taken since the last complete flush. They are lost if the output fails.
@@ -157,7 +157,7 @@ impl Runner {
 
     fn run(mut self, opened: &Sender<()>) {
         self.open();
-        // The receiver is gone if this took long.
+        // The receiver no longer exists if opening took long.
         let _ = opened.send(());
         let mut taken = VecDeque::new();
         let queue = Arc::clone(&self.lane.queue);
@@ -205,7 +205,7 @@ impl Runner {
 
     fn take(&mut self, record: &Record) {
         if self.is_open {
-            // Counted as lost if it fails.
+            // The record is counted as lost if writing it fails.
             self.unwritten += 1;
             if self.attempt(|sink| sink.take(record)) == Some(false) {
                 self.unwritten -= 1;

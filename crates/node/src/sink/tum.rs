@@ -1,4 +1,4 @@
-//! Poses as a TUM trajectory: one line for each odometry sample.
+//! Output of the poses as a TUM trajectory: one line for each odometry sample.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -11,14 +11,14 @@ use super::file::GrowingFile;
 use super::output::Sink;
 use super::record::{PoseCause, PoseRecord, Record};
 
-/// A TUM trajectory.
+/// Writer of a TUM trajectory.
 pub struct Tum {
     path: PathBuf,
     file: Option<GrowingFile>,
 }
 
 impl Tum {
-    /// A trajectory in this file.
+    /// Creates a writer to the file `path`.
     pub fn new(path: &Path) -> Self {
         Self {
             path: path.to_owned(),
@@ -38,7 +38,7 @@ impl Sink for Tum {
     }
 
     fn take(&mut self, record: &Record) -> Result<bool> {
-        // No pose is written while the first pose is searched for.
+        // No pose is written before the first pose is found.
         if let Record::Pose(PoseRecord {
             status,
             by: PoseCause::Odometry,

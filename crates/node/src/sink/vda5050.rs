@@ -8,10 +8,11 @@ use serde::Serialize;
 use crate::clock::unix_s;
 use crate::settings::{MqttOutput, VdaVersion};
 
-/// Whether the vehicle is reported as localized.
+/// Decides whether the vehicle is reported as localized.
 ///
-/// It becomes true once the pose was valid for `localized_after_s`, and false at once when it is not: the fleet
-/// manager then stops the vehicle. A pose is valid while its protection level is at most the alert limit.
+/// The result becomes true when the pose has been valid for `localized_after_s`. It becomes false
+/// immediately when the pose is not valid, so that the fleet manager stops the vehicle. A pose is
+/// valid while its protection level is at most the alert limit.
 #[derive(Debug, Clone)]
 pub struct Localized {
     after_s: f64,
@@ -21,7 +22,7 @@ pub struct Localized {
 }
 
 impl Localized {
-    /// Not localized yet.
+    /// Creates the state of a vehicle that is not localized.
     pub const fn new(settings: &MqttOutput, alert_limit_m: f64) -> Self {
         Self {
             after_s: settings.localized_after_s,
@@ -36,7 +37,7 @@ impl Localized {
         let is_within = level_m.is_some_and(|it| it <= self.alert_limit_m);
         let is_valid = match status.state {
             State::Ok | State::Degraded => is_within,
-            // Nothing monitors the pose, and no protection level contradicts it.
+            // The pose is not monitored, and no protection level contradicts it.
             State::Unmonitored => level_m.is_none_or(|_| is_within),
             State::Waiting | State::Searching | State::Lost | State::Unavailable => false,
         };
@@ -45,14 +46,14 @@ impl Localized {
             return false;
         }
         let time_s = status.time_s;
-        // Time may have gone back, after a restart of the drive.
+        // The time decreases after a restart of the drive.
         let since_s = self.valid_since_s.filter(|it| *it <= time_s);
         let since_s = since_s.unwrap_or(time_s);
         self.valid_since_s = Some(since_s);
         time_s - since_s >= self.after_s
     }
 
-    /// Not localized any more.
+    /// Resets the state to not localized.
     pub const fn reset(&mut self) {
         self.valid_since_s = None;
     }

@@ -98,7 +98,7 @@ pub struct StatusBoard {
 }
 
 impl StatusBoard {
-    /// An empty board of a node, by its name, with this update period.
+    /// Creates the board of a node without data, with its name and update period.
     pub fn new(name: &str, period: Duration, counters: Counters) -> Self {
         let state = State {
             track_m: TRACK_M,

@@ -52,7 +52,7 @@ impl Text {
     }
 }
 
-/// All metrics of a node.
+/// Returns all metrics of a node.
 pub fn text(board: &StatusBoard) -> String {
     let mut text = Text(String::with_capacity(8192));
     let counters = &board.counters;

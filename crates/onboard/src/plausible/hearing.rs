@@ -1,5 +1,5 @@
-//! Reception of radio heads along the road, by the link budget. It reveals radio heads, road and
-//! start in different coordinate frames, and cells that interfere.
+//! Reception of radio heads along the road according to the link budget. It reveals different
+//! coordinate frames of radio heads, road and start, and interfering cells.
 
 use super::warning::Warning;
 use crate::geometry::Point;
@@ -9,8 +9,8 @@ use crate::road::Road;
 use crate::settings::{Site, Vehicle};
 use crate::walls::Walls;
 
-/// Minimum ratio of an SSB to noise, or to noise plus interference, for detection with four
-/// antennas (dB; `cargo test -p nr-ssb --test all detection`).
+/// Minimum power of an SSB relative to noise, or to noise plus interference, for detection with
+/// four antennas (dB; `cargo test -p nr-ssb --test all detection`).
 const FOUND_DB: f64 = -10.0;
 /// Number of radio heads that determine a position without a road.
 const FOR_A_PLACE: usize = 3;

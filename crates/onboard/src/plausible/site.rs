@@ -246,7 +246,7 @@ fn bends(site: &Site) -> Vec<Warning> {
         .iter()
         .flat_map(|road| road.segments.iter().flatten());
     let narrow = segments.enumerate().filter(|(_, it)| {
-        // Heading changes above one turn have a warning of their own.
+        // Heading changes above one turn have a separate warning.
         it.turn_rad.abs() <= TAU && it.length_m < LEAST_RADIUS_M * it.turn_rad.abs()
     });
     narrow
@@ -263,11 +263,11 @@ fn bends(site: &Site) -> Vec<Warning> {
         .collect()
 }
 
-/// Distance along the road before and behind a radio head that it is to serve (m).
+/// Distance along the road on either side of a radio head for which line of sight is expected (m).
 const NEXT_TO_M: f64 = 60.0;
 
-/// Returns warnings for radio heads that walls hide from the road next to them, and that would be in
-/// sight on the other side of the road.
+/// Returns warnings for radio heads that walls hide from the nearby road, and that would have line
+/// of sight on the other side of the road.
 fn other_side(site: &Site, road: &Road) -> Vec<Warning> {
     if site.walls.is_empty() {
         return Vec::new();
@@ -277,7 +277,8 @@ fn other_side(site: &Site, road: &Road) -> Vec<Warning> {
         let mut walls = site.walls.iter().flat_map(|wall| wall.points_m.windows(2));
         walls.any(|ends| cross([from, to], [ends[0].into(), ends[1].into()]))
     };
-    // Share of the road about a distance along it that walls hide from a position.
+    // Returns the fraction of the road around the distance `about_m` that walls hide from a
+    // position.
     let hidden_share = |from: Point, about_m: f64| {
         let near = route
             .iter()

@@ -45,7 +45,7 @@ fn beneath(path: &str, found: Vec<Warning>) -> impl Iterator<Item = Warning> {
 /// Returns the warnings of the site, and of radio heads that are received nowhere on the path.
 fn in_reach(site: &Site, vehicle: &Vehicle, route: Option<&Road>) -> Vec<Warning> {
     let mut found = written(site, route);
-    // Positions in degrees or grid coordinates have a warning already.
+    // Positions in degrees or grid coordinates already have a warning.
     let of_places = |it: &Warning| it.key.ends_with("position_m") || it.key.starts_with("road");
     if !found.iter().any(of_places) {
         found.extend(without_reception(site, vehicle, route));

@@ -39,7 +39,7 @@ pub fn unusual(settings: &impl Serialize, rows: &[Usual]) -> Vec<Warning> {
     found
 }
 
-/// Calls `report` with the path and value of every number that the steps lead to.
+/// Calls `report` with the path and the value of every number at the path `steps`.
 fn visit(parent: &Value, steps: &[&str], path: String, report: &mut impl FnMut(String, f64)) {
     let Some((step, rest)) = steps.split_first() else {
         if let Some(number) = parent.as_f64() {

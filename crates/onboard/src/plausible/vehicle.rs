@@ -12,7 +12,7 @@ use crate::settings::Vehicle;
 const TYRES: &str = "no tyre grips better than 1 g";
 const KNOWN_NO_BETTER: &str = "with this uncertainty, the direction is unknown";
 
-/// Usual ranges of numbers. They are wide: some vehicle exists at every value within.
+/// Usual ranges of numbers. They are wide, so that they contain the values of every real vehicle.
 const ROWS: &[Usual] = &[
     Usual {
         key: "top_speed_kmh",
@@ -282,7 +282,7 @@ pub fn of_vehicle(vehicle: &Vehicle) -> Vec<Warning> {
 pub fn speed_in_mps(key: &str, speed_kmh: f64) -> Option<Warning> {
     let is_round = |value: f64, step: f64| (value / step - (value / step).round()).abs() < 1e-6;
     let intended_kmh = (speed_kmh * 3.6).round();
-    // Within two decimal places.
+    // The value equals the speed in m/s to two decimal places.
     let fits = intended_kmh >= 1.0 && (intended_kmh / 3.6 - speed_kmh).abs() <= 0.005;
     let doubtful = fits && !is_round(speed_kmh, 0.1) && !is_round(speed_kmh / 3.6, 0.05);
     doubtful.then(|| Warning {

@@ -81,12 +81,12 @@ impl Road {
         }
     }
 
-    /// Length of the road in metres.
+    /// Returns the length of the road in metres.
     pub const fn length_m(&self) -> f64 {
         self.length_m
     }
 
-    /// Width of the road in metres.
+    /// Returns the width of the road in metres.
     pub const fn width_m(&self) -> f64 {
         self.width_m
     }
@@ -114,7 +114,7 @@ impl Road {
         let here = self.curvature_per_m(along_m);
         let aside_m = 3.0_f64.sqrt() * std_m;
         let [before, after] = [-aside_m, aside_m].map(|by_m| self.curvature_per_m(along_m + by_m));
-        // Differences are computed first, so that the result is exactly zero on a line or arc.
+        // The differences are computed first, so that the result is exactly zero on a line or arc.
         let (down, up) = (before - here, after - here);
         let offset = (down + up) / 6.0;
         let slope_per_m2 = if std_m > 0.0 {

@@ -49,9 +49,9 @@ pub trait Library {
     /// [`SettingsError`] if the file does not exist or cannot be read.
     fn points_m(&self, name: &str, referrer: &str) -> Result<Vec<[f64; 2]>, SettingsError>;
 
-    /// Returns the full path of a file that the file `referrer` names and that is not opened here.
+    /// Returns the full path of a file that is named in the file `referrer` and is not opened here.
     /// Without a file system, the name is returned unchanged.
-    fn path(&self, name: &str, _beside: &str) -> String {
+    fn path(&self, name: &str, _referrer: &str) -> String {
         name.to_owned()
     }
 }

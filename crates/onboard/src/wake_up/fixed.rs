@@ -80,7 +80,7 @@ mod tests {
     fn late_ssbs_are_used_and_do_not_shift_the_interval() {
         let mut policy = FixedInterval::new(Due::constant(0.08, 0.0));
         assert!(policy.take(0.0) && policy.take(0.16));
-        // A late SSB, and another SSB of the burst that was used.
+        // A late SSB, and another SSB of a burst that was already used.
         assert!(policy.take(0.02) && policy.take(0.163));
         assert!(!policy.take(0.18) && !policy.take(0.22));
         assert!(policy.take(0.24));

@@ -38,8 +38,8 @@ impl Pid {
             base_s,                                    // 5
             max_s,                                     // 5
             u_unit_s: settings.u_unit_ms * 1e-3,
-            // Anti-windup, which the paper does not have: after a persistent deficit the wake-up
-            // time would otherwise stay at its bound for long.
+            // Anti-windup, which the paper does not specify. Without it, the wake-up time stays at
+            // its bound for a long time after a persistent deficit.
             integral_clamp: if settings.integral_clamp > 0.0 {
                 settings.integral_clamp
             } else {

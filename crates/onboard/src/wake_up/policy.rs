@@ -26,7 +26,7 @@ pub struct Situation<'a> {
     pub localizer: &'a dyn Localizer,
     /// Radio heads in line of sight, with the attenuation of walls.
     pub heads: &'a [RadioHead],
-    /// Link budget of their SSBs.
+    /// Link budget between the radio heads and the vehicle.
     pub budget: &'a LinkBudget,
     /// Height of the array in metres.
     pub height_m: f64,
@@ -98,8 +98,8 @@ pub trait WakeUpPolicy: Send {
         chosen: &mut [bool],
     ) -> Result<f64, BoxError>;
 
-    /// Whether the error stays below the policy's own target until the next burst, if it has a
-    /// target. `false` after a burst means that the target cannot be reached there, or not at an
+    /// Whether the error stays below the policy's target until the next burst, if the policy has a
+    /// target. `false` after a burst means that the target cannot be reached, or not at an
     /// acceptable energy.
     fn keeps_bound(&self, _now: &Situation<'_>) -> Option<bool> {
         None

@@ -20,7 +20,6 @@
 //!
 //! The value of an angle depends mainly on the SNR of its SSB, which an active receiver measures
 //! before any angle is estimated. With `snr_headroom_db`, the measured SNR determines the value.
-//! before any angle is estimated. Given `snr_headroom_db`, an angle's worth is judged by that.
 
 use super::policy::{SAME_TIME_S, Situation, WakeUpPolicy};
 use crate::BoxError;
@@ -83,10 +82,11 @@ impl UncertaintyDriven {
         self.error_m(ekf, time_s + self.period_s) <= self.target_error_m
     }
 
-    /// Returns the angles to use, one bit for each radio head: the number with the best reduction
-    /// per energy, if its value is sufficient or the target requires it, and more if the target
-    /// requires more. If no number is sufficient, those whose value justifies their energy.
-    /// `snr_db` returns the SNR of a radio head at a distance.
+    /// Returns the angles to use, one bit for each radio head. The number of angles has the maximum
+    /// variance reduction per energy, if that reduction is sufficient or the target requires
+    /// angles; the number is larger if the target requires it. If all angles together cannot meet
+    /// the target, every angle whose reduction justifies its energy is used. `snr_db` returns the
+    /// SNR of a radio head at a distance.
     fn choice(
         &self,
         ekf: &Ekf,
@@ -143,8 +143,8 @@ impl UncertaintyDriven {
         }
     }
 
-    /// Returns the time after `time_s` for which the error stays below the target without another
-    /// angle, in seconds: the latest wake-up.
+    /// Returns the duration after `time_s` for which the error stays below the target without
+    /// another angle, in seconds. It determines the latest wake-up.
     fn wake_up_time_s(&self, ekf: &Ekf, time_s: f64) -> f64 {
         let holds = |periods: f64| {
             self.error_m(ekf, time_s + periods * self.period_s) <= self.target_error_m
@@ -170,7 +170,7 @@ impl UncertaintyDriven {
     }
 }
 
-/// Another localizer, or one whose position is unknown, uses every angle.
+/// With another localizer, or while the position is unknown, every angle is used.
 impl WakeUpPolicy for UncertaintyDriven {
     /// Whether the error would exceed the target at the following SSB, or the value of an angle
     /// justifies its energy.

@@ -218,7 +218,7 @@ impl<'a> Replay<'a> {
         (self.was_lost, self.recovered) = (is_lost, recovered);
     }
 
-    /// Remarks on faults of odometry and receive channels that begin or end.
+    /// Adds remarks on faults of odometry and receive channels that begin or end.
     fn remark_on_faults(&mut self, time_s: f64) {
         let before = std::mem::replace(&mut self.faults, *self.onboard.faults());
         let now = self.faults;
@@ -295,8 +295,8 @@ impl<'a> Replay<'a> {
         self.onboard.keep_journal();
     }
 
-    /// Smoothed poses at the odometry samples, from the first known one on; they use the
-    /// measurements of the whole drive.
+    /// Returns the smoothed poses at the odometry samples, from the first known pose on. They use
+    /// the measurements of the whole drive.
     ///
     /// # Errors
     /// [`ReplayError::Custom`].
@@ -318,12 +318,12 @@ impl<'a> Replay<'a> {
         self.drive.remarks.push(Remark { time_s, text });
     }
 
-    /// Angles so far, each with its result (used or rejected).
+    /// Returns the angles processed so far, each with its result (used or rejected).
     pub fn aoa_estimates(&self) -> &[AngleResult] {
         &self.drive.aoa_estimates
     }
 
-    /// Located drive so far.
+    /// Returns the drive located so far.
     pub const fn located(&self) -> &LocatedDrive {
         &self.drive
     }
@@ -383,7 +383,7 @@ impl<'a> Replay<'a> {
                     }
                 }
                 Ok(_) => self.beyond_map = false,
-                // A sample that is left out gives no information on the vehicle's position.
+                // A rejected sample contains no information about the vehicle's position.
                 Err(defect) => {
                     self.remark(at_s, format!("odometry at {at_s} s: left out, {defect}"));
                     continue;

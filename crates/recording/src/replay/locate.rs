@@ -222,8 +222,7 @@ fn as_given<'a>(
     }
 }
 
-/// Converts the measurement of an execution to a logged angle; the time offset is already
-/// corrected.
+/// Converts the result of an angle to a logged angle. Its time offset is already corrected.
 fn as_logged(angle_result: &AngleResult) -> Option<LoggedAngle> {
     let measured = angle_result.measured?;
     let ssb = SsbDetection {
@@ -277,7 +276,7 @@ fn smoothed_poses(
         integrity: Some(IntegritySettings::off()),
         ..as_chosen(&in_time(vehicle))
     };
-    // The smoothed filter estimates a bias if the monitored one did.
+    // The smoothed filter estimates biases if the monitored filter did.
     let multipath_bias_probability = EkfConfig::new(site, vehicle).multipath_bias_probability;
     unguarded.receiver.multipath_bias_probability = Some(multipath_bias_probability);
     let mut mistrusted_until_s = BTreeMap::new();
@@ -294,7 +293,7 @@ fn smoothed_poses(
     };
     let aoa_estimates = aoa_estimates.iter().filter(trusted);
     let mut angles: Vec<LoggedAngle> = aoa_estimates.filter_map(as_logged).collect();
-    // With all data available, no angle is late.
+    // All data are available, so that no angle is late.
     angles.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));
     let mut replay = Replay::new(site, &unguarded, start, Custom::default(), odometry)?;
     replay.keep_journal();

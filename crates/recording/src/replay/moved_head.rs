@@ -127,7 +127,7 @@ fn log_likelihood(sighted: &[Sighted], place: Point, rise_m: f64, measurand: &Me
     sighted.iter().map(of_angle).sum()
 }
 
-/// Pattern search (Hooke and Jeeves, J. ACM 8(2), 1961) from a start position. The number of moves
+/// Refines a position by pattern search (Hooke and Jeeves, J. ACM 8(2), 1961). The number of moves
 /// per step size is limited to the resolution of the previous grid, because the likelihood may
 /// increase for kilometres along a diverged path.
 fn refine(

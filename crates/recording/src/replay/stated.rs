@@ -8,8 +8,8 @@ use onboard::settings::{DriveKind, Site, Vehicle};
 
 use crate::angle_log::LoggedAngle;
 
-/// Fraction of the specified variance that is correlated between angles. The examined sensors
-/// (cameras and a laser with cautious data sheets) have 0.08 to 0.2.
+/// Fraction of the specified variance that is correlated between angles. Examined sensors (cameras,
+/// and a laser with cautious specifications) have 0.08 to 0.2.
 const USUAL_SHARE: f64 = 0.25;
 
 /// Prior probability of errors that are correlated over metres, if the scatter is unknown.

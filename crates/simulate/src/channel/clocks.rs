@@ -64,7 +64,8 @@ impl Clocks {
         };
         let model = RangeModel::new(&ranging, &vehicle.array, site.wavelength_m());
         let scale = scenario.iq.clock_error_scale;
-        // The receiver counts from its first SSB: the offset of the vehicle's clock has no effect.
+        // The receiver measures delays relative to its first SSB, so that the offset of the
+        // vehicle's clock has no effect.
         let vehicle_m = [0.0, model.clock_wander_m_per_sqrt_s];
         made.vehicle = Some(Clock::new(streams, VEHICLE, vehicle_m, scale));
         let heads: Vec<_> = site.radio_heads.iter().map(RadioHead::from).collect();
@@ -93,8 +94,8 @@ impl Clocks {
         }
     }
 
-    /// Returns the delay of the SSBs of radio head `index` due to the clocks in seconds: a radio
-    /// head that transmits late, and a vehicle clock that is fast.
+    /// Returns the delay of the SSBs of radio head `index` due to the clocks in seconds. It is
+    /// positive if the radio head transmits late or the vehicle's clock is fast.
     pub fn delay_s(&self, index: usize) -> f64 {
         let oscillator = self.of_heads.get(index);
         let head = oscillator.and_then(|&at| self.oscillators.get(at));

@@ -11,8 +11,8 @@ use crate::world::{Antennas, LineOfSight};
 /// Propagation from one radio head to the antennas in one run.
 /// [`RicianPropagation`](super::RicianPropagation) is an example implementation.
 ///
-/// The channel must be a function of the position and independent of earlier calls. Then a run has
-/// the same fading for every choice of received SSBs.
+/// The channel must be a function of the position and independent of earlier calls, so that a run
+/// has the same fading for every choice of received SSBs.
 pub trait Propagation: Send {
     /// Returns the mean power relative to the free-space link budget in dB: shadowing and
     /// additional path loss. Called once per SSB, in order.

@@ -1,4 +1,4 @@
-//! A target of a position or stretch of the road.
+//! Target of a position or stretch of the road.
 
 use onboard::settings::{Check, SettingsError};
 use schemars::JsonSchema;
@@ -34,7 +34,8 @@ pub struct PlaceTarget {
 const ABOUT_M: f64 = 5.0;
 
 impl PlaceTarget {
-    /// Both ends of the stretch to which it applies, as distances along a road of this length in metres.
+    /// Returns both ends of the stretch to which the target applies, as distances along a road of
+    /// length `road_m`, in metres.
     pub fn ends_m(&self, road_m: f64) -> [f64; 2] {
         let from_m = self.at_m.map(|it| it - ABOUT_M).or(self.from_m);
         let to_m = self.at_m.map(|it| it + ABOUT_M).or(self.to_m);
@@ -44,7 +45,7 @@ impl PlaceTarget {
         ]
     }
 
-    /// Rejects a target without a place on the driven road.
+    /// Rejects a target without a position on the driven road.
     ///
     /// # Errors
     /// [`SettingsError::Value`] naming the key and the allowed values.

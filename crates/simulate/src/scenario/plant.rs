@@ -229,8 +229,8 @@ impl TomlFile for Plant {
     }
 }
 
-/// Alert limit over the error of the target: the containment limit of required navigation performance is twice
-/// its accuracy (ICAO Doc 9613, 1.2).
+/// Ratio of the alert limit to the error of the target. The containment limit of required
+/// navigation performance is twice its accuracy (ICAO Doc 9613, 1.2).
 const ALERT_LIMIT_PER_TARGET: f64 = 2.0;
 /// Currencies with a published rate (`economics/prices.toml`).
 const CONVERTED: [&str; 2] = ["USD", "EUR"];
@@ -245,7 +245,7 @@ fn stated<T: TomlFile>(
         Some(Value::String(name)) => {
             let named = library.text(T::WHAT, T::SHIPPED, name, origin);
             let named = named.map_err(|error| error.beneath(origin, T::WHAT))?;
-            // A text that is no TOML is rejected by its reader, with its place.
+            // A text that is not TOML is rejected by its reader, which reports the position.
             let keys = named.text.parse().unwrap_or_default();
             T::stated_keys(keys, &named.origin, library)
         }
@@ -303,7 +303,7 @@ impl Plant {
     /// Returns warnings about implausible values of site, vehicle, trip and prices.
     ///
     /// # Errors
-    /// [`SettingsError`] only where the plant has been changed by hand into an impossible one.
+    /// [`SettingsError`] only if the plant was changed by code to an invalid one.
     pub fn warnings(&self) -> Result<Vec<Warning>, SettingsError> {
         let mut found = self.scenario(&self.channel).warnings()?;
         found.extend(unusual_prices::of_plant(self, self.currency()));

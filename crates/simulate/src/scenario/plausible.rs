@@ -77,15 +77,15 @@ impl Scenario {
             found.extend(speed_in_mps("motion.top_speed_kmh", speed_kmh));
         }
         found.extend(self.faster_than_it_is());
-        found.extend(self.thrown_out(&path));
-        found.extend(self.far_from_belief(check)?);
+        found.extend(self.too_fast_for_bend(&path));
+        found.extend(self.far_from_nominal(check)?);
         let duration_s = self.size(check)?.duration_s;
         found.extend(self.after_the_drive(duration_s));
         Ok(found)
     }
 
     /// Warns of true values that are probably in another unit than the nominal values.
-    fn far_from_belief(&self, check: Check<'_>) -> Result<Vec<Warning>, SettingsError> {
+    fn far_from_nominal(&self, check: Check<'_>) -> Result<Vec<Warning>, SettingsError> {
         let (site, vehicle, _) = self.actual(check)?;
         let nominal = of_vehicle(&self.vehicle);
         let mut found = of_vehicle(&vehicle);
@@ -140,7 +140,7 @@ impl Scenario {
 
     /// Warns of a bend that cannot be driven at the speed because of a wrong radius or a wrong
     /// unit.
-    fn thrown_out(&self, path: &Road) -> Option<Warning> {
+    fn too_fast_for_bend(&self, path: &Road) -> Option<Warning> {
         let key = match self.motion.top_speed_kmh {
             Some(_) => "motion.top_speed_kmh",
             None => "vehicle.top_speed_kmh",

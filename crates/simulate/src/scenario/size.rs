@@ -5,9 +5,9 @@ use onboard::settings::{Check, SettingsError, Site, Vehicle};
 
 use super::motion::MotionSettings;
 
-/// Maximum number of SSBs or odometry samples of a drive without `allow_large`. The limit equals
+/// Maximum number of SSBs or odometry samples of a drive without `allow_large`. It corresponds to
 /// several hours with four radio heads.
-const MOST_LOOKS: f64 = 5e6;
+const MAX_SSBS: f64 = 5e6;
 /// Maximum memory without `allow_large`, in bytes.
 const MOST_BYTES: f64 = 1.5e9;
 /// Memory of the statistics of one burst over all runs in bytes, mainly for the quantiles.
@@ -67,7 +67,7 @@ impl DriveSize {
             (self.duration_s / 3600.0, self.angles, self.bytes(1) * 1e-9);
         let most = self.angles.max(self.odometry_samples);
         check.that(
-            most <= MOST_LOOKS && self.bytes(1) <= MOST_BYTES,
+            most <= MAX_SSBS && self.bytes(1) <= MOST_BYTES,
             "motion",
             format!("a drive of {hours:.1} h, {angles:.1e} SSBs and {gigabytes:.1} GB"),
             &format!(

@@ -90,7 +90,7 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
         becomes_nominal_at: Some(100.0),
         ..ROW
     },
-    // The wheels of a differential drive slip slightly over every metre.
+    // Not for a differential drive, whose nominal noise includes slip over every metre.
     Mode {
         id: SelectedHypothesis::NoisyOdometer,
         applies: |nominal, _| {
