@@ -72,7 +72,8 @@ pub fn azimuth_elevation<M: Manifold<N> + ?Sized, const N: usize>(
     covariance_around(&around, direction, snr, snapshots, true)
 }
 
-/// [`azimuth_elevation`], or the variance of the azimuth only if the elevation is known.
+/// Returns the bound of [`azimuth_elevation`], or the variance of the azimuth only if the elevation
+/// is known.
 pub(crate) fn covariance_around<const N: usize>(
     around: &Neighbourhood<N>,
     direction: Direction,

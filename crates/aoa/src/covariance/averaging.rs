@@ -46,7 +46,7 @@ impl<const N: usize> Covariance<N> {
         self.over_subarrays()
     }
 
-    /// Spatial smoothing without the compile-time check of `M <= N`.
+    /// Returns the spatially smoothed covariance without the compile-time check of `M <= N`.
     pub(crate) fn over_subarrays<const M: usize>(&self) -> Covariance<M> {
         let mut sum = zeros::<M>();
         let scale = 1.0 / (N - M + 1) as f64;

@@ -16,7 +16,7 @@ use crate::spectrum::polynomial::Spectrum;
 
 /// Number of directions at which the pattern of the weighted array is evaluated.
 const DIRECTIONS: usize = 64;
-/// Maximum relative side lobe power; above it, a direction is ambiguous.
+/// Maximum relative side lobe power. Above it, a direction is ambiguous.
 const ALIKE: f64 = 0.98;
 
 /// [`maximum_likelihood_pilots`](crate::maximum_likelihood_pilots) for a different noise variance

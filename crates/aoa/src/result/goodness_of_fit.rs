@@ -27,15 +27,17 @@ const FALSE_ALARM_DEVIATE: f64 = 2.575_829_303_548_901;
 /// Minimum degrees of freedom of an estimated noise variance that is treated as known: its error then adds less
 /// than 1.6 % to a standard deviation.
 const MANY_FREEDOMS: f64 = 100.0;
-/// Minimum degrees of freedom of an estimated noise variance for a reliable angle. With fewer the ratio of error
-/// to standard deviation exceeds 3 in more than 0.6 % of the estimates, or is below 0.9 RMS.
+/// Minimum degrees of freedom of an estimated noise variance for a reliable angle. With fewer, the
+/// ratio of error to standard deviation exceeds 3 in more than 0.6 % of the estimates, or has an
+/// RMS below 0.9.
 const FEWEST_FREEDOMS: f64 = 8.0;
-/// Degrees of freedom of an estimated noise variance that double the SNR needed to exclude a wholly wrong direction.
-/// With fewer the estimated SNR scatters more.
+/// Degrees of freedom of an estimated noise variance that double the SNR required to exclude an
+/// outlier. With fewer, the variance of the estimated SNR is larger.
 const FREEDOMS_AT_TWICE_THE_SNR: f64 = 10.0;
-/// Relative increase of an angle's variance at the needed SNR; it falls with the cube of the SNR. An SNR near the
-/// threshold exceeds it more often because the noise is underestimated than because it is small. Fitted so that angles
-/// that are reliable in one fifth of the trials or more have a z-RMS from 0.9 to 1.15.
+/// Relative increase of an angle's variance at the required SNR; it decreases with the cube of the
+/// SNR. An estimated SNR near the threshold is more often caused by an underestimated noise than by
+/// a weak signal. The value was fitted so that the z-RMS is 0.9 to 1.15 if at least one fifth of
+/// the angles are reliable.
 const INCREASE_AT_THRESHOLD: f64 = 0.6;
 
 /// Goodness of fit of the sources and white noise to the received snapshots.
@@ -57,8 +59,8 @@ pub struct GoodnessOfFit {
     /// Residual power that is correlated with the waveforms, relative to the noise power in the same
     /// dimensions: a reduced chi-squared with mean 1 if the model holds.
     pub coherent: f64,
-    /// Rest of the residual: its power relative to the noise power if the noise is known, otherwise a
-    /// measure of its anisotropy (John's statistic). The mean is 1 if the model holds.
+    /// Rest of the residual: the ratio of its power to the noise power if the noise is known,
+    /// otherwise its anisotropy (John's statistic). The mean is 1 if the model holds.
     pub noise: f64,
     model: Model,
 }
@@ -92,7 +94,8 @@ pub(crate) struct Tests {
     coherent_freedom: f64,
     rest_freedom: f64,
     dimensions_left: f64,
-    /// Factor on the variance of an angle far above the threshold SNR, and its increase at that SNR.
+    /// Factor on the variance of an angle far above the threshold SNR, and relative increase of the
+    /// variance at that SNR.
     unknown_noise: f64,
     increase_at_threshold: f64,
     /// Factor on the threshold SNR.
@@ -154,12 +157,13 @@ impl Model {
         2.0 * self.snapshots_left() * self.dimensions_left()
     }
 
-    /// Degrees of freedom of the noise variance that is estimated from the whole residual of one source.
+    /// Returns the degrees of freedom of the noise variance that is estimated from the whole
+    /// residual of one source.
     fn noise_freedom(self) -> f64 {
         self.residual_dimensions() - f64::from(self.parameters)
     }
 
-    /// Number of real dimensions of the residual in all snapshots.
+    /// Returns the number of real dimensions of the residual in all snapshots.
     fn residual_dimensions(self) -> f64 {
         2.0 * f64::from(self.snapshots) * self.dimensions_left()
     }
@@ -169,12 +173,14 @@ impl Model {
         self.noise_is_known || self.sources != 1 || self.noise_freedom() >= MANY_FREEDOMS
     }
 
-    /// Factor on the variance of an angle because the noise variance is estimated with `f` degrees of freedom.
+    /// Returns the factor on the variance of an angle that is due to the estimation of the noise
+    /// variance with `f` degrees of freedom.
     ///
-    /// The residual's power is divided by all of its dimensions, `f + p`, although `p` of them were fitted. The
-    /// angle's error over its standard deviation then follows Student's t distribution of `f` degrees of freedom,
-    /// whose variance is `f / (f - 2)`. `f / (f - 3)` in its place also keeps the share beyond three standard
-    /// deviations below 0.6 %, for `f` from 7 on.
+    /// The residual's power is divided by all of its dimensions, `f + p`, although `p` of them were
+    /// fitted. The ratio of the angle's error to its standard deviation then follows Student's t
+    /// distribution with `f` degrees of freedom, whose variance is `f / (f - 2)`. The factor `f /
+    /// (f - 3)` also keeps the fraction beyond three standard deviations below 0.6 % for `f` of at
+    /// least 7.
     fn unknown_noise(self) -> f64 {
         if self.has_known_noise() {
             return 1.0;
@@ -183,7 +189,8 @@ impl Model {
         self.residual_dimensions() / remaining.max(1.0)
     }
 
-    /// Factor on the SNR needed to exclude a wholly wrong direction, because the noise variance is estimated.
+    /// Returns the factor on the SNR required to exclude an outlier that is due to the estimation
+    /// of the noise variance.
     fn needed(self) -> f64 {
         if self.has_known_noise() {
             return 1.0;
@@ -191,7 +198,7 @@ impl Model {
         self.unknown_noise() * (1.0 + FREEDOMS_AT_TWICE_THE_SNR / self.noise_freedom().max(1.0))
     }
 
-    /// Degrees of freedom of the numerator and the denominator of each ratio.
+    /// Returns the degrees of freedom of the numerator and the denominator of each ratio.
     fn freedoms(self) -> [[f64; 2]; 2] {
         let shape = self.dimensions_left().powi(2) - 1.0;
         if self.noise_is_known {
@@ -253,7 +260,8 @@ impl Tests {
         let larger = |a: f64, b: f64| if a > b { a } else { b };
         let least = power * ROUNDING;
         let rest = larger(left.rest, least);
-        // Noise variance in one real dimension: given or estimated, from the rest, and from the coherent part.
+        // Noise variance in one real dimension: given or estimated, from the rest of the residual,
+        // and from its coherent part.
         let of_noise = 0.5 * noise_power / f64::from(self.model.snapshots);
         let of_rest = rest / self.rest_freedom;
         let of_coherent = left.coherent / self.coherent_freedom;
@@ -285,13 +293,14 @@ impl Tests {
         }
     }
 
-    /// SNR needed to exclude a wholly wrong direction; `with_known_noise` is the needed SNR for known noise.
+    /// Returns the SNR required to exclude an outlier; `with_known_noise` is the required SNR for
+    /// known noise.
     pub(crate) const fn needed_snr(&self, with_known_noise: f64) -> f64 {
         self.needed * with_known_noise
     }
 
-    /// Factor on the variance of an angle, because the noise variance is estimated. `needed_snr` is the
-    /// result of [`Self::needed_snr`].
+    /// Returns the factor on the variance of an angle that is due to the estimation of the noise
+    /// variance. `needed_snr` is the result of [`Self::needed_snr`].
     #[inline(always)]
     pub(crate) fn variance_factor(&self, snr: f64, needed_snr: f64) -> f64 {
         let ratio = needed_snr / snr;
@@ -305,7 +314,7 @@ impl Tests {
         (!self.is_noise_determined).then_some(Reason::TooFewSnapshots)
     }
 
-    /// Reason of a misfit, if a ratio exceeds its limit.
+    /// Returns the reason of a misfit if a ratio exceeds its limit.
     #[inline(always)]
     pub(crate) fn misfit(&self, [coherent, noise]: [f64; 2]) -> Option<Reason> {
         if noise > self.noise_limit {
@@ -319,17 +328,17 @@ impl Tests {
 }
 
 impl GoodnessOfFit {
-    /// Reason of a misfit, if a test rejects the model: [`Reason::Multipath`] or [`Reason::MoreSources`]. A model
-    /// that holds is rejected with a probability of 1 %.
+    /// Returns the reason of a misfit if a test rejects the model: [`Reason::Multipath`] or
+    /// [`Reason::MoreSources`]. A model that holds is rejected with a probability of 1 %.
     pub fn misfit(&self) -> Option<Reason> {
         self.model.tests().misfit([self.coherent, self.noise])
     }
 
-    /// Probability that a model that holds has an equal or worse fit, from the worse of both ratios. It is 1 if
-    /// there is nothing to test: a single snapshot with unknown noise.
+    /// Returns the probability that a model that holds has an equal or worse fit, from the worse of
+    /// both ratios. It is 1 if there is nothing to test: a single snapshot with unknown noise.
     ///
-    /// The F distribution is approximated by Paulson (1942). The relative error is below 10 % down to a
-    /// probability of 1e-3, and the result is never much too small.
+    /// The F distribution is approximated by Paulson (1942). The relative error is below 10 % for
+    /// probabilities above 1e-3, and the result is never far too small.
     pub fn p_value(&self) -> f64 {
         let ratios = [self.coherent, self.noise];
         let freedoms = self.model.freedoms();
@@ -341,7 +350,7 @@ impl GoodnessOfFit {
             .zip(freedoms)
             .map(tail)
             .fold(1.0, f64::min);
-        // Minimum of two independent p-values: 1 - (1 - p)^2.
+        // The minimum of two independent p-values has the distribution function 1 - (1 - p)^2.
         less * (2.0 - less)
     }
 }
@@ -369,7 +378,7 @@ fn deviate(ratio: f64, freedom: [f64; 2]) -> f64 {
     ((1.0 - b) * root - (1.0 - a)) / (b * root * root + a).sqrt()
 }
 
-/// Ratio with the [`deviate`] [`FALSE_ALARM_DEVIATE`]; infinite if no ratio reaches it.
+/// Returns the ratio whose [`deviate`] is [`FALSE_ALARM_DEVIATE`]; infinite if no ratio has it.
 fn largest_ratio(freedom: [f64; 2]) -> f64 {
     if freedom.iter().any(|it| *it < 1.0) {
         return f64::INFINITY;
