@@ -71,7 +71,7 @@ impl DriveSize {
             "motion",
             format!("a drive of {hours:.1} h, {angles:.1e} SSBs and {gigabytes:.1} GB"),
             &format!(
-                "at most {MOST_LOOKS:.0e} SSBs or odometry samples and {:.1} GB are allowed \
+                "at most {MAX_SSBS:.0e} SSBs or odometry samples and {:.1} GB are allowed \
                  without allow_large = true (--allow-large); shorten the road or the stops, or \
                  raise top_speed_kmh",
                 MOST_BYTES * 1e-9
