@@ -8,7 +8,7 @@ from importlib.metadata import version
 from string import Template
 from typing import TYPE_CHECKING
 
-import vl_convert
+from access_av.report.chart_code import chart_code
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,15 +38,10 @@ def fill(template: str, specs: Mapping[str, Spec], **fields: object) -> str:
         style=_read("style.css"),
         footer=f"ACCESS-AV {version('access-av')}. This localizer is not a safety function "
         "in the sense of ISO 3691-4.",
-        bundle=bundle(),
+        bundle=chart_code(),
         specs=json.dumps(specs, separators=(",", ":")).replace("<", "\\u003c"),
         script=_read("page.js"),
     )
-
-
-def bundle() -> str:
-    """Returns the code that draws charts; built once per process in one or two seconds."""
-    return vl_convert.javascript_bundle()  # type: ignore[call-arg]  # its type stub is wrong
 
 
 def _read(name: str) -> str:
