@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import fcntl
 import os
+import shutil
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -84,17 +86,36 @@ def access_av(
     return run
 
 
+def made_once(
+    tmp_path_factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]
+) -> Path:
+    """Returns a directory that ``make`` fills once for all parallel workers."""
+    base = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        base = base.parent  # the workers have directories of their own in it
+    folder, finished = base / name, base / f"{name}.finished"
+    with (base / f"{name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not finished.exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir()
+            make(folder)
+            finished.touch()
+    return folder
+
+
 @pytest.fixture(scope="session")
 def quick_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Results of a small evaluation, in a temporary ``results/`` directory."""
     from access_av.report.paper import results as paper_results
 
-    results = tmp_path_factory.mktemp("results")
-    directory = results / "2000-01-01T000000.000-evaluate"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("access_av.tables.results_directory.RESULTS", results)
-        paper_results.run(["every-ssb", "gate"], runs=3, seed=5, out=directory)
-    return results
+    def make(results: Path) -> None:
+        directory = results / "2000-01-01T000000.000-evaluate"
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("access_av.tables.results_directory.RESULTS", results)
+            paper_results.run(["every-ssb", "gate"], runs=3, seed=5, out=directory)
+
+    return made_once(tmp_path_factory, "quick-results", make)
 
 
 @pytest.fixture(scope="session")
@@ -103,17 +124,18 @@ def short_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from access_av.cli.main import main
     from short_plant import PLANT
 
-    folder = tmp_path_factory.mktemp("study")
-    (folder / "short.toml").write_text(PLANT, "utf-8")
-    command = ["access-av", "study", str(folder / "short.toml"), "--runs", "4"]
-    more = ["--force-remedies", "--sweep", "site.rician_k_db=3", "--out", str(folder / "out")]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("access_av.tables.results_directory.RESULTS", folder / "results")
-        patch.setattr(sys, "argv", [*command, *more])
-        with pytest.raises(SystemExit) as stopped:
-            main()
-    assert not stopped.value.code
-    return folder / "out"
+    def make(folder: Path) -> None:
+        (folder / "short.toml").write_text(PLANT, "utf-8")
+        command = ["access-av", "study", str(folder / "short.toml"), "--runs", "4"]
+        more = ["--force-remedies", "--sweep", "site.rician_k_db=3", "--out", str(folder / "out")]
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("access_av.tables.results_directory.RESULTS", folder / "results")
+            patch.setattr(sys, "argv", [*command, *more])
+            with pytest.raises(SystemExit) as stopped:
+                main()
+        assert not stopped.value.code
+
+    return made_once(tmp_path_factory, "short-study", make) / "out"
 
 
 @pytest.fixture

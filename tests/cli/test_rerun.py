@@ -12,7 +12,7 @@ import polars as pl
 import pytest
 
 from access_av.tables.inputs import inputs
-from short_plant import PLANT
+from short_plant import LAST_METRES
 
 SCENARIO = """\
 extends = "paper-real-odometry-2"
@@ -58,7 +58,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     where = tmp_path_factory.mktemp("rerun")
     (where / "short.toml").write_text(SCENARIO)
     (where / "space.toml").write_text(SPACE)
-    (where / "plant.toml").write_text(PLANT)
+    (where / "plant.toml").write_text(LAST_METRES)
     drives = (
         ("drive", ()),
         ("log1", ("--angles",)),
