@@ -8,14 +8,43 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from typing_extensions import Self
 
-class Judgement(Enum):
-    """Whether runs meet the target; `study.json` contains the value."""
 
-    MET = "met"
-    PROBABLY_MET = "probably_met"
-    PROBABLY_MISSED = "probably_missed"
-    MISSED = "missed"
+class Worded(Enum):
+    """Enumeration of values with their wording.
+
+    Attributes
+    ----------
+    words
+        The wording for reports.
+    badge
+        Kind of the badge of a page: ``yes``, ``fit`` or ``no``; empty without a badge.
+    """
+
+    words: str
+    badge: str
+
+    def __new__(cls, value: str, words: str = "", badge: str = "") -> Self:
+        """Creates a member; without ``words``, the value is the wording."""
+        made = object.__new__(cls)
+        made._value_, made.words, made.badge = value, words or value, badge
+        return made
+
+
+class Judgement(Worded):
+    """Whether runs meet the target; `study.json` contains the value.
+
+    Examples
+    --------
+    >>> Judgement.PROBABLY_MET.words, Judgement.PROBABLY_MET.badge
+    ('probably good enough', 'fit')
+    """
+
+    MET = "met", "good enough", "yes"
+    PROBABLY_MET = "probably_met", "probably good enough", "fit"
+    PROBABLY_MISSED = "probably_missed", "probably not good enough", "fit"
+    MISSED = "missed", "not good enough", "no"
 
     @classmethod
     def of(cls, share: tuple[float, float, float], percent: float) -> Judgement:
@@ -51,45 +80,13 @@ class Judgement(Enum):
         """Whether the estimated share meets the target, with or without 95 % confidence."""
         return self in (Judgement.MET, Judgement.PROBABLY_MET)
 
-    @property
-    def words(self) -> str:
-        """The wording for reports.
 
-        Examples
-        --------
-        >>> Judgement.PROBABLY_MET.words
-        'probably good enough'
-        """
-        return _JUDGEMENTS[self][0]
-
-    @property
-    def badge(self) -> str:
-        """Kind of the badge of a page: ``yes``, ``fit`` or ``no``."""
-        return _JUDGEMENTS[self][1]
-
-
-class Effect(Enum):
+class Effect(Worded):
     """Effect of a remedy on the error; `study.json` contains the value."""
 
-    HELPS = "helps"
-    UNCERTAIN = "uncertain"
-    HARMS = "harms"
-
-    @property
-    def words(self) -> str:
-        """The wording for reports.
-
-        Examples
-        --------
-        >>> [it.words for it in Effect]
-        ['helps', 'not sure', 'makes it worse']
-        """
-        return _EFFECTS[self][0]
-
-    @property
-    def badge(self) -> str:
-        """Kind of the badge of a page: ``yes``, ``fit`` or ``no``."""
-        return _EFFECTS[self][1]
+    HELPS = "helps", "helps", "yes"
+    UNCERTAIN = "uncertain", "not sure", "fit"
+    HARMS = "harms", "makes it worse", "no"
 
     @classmethod
     def of(cls, delta_m: tuple[float, float, float]) -> Effect:
@@ -106,32 +103,54 @@ class Effect(Enum):
         return cls.HARMS if low > 0.0 else cls.UNCERTAIN
 
 
-class NotOk(Enum):
+class NotOk(Worded):
     """Reason for a state other than ``ok``; `study.json` contains the value."""
 
-    LEVEL = "level"
-    SUSPECTED = "suspected"
-    CONTRADICTED = "contradicted"
-
-    @property
-    def words(self) -> str:
-        """The wording for reports.
-
-        Examples
-        --------
-        >>> NotOk.LEVEL.words
-        'level above the alert limit'
-        """
-        return _REASONS[self]
+    LEVEL = "level", "level above the alert limit"
+    SUSPECTED = "suspected", "suspected fault"
+    CONTRADICTED = "contradicted", "position lost"
 
 
 class Cause(Enum):
-    """Cause of an unavailable position."""
+    """Cause of an unavailable position.
 
-    SEARCHING = "searching"
-    CONTRADICTED = "contradicted"
-    TOO_WIDE = "too_wide"
-    SUSPECTED = "suspected"
+    Attributes
+    ----------
+    remedy
+        Measures against the cause.
+    """
+
+    remedy: str
+    _words: str
+
+    def __new__(cls, value: str, words: str = "", remedy: str = "") -> Self:
+        """Creates a member; ``words`` may contain the alert limit."""
+        made = object.__new__(cls)
+        made._value_, made._words, made.remedy = value, words, remedy
+        return made
+
+    SEARCHING = (
+        "searching",
+        "first position not found yet",
+        "a start pose, or more radio heads near the start",
+    )
+    CONTRADICTED = (
+        "contradicted",
+        "contradictions between radio heads, array and odometer",
+        "a survey of radio heads and array mounting (access-av record survey)",
+    )
+    TOO_WIDE = (
+        "too_wide",
+        "protection level above the alert limit of {limit_m:g} m",
+        "more wake-ups, more radio heads, smaller standard deviations, or a higher "
+        "integrity.alert_limit_m if the plant permits it",
+    )
+    SUSPECTED = (
+        "suspected",
+        "fault of a radio head, the array or the odometer suspected, now or recently",
+        "realistic standard deviations of array, odometer and radio heads, because errors within "
+        "them are not faults",
+    )
 
     def words(self, alert_limit_m: float) -> str:
         """Returns the wording for reports, with the alert limit of the vehicle in metres.
@@ -141,25 +160,15 @@ class Cause(Enum):
         >>> Cause.TOO_WIDE.words(1.5)
         'protection level above the alert limit of 1.5 m'
         """
-        return _CAUSES[self][0].format(limit_m=alert_limit_m)
-
-    @property
-    def remedy(self) -> str:
-        """Measures against the cause."""
-        return _CAUSES[self][1]
+        return self._words.format(limit_m=alert_limit_m)
 
 
-class LevelResult(Enum):
+class LevelResult(Worded):
     """Whether runs reach a 3GPP positioning service level; the value is the wording."""
 
-    REACHED = "reached"
-    TOO_FEW_RUNS = "too few runs"
-    NOT_REACHED = "not reached"
-
-    @property
-    def badge(self) -> str:
-        """Kind of the badge of a page: ``yes``, ``fit`` or ``no``."""
-        return _LEVEL_BADGES[self]
+    REACHED = "reached", "", "yes"
+    TOO_FEW_RUNS = "too few runs", "", "fit"
+    NOT_REACHED = "not reached", "", "no"
 
 
 class Agreement(Enum):
@@ -168,46 +177,3 @@ class Agreement(Enum):
     AGREED = "agreed"
     EQUIVALENT = "equivalent"
     UNDECIDED = "undecided"
-
-
-_JUDGEMENTS = {
-    Judgement.MET: ("good enough", "yes"),
-    Judgement.PROBABLY_MET: ("probably good enough", "fit"),
-    Judgement.PROBABLY_MISSED: ("probably not good enough", "fit"),
-    Judgement.MISSED: ("not good enough", "no"),
-}
-_EFFECTS = {
-    Effect.HELPS: ("helps", "yes"),
-    Effect.UNCERTAIN: ("not sure", "fit"),
-    Effect.HARMS: ("makes it worse", "no"),
-}
-_REASONS = {
-    NotOk.LEVEL: "level above the alert limit",
-    NotOk.SUSPECTED: "suspected fault",
-    NotOk.CONTRADICTED: "position lost",
-}
-_LEVEL_BADGES = {
-    LevelResult.REACHED: "yes",
-    LevelResult.TOO_FEW_RUNS: "fit",
-    LevelResult.NOT_REACHED: "no",
-}
-_CAUSES = {
-    Cause.SEARCHING: (
-        "first position not found yet",
-        "a start pose, or more radio heads near the start",
-    ),
-    Cause.CONTRADICTED: (
-        "contradictions between radio heads, array and odometer",
-        "a survey of radio heads and array mounting (access-av record survey)",
-    ),
-    Cause.TOO_WIDE: (
-        "protection level above the alert limit of {limit_m:g} m",
-        "more wake-ups, more radio heads, smaller standard deviations, or a higher "
-        "integrity.alert_limit_m if the plant permits it",
-    ),
-    Cause.SUSPECTED: (
-        "fault of a radio head, the array or the odometer suspected, now or recently",
-        "realistic standard deviations of array, odometer and radio heads, because errors "
-        "within them are not faults",
-    ),
-}

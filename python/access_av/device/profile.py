@@ -15,6 +15,7 @@ from access_av.device.energy import Interval, Recording, TooShortError, Window, 
 from access_av.device.power_modes import Mode, ModeError
 from access_av.device.workload import CHAIN, Timing, repeat, workloads
 from access_av.errors import InputError
+from access_av.settings import as_dict
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,26 +24,9 @@ if TYPE_CHECKING:
     from access_av.device.counters import Counters
 
 NO_SENSOR = "no power sensor on this machine (looked for INA3221, INA238, RAPL)"
-# The radio is not measured: order-of-magnitude values, to be replaced by those of the device.
-RECEIVER = {
-    "counted": True,
-    "on_time_ms": 5.0,
-    "settling_ms": {
-        "value": 5.0,
-        "low": 1.0,
-        "high": 15.0,
-        "provenance": "assumed",
-        "source": "oscillator and automatic gain of a cellular receiver from light sleep",
-    },
-    "power_w": {
-        "value": 1.0,
-        "low": 0.3,
-        "high": 2.5,
-        "provenance": "assumed",
-        "source": "a cellular receiver of a few MHz",
-        "boundary": "marginal",
-    },
-}
+# The radio is not measured: it has the assumed values of this platform, to be replaced by those of
+# the device.
+RADIO_OF = "generic-x86"
 # Duration of each workload without energy measurement (s).
 TIMING_S = 1.0
 
@@ -142,7 +126,7 @@ class Profile:
         settings: dict[str, Any] = {
             "name": name,
             "description": f"{self.machine}; energy above idle: {energy}",
-            "receiver": RECEIVER,
+            "receiver": as_dict(_core.Platform.load(RADIO_OF))["receiver"],
             "cpu": {"cycles_per_burst": cycles.pop(CHAIN), "cycles_per_execution": cycles},
             "modes": [self._mode(mode, source) for mode in modes],
         }
