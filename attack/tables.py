@@ -36,6 +36,9 @@ SPACE: dict[str, Any] = {
 }
 
 
+KINDS = {"operating_points": "paper", "designs": "design"}
+
+
 def held(name: str) -> dict[str, list[Any]]:
     """Returns a table of the results, by name."""
     text = {"energy_provenance": "fitted", "interpretation": "gate", "campaign": "adaptive"}
@@ -44,7 +47,7 @@ def held(name: str) -> dict[str, list[Any]]:
             {"text": text.get(column, "music"), "true or false": True}.get(unit, 1.0)
             for _ in range(8)
         ]
-        for column in TABLES[name].columns
+        for column in TABLES["operating_points"].of(KINDS[name])
         if (unit := GLOSSARY[column].unit)
     }
 

@@ -105,7 +105,7 @@ def real_arrays(data: Path) -> Iterator[Case]:
     """Four antennas, 30 positions each, an unmodulated carrier."""
     for path in sorted((data / "captures").glob("aoa4_day1_array*.sigmf-meta")):
         bursts = [it for it in estimate_bursts(path) if it.truth_deg is not None]
-        errors = [it.azimuth_from_broadside_deg - (it.truth_deg or 0.0) for it in bursts]
+        errors = [it.azimuth_deg - (it.truth_deg or 0.0) for it in bursts]
         yield (
             path.stem,
             np.radians(errors),

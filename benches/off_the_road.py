@@ -160,7 +160,7 @@ def locate(case: Case, seed: int, settings: list[str]) -> dict[str, float]:
     textbook = hall_drive.textbook(drive)[0] - drive.truth
     rows = located.angles.filter(pl.col("accepted").not_()).sort("time_s")["time_s"].to_list()
     tenth = rows[9] if len(rows) > 9 else math.inf
-    late = located.findings.filter(pl.col("constant") == "receiver.angle_time_offset_s")
+    late = located.findings.filter(pl.col("key") == "receiver.angle_time_offset_s")
     late_refused = min(tenth, LAP_S) + DISTRUST_S
     refused_s = rows[9] if len(rows) > 9 else 0.0
     wrong_ok = ok & (error > ALERT_LIMIT_M)
@@ -179,7 +179,7 @@ def locate(case: Case, seed: int, settings: list[str]) -> dict[str, float]:
         "dark_s": hall_drive.STEP_S * float(np.sum(dark & (time_s > late_refused))),
         "back": float(np.max(error[settled]) < WRONG_M),
         "distrusted_s": float(np.max(time_s[wrong_ok], initial=refused_s) - refused_s),
-        "late_s": float(late["found_value"][-1]) if late.height else math.nan,
+        "late_s": float(late["found"][-1]) if late.height else math.nan,
         "exit_named": float(any("late" in it for it in [*located.remarks, *located.diagnoses])),
     }
 

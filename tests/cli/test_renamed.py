@@ -10,8 +10,7 @@ import pytest
 from access_av import Scenario, SettingsError
 from access_av.errors import InputError
 from access_av.tables import renamed, validation
-from access_av.tables.columns.glossary import GLOSSARY
-from access_av.tables.columns.tables import TABLES
+from access_av.tables.columns import GLOSSARY, TABLES
 from conftest import commands
 
 if TYPE_CHECKING:
@@ -108,7 +107,7 @@ def test_old_columns() -> None:
             validation.check(pl.DataFrame({old: [1.0]}), "mine.csv", numbers=[new])
     rows = pl.DataFrame({"time_s": [0.0], "reading": ["gate"]})
     with pytest.raises(InputError, match="write `interpretation`"):
-        validation.check_types(rows, "mine.parquet", "operating_points")
+        validation.check_types(rows, "mine.parquet", "operating_points", "paper")
 
 
 def test_new_columns_and_tables_exist() -> None:

@@ -403,7 +403,7 @@ def test_the_table_has_its_documented_columns() -> None:
     driven = cloud(4, PAIRS)
     driven.append(replace(driven[0], energy_j=np.full(4, np.inf), square_m2=np.full(4, np.inf)))
     rows = rows_of(driven)
-    assert rows.columns == list(columns.TABLES["designs"].columns)
+    assert rows.columns == list(columns.TABLES["operating_points"].of("design"))
     assert rows["energy_j"].to_list()[-1] is rows["rms_error_m"].to_list()[-1] is None
     assert rows["on_front"].to_list()[-1] is False
 
@@ -461,6 +461,7 @@ def test_a_design_is_rated_in_its_worst_environment(
     assert rows["p99_error_m"].to_list() == pytest.approx([0.2, 0.9])
     assert rows["world"][1] == "rician_k_db 5"
     assert of_worlds["p99_error_m"].to_list() == pytest.approx([0.2, 0.2, 0.9, 0.05])
+    assert of_worlds.columns == rows.columns
     kept = Query(max_error_m=0.3).kept(rows)
     assert kept["choice"].to_list() == ["interval_ms 2000"]
     page = render_designs(Scenario.load("paper"), found.driven, rows, of_worlds)

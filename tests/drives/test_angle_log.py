@@ -71,7 +71,7 @@ def test_an_angle_log_gives_the_poses_of_its_samples(
     assert "receiver noise and the site's scatter (rician_k_db = " in comments[0]
     assert "phase_noise_sigma_rad: receiver noise only" in comments[1]
     rows = pl.read_parquet(out / "angles.parquet")
-    assert rows.columns == list(TABLES["recorded_angles"].columns)
+    assert tuple(rows.columns) == TABLES["measurements"].of("log", "angle")
     assert (rows["phase_sigma_rad"] > rows["phase_noise_sigma_rad"]).all()
 
     def located(recording: Path, vehicle_file: Path) -> drives.Drive:
@@ -148,7 +148,7 @@ def test_the_truth_of_a_synthetic_recording_is_shown(drive: Path) -> None:
         from_axis_rad = math.atan2(dy, dx) - pose["heading_rad"]
         assert burst.truth_deg == pytest.approx(math.degrees(math.asin(math.cos(from_axis_rad))))
         if pci == STRONGER:
-            errors_deg.append(burst.azimuth_from_broadside_deg - burst.truth_deg)
+            errors_deg.append(burst.azimuth_deg - burst.truth_deg)
     # Both cells transmit simultaneously; the estimated direction is that of the stronger one.
     assert np.median(np.abs(errors_deg)) < math.degrees(0.1)
 

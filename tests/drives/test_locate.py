@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 
 from access_av import Site, Vehicle, drives
 from access_av._core import RecordingError
-from access_av.tables.columns.tables import TABLES
+from access_av.tables.columns import TABLES
 from access_av.tables.toml import tomllib
 from conftest import ROOT
 from robot import HEADS_M, RATE_HZ, TRACK_M, robot
@@ -346,9 +346,9 @@ def test_a_wider_track_than_specified_is_estimated(tmp_path: Path) -> None:
         "odometer = {", f"odometer = {{ track_width_m = {1.08 * TRACK_M}, track_width_std_m = 0.02,"
     )
     drive = driven.locate(tmp_path)
-    found = drive.findings.row(by_predicate=pl.col("constant") == "gyroscope.scale", named=True)
-    assert found["stated_value"] == 1.0
-    assert abs(found["found_value"] - 1 / 1.08) < 4.0 * found["found_value_std"] < 0.05
+    found = drive.findings.row(by_predicate=pl.col("key") == "gyroscope.scale", named=True)
+    assert found["before"] == 1.0
+    assert abs(found["found"] - 1 / 1.08) < 4.0 * found["std"] < 0.05
     assert driven.rms_error_m(drive) < 0.1
 
 

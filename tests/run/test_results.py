@@ -122,7 +122,11 @@ def test_a_sweep_equals_its_simulations() -> None:
     }
     found = access_av.sweep(SHORT, vary, runs=2, seed=4)
     assert found.table.height == 8
-    assert found.table.columns == list(columns.table("sweep").columns)
+    assert found.table.columns == list(columns.table("compared").columns)
+    for row, result in zip(found.table.to_dicts(), found.results, strict=True):
+        [exact] = [it for it in result.percentiles if it.percent == found.percent]
+        assert row["percentile_m"] == exact.value
+        assert row["percentile_low_m"] == exact.low <= exact.value
     assert found.values[-1] == {
         "estimator": "bartlett",
         "policy": "EveryFifth",

@@ -61,7 +61,7 @@ def test_calibration_and_sign_of_the_angle(tmp_path: Path) -> None:
     assert [burst.sample_start for burst in bursts] == [BURST * (2 * k + 1) for k in range(5)]
     for burst, azimuth_deg in zip(bursts, azimuths_deg, strict=True):
         # The noise of the reference adds to that of the burst.
-        assert abs(burst.azimuth_from_broadside_deg - azimuth_deg) < 6 * burst.sigma_deg
+        assert abs(burst.azimuth_deg - azimuth_deg) < 6 * burst.sigma_deg
 
 
 @pytest.mark.parametrize(("array", "bound_deg"), [(1, 2.5), (2, 2.9), (3, 6.4)])
@@ -76,7 +76,7 @@ def test_real_recordings(data: Path, array: int, bound_deg: float) -> None:
 def test_json_has_the_promised_keys(access_av: Callable[..., Finished], tmp_path: Path) -> None:
     done = access_av("record", "aoa", str(write(tmp_path / "array", [20.0])), "--json")
     (burst,) = json.loads(done.out)
-    assert set(burst) >= {"sample_start", "azimuth_from_broadside_deg", "sigma_deg", "truth_deg"}
+    assert set(burst) >= {"sample_start", "azimuth_deg", "sigma_deg", "truth_deg"}
     assert access_av("record", "aoa", str(tmp_path / "array"), columns=60).code == 0
 
 

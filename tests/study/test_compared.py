@@ -13,7 +13,7 @@ from access_av.run.pairs import ErrorSamples
 from access_av.statistics.paired import paired_difference
 from access_av.study.compare import beside_first
 from access_av.study.compare import table as compared_table
-from access_av.tables.columns.tables import TABLES
+from access_av.tables.columns import TABLES
 from access_av.verdicts import Effect, Judgement
 
 

@@ -45,16 +45,16 @@ UNITS = {
 def check(name: str, found: pl.DataFrame | list[dict[str, Any]]) -> None:
     table = columns.table(name)
     if isinstance(found, pl.DataFrame):
-        assert found.columns == list(table.columns)
+        assert found.columns == [name for name in table.columns if name in found.columns]
+        assert set(table.columns) - set(found.columns) <= table.absent.keys()
         for series in found.iter_columns():
             if series.dtype.is_float():
                 assert not series.is_nan().any(), series.name
             assert series.name in table.null or series.null_count() == 0, series.name
     else:
         for record in found:
-            absent = {key for key, when in table.null.items() if "absent" in when}
             assert [*record] == [key for key in table.columns if key in record]
-            assert set(table.columns) - record.keys() <= absent
+            assert set(table.columns) - record.keys() <= table.absent.keys()
             assert {key for key, value in record.items() if value is None} <= table.null.keys()
 
 
@@ -63,7 +63,7 @@ def test_every_name_is_in_a_table_and_explained() -> None:
     assert used == columns.GLOSSARY.keys()
     for table in columns.TABLES.values():
         assert len(set(table.columns)) == len(table.columns), table.name
-        assert table.null.keys() <= set(table.columns), table.name
+        assert {*table.null, *table.absent} <= set(table.columns), table.name
 
 
 def test_units_in_names_are_the_units() -> None:
@@ -101,7 +101,7 @@ def test_simulation(scenario: str, changes: dict[str, object]) -> None:
         Scenario.load(scenario).with_overrides(changes), runs=1, keep_trajectories=True
     )
     for name in ("steps", "runs", "trajectories", "aoa_estimates"):
-        check(name, getattr(found, name))
+        check(name.replace("aoa_estimates", "measurements"), getattr(found, name))
     assert found.trajectories is not None
     check("nees", statistics.nees(found.trajectories))
     check("mean_nees", statistics.mean_nees(found.trajectories))
@@ -113,41 +113,45 @@ def test_located_drives(tmp_path: Path) -> None:
     vehicle = tmp_path / "vehicle.toml"
     drive = drives.locate(site, odometry, tmp_path / "iq", vehicle=vehicle, smooth=True)
     assert drive.smoothed is not None
-    check("poses", drive.poses)
-    check("smoothed", drive.smoothed)
+    check("trajectories", drive.poses)
+    check("trajectories", drive.smoothed)
     assert drive.smoothed["protection_level_m"].is_null().all()
-    check("angles", drive.angles)
-    check("findings", drive.findings)
+    check("measurements", drive.angles)
+    check("survey", drive.findings)
     found = estimate_angles(site, tmp_path / "iq", vehicle=vehicle)
-    check("recorded_angles", found.angles)
+    check("measurements", found.angles)
     check("located_errors", drives.error_m(drive.poses, tmp_path / "truth.tum"))
     without_gyroscope = pl.read_csv(odometry).columns
     assert without_gyroscope == list(columns.TABLES["odometry"].columns[:3])
     # The angle log has the columns of its table, and can be read.
     log = tmp_path / "angles.csv"
-    drive.angles.select(columns.TABLES["angles"].columns[:7]).drop_nulls().write_csv(log)
+    drive.angles.select(columns.TABLES["measurements"].columns[1:8]).drop_nulls().write_csv(log)
     assert drives.locate(site, odometry, log, vehicle=vehicle).angles.height > 0
     ranges = tmp_path / "ranges.csv"
     ranges.write_text("time_s,pci,range_m,sigma_m\n1.0,1,30.0,5.0\n2.0,2,40.0,\n")
     of_ranges = Vehicle.load(str(vehicle)).with_overrides({"ranging.sigma_m": 5.0})
-    check("ranges", drives.locate(site, odometry, ranges, vehicle=of_ranges).ranges)
+    check("measurements", drives.locate(site, odometry, ranges, vehicle=of_ranges).ranges)
 
 
 def test_bound() -> None:
     for scenario in ("paper", "yard"):
         found = bound(scenario, map_step_m=50.0)
         check("bound_route", found.route)
-        check("bound_map", found.site)
+        check("bound_route", found.site)
         check("bound_heads", found.heads)
 
 
 def test_evaluation(quick_study: Path) -> None:
-    names = ("operating_points", "errors", "snr", "ablations", "fixed_front", "proposed_vs_paper",
+    for name in ("errors", "snr"):
+        check("steps", pl.read_parquet(quick_study / "latest" / f"{name}.parquet"))
+    merged = {"fixed_front": "operating_points", "evaluation_runs": "runs", "resamples": "runs"}
+    names = ("operating_points", "ablations", "fixed_front", "proposed_vs_paper",
              "equal_information",
              "evaluation_runs", "resamples",
              "fit_degrees_of_freedom")  # fmt: skip
     for name in names:
-        check(name, pl.read_parquet(quick_study / "latest" / f"{name}.parquet"))
+        table = pl.read_parquet(quick_study / "latest" / f"{name}.parquet")
+        check(merged.get(name, name), table)
     check("claims", json.loads((quick_study / "latest/claims.json").read_text()))
 
 
@@ -179,7 +183,7 @@ def test_cells_and_bursts(access_av: Callable[..., Finished], data: Path) -> Non
     for done in (one, several):
         check("cells", json.loads(done.out))
     check(
-        "bursts",
+        "cells",
         json.loads(access_av("record", "aoa", captures / "aoa4_day1_array1", "--json").out),
     )
 
@@ -193,18 +197,21 @@ def test_cells_without_a_recording() -> None:
 
 
 def test_command(access_av: Callable[..., Finished]) -> None:
-    done = access_av("file", "columns", "aoa_estimates", columns=100)
+    done = access_av("file", "columns", "measurements", columns=100)
     assert done.code == 0
-    for name in columns.TABLES["aoa_estimates"].columns:
+    for name in columns.TABLES["measurements"].columns:
         assert re.search(rf"^ {name} ", done.out, flags=re.MULTILINE)
     assert "no angle could be estimated" in done.out
     tables = json.loads(access_av("file", "columns", "--json").out)
     assert tables.keys() == columns.TABLES.keys()
-    assert tables["snr"]["columns"][0] == {
+    assert tables["nees"]["columns"][1] == {
         "name": "time_s", "unit": "s", "null": "never",
         "meaning": "Time from the start of the drive, or by the recording's clock",
     }  # fmt: skip
     assert access_av("file", "columns", columns=60).code == 0
-    wrong = access_av("file", "columns", "executiones")
+    wrong = access_av("file", "columns", "mesurements")
     assert wrong.code == 2
-    assert "aoa_estimates" in wrong.err
+    assert "measurements" in wrong.err
+    assert (
+        "the present name is operating_points" in access_av("file", "columns", "design_worlds").err
+    )

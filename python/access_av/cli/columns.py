@@ -27,8 +27,7 @@ def columns(
     ] = False,
 ) -> None:
     """Print name, unit and meaning of each column, and the condition of a null value."""
-    from access_av.tables.columns.look_up import as_json, markdown, table
-    from access_av.tables.columns.tables import TABLES
+    from access_av.tables.columns import TABLES, as_json, markdown, table
 
     if as_markdown:
         print(markdown(), end="")

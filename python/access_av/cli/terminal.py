@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from access_av.run.service_levels import Verdict
     from access_av.run.simulation import Simulation
     from access_av.signal.recorded_angles import BurstAngle
-    from access_av.tables.columns.tables import Table
+    from access_av.tables.columns import Table
 
 # Printed texts can come from files, therefore markup is disabled.
 console = Console(highlight=False, markup=False)
@@ -322,7 +322,7 @@ def show_bursts(bursts: Sequence[BurstAngle]) -> None:
     """Prints the angles of bursts, with errors if the truth is known."""
     made = table(["sample", "azimuth °", "σ °", "SNR dB", "truth °", "error °", "doubt"], text=0)
     for burst in bursts:
-        azimuth_deg, truth_deg = burst.azimuth_from_broadside_deg, burst.truth_deg
+        azimuth_deg, truth_deg = burst.azimuth_deg, burst.truth_deg
         made.add_row(
             str(burst.sample_start),
             unsigned_zero(f"{azimuth_deg:.2f}"),

@@ -24,25 +24,18 @@ def rows_of(driven: Sequence[Driven]) -> pl.DataFrame:
 
     With several environments, each row is that of the worst one.
     """
-    on_front = set(may_be_front(driven))
-    return pl.DataFrame(
-        [
-            {"design": index, **row_of(one), "on_front": index in on_front}
-            for index, one in enumerate(driven)
-        ],
-        infer_schema_length=None,
-        schema_overrides=NUMBERS,
-    )
+    return _rows(driven, list(enumerate(driven)))
 
 
 def rows_of_worlds(driven: Sequence[Driven]) -> pl.DataFrame:
     """Returns one row per design and environment; empty for a single environment."""
+    return _rows(driven, [(index, it) for index, one in enumerate(driven) for it in one.worlds])
+
+
+def _rows(driven: Sequence[Driven], shown: Sequence[tuple[int, Driven]]) -> pl.DataFrame:
+    on_front = set(may_be_front(driven)) if shown else set()
     return pl.DataFrame(
-        [
-            {"design": index, **row_of(world)}
-            for index, one in enumerate(driven)
-            for world in one.worlds
-        ],
+        [{"design": index, **row_of(one), "on_front": index in on_front} for index, one in shown],
         infer_schema_length=None,
         schema_overrides=NUMBERS,
     )
@@ -54,12 +47,12 @@ def row_of(one: Driven) -> dict[str, Any]:
         "choice": one.design.label,
         "world": one.design.world,
         "runs": one.square_m2.size,
-        "energy_j": _known(one.mean_energy_j),
-        "rms_error_m": _known(one.rms_m),
-        **as_columns(one.percentiles()),
-        "p90_max_error_m": _known(one.p90_worst_m),
         "aoa_estimates": float(one.aoa_estimates.mean()),
         "bursts_received": float(one.bursts_received.mean()),
+        "rms_error_m": _known(one.rms_m),
+        "energy_j": _known(one.mean_energy_j),
+        **as_columns(one.percentiles()),
+        "p90_max_error_m": _known(one.p90_worst_m),
     }
 
 

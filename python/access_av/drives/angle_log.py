@@ -13,7 +13,7 @@ from access_av import _core
 from access_av.errors import InputError
 from access_av.settings import as_dict
 from access_av.tables import validation
-from access_av.tables.columns.tables import TABLES
+from access_av.tables.columns import TABLES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -118,8 +118,8 @@ def estimate_angles(
     columns, remarks, warnings = _core.estimate_angles(
         plant, carrier, recording, start_time_s=start_time_s
     )
-    angles = pl.DataFrame(columns).with_columns(pl.col("resolved").cast(pl.Boolean))
-    return AngleLog(angles.select(TABLES["recorded_angles"].columns), plant, remarks, warnings)
+    angles = TABLES["measurements"].frame(columns).with_columns(pl.col("resolved").cast(pl.Boolean))
+    return AngleLog(angles, plant, remarks, warnings)
 
 
 def columns_of(path: str | Path) -> dict[str, NDArray[np.float64]] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import polars as pl
 
@@ -13,9 +13,10 @@ from access_av.drives import angle_log, truth_frame
 from access_av.errors import InputError
 from access_av.run.pairs import STRETCHES, ErrorSamples
 from access_av.run.service_levels import INDEPENDENT_S
+from access_av.tables.columns import TABLES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
     from pathlib import Path
 
     from access_av._core import Scenario, Site, Vehicle
@@ -33,7 +34,9 @@ MAX_UNAVAILABLE = 0.2
 # Wrong time units, in units per second.
 TIME_UNITS = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 
-FINDINGS = {"constant": pl.String, "constant_unit": pl.String}
+# Columns of the estimated vehicle parameters, in the order of the core.
+TEXT, NUMBER = pl.String(), pl.Float64()
+FINDINGS = {"key": TEXT, "unit": TEXT, "before": NUMBER, "found": NUMBER, "std": NUMBER}
 
 DATATYPES = ("ci16_le", "cf32_le")
 
@@ -326,27 +329,17 @@ def locate(
         start_unknown=start_unknown,
         smooth=smooth,
     )
-    angles = pl.DataFrame(located.angles).with_columns(pl.col(pl.Float64).fill_nan(None))
-    ranges = pl.DataFrame(located.ranges).with_columns(pl.col(pl.Float64).fill_nan(None))
-    smoothed = _poses(located.smoothed) if smooth else None
     return Drive(
-        poses=_poses(located.poses),
-        angles=angles,
-        ranges=ranges,
+        poses=TABLES["trajectories"].frame(located.poses),
+        angles=TABLES["measurements"].frame(located.angles),
+        ranges=TABLES["measurements"].frame(located.ranges),
         remarks=located.remarks,
         diagnoses=located.diagnoses,
         suspicions=located.suspicions,
-        findings=pl.DataFrame(located.findings, schema_overrides=FINDINGS),
-        smoothed=smoothed,
+        findings=pl.DataFrame(list(located.findings.values()), schema=FINDINGS),
+        smoothed=TABLES["trajectories"].frame(located.smoothed) if smooth else None,
         _core=located,
     )
-
-
-def _poses(columns: Mapping[str, Any]) -> pl.DataFrame:
-    table = pl.DataFrame(
-        columns, schema_overrides={"integrity": pl.String, "selected_hypothesis": pl.String}
-    )
-    return table.with_columns(pl.col(pl.Float64).fill_nan(None))
 
 
 def read_tum(file: str | Path) -> pl.DataFrame:

@@ -35,7 +35,7 @@ _KEY: dict[str, tuple[Any, Any]] = {
 def of_drives(
     drives: Drives | None, energy_per_execution_j: float | None = None, **key: Any
 ) -> pl.DataFrame:
-    """Returns the runs of a setting; columns ``evaluation_runs`` of :mod:`access_av.columns`.
+    """Returns the runs of a setting; columns ``runs`` of :mod:`access_av.columns`.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def runs_of(evaluation: Evaluation) -> list[pl.DataFrame]:
 def resamples_of(evaluation: Evaluation) -> list[pl.DataFrame]:
     """Returns the bootstrap resamples of every operating point of an evaluation.
 
-    Columns ``resamples`` of :mod:`access_av.columns`. Row 0 of a setting is the sample.
+    Columns ``runs`` of :mod:`access_av.columns`. Row 0 of a setting is the sample.
     """
     tables = []
     for key, drives, _ in _points(evaluation):

@@ -8,13 +8,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import polars as pl
 
 from access_av import _core
+from access_av.tables.columns import TABLES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import polars as pl
     from numpy.typing import NDArray
 
 
@@ -69,4 +70,4 @@ def drops(
         carrier_mhz=carrier_mhz,
         seed=seed,
     )
-    return pl.DataFrame(columns).fill_nan(None)
+    return TABLES["channel_drops"].frame(columns)

@@ -14,6 +14,7 @@ from access_av import _core
 from access_av.errors import InputError
 from access_av.run import service_levels
 from access_av.settings import as_dict
+from access_av.tables.columns import TABLES
 from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
@@ -44,9 +45,9 @@ class ErrorBound(Result):
     heads
         One row per radio head; columns ``bound_heads``.
     site
-        The bound over the site, one row per square of ``map_step_m``; columns ``bound_map``. It is
-        valid for a vehicle that has measured ``map_num_angles`` independent angles, with a heading
-        σ of ``map_heading_std_rad`` and an unknown position.
+        The bound over the site, one row per square of ``map_step_m``; columns ``bound_route``. It
+        is valid for a vehicle that has measured ``map_num_angles`` independent angles, with a
+        heading σ of ``map_heading_std_rad`` and an unknown position.
     """
 
     scenario: _core.Scenario
@@ -153,12 +154,11 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
         )
     )
     bound_m = core.at(x_m, y_m, looks, heading_std_rad)
-    site = pl.DataFrame({"x_m": x_m, "y_m": y_m, "bound_m": bound_m})
     return ErrorBound(
         scenario=scenario,
         route=route,
         heads=heads,
-        site=site.with_columns(pl.col("bound_m").fill_nan(None)),
+        site=TABLES["bound_route"].frame({"x_m": x_m, "y_m": y_m, "bound_m": bound_m}),
         map_step_m=step_m,
         map_num_angles=looks,
         map_heading_std_rad=heading_std_rad,

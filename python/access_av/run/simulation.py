@@ -23,6 +23,7 @@ from access_av.run.shared_state import SharedState
 from access_av.statistics.consistency import Consistency, horizontal_error_m
 from access_av.statistics.integrity import Integrity
 from access_av.statistics.percentiles import Percentile, column
+from access_av.tables.columns import TABLES
 from access_av.tables.numbers import number
 from access_av.tables.result import Origin, Result, origin
 
@@ -99,11 +100,12 @@ class Simulation(Result):
         seed: int | None = None,
     ) -> Simulation:
         """Converts the results of the Rust core to tables."""
+        kept, estimates = found.trajectories, found.aoa_estimates
         return cls(
-            steps=_table(found.steps),
-            runs=_table(found.runs),
-            trajectories=None if found.trajectories is None else _table(found.trajectories),
-            aoa_estimates=None if found.aoa_estimates is None else _table(found.aoa_estimates),
+            steps=TABLES["steps"].frame(found.steps),
+            runs=TABLES["runs"].frame(found.runs),
+            trajectories=None if kept is None else TABLES["trajectories"].frame(kept),
+            aoa_estimates=None if estimates is None else TABLES["measurements"].frame(estimates),
             integrity=found.integrity and Integrity.of_runs(*found.integrity),
             error_quantiles_m=found.error_quantiles_m,
             errors_m=found.errors_m,
@@ -126,18 +128,19 @@ class Simulation(Result):
             if exact is None
             else {column(each.percent): each.value for each in exact}
         )
-        mean = (
-            self.runs.select("aoa_estimates", "bursts_received", "energy_j")
-            .mean()
-            .row(0, named=True)
-        )
         return {
             "rms_error_m": self.rms_error_m,
             "mean_error_m": self.mean_error_m,
             **errors_m,
-            **mean,
+            **self.means,
             "duration_s": float(self.steps["time_s"][-1]),
         }
+
+    @property
+    def means(self) -> dict[str, float | None]:
+        """Means over the runs of angle estimates, received bursts and energy."""
+        of_runs = self.runs.select("aoa_estimates", "bursts_received", "energy_j")
+        return of_runs.mean().row(0, named=True)
 
     @property
     def percentiles(self) -> list[Percentile] | None:
@@ -145,11 +148,15 @@ class Simulation(Result):
 
         Computed over all known positions by :func:`access_av.statistics.percentiles`.
         """
-        errors_m = self.horizontal_errors_m
-        if errors_m is None or np.isnan(errors_m).all():
+        errors = self.errors()
+        return None if errors is None or np.isnan(errors.errors_m).all() else errors.percentiles()
+
+    def errors(self, name: str = "") -> ErrorSamples | None:
+        """Returns :attr:`horizontal_errors_m` with statistics; ``None`` without single runs."""
+        errors_m, duration_s = self.horizontal_errors_m, float(self.steps["time_s"][-1])
+        if errors_m is None:
             return None
-        duration_s = float(self.steps["time_s"][-1])
-        return ErrorSamples(errors_m=errors_m, duration_s=duration_s).percentiles()
+        return ErrorSamples(name=name, errors_m=errors_m, duration_s=duration_s)
 
     @property
     def mean_error_m(self) -> float | None:
@@ -350,13 +357,3 @@ def _warn_of_localizer(scenario: Scenario) -> None:
     for it in scenario.warnings():
         if it.key.endswith(LOCALIZER_KEY):
             warnings.warn(f"{scenario.name}: {it}", ImplausibleSettingsWarning, stacklevel=3)
-
-
-def _table(columns: Mapping[str, Any]) -> pl.DataFrame:
-    """Returns a table with null for unknown values."""
-    words = {
-        name: pl.String
-        for name in ("integrity", "selected_hypothesis", "reason")
-        if name in columns
-    }
-    return pl.DataFrame(columns, schema_overrides=words).fill_nan(None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,6 @@ from access_av._core import Scenario
 from access_av.errors import InputError
 from access_av.run.difference import Difference, difference
 from access_av.run.simulation import Simulation, simulate
-from access_av.statistics.percentiles import as_columns
 from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
@@ -34,8 +32,8 @@ class Sweep(Result):
     Attributes
     ----------
     table
-        One row per combination; columns ``sweep`` of :mod:`access_av.columns`. Differences are to
-        the first combination, in pairs of runs.
+        One row per combination; columns ``compared`` of :mod:`access_av.columns`. Differences are
+        to the first combination, in pairs of runs.
     values
         Swept values of each combination, by key. A plug-in has its name.
     results
@@ -43,7 +41,7 @@ class Sweep(Result):
     scenario, seed, runs
         Swept keys, seed of all combinations, and number of runs of each.
     percent
-        Percentile of ``delta_m`` and of :meth:`plot`.
+        Percentile of the table and of :meth:`plot`.
     origin
         Version and commit.
     """
@@ -80,8 +78,7 @@ class Sweep(Result):
         """Draws the error percentile of each combination with its 95 % interval, with Altair."""
         from access_av.plots.of_results import intervals
 
-        name = f"p{self.percent:g}".replace(".", "_")
-        columns = (f"{name}_error_m", f"{name}_error_low_m", f"{name}_error_high_m")
+        columns = ("percentile_m", "percentile_low_m", "percentile_high_m")
         title = f"{self.percent:g}th percentile of the horizontal error / m"
         return intervals(self.table, "variant", columns, title=title)
 
@@ -176,24 +173,16 @@ def sweep(
 
 
 def _row(values: Mapping[str, Any], found: Simulation, to_first: Difference) -> dict[str, Any]:
-    exact = found.percentiles
-    mean = (
-        found.runs.select("aoa_estimates", "bursts_received", "energy_j").mean().row(0, named=True)
-    )
-    return {
-        "variant": ", ".join(f"{key.rpartition('.')[2]} = {it}" for key, it in values.items()),
-        "runs": found.runs.height,
-        "rms_error_m": found.rms_error_m,
-        **({} if exact is None else as_columns(exact)),
-        "delta_m": _finite(to_first.delta_m),
-        "delta_low_m": _finite(to_first.low_m),
-        "delta_high_m": _finite(to_first.high_m),
-        **mean,
-    }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    name = ", ".join(f"{key.rpartition('.')[2]} = {it}" for key, it in values.items())
+    ends = (to_first.delta_m, to_first.low_m, to_first.high_m)
+    errors = found.errors(name)
+    assert errors is not None  # errors_every is set
+    row = errors.record(to_first.percent, ends)
+    if (integrity := found.integrity) is not None:
+        row["availability"] = integrity.availability
+        row["unavailable_share"] = integrity.state_shares["unavailable"]
+        row["exceedances"] = integrity.exceedances
+    return {**row, **found.means, "rms_error_m": found.rms_error_m}
 
 
 def _shown(value: Any) -> Any:

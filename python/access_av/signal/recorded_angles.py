@@ -40,7 +40,7 @@ class BurstAngle:
     ----------
     sample_start
         First sample of the burst.
-    azimuth_from_broadside_deg
+    azimuth_deg
         Azimuth in degrees, counter-clockwise (seen from above) from the array's broadside, which is
         90° clockwise of the axis.
     sigma_deg
@@ -58,7 +58,7 @@ class BurstAngle:
     """
 
     sample_start: int
-    azimuth_from_broadside_deg: float
+    azimuth_deg: float
     sigma_deg: float
     snr_db: float
     label: str
@@ -143,7 +143,7 @@ def estimate_bursts(
         bursts.append(
             BurstAngle(
                 sample_start=start,
-                azimuth_from_broadside_deg=azimuth_deg,
+                azimuth_deg=azimuth_deg,
                 sigma_deg=math.degrees(sigma_rad),
                 snr_db=float(found.snr_db),
                 label=label,
@@ -178,7 +178,7 @@ def _estimate(
 def mean_absolute_error_deg(bursts: Sequence[BurstAngle]) -> float | None:
     """Returns the mean absolute error against the annotated truth; ``None`` without truth."""
     errors = [
-        abs((burst.azimuth_from_broadside_deg - burst.truth_deg + 180.0) % 360.0 - 180.0)
+        abs((burst.azimuth_deg - burst.truth_deg + 180.0) % 360.0 - 180.0)
         for burst in bursts
         if burst.truth_deg is not None
     ]

@@ -78,9 +78,9 @@ def as_columns(percentiles: Sequence[Percentile]) -> dict[str, float | None]:
     found: dict[str, float | None] = {}
     for each in percentiles:
         name = column(each.percent)
-        found[name] = _finite(each.value)
+        found[name] = finite(each.value)
         for end in ("low", "high"):
-            found[name.replace("_error_m", f"_error_{end}_m")] = _finite(getattr(each, end))
+            found[name.replace("_error_m", f"_error_{end}_m")] = finite(getattr(each, end))
     return found
 
 
@@ -90,8 +90,9 @@ def names() -> list[str]:
     return list(as_columns(every))
 
 
-def _finite(value: float | None) -> float | None:
-    return None if value is None or math.isinf(value) else value
+def finite(value: float | None) -> float | None:
+    """Returns a value of a table: ``None`` unless finite."""
+    return None if value is None or not math.isfinite(value) else value
 
 
 def percentiles(

@@ -202,27 +202,9 @@ def beside_first(found: Sequence[ErrorSamples], percents: Sequence[float]) -> li
 
 def table(found: Sequence[Compared]) -> pl.DataFrame:
     """Returns one row per variant and percentile: columns ``compared``."""
-    rows = []
-    for it in found:
-        for place, percent in enumerate(it.percents):
-            known = it.driven.percentile(percent)
-            delta = (None, None, None) if it.delta_m is None else it.delta_m[place]
-            shares = it.driven.state_shares or {}
-            rows.append(
-                {
-                    "variant": it.driven.name,
-                    "runs": it.driven.runs,
-                    "percent": percent,
-                    "percentile_m": known.value,
-                    "percentile_low_m": known.low,
-                    "percentile_high_m": known.high,
-                    **dict(zip(("delta_m", "delta_low_m", "delta_high_m"), delta, strict=True)),
-                    "lost_runs": it.driven.lost_runs,
-                    "availability": shares.get("ok"),
-                    "degraded_share": shares.get("degraded"),
-                    "unavailable_share": shares.get("unavailable"),
-                    "exceedances": it.driven.exceedances,
-                    "energy_j": it.driven.energy_j,
-                }
-            )
+    rows = [
+        it.driven.record(percent, None if it.delta_m is None else it.delta_m[place])
+        for it in found
+        for place, percent in enumerate(it.percents)
+    ]
     return pl.DataFrame(rows, infer_schema_length=None)

@@ -11,8 +11,7 @@ import polars as pl
 
 from access_av.errors import InputError
 from access_av.tables import csv_text, renamed
-from access_av.tables.columns.glossary import GLOSSARY
-from access_av.tables.columns.tables import TABLES
+from access_av.tables.columns import GLOSSARY, TABLES
 from access_av.tables.results_directory import regular
 
 if TYPE_CHECKING:
@@ -113,15 +112,15 @@ def row_name(where: str, index: int) -> str:
     return f"row {index + 1}"
 
 
-def check_types(rows: pl.DataFrame, where: str, what: str) -> None:
-    """Rejects a table without a column of :data:`access_av.columns.TABLES`.
+def check_types(rows: pl.DataFrame, where: str, what: str, kind: str) -> None:
+    """Rejects a table without a column of a ``kind`` of :data:`access_av.columns.TABLES`.
 
     Raises
     ------
     InputError
         The message names the table (``where``) and the column.
     """
-    for name in TABLES[what].columns:
+    for name in TABLES[what].of(kind):
         found = rows.schema.get(name, pl.Unknown())
         is_text = GLOSSARY[name].unit == "text"
         fine = found == pl.String if is_text else found.is_numeric() or found == pl.Boolean
