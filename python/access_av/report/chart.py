@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import altair as alt
 import polars as pl
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 # Colours of Okabe and Ito: distinct on light and dark, in print and for colour-blind readers.
 BLUE, ORANGE, GREEN, GREY, PURPLE = "#2f7ed8", "#d55e00", "#009e73", "#8a8f98", "#b48ead"
@@ -54,6 +57,51 @@ def to_scale(
         for (low, high), more in zip((x_m, y_m), more_m, strict=True)
     )
     return x, y, round(height_px)
+
+
+def tips(*entries: tuple[str, ...]) -> list[alt.Tooltip]:
+    """Returns tooltips; an entry is a field with an optional title and number format."""
+    made = []
+    for field, *texts in entries:
+        more: dict[str, Any] = dict(zip(("title", "format"), texts, strict=False))
+        made.append(alt.Tooltip(field, **more))
+    return made
+
+
+def colours(field: str, by_name: Mapping[str, str], **legend: Any) -> alt.Color:
+    """Returns the colour scale of named values, in the order of the legend."""
+    scale = alt.Scale(domain=list(by_name), range=list(by_name.values()))
+    return alt.Color(field, scale=scale, legend=alt.Legend(**{"title": None, **legend}))
+
+
+def dashed(channel: str, field: str, value: float, **mark: Any) -> alt.Chart:
+    """Returns a dashed line at a value of the channel ``x`` or ``y``."""
+    rule = alt.Chart(pl.DataFrame({field: [value]})).mark_rule(
+        strokeDash=[5, 4], strokeWidth=1.5, **mark
+    )
+    chart: alt.Chart = rule.encode(**{channel: f"{field}:Q"})
+    return chart
+
+
+def lines_of(table: pl.DataFrame, x: str, names: Mapping[str, str], value: str) -> pl.DataFrame:
+    """Returns columns with their names as rows ``line`` and ``value``, thinned, against ``x``."""
+    rows = thinned(table.select(x, *names)).rename(dict(names))
+    return rows.unpivot(index=x, variable_name="line", value_name=value)
+
+
+def line_chart(
+    rows: pl.DataFrame,
+    by_name: Mapping[str, str],
+    x: alt.X,
+    y: alt.Y,
+    tooltip: list[alt.Tooltip],
+    **legend: Any,
+) -> alt.Chart:
+    """Returns a chart of lines: column ``line``, with the colour of each line."""
+    colour = colours("line:N", by_name, **legend)
+    marks = alt.Chart(rows).mark_line(strokeWidth=1.8)
+    chart: alt.Chart = marks.encode(x=x, y=y, color=colour, tooltip=tooltip)
+    return chart
 
 
 def time_axis(column: str = "time_s") -> alt.X:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from html import escape
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import altair as alt
 import numpy as np
 import polars as pl
 
-from access_av.report.chart import GREEN, GREY, ORANGE, finish, thinned
-from access_av.report.labels import domain, placed
+from access_av.report.chart import GREEN, GREY, ORANGE, finish, thinned, tips
+from access_av.report.labels import Axis, placed
 from access_av.report.labels import layers as labels
-from access_av.report.page import sheet
-from access_av.report.parts import badge, figure, section, source, table, tile, warnings
+from access_av.report.page import VERSION, sheet
+from access_av.report.parts import badge, figure, records, section, source, warnings
 from access_av.statistics.percentiles import ends_text
 from access_av.tables.numbers import number, value_text
 
@@ -81,61 +79,60 @@ def render_designs(
         caption = "RMS error of one design over its runs. Select the design below the chart."
         sections.append(section("Over the drive", caption, figure("tracks")))
     if not of_worlds.is_empty():
-        sections.append(section("Each environment", "", _table(of_worlds)))
-    written = source("Scenario with all default values", scenario.to_toml())
-    sections.append(section("Provenance", "", written))
+        sections.append(section("Each environment", "", _table(of_worlds, of_worlds=True)))
     front = int(rows["on_front"].sum())
+    written = source("Scenario with all default values", scenario.to_toml())
     return sheet(
         specs,
-        title=f"ACCESS-AV designs: {escape(scenario.name)}",
-        kicker="ACCESS-AV designs",
+        "designs",
+        scenario.name,
         headline=f"{front} of {rows.height} designs on the Pareto front of energy and error",
-        lead=escape(scenario.description),
+        lead=scenario.description,
         tiles=_tiles(rows, runs),
-        meta=escape(f"Scenario “{scenario.name}”, version {version('access-av')}."),
-        sections=warnings(scenario.warnings()) + "".join(sections),
+        meta=f"Scenario “{scenario.name}”, {VERSION}.",
+        sections=[warnings(scenario.warnings()), *sections, section("Provenance", "", written)],
     )
 
 
-def _tiles(rows: pl.DataFrame, runs: int) -> str:
-    tiles = [tile(str(rows.height), f"designs, {runs} runs each")]
+def _tiles(rows: pl.DataFrame, runs: int) -> list[tuple[str, str]]:
+    tiles = [(str(rows.height), f"designs, {runs} runs each")]
     if (energy_j := rows["energy_j"].min()) is not None:
-        tiles.append(tile(f"{value_text(energy_j)} J", "minimum energy of a trip"))
+        tiles.append((f"{value_text(energy_j)} J", "minimum energy of a trip"))
     if (error_m := rows["p99_error_m"].min()) is not None:
-        tiles.append(tile(f"{value_text(error_m)} m", "minimum 99th percentile of the error"))
-    return "".join(tiles)
+        tiles.append((f"{value_text(error_m)} m", "minimum 99th percentile of the error"))
+    return tiles
 
 
-def _table(rows: pl.DataFrame) -> str:
+def _table(rows: pl.DataFrame, *, of_worlds: bool = False) -> str:
     """Returns the table of the first :data:`MOST_ROWS` designs."""
-    worlds = (rows["world"] != "").any()
-    judged = "on_front" in rows.columns
-    head = [
-        "No.",
-        "Design",
-        *(["Environment" if not judged else "Worst environment"] if worlds else []),
+    world = {"world": "Environment" if of_worlds else "Worst environment"}
+    if not (rows["world"] != "").any():
+        world = {}
+    cells = [
+        {
+            "No.": str(row["design"]),
+            "Design": row["choice"] or "baseline",
+            **{name: row[key] for key, name in world.items()},
+            "Energy / J": number(row["energy_j"], 2),
+            "Median / m": number(row["p50_error_m"]),
+            "p90 / m": number(row["p90_error_m"]),
+            "p99 / m": number(row["p99_error_m"]),
+            "95 % interval of p99": ends_text(row["p99_error_low_m"], row["p99_error_high_m"]),
+            "RMS / m": number(row["rms_error_m"]),
+            "Estimates": number(row["aoa_estimates"], 0),
+            **(
+                {}
+                if of_worlds
+                else {"Pareto front": badge("yes", "yes") if row["on_front"] else ""}
+            ),
+        }
+        for row in rows.head(MOST_ROWS).iter_rows(named=True)
     ]
-    numbers = range(len(head), len(head) + 7)
-    head += ["Energy / J", "Median / m", "p90 / m", "p99 / m", "95 % interval of p99"]
-    head += ["RMS / m", "Estimates", *(["Pareto front"] if judged else [])]
-    cells = []
-    for row in rows.head(MOST_ROWS).iter_rows(named=True):
-        cells.append(
-            [
-                str(row["design"]),
-                escape(row["choice"] or "baseline"),
-                *([escape(row["world"])] if worlds else []),
-                number(row["energy_j"], 2),
-                *(number(row[f"p{percent}_error_m"]) for percent in (50, 90, 99)),
-                ends_text(row["p99_error_low_m"], row["p99_error_high_m"]),
-                number(row["rms_error_m"]),
-                number(row["aoa_estimates"], 0),
-                *([badge("yes", "yes") if row["on_front"] else ""] if judged else []),
-            ]
-        )
+    first = 2 + len(world)
+    made = records(cells, numbers=range(first, first + 7))
     more = rows.height - MOST_ROWS
     below = f'<p class="note">{more} more designs are in the Parquet file of this report.</p>'
-    return table(head, cells, numbers=numbers) + (below if more > 0 else "")
+    return made + (below if more > 0 else "")
 
 
 def _energy_against_error(drawn: pl.DataFrame) -> Spec:
@@ -151,23 +148,19 @@ def _energy_against_error(drawn: pl.DataFrame) -> Spec:
     front = points.filter("on_front")
     others, known = points.filter(~pl.col("on_front")), front.drop_nulls(list(ends))
     reached = [points["p99_error_m"], *(known[end] for end in ends)]
-    x_domain = domain(points["energy_j"].to_list() or [1.0], log=True)
-    y_domain = domain([value for column in reached for value in column] or [0.0])
-    scale = alt.Scale(type="log", nice=False, domain=x_domain)
-    x = alt.X("energy_j:Q", title="energy of a trip / J", scale=scale)
-    y = alt.Y(
-        "p99_error_m:Q",
-        title="99th percentile of the error / m",
-        scale=alt.Scale(zero=False, nice=False, domain=y_domain),
+    x_axis = Axis("energy_j", "energy of a trip / J", points["energy_j"].to_list(), log=True)
+    y_axis = Axis(
+        "p99_error_m", "99th percentile of the error / m", [it for one in reached for it in one]
     )
-    tooltip = [
-        alt.Tooltip("design:Q", title="No."),
-        alt.Tooltip("choice:N", title="design"),
-        alt.Tooltip("energy_j:Q", title="energy / J", format=".3g"),
-        alt.Tooltip("p99_error_m:Q", title="99th percentile / m", format=".3g"),
-        alt.Tooltip("rms_error_m:Q", title="RMS / m", format=".3g"),
-        alt.Tooltip("aoa_estimates:Q", title="estimates", format=".0f"),
-    ]
+    x, y = x_axis.of(alt.X), y_axis.of(alt.Y)
+    tooltip = tips(
+        ("design:Q", "No."),
+        ("choice:N", "design"),
+        ("energy_j:Q", "energy / J", ".3g"),
+        ("p99_error_m:Q", "99th percentile / m", ".3g"),
+        ("rms_error_m:Q", "RMS / m", ".3g"),
+        ("aoa_estimates:Q", "estimates", ".0f"),
+    )
 
     def layer(rows: pl.DataFrame, colour: str, opacity: float) -> Any:
         marks = alt.Chart(rows).mark_circle(size=70, color=colour, opacity=opacity)
@@ -181,8 +174,9 @@ def _energy_against_error(drawn: pl.DataFrame) -> Spec:
     if not front.is_empty():
         layers.append(layer(front, ORANGE, 1.0))
     number = pl.when(pl.int_range(pl.len()) < MOST_NAMES).then("design")
-    axes = ("energy_j", x_domain, True), ("p99_error_m", y_domain, False)
-    numbered = placed(points.with_columns(number=number), "number", *axes, ENERGY_ERROR_PX)
+    numbered = placed(
+        points.with_columns(number=number), "number", x_axis.place, y_axis.place, ENERGY_ERROR_PX
+    )
     labelled = numbered.filter(pl.col("label") != "")
     layers += labels(alt.Chart(labelled).encode(x=x, y=y))
     chart: Any = alt.layer(*layers)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from html import escape
-from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from access_av.errors import InputError
 from access_av.report import drive_charts as charts
-from access_av.report.page import sheet
-from access_av.report.parts import figure, section, shown, source, table, tile, warnings
+from access_av.report.page import VERSION, sheet
+from access_av.report.parts import figure, section, shown, source, table, warnings
 from access_av.report.played import CAPTION as PLAYED
 from access_av.report.shown import service_levels
 from access_av.run.assumptions import energy_boundary, in_words, optimistic_assumptions
@@ -66,13 +64,8 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, appendix: st
         specs["aoa_estimates"] = charts.aoa_estimates_against_time(
             result.aoa_estimates, runs, duration_s
         )
-        sections.append(
-            section(
-                "Angle estimates",
-                "Angle estimates per second, mean over the runs.",
-                figure("aoa_estimates"),
-            )
-        )
+        text = "Angle estimates per second, mean over the runs."
+        sections.append(section("Angle estimates", text, figure("aoa_estimates")))
     integrity = result.integrity
     if integrity is not None:
         vehicle = as_dict(scenario.resolved().vehicle)
@@ -91,40 +84,32 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, appendix: st
                 shown(service_levels(levels)),
             )
         )
-    sections.append(appendix)
-    sections.append(
-        section(
-            "Provenance",
-            "Simulated by this version with the scenario below and the seed above.",
-            source("Scenario with all default values", scenario.to_toml()),
-        )
-    )
+    written = source("Scenario with all default values", scenario.to_toml())
+    text = "Simulated by this version with the scenario below and the seed above."
+    sections += [appendix, section("Provenance", text, written)]
     tiles = [
-        tile(f"{each.value:.3f} m", f"{each.percent:g}th percentile of the horizontal error")
+        (f"{each.value:.3f} m", f"{each.percent:g}th percentile of the horizontal error")
         for each in result.percentiles or ()
         if each.percent in SHOWN_PERCENTS
     ]
     if (boundary := energy_boundary(scenario)) is not None:
         energy_j = value_text(result.runs["energy_j"].mean())
-        tiles.append(tile(f"{energy_j} J", f"energy of a run: {boundary}"))
-    estimates = result.runs["aoa_estimates"].sum() / runs
-    tiles.append(tile(f"{estimates:,.0f}", "angles estimated per run"))
+        tiles.append((f"{energy_j} J", f"energy of a run: {boundary}"))
+    tiles.append((f"{result.runs['aoa_estimates'].sum() / runs:,.0f}", "angles estimated per run"))
     if operation is not None and integrity is not None:
-        tiles.append(tile(f"{operation.reliable:.1%}", "availability (state ok)"))
+        tiles.append((f"{operation.reliable:.1%}", "availability (state ok)"))
         beyond = f"of {operation.epochs:,} errors above the protection level in state ok"
-        tiles.append(tile(f"{integrity.exceedances:,}", beyond))
+        tiles.append((f"{integrity.exceedances:,}", beyond))
     return sheet(
         specs,
-        title=f"ACCESS-AV drive: {escape(scenario.name)}",
-        kicker="ACCESS-AV drive",
+        "drive",
+        scenario.name,
         headline=f"90 % of the errors are below {result.error_quantiles_m[0.9]:.2f} m",
-        lead=escape(f"{scenario.description} {in_words(optimistic_assumptions(scenario))}".strip()),
-        tiles="".join(tiles),
-        meta=escape(
-            f"Scenario “{scenario.name}”, {runs} runs of {duration_s:.1f} s, seed {seed}, "
-            f"version {version('access-av')}."
-        ),
-        sections=warnings(scenario.warnings()) + "".join(sections),
+        lead=f"{scenario.description} {in_words(optimistic_assumptions(scenario))}".strip(),
+        tiles=tiles,
+        meta=f"Scenario “{scenario.name}”, {runs} runs of {duration_s:.1f} s, seed {seed}, "
+        f"{VERSION}.",
+        sections=[warnings(scenario.warnings()), *sections],
     )
 
 

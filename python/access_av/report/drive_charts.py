@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING
 import altair as alt
 import polars as pl
 
-from access_av.report.chart import BLUE, GREEN, LEAST_M, ORANGE, finish, thinned
+from access_av.report.chart import (
+    BLUE,
+    GREEN,
+    LEAST_M,
+    ORANGE,
+    finish,
+    line_chart,
+    lines_of,
+    thinned,
+    tips,
+)  # fmt: skip
 from access_av.report.played import played, received_of, steps_of
 from access_av.report.site_map import Frame, heads_of
 from access_av.statistics.consistency import horizontal_error_m
@@ -30,13 +40,8 @@ MARGIN_M = 25.0
 def error_against_time(steps: pl.DataFrame) -> Spec:
     """Returns the chart of error quantiles over the runs against time."""
     names = {"p50_error_m": "median", "p90_error_m": "90th percentile", "rms_error_m": "RMS"}
-    chart = _lines(
-        steps,
-        names,
-        line="over the runs",
-        x=("time_s", "time / s"),
-        y=("error_m", "horizontal error / m"),
-    )
+    x, y = ("time_s", "time / s"), ("error_m", "horizontal error / m")
+    chart = _lines(steps, names, "over the runs", x, y)
     return finish(chart, height=240, description="Horizontal error against time, over the runs")
 
 
@@ -65,11 +70,9 @@ def aoa_estimates_against_time(aoa_estimates: pl.DataFrame, runs: int, duration_
             x2="end_s:Q",
             y=alt.Y("per_second:Q", title="angle estimates per second"),
             color=alt.Color("head:N", legend=alt.Legend(title=None)),
-            tooltip=[
-                alt.Tooltip("head:N", title="radio head"),
-                alt.Tooltip("start_s:Q", title="from / s"),
-                alt.Tooltip("per_second:Q", title="per second"),
-            ],
+            tooltip=tips(
+                ("head:N", "radio head"), ("start_s:Q", "from / s"), ("per_second:Q", "per second")
+            ),
         )
     )
     return finish(chart, height=200, description="Angle estimates per second against time")
@@ -107,11 +110,11 @@ def stanford(trajectories: pl.DataFrame, alert_limit_m: float) -> Spec:
                 scale=alt.Scale(type="log", scheme="viridis"),
                 legend=alt.Legend(title="epochs"),
             ),
-            tooltip=[
-                alt.Tooltip("error_from_m:Q", title="error from / m", format=".3f"),
-                alt.Tooltip("level_from_m:Q", title="level from / m", format=".3f"),
-                "epochs:Q",
-            ],
+            tooltip=tips(
+                ("error_from_m:Q", "error from / m", ".3f"),
+                ("level_from_m:Q", "level from / m", ".3f"),
+                ("epochs:Q",),
+            ),
         )
     )
     diagonal = (
@@ -121,9 +124,8 @@ def stanford(trajectories: pl.DataFrame, alert_limit_m: float) -> Spec:
     )
     limit = alt.Chart(pl.DataFrame({"at_m": [alert_limit_m]}))
     rule = limit.mark_rule(strokeDash=[5, 4], strokeWidth=1.5)
-    limits = rule.encode(x=alt.X("at_m:Q", scale=scale)) + rule.encode(
-        y=alt.Y("at_m:Q", scale=scale)
-    )
+    limits = rule.encode(x=alt.X("at_m:Q", scale=scale))
+    limits += rule.encode(y=alt.Y("at_m:Q", scale=scale))
     return finish(
         cells + diagonal + limits,
         height=420,
@@ -138,13 +140,8 @@ def _bin(length_m: pl.Expr) -> pl.Expr:
 def bound_along_route(route: pl.DataFrame) -> Spec:
     """Returns the chart of the bound along the road, with its components."""
     names = {"bound_m": "horizontal", "along_std_m": "along the road", "across_std_m": "across it"}
-    chart = _lines(
-        route,
-        names,
-        line="error",
-        x=("along_m", "along the road / m"),
-        y=("bound_m", "least RMS error / m"),
-    )
+    x, y = ("along_m", "along the road / m"), ("bound_m", "least RMS error / m")
+    chart = _lines(route, names, "error", x, y)
     return finish(chart, height=260, description="Lower bound of the RMS error along the route")
 
 
@@ -175,7 +172,7 @@ def bound_over_site(bound: ErrorBound) -> Spec:
                 scale=alt.Scale(type="log", scheme="viridis", reverse=True),
                 legend=alt.Legend(title="least RMS error / m", gradientLength=240),
             ),
-            tooltip=[alt.Tooltip("bound_m:Q", title="bound / m", format=".3f")],
+            tooltip=tips(("bound_m:Q", "bound / m", ".3f")),
         )
     )
     road = alt.Chart(_road(bound.route)).mark_line(
@@ -218,33 +215,14 @@ def _road(route: pl.DataFrame) -> pl.DataFrame:
 
 
 def _lines(
-    table: pl.DataFrame,
-    names: dict[str, str],
-    *,
-    line: str,
-    x: tuple[str, str],
-    y: tuple[str, str],
+    table: pl.DataFrame, names: dict[str, str], line: str, x: tuple[str, str], y: tuple[str, str]
 ) -> alt.Chart:
     """Returns one line per column of ``names``; ``x`` and ``y`` are columns with titles."""
     (across, x_title), (upward, y_title) = x, y
-    rows = (
-        thinned(table.select(across, *names))
-        .rename(names)
-        .unpivot(index=across, variable_name="line", value_name=upward)
+    return line_chart(
+        lines_of(table, across, names, upward),
+        dict(zip(names.values(), (BLUE, ORANGE, GREEN), strict=True)),
+        alt.X(f"{across}:Q", title=x_title),
+        alt.Y(f"{upward}:Q", title=y_title),
+        tips(("line:N", line), (f"{across}:Q", x_title, ".1f"), (f"{upward}:Q", y_title, ".3f")),
     )
-    scale = alt.Scale(domain=list(names.values()), range=[BLUE, ORANGE, GREEN])
-    chart: alt.Chart = (
-        alt.Chart(rows)
-        .mark_line(strokeWidth=1.8)
-        .encode(
-            x=alt.X(f"{across}:Q", title=x_title),
-            y=alt.Y(f"{upward}:Q", title=y_title),
-            color=alt.Color("line:N", scale=scale, legend=alt.Legend(title=None)),
-            tooltip=[
-                alt.Tooltip("line:N", title=line),
-                alt.Tooltip(f"{across}:Q", title=x_title, format=".1f"),
-                alt.Tooltip(f"{upward}:Q", title=y_title, format=".3f"),
-            ],
-        )
-    )
-    return chart

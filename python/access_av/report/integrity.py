@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from html import escape
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from access_av.report import drive_charts as charts
-from access_av.report.page import sheet
-from access_av.report.parts import figure, source, table, tile, warnings
+from access_av.report.page import VERSION, sheet
+from access_av.report.parts import figure, section, source, table, warnings
 from access_av.run.pairs import UNCHANGED
 from access_av.tables.numbers import number
 
@@ -40,8 +38,8 @@ def render_integrity(
     """Returns the campaign as a self-contained HTML page."""
     rows = [
         (
-            escape(_world(one)),
-            escape(one["channel"]),
+            _world(one),
+            one["channel"],
             str(one["heads"]),
             f"{one['availability']:.1%}",
             f"{one['exceedance_share']:.1e}",
@@ -68,19 +66,24 @@ def render_integrity(
     first = cases[0].scenario
     return sheet(
         specs,
-        title=f"ACCESS-AV integrity: {escape(first.name)}",
-        kicker="ACCESS-AV integrity",
+        "integrity",
+        first.name,
         headline="Protection level under faults and wrong settings",
-        lead=escape(first.description),
-        tiles=tile(
-            f"{worst['exceedance_share']:.1e}",
-            f"of the errors in state ok above the protection level, worst case: {_world(worst)}",
-        )
-        + tile(f"{least['availability']:.1%}", f"availability, worst case: {_world(least)}"),
-        meta=escape(f"{runs} runs of each case, seed {seed}, version {version('access-av')}."),
-        sections=warnings(first.warnings())
-        + f"<section><h2>Cases</h2>{table(HEAD, rows, numbers=range(2, 13))}</section>"
-        + beside
-        + f"<section><h2>Stanford diagrams</h2>{diagrams}</section><section><h2>Provenance</h2>"
-        f"{source('Scenario of the first case', first.to_toml())}</section>",
+        lead=first.description,
+        tiles=[
+            (
+                f"{worst['exceedance_share']:.1e}",
+                "of the errors in state ok above the protection level, worst case: "
+                f"{_world(worst)}",
+            ),
+            (f"{least['availability']:.1%}", f"availability, worst case: {_world(least)}"),
+        ],
+        meta=f"{runs} runs of each case, seed {seed}, {VERSION}.",
+        sections=[
+            warnings(first.warnings()),
+            section("Cases", "", table(HEAD, rows, numbers=range(2, 13))),
+            beside,
+            section("Stanford diagrams", "", diagrams),
+            section("Provenance", "", source("Scenario of the first case", first.to_toml())),
+        ],
     )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import altair as alt
 import numpy as np
@@ -43,6 +44,46 @@ def domain(values: Sequence[float], *, log: bool = False) -> list[float]:
     margin = MARGIN * ((high - low) or abs(high) or 1.0)
     ends = (low - margin, high + margin)
     return [math.exp(it) if log else it for it in ends]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Axis of a chart of labelled points: column, title, values that it contains, scale."""
+
+    column: str
+    title: str
+    values: Sequence[float]
+    log: bool = False
+    axis: Any = alt.Undefined
+
+    @property
+    def place(self) -> tuple[str, list[float], bool]:
+        """Column, domain, and whether the scale is logarithmic."""
+        values = list(self.values) or [1.0 if self.log else 0.0]
+        return self.column, domain(values, log=self.log), self.log
+
+    def of(self, channel: Any, column: str = "") -> Any:
+        """Returns the axis as ``alt.X`` or ``alt.Y``, also of another column."""
+        kind = {"type": "log"} if self.log else {"zero": False}
+        scale = alt.Scale(domain=self.place[1], nice=False, **kind)
+        field = f"{column or self.column}:Q"
+        return channel(field, title=self.title, scale=scale, axis=self.axis)
+
+
+def labelled(
+    points: pl.DataFrame,
+    name: str,
+    x: Axis,
+    y: Axis,
+    height_px: float,
+    *,
+    group: str | None = None,
+    **encodings: Any,
+) -> tuple[alt.Chart, alt.Chart, alt.Chart]:
+    """Returns the chart of points without marks, the lines to distant labels, and the labels."""
+    found = placed(points, name, x.place, y.place, height_px, group=group)
+    base = alt.Chart(found).encode(x=x.of(alt.X), y=y.of(alt.Y), **encodings)
+    return base, *layers(base)
 
 
 def placed(

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from html import escape
-from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 import polars as pl
 
 from access_av.drives import recorded as drives
 from access_av.report import located_charts as charts
-from access_av.report.page import sheet
-from access_av.report.parts import figure, section, source, table, tile, warnings
+from access_av.report.page import VERSION, sheet
+from access_av.report.parts import figure, section, source, table, warnings
 from access_av.report.played import CAPTION as PLAYED
 from access_av.run.operation import Operation
 from access_av.tables.numbers import number
@@ -88,19 +87,21 @@ def render_located(
                 places + _by_head(drive.angles),
             )
         )
-    sections.append(appendix)
     nominal = source("Site with all default values", site.to_toml())
     nominal += source("Vehicle with all default values", vehicle.to_toml())
-    sections.append(section("Provenance", "", nominal))
     return sheet(
         specs,
-        title="ACCESS-AV located drive",
-        kicker="ACCESS-AV located drive",
+        "located drive",
         headline=_headline(drive, numbers),
-        lead=escape(drive.suspicions[0]) + "." if drive.suspicions else "",
+        lead=f"{drive.suspicions[0]}." if drive.suspicions else "",
         tiles=_tiles(drive, numbers),
-        meta=escape(f"Version {version('access-av')}."),
-        sections=warnings(site.warnings(vehicle)) + "".join(sections),
+        meta=f"{VERSION.capitalize()}.",
+        sections=[
+            warnings(site.warnings(vehicle)),
+            *sections,
+            appendix,
+            section("Provenance", "", nominal),
+        ],
     )
 
 
@@ -112,7 +113,7 @@ def _headline(drive: Drive, numbers: dict[str, float]) -> str:
     return f"{numbers['angles']:,.0f} angles in {numbers['duration_s']:.0f} s"
 
 
-def _tiles(drive: Drive, numbers: dict[str, float]) -> str:
+def _tiles(drive: Drive, numbers: dict[str, float]) -> list[tuple[str, str]]:
     share = numbers["accepted"] / max(1.0, numbers["angles"])
     tiles = {
         "duration": f"{numbers['duration_s']:.1f} s",
@@ -135,7 +136,7 @@ def _tiles(drive: Drive, numbers: dict[str, float]) -> str:
         tiles["of the time ok with an error above the protection level"] = (
             f"{numbers['beyond_while_ok']:.2%}"
         )
-    return "".join(tile(value, text) for text, value in tiles.items())
+    return [(value, text) for text, value in tiles.items()]
 
 
 def _tracks(
@@ -208,7 +209,7 @@ def _by_head(angles: pl.DataFrame) -> str:
         .sort("pci", "ssb_index", "reason")
     )
     rows = [
-        (str(pci), str(index), escape(reason), f"{count:,}", number(nis, 2))
+        (str(pci), str(index), reason, f"{count:,}", number(nis, 2))
         for pci, index, reason, count, nis in reasons.iter_rows()
     ]
     head = ("PCI", "SSB", "Verdict", "Angles", "Mean squared deviations")
@@ -218,10 +219,10 @@ def _by_head(angles: pl.DataFrame) -> str:
 def _findings(findings: pl.DataFrame) -> str:
     rows = [
         (
-            escape(quantity),
+            quantity,
             f"{stated:.4f}",
             f"{found:.4f} ± {std:.4f}" if std else "taken as exact",
-            escape(unit),
+            unit,
         )
         for quantity, unit, stated, found, std in findings.iter_rows()
     ]

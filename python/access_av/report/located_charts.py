@@ -14,10 +14,14 @@ from access_av.report.chart import (
     LEAST_M,
     ORANGE,
     PURPLE,
+    colours,
+    dashed,
     finish,
+    line_chart,
     thinned,
     time_axis,
-)
+    tips,
+)  # fmt: skip
 from access_av.report.played import played
 from access_av.report.site_map import Frame, heads_of
 
@@ -43,23 +47,15 @@ ERRORS = {
 def track(drive: Drive, lines: dict[str, pl.DataFrame], site: Site, steps: pl.DataFrame) -> Spec:
     """Returns the animated map of the vehicle's track.
 
-    Parameters
-    ----------
-    drive
-        Located drive.
-    lines
-        Poses by their name in ``TRACKS``.
-    site
-        Nominal site.
-    steps
-        Steps of the drive for :func:`access_av.report.played.played`.
+    ``lines`` are poses by their name in ``TRACKS``; ``steps`` those of
+    :func:`access_av.report.played.played`.
     """
     heads = heads_of(site)
-    table = pl.concat(
-        thinned(line.select("time_s", "x_m", "y_m"), POINTS_PER_TRACK).with_columns(
-            line=pl.lit(name)
-        )
-        for name, line in lines.items()
+    table = _joined(
+        {
+            name: thinned(line.select("time_s", "x_m", "y_m"), POINTS_PER_TRACK)
+            for name, line in lines.items()
+        }
     )
     every = pl.concat([table.select("x_m", "y_m"), heads.select("x_m", "y_m")])
     across_m, upward_m = (every.max() - every.min()).row(0)
@@ -68,7 +64,7 @@ def track(drive: Drive, lines: dict[str, pl.DataFrame], site: Site, steps: pl.Da
     driven = frame.put(
         alt.Chart(table).mark_line(strokeWidth=1.6),
         order="time_s:Q",
-        color=_colours(TRACKS, lines),
+        color=colours("line:N", _present(TRACKS, lines)),
     )
     layers = alt.LayerChart(layer=[*frame.beneath(site), driven, *frame.masts(heads, ORANGE)])
     received = drive.angles.filter("accepted").select("time_s", "pci", "ssb_index")
@@ -82,32 +78,28 @@ def track(drive: Drive, lines: dict[str, pl.DataFrame], site: Site, steps: pl.Da
 def error(lines: dict[str, pl.DataFrame]) -> Spec:
     """Returns the chart of error, standard deviation and protection level against time.
 
-    Parameters
-    ----------
-    lines
-        ``time_s`` and ``error_m`` by the line's name in ``ERRORS``.
+    ``lines`` are ``time_s`` and ``error_m`` by the line's name in ``ERRORS``.
     """
-    table = pl.concat(
-        thinned(line.select("time_s", pl.col("error_m").clip(LEAST_M)).drop_nulls()).with_columns(
-            line=pl.lit(name)
-        )
+    drawn = {
+        name: thinned(line.select("time_s", pl.col("error_m").clip(LEAST_M)).drop_nulls())
         for name, line in lines.items()
-    )
-    chart = (
-        alt.Chart(table)
-        .mark_line(strokeWidth=1.8)
-        .encode(
-            x=time_axis(),
-            y=alt.Y("error_m:Q", title="horizontal / m", scale=alt.Scale(type="log")),
-            color=_colours(ERRORS, lines),
-            tooltip=[
-                alt.Tooltip("line:N"),
-                alt.Tooltip("time_s:Q", title="time / s", format=".1f"),
-                alt.Tooltip("error_m:Q", title="m", format=".3f"),
-            ],
-        )
+    }
+    chart = line_chart(
+        _joined(drawn),
+        _present(ERRORS, lines),
+        time_axis(),
+        alt.Y("error_m:Q", title="horizontal / m", scale=alt.Scale(type="log")),
+        tips(("line:N",), ("time_s:Q", "time / s", ".1f"), ("error_m:Q", "m", ".3f")),
     )
     return finish(chart, height=260, description="Error, deviation and level against time")
+
+
+def _joined(lines: dict[str, pl.DataFrame]) -> pl.DataFrame:
+    return pl.concat(rows.with_columns(line=pl.lit(name)) for name, rows in lines.items())
+
+
+def _present(by_name: dict[str, str], lines: dict[str, pl.DataFrame]) -> dict[str, str]:
+    return {name: colour for name, colour in by_name.items() if name in lines}
 
 
 def angles(compared: pl.DataFrame) -> Spec:
@@ -118,11 +110,7 @@ def angles(compared: pl.DataFrame) -> Spec:
         .encode(
             x=time_axis(),
             y=alt.Y("deviations:Q", title="deviations", scale=alt.Scale(type="symlog")),
-            color=alt.Color(
-                "verdict:N",
-                scale=alt.Scale(domain=["accepted", "refused"], range=[BLUE, ORANGE]),
-                legend=alt.Legend(title=None),
-            ),
+            color=colours("verdict:N", {"accepted": BLUE, "refused": ORANGE}),
         )
     )
     return finish(dots, height=220, description="Normalised innovation of each angle against time")
@@ -148,12 +136,5 @@ def heads(compared: pl.DataFrame) -> Spec:
             tooltip=["head:N", "deviations:Q", "angles:Q"],
         )
     )
-    normal = alt.Chart(pl.DataFrame({"at": [P90_SIGMAS]}))
-    line = normal.mark_rule(strokeDash=[5, 4], strokeWidth=1.5, color=ORANGE).encode(y="at:Q")
+    line = dashed("y", "at", P90_SIGMAS, color=ORANGE)
     return finish(bars + line, height=200, description="Innovations of each radio head")
-
-
-def _colours(all_of: dict[str, str], lines: dict[str, pl.DataFrame]) -> alt.Color:
-    shown = {name: colour for name, colour in all_of.items() if name in lines}
-    scale = alt.Scale(domain=list(shown), range=list(shown.values()))
-    return alt.Color("line:N", scale=scale, legend=alt.Legend(title=None))

@@ -8,14 +8,36 @@ from typing import TYPE_CHECKING
 from access_av.report.shown import Badge
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from access_av.report.shown import Shown
 
 
-def badge(text: str, kind: str) -> str:
+class Html(str):
+    """HTML of a table cell; other text of cells is escaped."""
+
+    __slots__ = ()
+
+
+def badge(text: str, kind: str) -> Html:
     """Returns a badge; ``kind`` is ``yes``, ``no``, ``fit``, ``arithmetic`` or ``construction``."""
-    return f'<span class="badge {kind}">{escape(text)}</span>'
+    return Html(f'<span class="badge {kind}">{escape(text)}</span>')
+
+
+def small(text: str, *below: str) -> Html:
+    """Returns a cell with smaller lines below its text."""
+    return Html(_html(text) + "".join(f"<small>{_html(it)}</small>" for it in below))
+
+
+def code(text: str) -> Html:
+    """Returns a cell with a key or a command."""
+    return Html(f"<code>{escape(text)}</code>")
+
+
+def _html(cell: str | Badge) -> str:
+    if isinstance(cell, Badge):
+        return badge(*cell)
+    return cell if isinstance(cell, Html) else escape(cell)
 
 
 def tile(value: str, text: str) -> str:
@@ -32,27 +54,25 @@ def figure(chart_id: str, caption: str = "", title: str = "") -> str:
 
 def table(
     head: Sequence[str],
-    rows: Iterable[Sequence[str]],
+    rows: Iterable[Sequence[str | Badge]],
     *,
     numbers: Sequence[int] = (),
     kind: str = "cards",
 ) -> str:
-    """Returns a table; ``numbers`` are the right-aligned columns. Cells contain HTML.
+    """Returns a table; ``numbers`` are the right-aligned columns.
 
     On a narrow screen, each row of ``cards`` becomes a card with the column names; a ``matrix``
     keeps its columns, and hides the ``small`` and ``span`` elements of its cells.
     """
 
-    def cell(tag: str, column: int, content: str) -> str:
+    def cell(tag: str, column: int, content: str | Badge) -> str:
         kind = ' class="number"' if column in numbers else ""
         name = f' data-label="{escape(head[column])}"' if tag == "td" and column else ""
-        return f"<{tag}{kind}{name}>{content}</{tag}>"
+        return f"<{tag}{kind}{name}>{_html(content)}</{tag}>"
 
-    top = "".join(cell("th", column, escape(name)) for column, name in enumerate(head))
+    top = "".join(cell("th", column, name) for column, name in enumerate(head))
     body = "".join(
-        "<tr>"
-        + "".join(cell("td", column, content) for column, content in enumerate(row))
-        + "</tr>"
+        f"<tr>{''.join(cell('td', column, content) for column, content in enumerate(row))}</tr>"
         for row in rows
     )
     return (
@@ -61,14 +81,20 @@ def table(
     )
 
 
+def records(rows: Sequence[Mapping[str, str | Badge]], *, numbers: Sequence[int] = ()) -> str:
+    """Returns a table of rows with equal columns: cells by the name of their column."""
+    return table(list(rows[0]), [list(it.values()) for it in rows], numbers=numbers) if rows else ""
+
+
 def shown(content: Shown) -> str:
     """Returns a table that the terminal shows, too."""
-    rows = [
-        [badge(*cell) if isinstance(cell, Badge) else escape(cell) for cell in row]
-        for row in content.rows
-    ]
     numbers = [it for it in range(len(content.head)) if it not in content.texts]
-    return table(content.head, rows, numbers=numbers)
+    return table(content.head, content.rows, numbers=numbers)
+
+
+def folded(title: str, content: str) -> str:
+    """Returns a collapsed element."""
+    return f"<details><summary>{escape(title)}</summary>{content}</details>"
 
 
 def section(title: str, text: str, body: str) -> str:
@@ -87,5 +113,4 @@ def warnings(found: Iterable[object]) -> str:
 def source(title: str, text: str) -> str:
     """Returns a file in a collapsed element."""
     # tabindex makes the scrolling text accessible by keyboard.
-    shown = f'<pre tabindex="0">{escape(text)}</pre>'
-    return f"<details><summary>{escape(title)}</summary>{shown}</details>"
+    return folded(title, f'<pre tabindex="0">{escape(text)}</pre>')

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import math
 from html import escape
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from access_av.report import study_charts as charts
-from access_av.report.page import sheet
-from access_av.report.parts import badge, figure, section, source, table, tile, warnings
+from access_av.report.page import VERSION, sheet
+from access_av.report.parts import (
+    badge,
+    code,
+    figure,
+    folded,
+    records,
+    section,
+    small,
+    source,
+    table,
+    warnings,
+)  # fmt: skip
 from access_av.report.played import CAPTION as PLAYED
 from access_av.report.study_operation import money_section, operation_section
 from access_av.report.study_parts import (
@@ -20,11 +30,10 @@ from access_av.report.study_parts import (
     lost,
     reliability_rows,
     sources,
-)
+)  # fmt: skip
 from access_av.run.assumptions import in_words, optimistic_assumptions
 from access_av.settings import as_dict
 from access_av.study import economy
-from access_av.verdicts import NotOk
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -53,35 +62,35 @@ def render_study(study: Study, appendix: str = "") -> str:
     }
     if study.points:
         specs["ways"] = charts.ways_to_operate(study)
-    scenario = study.nominal.scenario
-    assumed = in_words(optimistic_assumptions(scenario))
+    assumed = in_words(optimistic_assumptions(study.nominal.scenario))
     described = f"{study.plant.description}." if study.plant.description else ""
     return sheet(
         specs,
-        title=f"ACCESS-AV study: {escape(study.plant.name)}",
-        kicker=f"ACCESS-AV study: {escape(study.plant.name)}",
+        "study",
+        study.plant.name,
+        kicker=f"ACCESS-AV study: {study.plant.name}",
         headline=_headline(study),
-        lead=escape(f"{study.verdict} {described} {assumed}".strip()),
+        lead=f"{study.verdict} {described} {assumed}".strip(),
         tiles=_tiles(study),
-        meta=escape(
-            f"Simulated: {study.nominal.runs} trips of {study.nominal.duration_s:.0f} s with the "
-            f"nominal channel, seed {study.seed}, version {version('access-av')}. Intervals: 95 %."
-        ),
-        sections=warnings(study.plant.warnings())
-        + _verdict(study)
-        + _where(study)
-        + _remedies(study)
-        + operation_section(study)
-        + money_section(study)
-        + appendix
-        + _unverified(study)
-        + section(
-            "Provenance",
-            "errors.parquet, drives.parquet, targets.parquet, places.csv, points.parquet and "
-            "trajectories.parquet (the drive that is played) next to this page contain the data of "
-            "its figures.",
-            source("Plant, all defaults written out", study.plant.to_toml()),
-        ),
+        meta=f"Simulated: {study.nominal.runs} trips of {study.nominal.duration_s:.0f} s with the "
+        f"nominal channel, seed {study.seed}, {VERSION}. Intervals: 95 %.",
+        sections=[
+            warnings(study.plant.warnings()),
+            _verdict(study),
+            _where(study),
+            _remedies(study),
+            operation_section(study),
+            money_section(study),
+            appendix,
+            _unverified(study),
+            section(
+                "Provenance",
+                "errors.parquet, drives.parquet, targets.parquet, places.csv, points.parquet and "
+                "trajectories.parquet (the drive that is played) next to this page contain the "
+                "data of its figures.",
+                source("Plant, all defaults written out", study.plant.to_toml()),
+            ),
+        ],
     )
 
 
@@ -89,32 +98,30 @@ def _headline(study: Study) -> str:
     judged = study.judged(study.nominal).words
     stretches = len(study.targets.each) - 1
     more = f", and {count(stretches, 'target')} of stretches" if stretches else ""
-    return escape(
+    return (
         f"{judged[0].upper()}{judged[1:]} for {study.error_m:g} m, {study.percent:g} % of the "
         f"time{more}"
     )
 
 
-def _tiles(study: Study) -> str:
+def _tiles(study: Study) -> list[tuple[str, str]]:
     nominal, poor_los = (
         it.percentile(study.percent).value for it in (study.nominal, study.poor_los)
     )
+    within = f"error that the vehicle does not exceed for {study.percent:g} % of time"
     made = [
-        tile(
-            f"{nominal:.2f} m",
-            f"error that the vehicle does not exceed for {study.percent:g} % of time",
-        ),
-        tile(f"{poor_los:.2f} m", "the same percentile with poor line of sight"),
+        (f"{nominal:.2f} m", within),
+        (f"{poor_los:.2f} m", "the same percentile with poor line of sight"),
     ]
     if lost_runs := study.nominal.lost_runs:
-        made.insert(0, tile(f"{lost_runs} of {study.nominal.runs}", "drives LOST"))
+        made.insert(0, (f"{lost_runs} of {study.nominal.runs}", "drives LOST"))
     if study.point is not None:
-        made.append(tile(joules(economy.trip_j(study.point).central), "a trip, above idle"))
+        made.append((joules(economy.trip_j(study.point).central), "a trip, above idle"))
     if study.day is not None:
-        made.append(tile(f"{digits(study.day.trips_wh.central)} Wh", "a fleet’s day, above idle"))
+        made.append((f"{digits(study.day.trips_wh.central)} Wh", "a fleet’s day, above idle"))
     if study.nominal.ok_share is not None:
-        made.append(tile(f"{study.nominal.ok_share:.1%}", "of the time in state ok"))
-    return "".join(made)
+        made.append((f"{study.nominal.ok_share:.1%}", "of the time in state ok"))
+    return made
 
 
 def _interval(values: tuple[float, float, float]) -> str:
@@ -123,19 +130,16 @@ def _interval(values: tuple[float, float, float]) -> str:
 
 def _verdict(study: Study) -> str:
     rows: list[tuple[str, ...]] = []
-    for name, driven in (
-        ("nominal", study.nominal),
-        ("poor line of sight", study.poor_los),
-    ):
+    for name, driven in (("nominal", study.nominal), ("poor line of sight", study.poor_los)):
         for number, it in enumerate(study.results(driven)):
             stretch = f"{it.target.from_m:.0f} to {it.target.to_m:.0f} m along the road"
             rows.append(
                 (
-                    f"{escape(it.target.name)}<small>{escape(name)}, {stretch}</small>",
+                    small(it.target.name, f"{name}, {stretch}"),
                     lost(driven) if number == 0 else "–",
-                    escape(it.target.words.replace(" %", "\N{NO-BREAK SPACE}%")),
+                    it.target.words.replace(" %", "\N{NO-BREAK SPACE}%"),
                     f"{it.error.value:.3f} m",
-                    f"{escape(it.error.interval)} m",
+                    f"{it.error.interval} m",
                     f"{it.share[0]:.2%}",
                     _interval(it.share),
                     badge(it.judgement.words, it.judgement.badge),
@@ -144,7 +148,7 @@ def _verdict(study: Study) -> str:
         judged = study.judged(driven)
         rows.append(
             (
-                f"all targets<small>{escape(name)}</small>",
+                small("all targets", name),
                 *(["–"] * 6),
                 badge(judged.words, judged.badge),
             )
@@ -184,40 +188,36 @@ def _integrity(study: Study, written: Mapping[str, Any]) -> str:
     drives += [it for name, it in of_points.items() if name != study.nominal.name]
     rows = reliability_rows(drives)
     first = 2  # the other rows are collapsed
-    head = ("Variant", "Lost drives", "State ok", *(it.words for it in NotOk), "Errors while ok")
+    tables = (records(it, numbers=range(1, 7)) for it in (rows[:first], rows[first:]))
     return (
         f"<h3>Reliability</h3><p>Integrity settings: {escape(', '.join(settings))}. State ok: the "
         "protection level is below the alert limit, and no fault is suspected. Otherwise: share of "
         "the time by reason. Errors while ok: SSBs whose error exceeds the protection level.</p>"
-        + table(head, rows[:first], numbers=range(1, len(head)))
-        + "<details><summary>Measures and operations</summary>"
-        + table(head, rows[first:], numbers=range(1, len(head)))
-        + "</details>"
+        + next(tables)
+        + folded("Measures and operations", next(tables))
     )
 
 
 def _where(study: Study) -> str:
-    rows = [
-        (
-            str(number),
-            f"{place.along_m:.0f} m",
-            f"({place.x_m:.0f}, {place.y_m:.0f}) m",
-            f"{place.error_m:.2f} m",
-            escape(place.why),
-        )
+    worst = [
+        {
+            "": str(number),
+            "Along the road": f"{place.along_m:.0f} m",
+            "Position": f"({place.x_m:.0f}, {place.y_m:.0f}) m",
+            f"{study.percent:g} % within": f"{place.error_m:.2f} m",
+            "Why": place.why,
+        }
         for number, place in enumerate(study.worst, start=1)
     ]
-    kept = study.places["passes"].sum() / study.places.height
-    head = ("", "Along the road", "Position", f"{study.percent:g} % within", "Why")
     sides = [
-        (
-            escape(it["name"]),
-            f"{it['along_m']:.0f} m",
-            f"{it['distance_m']:.0f} m to the {it['side']}",
-        )
+        {
+            "Radio head": it["name"],
+            "nearest point of the road": f"{it['along_m']:.0f} m",
+            "distance and side of the road": f"{it['distance_m']:.0f} m to the {it['side']}",
+        }
         for it in study.heads.iter_rows(named=True)
     ]
-    side_head = ("Radio head", "nearest point of the road", "distance and side of the road")
+    kept = study.places["passes"].sum() / study.places.height
     return section(
         "Where is the error too large?",
         f"Colour of the road: {study.percent:g}th percentile of the error within 5 m of each "
@@ -226,8 +226,8 @@ def _where(study: Study) -> str:
         "squares: stops; diamonds: targets of positions and stretches; grey lines: walls; numbers: "
         f"worst positions. places.csv has each metre. Drawn to scale on a wide screen. {PLAYED}",
         figure("map")
-        + table(head, rows, numbers=(1, 2, 3))
-        + table(side_head, sides, numbers=(1, 2))
+        + records(worst, numbers=(1, 2, 3))
+        + records(sides, numbers=(1, 2))
         + '<div class="charts">'
         + figure(
             "along",
@@ -249,38 +249,29 @@ def _places(study: Study) -> str:
     """Returns the data of the charts along the road as a collapsible table."""
     step = math.ceil(study.places.height / MOST_PLACES)
     rows = [
-        (
-            f"{place['along_m']:.0f} m",
-            badge("kept", "yes") if place["passes"] else badge("missed", "no"),
-            f"{place['target_error_m']:.3f} m",
-            f"{place['median_error_m']:.3f} m",
-            "–" if place["level_m"] is None else f"{place['level_m']:.2f} m",
-            f"{place['reliable_share']:.0%}",
-            f"{place['bound_m']:.3f} m",
-            "–" if (it := place["along_road_error_per_degree_m"]) is None else f"{it:.2f} m",
-            "–" if (it := place["best_snr_db"]) is None else f"{it:.0f} dB",
-        )
+        {
+            "Along the road": f"{place['along_m']:.0f} m",
+            "Target": badge("kept", "yes") if place["passes"] else badge("missed", "no"),
+            f"{study.percent:g} % within": f"{place['target_error_m']:.3f} m",
+            "half within": f"{place['median_error_m']:.3f} m",
+            "level": "–" if place["level_m"] is None else f"{place['level_m']:.2f} m",
+            "reliable": f"{place['reliable_share']:.0%}",
+            "least RMS": f"{place['bound_m']:.3f} m",
+            "dilution": "–"
+            if (it := place["along_road_error_per_degree_m"]) is None
+            else f"{it:.2f} m",
+            "SNR": "–" if (it := place["best_snr_db"]) is None else f"{it:.0f} dB",
+        }
         for place in study.places.gather_every(step).iter_rows(named=True)
     ]
-    head = (
-        "Along the road", "Target", f"{study.percent:g} % within", "half within", "level",
-        "reliable", "least RMS", "dilution", "SNR",
-    )  # fmt: skip
-    return (
-        f"<details><summary>These figures every {step} m</summary>"
-        f"{table(head, rows, numbers=range(2, 9))}</details>"
-    )
+    return folded(f"These figures every {step} m", records(rows, numbers=range(2, 9)))
 
 
 def _remedies(study: Study) -> str:
     if study.measured is None:
-        return section(
-            "What reduces the error?",
-            "The drives meet all targets: no measure was simulated. --force-remedies simulates "
-            "them.",
-            "",
-        )
-    currency = escape(study.prices.currency)
+        text = "The drives meet all targets: no measure was simulated. "
+        return section("What reduces the error?", f"{text}--force-remedies simulates them.", "")
+    currency = study.prices.currency
     measured = study.measured
     before = measured.before
     base = before.percentile(study.percent)
@@ -289,7 +280,7 @@ def _remedies(study: Study) -> str:
         (
             "without any measure",
             lost(before),
-            f"{base.value:.3f} m<small>{escape(base.interval)} m</small>",
+            small(f"{base.value:.3f} m", f"{base.interval} m"),
             *(["–"] * 3),
             badge(judged.words, judged.badge),
         )
@@ -299,10 +290,10 @@ def _remedies(study: Study) -> str:
         per_price = it.cm_per_price
         rows.append(
             (
-                f"{escape(it.name)}<small>{escape(it.what)}</small>",
+                small(it.name, it.what),
                 lost(it.driven),
-                f"{it.error.value:.3f} m<small>{escape(it.error.interval)} m</small>",
-                f"{delta:+.3f} m<small>{low:+.3f} to {high:+.3f} m: {it.effect.words}</small>",
+                small(f"{it.error.value:.3f} m", f"{it.error.interval} m"),
+                small(f"{delta:+.3f} m", f"{low:+.3f} to {high:+.3f} m: {it.effect.words}"),
                 ends(it.cost),
                 "–" if per_price is None else f"{per_price:.2g}",
                 badge(it.judgement.words, it.judgement.badge),
@@ -333,23 +324,20 @@ def _remedies(study: Study) -> str:
 
 def _unverified(study: Study) -> str:
     rows = [
-        (
-            f"<code>{escape(it.key)}</code>",
-            escape(it.what),
-            escape(it.otherwise or "–"),
-            "no effect on the error"
+        {
+            "Key": code(it.key),
+            "Value": it.what,
+            "Alternative": it.otherwise or "–",
+            "effect on the bound": "no effect on the error"
             if it.effect is None
             else f"{100.0 * (it.effect - 1.0):+.0f} %",
-        )
+        }
         for it in study.unverified
     ]
-    if not rows:
-        return section("Unverified values", "No value is equal to the template’s.", "")
-    head = ("Key", "Value", "Alternative", "effect on the bound")
-    return section(
-        "Unverified values",
+    text = (
         "These values are equal to the template’s or the default, the most influential first. "
         "Effect: change of the least error that any localizer can reach (90th percentile along "
-        "the road) with the alternative.",
-        table(head, rows, numbers=(3,)),
+        "the road) with the alternative."
     )
+    none = "No value is equal to the template’s."
+    return section("Unverified values", text if rows else none, records(rows, numbers=(3,)))

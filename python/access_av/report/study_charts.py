@@ -8,9 +8,21 @@ from typing import TYPE_CHECKING, Any
 import altair as alt
 import polars as pl
 
-from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, finish, thinned
-from access_av.report.labels import domain, placed
-from access_av.report.labels import layers as labels
+from access_av.report.chart import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    colours,
+    dashed,
+    finish,
+    line_chart,
+    lines_of,
+    thinned,
+    tips,
+)  # fmt: skip
+from access_av.report.labels import Axis, labelled
 from access_av.report.played import played, received_of, steps_of
 from access_av.report.site_map import Frame, heads_of
 from access_av.report.study_parts import numbered
@@ -55,30 +67,22 @@ def road_map(study: Study) -> Spec:
     drawn = frame.put(
         alt.Chart(road).mark_rule(strokeWidth=7, strokeCap="round"),
         ends=True,
-        color=alt.Color(
-            "class_:N",
-            scale=alt.Scale(domain=_classes(study.error_m), range=list(COLOURS)),
-            legend=alt.Legend(title=None, columns=2),
+        color=colours(
+            "class_:N", dict(zip(_classes(study.error_m), COLOURS, strict=True)), columns=2
         ),
-        tooltip=[
-            alt.Tooltip("along_m:Q", title="along the road / m", format=".0f"),
-            alt.Tooltip("target_error_m:Q", title=f"{study.percent:g} % within / m"),
-            alt.Tooltip("level_m:Q", title="protection level / m"),
-            alt.Tooltip("reliable_share:Q", title="reliable", format=".0%"),
-            alt.Tooltip("best_snr_db:Q", title="SNR of the strongest / dB", format=".0f"),
-        ],
+        tooltip=tips(
+            ("along_m:Q", "along the road / m", ".0f"),
+            ("target_error_m:Q", f"{study.percent:g} % within / m"),
+            ("level_m:Q", "protection level / m"),
+            ("reliable_share:Q", "reliable", ".0%"),
+            ("best_snr_db:Q", "SNR of the strongest / dB", ".0f"),
+        ),
     )
     layers = [*frame.beneath(site), drawn, *frame.masts(heads)]
-    targets = _at(
-        study,
-        {it.name: 0.5 * (it.from_m + it.to_m) for it in study.targets.each[1:]},
-    )
+    targets = _at(study, {it.name: 0.5 * (it.from_m + it.to_m) for it in study.targets.each[1:]})
     stops = _at(
         study,
-        {
-            stop.get("name") or f"stop at {stop['at_m']:.0f} m": stop["at_m"]
-            for stop in _stops(study)
-        },
+        {it.get("name") or f"stop at {it['at_m']:.0f} m": it["at_m"] for it in _stops(study)},
     )
     named = {stop["name"] for stop in _stops(study) if stop.get("name")}
     named |= {name for name, *_ in study.plant.targets if name}
@@ -86,7 +90,7 @@ def road_map(study: Study) -> Spec:
         if rows.is_empty():
             continue
         symbol = alt.Chart(rows).mark_point(shape=shape, size=120, color=colour, strokeWidth=2)
-        said = [alt.Tooltip("name:N"), alt.Tooltip("along_m:Q", title="along the road / m")]
+        said = tips(("name:N",), ("along_m:Q", "along the road / m"))
         layers.append(frame.put(symbol, tooltip=said))
         shown = rows.filter(pl.col("name").is_in(list(named)))
         if rows is targets and not stops.is_empty():  # one name for a stop and its target
@@ -158,31 +162,17 @@ def along_road(study: Study) -> Spec:
         "level_m": "median protection level",
         "bound_m": "least RMS error",
     }
-    rows = (
-        thinned(study.places.select("along_m", *names))
-        .rename(names)
-        .unpivot(index="along_m", variable_name="line", value_name="error_m")
+    lines = line_chart(
+        lines_of(study.places, "along_m", names, "error_m"),
+        dict(zip(names.values(), (ORANGE, BLUE, PURPLE, GREEN), strict=True)),
+        alt.X("along_m:Q", title="along the road / m", scale=alt.Scale(nice=False)),
+        alt.Y("error_m:Q", title="horizontal error / m"),
+        [*tips(("line:N",), ("along_m:Q",)), alt.Tooltip("error_m:Q", format=".3f")],
+        columns=2,
     )
-    lines = (
-        alt.Chart(rows)
-        .mark_line(strokeWidth=1.8)
-        .encode(
-            x=alt.X("along_m:Q", title="along the road / m", scale=alt.Scale(nice=False)),
-            y=alt.Y("error_m:Q", title="horizontal error / m"),
-            color=alt.Color(
-                "line:N",
-                scale=alt.Scale(domain=list(names.values()), range=[ORANGE, BLUE, PURPLE, GREEN]),
-                legend=alt.Legend(title=None, columns=2),
-            ),
-            tooltip=["line:N", "along_m:Q", alt.Tooltip("error_m:Q", format=".3f")],
-        )
-    )
-    target = (
-        alt.Chart(pl.DataFrame({"error_m": [study.error_m]}))
-        .mark_rule(strokeDash=[5, 4], strokeWidth=1.5)
-        .encode(y="error_m:Q")
-    )
-    return finish(lines + target, height=260, description="Horizontal error along the road")
+    target = dashed("y", "error_m", study.error_m)
+    chart: Any = lines + target
+    return finish(chart, height=260, description="Horizontal error along the road")
 
 
 def signal_along_road(study: Study) -> Spec:
@@ -241,37 +231,29 @@ def ways_to_operate(study: Study) -> Spec:
             for number, (index, point) in enumerate(numbered(study), start=1)
         ]
     ).filter(pl.col("error_m").is_finite())
-    x_domain = domain(rows["energy_j"].to_list() or [1.0], log=True)
-    y_domain = domain([*rows["error_m"], study.error_m])
-    axes = ("energy_j", x_domain, True), ("error_m", y_domain, False)
-    base = alt.Chart(placed(rows, "number", *axes, WAYS_PX)).encode(
-        x=alt.X(
-            "energy_j:Q",
-            title="energy of a trip / J",
-            scale=alt.Scale(type="log", nice=False, domain=x_domain),
+    base, lines, numbers = labelled(
+        rows,
+        "number",
+        Axis(
+            "energy_j",
+            "energy of a trip / J",
+            rows["energy_j"].to_list(),
+            log=True,
             axis=alt.Axis(values=_round_values(rows["energy_j"])),
         ),
-        y=alt.Y(
-            "error_m:Q",
-            title=f"{study.percent:g}th percentile of the error / m",
-            scale=alt.Scale(zero=False, nice=False, domain=y_domain),
+        Axis(
+            "error_m",
+            f"{study.percent:g}th percentile of the error / m",
+            [*rows["error_m"], study.error_m],
         ),
+        WAYS_PX,
         tooltip=["number:N", "way:N", "mode:N", "energy_j:Q", "error_m:Q"],
     )
     points = base.mark_point(filled=True, opacity=0.9).encode(
-        color=alt.Color(
-            "kind:N",
-            scale=alt.Scale(domain=kinds, range=[ORANGE, BLUE, GREY]),
-            legend=alt.Legend(title=None, columns=1),
-        ),
+        color=colours("kind:N", dict(zip(kinds, (ORANGE, BLUE, GREY), strict=True)), columns=1),
         size=alt.Size("kind:N", scale=alt.Scale(domain=kinds, range=[110, 70, 40]), legend=None),
     )
-    target = (
-        alt.Chart(pl.DataFrame({"error_m": [study.error_m]}))
-        .mark_rule(strokeDash=[5, 4], strokeWidth=1.5)
-        .encode(y="error_m:Q")
-    )
-    lines, numbers = labels(base)
+    target = dashed("y", "error_m", study.error_m)
     # Draw the points of the front over the others, and the recommended one last.
     drawn = [points.transform_filter(alt.datum.kind == kind) for kind in reversed(kinds)]
     chart: Any = alt.layer(target, lines, *drawn, numbers)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from html import escape
 from typing import TYPE_CHECKING
 
-from access_av.report.parts import badge, figure, section, table
+from access_av.report.parts import badge, code, figure, folded, records, section, small
 from access_av.report.study_parts import (
     digits,
     ends,
@@ -42,14 +41,13 @@ def operation_section(study: Study) -> str:
         f"trip takes {joules_range(economy.trip_j(point))}, the fleet’s day "
         f"{ends(day.trips_wh)} Wh. Boundary: {boundary}; low to high. {_agreement(study)}"
     )
-    keys = [(f"<code>{escape(key)}</code>", escape(json.dumps(value))) for key, value in
-            point.settings.items()]  # fmt: skip
+    keys = [{"Key": code(key), "Value": json.dumps(value)} for key, value in point.settings.items()]
     return section(
         "How to operate it",
         text,
         "<p>recommended.toml next to this page contains this operating point: "
         "<code>access-av run recommended.toml</code> simulates it. Its keys:</p>"
-        + table(("Key", "Value"), keys)
+        + records(keys)
         + _rivals(study)
         + _composition(study, point, day)
         + figure(
@@ -58,7 +56,7 @@ def operation_section(study: Study) -> str:
             "table of all points.",
         )
         + _numbered(study)
-        + _points(study),
+        + _points(study, point),
     )
 
 
@@ -85,31 +83,30 @@ def _rivals(study: Study) -> str:
     rows = []
     for it in study.recommendation.rivals:
         delta, low, high = it.delta_m
+        judged = it.point.judgement
         rows.append(
-            (
-                escape(it.point.name),
-                lost(it.point.driven),
-                f"{it.point.error_m:.3f} m",
-                f"{delta:+.3f} m",
-                f"{low:+.3f} to {high:+.3f} m",
-                f"{it.delta_j:+.3g} J",
-                "–" if it.day_share is None else f"{100.0 * it.day_share:+.2g} %",
-                badge("equivalent", "fit")
+            {
+                "Rival": it.point.name,
+                "Lost drives": lost(it.point.driven),
+                f"{study.percent:g} % within": f"{it.point.error_m:.3f} m",
+                "error difference": f"{delta:+.3f} m",
+                "interval": f"{low:+.3f} to {high:+.3f} m",
+                "energy difference, a trip": f"{it.delta_j:+.3g} J",
+                "of the fleet’s day": "–"
+                if it.day_share is None
+                else f"{100.0 * it.day_share:+.2g} %",
+                "": badge("equivalent", "fit")
                 if it.is_equivalent
-                else badge(it.point.judgement.words, it.point.judgement.badge),
-            )
+                else badge(judged.words, judged.badge),
+            }
         )
     if not rows:
         return ""
-    head = (
-        "Rival", "Lost drives", f"{study.percent:g} % within", "error difference", "interval",
-        "energy difference, a trip", "of the fleet’s day", "",
-    )  # fmt: skip
     return (
         "<h3>Rivals of the recommended point</h3><p>Differences: rival − recommended, in pairs of "
         "drives. Equivalent: the interval of the error difference contains 0, and the energy of "
         f"the fleet’s day, idle included, differs by less than {MATTERS_SHARE:.0%}.</p>"
-        + table(head, rows, numbers=range(2, 7))
+        + records(rows, numbers=range(2, 7))
     )
 
 
@@ -123,15 +120,16 @@ def _composition(study: Study, point: Point, day: economy.Day) -> str:
         "idle": "computers, idle while switched on",
     }
     rows = [
-        (
-            named[name],
-            f"{digits(wh)} Wh",
-            "–" if name == "idle" or not added else f"{100.0 * wh / added:.4g} %",
-            f"{100.0 * wh / whole:.4g} %" if whole else "–",
-        )
+        {
+            "Part": named[name],
+            "Fleet’s day": f"{digits(wh)} Wh",
+            "share above idle": "–"
+            if name == "idle" or not added
+            else f"{100.0 * wh / added:.4g} %",
+            "share of all": f"{100.0 * wh / whole:.4g} %" if whole else "–",
+        }
         for name, wh in parts.items()
     ]
-    head = ("Part", "Fleet’s day", "share above idle", "share of all")
     text = ""
     if day.idle_share is not None:
         text = (
@@ -140,63 +138,53 @@ def _composition(study: Study, point: Point, day: economy.Day) -> str:
             "Estimator "
             "and wake-up have little effect on it.</p>"
         )
-    return f"<h3>Composition of the energy</h3>{text}" + table(head, rows, numbers=range(1, 4))
+    return f"<h3>Composition of the energy</h3>{text}" + records(rows, numbers=range(1, 4))
 
 
 def _numbered(study: Study) -> str:
     """Returns the table of all points of the chart, by energy."""
     rows = [
-        (
-            str(number),
-            f"{escape(it.operation.method)}, {escape(it.operation.wake_up)}",
-            f"{it.mode} ({escape(it.mode_name)})",
-            f"{economy.trip_j(it).central:.3g} J",
-            f"{it.error_m:.3f} m" if math.isfinite(it.error_m) else "lost",
-        )
+        {
+            "No.": str(number),
+            "Operation": f"{it.operation.method}, {it.operation.wake_up}",
+            "Power mode": f"{it.mode} ({it.mode_name})",
+            "energy of a trip": f"{economy.trip_j(it).central:.3g} J",
+            f"{study.percent:g} % within": f"{it.error_m:.3f} m"
+            if math.isfinite(it.error_m)
+            else "lost",
+        }
         for number, (_, it) in enumerate(numbered(study), start=1)
     ]
-    head = ("No.", "Operation", "Power mode", "energy of a trip", f"{study.percent:g} % within")
-    made = table(head, rows, numbers=range(3, 5))
-    return f"<details><summary>All {len(rows)} points of the chart</summary>{made}</details>"
+    return folded(f"All {len(rows)} points of the chart", records(rows, numbers=range(3, 5)))
 
 
-def _points(study: Study) -> str:
+def _points(study: Study, point: Point) -> str:
     """Returns the table of operations in the best mode, then in all power modes."""
-    point = study.point
     least: dict[str, Point] = {}
     for it in study.points:
         if it.operation.name not in least or it.energy_j < least[it.operation.name].energy_j:
             least[it.operation.name] = it
-    if point is not None:
-        least[point.operation.name] = point
+    least[point.operation.name] = point
     rows = [_way(study, it) for it in sorted(least.values(), key=lambda it: it.error_m)]
-    head = (
-        "Operation", "Lost drives", f"{study.percent:g} % within", "interval", "estimates a trip",
-        "J a trip, above idle", "state ok", "",
-    )  # fmt: skip
     modes = [
-        (
-            f"{it.mode} {escape(it.mode_name)}",
-            f"{it.error_m:.3f} m",
-            joules_range(economy.trip_j(it)),
-            "–" if it.idle_w is None else watts(it.idle_w),
-            "–" if it.idle_w is None else _fleet_day(study, it),
-        )
+        {
+            "Power mode": f"{it.mode} {it.mode_name}",
+            f"{study.percent:g} % within": f"{it.error_m:.3f} m",
+            "a trip, above idle": joules_range(economy.trip_j(it)),
+            "idle / W": "–" if it.idle_w is None else watts(it.idle_w),
+            "Wh a fleet’s day, with idle": "–" if it.idle_w is None else _fleet_day(study, it),
+        }
         for it in study.points
-        if point is not None and it.operation.name == point.operation.name
+        if it.operation.name == point.operation.name
     ]
-    mode_head = (
-        "Power mode", f"{study.percent:g} % within", "a trip, above idle", "idle / W",
-        "Wh a fleet’s day, with idle",
-    )  # fmt: skip
     return (
-        table(head, rows, numbers=range(2, 7))
+        records(rows, numbers=range(2, 7))
         + "<h3>Recommended operation in every power mode</h3>"
-        + table(mode_head, modes, numbers=range(1, 5))
+        + records(modes, numbers=range(1, 5))
     )
 
 
-def _way(study: Study, it: Point) -> tuple[str, ...]:
+def _way(study: Study, it: Point) -> dict[str, str]:
     found = it.driven.percentile(study.percent)
     label = (
         badge("recommended", "yes")
@@ -204,17 +192,19 @@ def _way(study: Study, it: Point) -> tuple[str, ...]:
         else badge(it.judgement.words, it.judgement.badge)
     )
     sample = "two seeds" if it.simulated and it.driven.name != it.operation.name else "screened"
-    return (
-        f"{escape(it.operation.method)}, {escape(it.operation.wake_up)}<small>mode {it.mode} "
-        f"({escape(it.mode_name)}); {it.driven.runs} drives, {sample}</small>",
-        lost(it.driven),
-        f"{found.value:.3f} m",
-        f"{escape(found.interval)} m",
-        f"{it.driven.aoa_estimates.mean():,.0f}",
-        joules_range(economy.trip_j(it)),
-        ok(it.driven),
-        label,
-    )
+    return {
+        "Operation": small(
+            f"{it.operation.method}, {it.operation.wake_up}",
+            f"mode {it.mode} ({it.mode_name}); {it.driven.runs} drives, {sample}",
+        ),
+        "Lost drives": lost(it.driven),
+        f"{study.percent:g} % within": f"{found.value:.3f} m",
+        "interval": f"{found.interval} m",
+        "estimates a trip": f"{it.driven.aoa_estimates.mean():,.0f}",
+        "J a trip, above idle": joules_range(economy.trip_j(it)),
+        "state ok": ok(it.driven),
+        "": label,
+    }
 
 
 def _fleet_day(study: Study, it: Point) -> str:
@@ -227,25 +217,26 @@ def money_section(study: Study) -> str:
     if not study.ways:
         return ""
     fleet = as_dict(study.plant)["fleet"]
-    years, currency = fleet["years"], escape(study.prices.currency)
+    years, currency = fleet["years"], study.prices.currency
+    vehicles = f"{fleet['vehicles']} vehicles by"
     money = [
-        (escape(name), ends(way.capital), ends(way.yearly), ends(economy.total(way, years)))
+        {
+            vehicles: name,
+            f"to buy / {currency}": ends(way.capital),
+            f"a year / {currency}": ends(way.yearly),
+            f"{years:g} years / {currency}": ends(economy.total(way, years)),
+        }
         for name, way in study.ways.items()
     ]
     carbon = [
-        (
-            escape(name),
-            ends(way.embodied_kg),
-            ends(way.use_kg_per_year),
-            ends(economy.total_kg(way, years)),
-        )
+        {
+            vehicles: name,
+            "production / kgCO2e": ends(way.embodied_kg),
+            "use a year / kgCO2e": ends(way.use_kg_per_year),
+            f"{years:g} years / kgCO2e": ends(economy.total_kg(way, years)),
+        }
         for name, way in study.ways.items()
     ]
-    vehicles = f"{fleet['vehicles']} vehicles by"
-    money_head = (vehicles, f"to buy / {currency}", f"a year / {currency}",
-                  f"{years:g} years / {currency}")  # fmt: skip
-    carbon_head = (vehicles, "production / kgCO2e", "use a year / kgCO2e",
-                   f"{years:g} years / kgCO2e")  # fmt: skip
     used = [
         "receiver", "computer", "lidar", "roadside_unit", "roadside_unit_yearly", "uwb_anchor",
         "uwb_anchor_spacing_m", "uwb_tag", "electricity_per_kwh", "grid_g_per_kwh",
@@ -261,7 +252,7 @@ def money_section(study: Study) -> str:
         "year. The cells of the network exist already and are not counted; a computer counts "
         f"with its price, production and idle power. {published} of {len(used)} figures "
         "are published ones and unverified for this plant.",
-        table(money_head, money, numbers=range(1, 4))
-        + table(carbon_head, carbon, numbers=range(1, 4))
+        records(money, numbers=range(1, 4))
+        + records(carbon, numbers=range(1, 4))
         + sources(study, used),
     )

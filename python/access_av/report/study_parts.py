@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import TYPE_CHECKING
 
-from access_av.report.parts import badge, table
+from access_av.report.parts import badge, folded, records
 from access_av.verdicts import NotOk
 
 if TYPE_CHECKING:
@@ -23,22 +22,21 @@ def lost(driven: Driven) -> str:
     return badge(f"LOST in {runs} of {driven.runs}", "no") if runs else f"0 of {driven.runs}"
 
 
-def reliability_rows(drives: Iterable[Driven]) -> list[tuple[str, ...]]:
+def reliability_rows(drives: Iterable[Driven]) -> list[dict[str, str]]:
     """Returns the reliability of each variant: lost drives, state ``ok``, reasons, errors."""
-    rows = []
-    for driven in drives:
-        reasons, beyond = driven.not_ok_shares, driven.exceedances
-        shares = [None] * len(NotOk) if reasons is None else [reasons[it] for it in NotOk]
-        rows.append(
-            (
-                escape(driven.name),
-                lost(driven),
-                ok(driven),
-                *("–" if it is None else f"{it:.1%}" for it in shares),
-                "–" if beyond is None else f"{beyond:,}",
-            )
-        )
-    return rows
+    return [
+        {
+            "Variant": driven.name,
+            "Lost drives": lost(driven),
+            "State ok": ok(driven),
+            **{
+                it.words: "–" if driven.not_ok_shares is None else f"{driven.not_ok_shares[it]:.1%}"
+                for it in NotOk
+            },
+            "Errors while ok": "–" if driven.exceedances is None else f"{driven.exceedances:,}",
+        }
+        for driven in drives
+    ]
 
 
 def ok(driven: Driven) -> str:
@@ -54,18 +52,15 @@ def count(number: int, what: str) -> str:
 def sources(study: Study, keys: list[str]) -> str:
     """Returns a collapsed table of figures and their sources."""
     rows = [
-        (
-            escape(key.replace("_", " ")),
-            ends(study.prices.ranges[key]),
-            badge("unverified", "fit") if key in study.prices.published else "",
-            escape(study.prices.sources[key]),
-        )
+        {
+            "Figure": key.replace("_", " "),
+            "low … central … high": ends(study.prices.ranges[key]),
+            "": badge("unverified", "fit") if key in study.prices.published else "",
+            "Source": study.prices.sources[key],
+        }
         for key in dict.fromkeys(keys)
     ]
-    return (
-        "<details><summary>Sources of these figures</summary>"
-        f"{table(('Figure', 'low … central … high', '', 'Source'), rows, numbers=(1,))}</details>"
-    )
+    return folded("Sources of these figures", records(rows, numbers=(1,)))
 
 
 def digits(value: float) -> str:

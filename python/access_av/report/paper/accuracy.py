@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import TYPE_CHECKING
 
 import altair as alt
@@ -10,9 +9,9 @@ import numpy as np
 import polars as pl
 
 from access_av.paper.statements import METHODS, paper_numbers
-from access_av.report.chart import BLUE, finish, thinned
-from access_av.report.paper.lines import EVERY_SSB, scale
-from access_av.report.parts import figure, table
+from access_av.report.chart import BLUE, finish, thinned, tips
+from access_av.report.paper.lines import EVERY_SSB, coloured
+from access_av.report.parts import figure, folded, records
 from access_av.signal.methods import label
 from access_av.tables.numbers import number
 
@@ -84,29 +83,21 @@ def accuracy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
 
 def accuracy_table(evaluation: Evaluation) -> str:
     """Returns the table of maximum and RMS errors of every operating point."""
+    keys = ["campaign", "method", "adaptive", "base_wake_up_ms"]
     rows = []
-    for point in evaluation.points.unique(
-        ["campaign", "method", "adaptive", "base_wake_up_ms"], maintain_order=True
-    ).iter_rows(named=True):
-        modes = evaluation.points.filter(
-            *(
-                pl.col(key) == point[key]
-                for key in ("campaign", "method", "adaptive", "base_wake_up_ms")
-            )
-        )["mode"]
+    for point in evaluation.points.unique(keys, maintain_order=True).iter_rows(named=True):
+        modes = evaluation.points.filter(*(pl.col(key) == point[key] for key in keys))["mode"]
         rows.append(
-            (
-                escape(label(point["method"], adaptive=point["adaptive"])),
-                "every SSB" if point["campaign"] == "P" else ", ".join(map(str, modes)),
-                f"{point['base_wake_up_ms']:g}",
-                number(point["worst_error_x_m"]),
-                number(point["worst_error_y_m"]),
-                number(point["rms_error_m"]),
-            )
+            {
+                "Method": label(point["method"], adaptive=point["adaptive"]),
+                "Modes": "every SSB" if point["campaign"] == "P" else ", ".join(map(str, modes)),
+                "Wake-up / ms": f"{point['base_wake_up_ms']:g}",
+                "Worst X / m": number(point["worst_error_x_m"]),
+                "Worst Y / m": number(point["worst_error_y_m"]),
+                "RMS / m": number(point["rms_error_m"]),
+            }
         )
-    head = ("Method", "Modes", "Wake-up / ms", "Worst X / m", "Worst Y / m", "RMS / m")
-    worst = table(head, rows, numbers=(2, 3, 4, 5))
-    return f"<details><summary>Worst and RMS errors as a table</summary>{worst}</details>"
+    return folded("Worst and RMS errors as a table", records(rows, numbers=(2, 3, 4, 5)))
 
 
 def _snr_chart(evaluation: Evaluation) -> Spec:
@@ -117,10 +108,9 @@ def _snr_chart(evaluation: Evaluation) -> Spec:
         .encode(
             x=alt.X("time_s:Q", title="time / s"),
             y=alt.Y("mean_true_snr_db:Q", title="SNR / dB"),
-            tooltip=[
-                alt.Tooltip("time_s:Q", title="time / s", format=".1f"),
-                alt.Tooltip("mean_true_snr_db:Q", title="SNR / dB", format=".2f"),
-            ],
+            tooltip=tips(
+                ("time_s:Q", "time / s", ".1f"), ("mean_true_snr_db:Q", "SNR / dB", ".2f")
+            ),
         )
     )
     return finish(
@@ -149,7 +139,7 @@ def _error_chart(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spe
         .encode(
             x=alt.X("time_s:Q", title="time / s"),
             y=alt.Y("error_m:Q", title=f"error in {axis.upper()} / m"),
-            color=alt.Color("line:N", scale=scale(names), legend=alt.Legend(title=None)),
+            color=coloured(names),
             strokeDash=alt.StrokeDash(
                 "line:N",
                 scale=alt.Scale(
@@ -160,11 +150,11 @@ def _error_chart(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spe
                 legend=alt.Legend(title=None),
             ),
             opacity=alt.condition(picked, alt.value(1.0), alt.value(0.15)),
-            tooltip=[
-                alt.Tooltip("line:N", title="method"),
-                alt.Tooltip("time_s:Q", title="time / s", format=".1f"),
-                alt.Tooltip("error_m:Q", title="error / m", format=".3f"),
-            ],
+            tooltip=tips(
+                ("line:N", "method"),
+                ("time_s:Q", "time / s", ".1f"),
+                ("error_m:Q", "error / m", ".3f"),
+            ),
         )
         .add_params(picked)
     )

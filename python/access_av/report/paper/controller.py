@@ -9,20 +9,19 @@ import altair as alt
 import polars as pl
 
 from access_av.paper import summary
-from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, finish
-from access_av.report.parts import badge, figure, table
+from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, colours, finish
+from access_av.report.parts import badge, figure, folded, records
 from access_av.tables.numbers import number
 
 if TYPE_CHECKING:
     from access_av.paper.study import Study
     from access_av.report.chart import Spec
 
-FIXED, INTERPRETATION, CONSTANT, OURS = (
-    "fixed interval",
-    "interpretation",
-    "constant instead",
-    "ours",
-)
+FIXED, INTERPRETATION, CONSTANT, OURS = NAMES = (
+    "fixed interval", "interpretation", "constant instead", "ours",
+)  # fmt: skip
+# Effects of Algorithm 1: the value of ``matters`` is -1, 0 or 1.
+EFFECTS = (("harms", "no"), ("no difference", "fit"), ("helps", "yes"))
 
 
 def contribution(study: Study, specs: dict[str, Spec]) -> str:
@@ -31,32 +30,20 @@ def contribution(study: Study, specs: dict[str, Spec]) -> str:
     specs["front"] = _front_chart(study)
     titles = {each.interpretation.name: each.interpretation.title for each in study.evaluations}
     rows = [
-        (
-            escape(titles[each.interpretation]),
-            str(each.mode),
-            f"{each.aoa_estimates:.0f}",
-            f"{each.constant_aoa_estimates:.0f} at {each.constant_ms:.0f} ms",
-            number(each.rms_error_m),
-            number(each.constant_rms_m),
-            f"{each.gain_m:+.3f} ({each.gain_low_m:+.3f} … {each.gain_high_m:+.3f})",
-            badge(
-                ("harms", "no difference", "helps")[each.matters + 1],
-                ("no", "fit", "yes")[each.matters + 1],
-            ),
-        )
+        {
+            "Interpretation": titles[each.interpretation],
+            "Mode": str(each.mode),
+            "Angle estimates": f"{each.aoa_estimates:.0f}",
+            "Constant: angle estimates": f"{each.constant_aoa_estimates:.0f} at "
+            f"{each.constant_ms:.0f} ms",
+            "RMS / m": number(each.rms_error_m),
+            "Constant: RMS / m": number(each.constant_rms_m),
+            "Gain / m (95 %)": _signed(each.gain_m, each.gain_low_m, each.gain_high_m),
+            "Algorithm 1": badge(*EFFECTS[each.matters + 1]),
+        }
         for each in study.ablations
     ]
-    head = (
-        "Interpretation",
-        "Mode",
-        "Angle estimates",
-        "Constant: angle estimates",
-        "RMS / m",
-        "Constant: RMS / m",
-        "Gain / m (95 %)",
-        "Algorithm 1",
-    )
-    details = table(head, rows, numbers=(1, 2, 4, 5))
+    every = folded("Every interpretation and mode as a table", records(rows, numbers=(1, 2, 4, 5)))
     return (
         '<div class="charts">'
         + figure("ablation", "RMS error with the constant minus RMS error with Algorithm 1, "
@@ -65,8 +52,7 @@ def contribution(study: Study, specs: dict[str, Spec]) -> str:
         + figure("front", "Points further down and left are better. The line is MUSIC at fixed "
         "intervals.",
                  "Error against angle estimates")
-        + "</div><details><summary>Every interpretation and mode as a table</summary>"
-        + f"{details}</details>"
+        + f"</div>{every}"
     )  # fmt: skip
 
 
@@ -79,46 +65,48 @@ def fair(study: Study) -> str:
         "bound": "bound: no localizer is better, with an angle at every SSB",
     }
     rows = [
-        (
-            "0.3 %, 1 cm/√m; start 0.1 m, 0.02 rad" if each.real_odometer else "exact, exact start",
-            "known" if each.map else "not known",
-            names[each.who],
-            f"{each.aoa_estimates:.0f}",
-            f"{each.rms_error_m:.4f}" if each.rms_error_m < 0.01 else f"{each.rms_error_m:.3f}",
-            f"{each.rms_low_m:.3f} … {each.rms_high_m:.3f}" if each.who != "bound" else "–",
-            number(each.worst_error_m),
-        )
+        {
+            "Odometer": "0.3 %, 1 cm/√m; start 0.1 m, 0.02 rad"
+            if each.real_odometer
+            else "exact, exact start",
+            "Road": "known" if each.map else "not known",
+            "Who": names[each.who],
+            "Angle estimates": f"{each.aoa_estimates:.0f}",
+            "RMS / m": number(each.rms_error_m, 4 if each.rms_error_m < 0.01 else 3),
+            "95 %": "–" if each.who == "bound" else f"{each.rms_low_m:.3f} … {each.rms_high_m:.3f}",
+            "Worst / m": number(each.worst_error_m),
+        }
         for each in study.equal_information
     ]
-    head = ("Odometer", "Road", "Who", "Angle estimates", "RMS / m", "95 %", "Worst / m")
-    return f"<p>{escape(summary.fair_text(study))}</p>" + table(head, rows, numbers=(3, 4, 6))
+    return f"<p>{escape(summary.fair_text(study))}</p>" + records(rows, numbers=(3, 4, 6))
 
 
 def ours(study: Study) -> str:
     """Returns the section on the proposed method and the paper's adaptive point in each mode."""
     rows = [
-        (
-            str(each.mode) if each.map else f"{each.mode}, road unknown",
-            f"{each.aoa_estimates:.0f} / {each.papers_aoa_estimates:.0f}",
-            f"{number(each.energy_j, 1)} / {number(each.papers_energy_j, 1)}",
-            f"{each.worst_error_m:.3f} / {each.papers_worst_m:.3f}",
-            f"{each.rms_error_m:.3f} / {each.papers_rms_m:.3f}",
-            f"{each.rms_error_reduction_m:+.3f} ({each.rms_error_reduction_low_m:+.3f} … "
-            f"{each.rms_error_reduction_high_m:+.3f})",
-            badge("better in both", "yes") if each.is_better else badge("not in both", "no"),
-        )
+        {
+            "Mode": str(each.mode) if each.map else f"{each.mode}, road unknown",
+            "Angle estimates, proposed / paper's": f"{each.aoa_estimates:.0f} / "
+            f"{each.papers_aoa_estimates:.0f}",
+            "Energy / J": f"{number(each.energy_j, 1)} / {number(each.papers_energy_j, 1)}",
+            "Worst error / m": f"{each.worst_error_m:.3f} / {each.papers_worst_m:.3f}",
+            "RMS / m": f"{each.rms_error_m:.3f} / {each.papers_rms_m:.3f}",
+            "RMS error reduction / m (95 %)": _signed(
+                each.rms_error_reduction_m,
+                each.rms_error_reduction_low_m,
+                each.rms_error_reduction_high_m,
+            ),
+            "Ours": badge("better in both", "yes")
+            if each.is_better
+            else badge("not in both", "no"),
+        }
         for each in study.proposed_vs_paper
     ]
-    head = (
-        "Mode",
-        "Angle estimates, proposed / paper's",
-        "Energy / J",
-        "Worst error / m",
-        "RMS / m",
-        "RMS error reduction / m (95 %)",
-        "Ours",
-    )
-    return f"<p>{escape(summary.ours_text(study))}</p>" + table(head, rows)
+    return f"<p>{escape(summary.ours_text(study))}</p>" + records(rows)
+
+
+def _signed(value: float, low: float, high: float) -> str:
+    return f"{value:+.3f} ({low:+.3f} … {high:+.3f})"
 
 
 def _gain_chart(study: Study) -> Spec:
@@ -131,7 +119,7 @@ def _gain_chart(study: Study) -> Spec:
                 "gain": each.gain_m,
                 "low": each.gain_low_m,
                 "high": each.gain_high_m,
-                "what": ("harms", "no difference", "helps")[each.matters + 1],
+                "what": EFFECTS[each.matters + 1][0],
             }
             for each in study.ablations
         ]
@@ -140,12 +128,8 @@ def _gain_chart(study: Study) -> Spec:
     base = alt.Chart(rows).encode(
         y=alt.Y("interpretation:N", sort=order, title=None, axis=alt.Axis(labelLimit=190)),
         yOffset=alt.YOffset("mode:N"),
-        color=alt.Color(
-            "what:N",
-            scale=alt.Scale(
-                domain=["helps", "no difference", "harms"], range=[GREEN, GREY, ORANGE]
-            ),
-            legend=alt.Legend(title=None, orient="top"),
+        color=colours(
+            "what:N", {"helps": GREEN, "no difference": GREY, "harms": ORANGE}, orient="top"
         ),
         tooltip=["interpretation:N", "mode:O", "gain:Q", "low:Q", "high:Q"],
     )
@@ -195,23 +179,17 @@ def _front_chart(study: Study) -> Spec:
     points = pl.DataFrame(rows).with_columns(pl.col(pl.Float64).round(4))
     x = alt.X("aoa_estimates:Q", title="angle estimates in a trip", scale=alt.Scale(type="log"))
     y = alt.Y("rms:Q", title="RMS error / m", scale=alt.Scale(type="log"))
-    names = [FIXED, INTERPRETATION, CONSTANT, OURS]
+    legend = alt.Legend(title=None, orient="top")
     dots = (
         alt.Chart(points)
         .mark_point(filled=True, size=60)
         .encode(
             x=x,
             y=y,
-            color=alt.Color(
-                "what:N",
-                scale=alt.Scale(domain=names, range=[GREY, BLUE, ORANGE, GREEN]),
-                legend=alt.Legend(title=None, orient="top"),
+            color=colours(
+                "what:N", dict(zip(NAMES, (GREY, BLUE, ORANGE, GREEN), strict=True)), orient="top"
             ),
-            shape=alt.Shape(
-                "what:N",
-                scale=alt.Scale(domain=names),
-                legend=alt.Legend(title=None, orient="top"),
-            ),
+            shape=alt.Shape("what:N", scale=alt.Scale(domain=list(NAMES)), legend=legend),
             tooltip=["name:N", "aoa_estimates:Q", "rms:Q"],
         )
     )

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import altair as alt
 import polars as pl
 
 from access_av.designs.query import Query, explore
 from access_av.paper.statements import ADAPTIVE_LABEL, of_claim
-from access_av.report.chart import finish
-from access_av.report.labels import domain, layers, placed
-from access_av.report.paper.lines import COLOURS, NAMES, by_mode, scale
+from access_av.report.chart import finish, tips
+from access_av.report.labels import Axis, labelled
+from access_av.report.paper.lines import COLOURS, NAMES, by_mode, coloured
 from access_av.report.parts import figure, table
 
 if TYPE_CHECKING:
@@ -44,30 +43,25 @@ def _projection(evaluation: Evaluation, axis: str) -> Spec:
     columns = ("mode", "energy_j", "worst_error_x_m", "worst_error_y_m")
     rows = points.select(columns).with_columns(pl.col(pl.Float64).round(4))
     error = f"worst_error_{axis}_m"
-    x_domain, y_domain = domain([*rows["energy_j"]] or [0.0]), domain([0.0, *rows[error]])
-    axes = ("energy_j", x_domain, False), (error, y_domain, False)
-    base = alt.Chart(placed(rows, "mode", *axes, PROJECTION_PX)).encode(
-        x=_axis(alt.X, "energy_j", "energy of a trip / J", x_domain),
-        y=_axis(alt.Y, error, f"worst error in {axis.upper()} / m", y_domain),
-        tooltip=[
-            alt.Tooltip("mode:O", title="power mode"),
-            alt.Tooltip("energy_j:Q", title="energy / J", format=".1f"),
-            alt.Tooltip("worst_error_x_m:Q", title="worst X / m", format=".3f"),
-            alt.Tooltip("worst_error_y_m:Q", title="worst Y / m", format=".3f"),
-        ],
+    base, lines, numbers = labelled(
+        rows,
+        "mode",
+        Axis("energy_j", "energy of a trip / J", [*rows["energy_j"]]),
+        Axis(error, f"worst error in {axis.upper()} / m", [0.0, *rows[error]]),
+        PROJECTION_PX,
+        tooltip=tips(
+            ("mode:O", "power mode"),
+            ("energy_j:Q", "energy / J", ".1f"),
+            ("worst_error_x_m:Q", "worst X / m", ".3f"),
+            ("worst_error_y_m:Q", "worst Y / m", ".3f"),
+        ),
     )
     dots = base.mark_circle(size=90, color=COLOURS[ADAPTIVE_LABEL])
-    lines, numbers = layers(base)
     return finish(
         lines + dots + numbers,
         height=PROJECTION_PX,
         description=f"Worst error in {axis.upper()} against energy of the adaptive points by mode",
     )
-
-
-def _axis(channel: Any, column: str, title: str, ends: list[float]) -> Any:
-    """Returns an axis whose domain is that of the label positions."""
-    return channel(f"{column}:Q", title=title, scale=alt.Scale(domain=ends, nice=False))
 
 
 def queries(evaluation: Evaluation) -> str:
@@ -82,7 +76,7 @@ def queries(evaluation: Evaluation) -> str:
             best = (
                 f"mode {first['mode']}: {first['energy_j']:.1f} J, RMS {first['rms_error_m']:.3f} m"
             )
-        rows.append((escape(str(query)), modes, best))
+        rows.append((str(query), modes, best))
     return table(("Query (adaptive)", "Modes that meet the query", "Minimum energy"), rows)
 
 
@@ -97,7 +91,7 @@ def _asked() -> list[Query]:
 
 def _chart(evaluation: Evaluation) -> Spec:
     """Returns the chart of error against energy; two sliders set the limits."""
-    table = by_mode(evaluation).select(
+    points = by_mode(evaluation).select(
         "mode",
         "mode_name",
         "line",
@@ -105,9 +99,9 @@ def _chart(evaluation: Evaluation) -> Spec:
             "energy_j", "rms_error_m", "worst_error_x_m", "worst_error_y_m", "aoa_estimates"
         ).round(4),
     )
-    table = table.filter(pl.col("energy_j").is_not_null())
+    points = points.filter(pl.col("energy_j").is_not_null())
     most_j, most_m = (
-        step * math.ceil(float(table.select(pl.col(name).max().fill_null(step)).item()) / step)
+        step * math.ceil(float(points.select(pl.col(name).max().fill_null(step)).item()) / step)
         for name, step in (("energy_j", 10.0), ("rms_error_m", 0.1))
     )
     wide_j = float(of_claim("d2_budget_260_j_rms_015_m", "query")["max_energy_j"])
@@ -122,39 +116,37 @@ def _chart(evaluation: Evaluation) -> Spec:
         bind=alt.binding_range(min=0.05, max=round(most_m, 2), step=0.01, name="RMS at most / m "),
     )
     meets = f"datum.energy_j <= {budget.name} && datum.rms_error_m <= {bound.name}"
-    x_domain = domain([*table["energy_j"]] or [0.0])
-    y_domain = domain([0.0, most_m, *table["rms_error_m"]])
-    axes = ("energy_j", x_domain, False), ("rms_error_m", y_domain, False)
-    base = alt.Chart(placed(table, "mode", *axes, SPACE_PX, group="line")).encode(
-        x=_axis(alt.X, "energy_j", "energy of a trip / J", x_domain),
-        y=_axis(alt.Y, "rms_error_m", "RMS error / m", y_domain),
+    x = Axis("energy_j", "energy of a trip / J", [*points["energy_j"]])
+    y = Axis("rms_error_m", "RMS error / m", [0.0, most_m, *points["rms_error_m"]])
+    base, lines, numbers = labelled(
+        points,
+        "mode",
+        x,
+        y,
+        SPACE_PX,
+        group="line",
         opacity=alt.condition(meets, alt.value(1.0), alt.value(0.18)),
     )
     dots = (
         base.mark_circle(size=70)
         .encode(
-            color=alt.Color("line:N", scale=scale(NAMES), legend=alt.Legend(title=None)),
-            tooltip=[
-                alt.Tooltip("mode:O", title="power mode"),
-                alt.Tooltip("mode_name:N", title="name"),
-                alt.Tooltip("line:N", title="method"),
-                alt.Tooltip("energy_j:Q", title="energy / J", format=".1f"),
-                alt.Tooltip("rms_error_m:Q", title="RMS error / m", format=".3f"),
-                alt.Tooltip("worst_error_x_m:Q", title="worst X / m", format=".3f"),
-                alt.Tooltip("worst_error_y_m:Q", title="worst Y / m", format=".3f"),
-                alt.Tooltip("aoa_estimates:Q", title="angle estimates", format=".0f"),
-            ],
+            color=coloured(NAMES),
+            tooltip=tips(
+                ("mode:O", "power mode"),
+                ("mode_name:N", "name"),
+                ("line:N", "method"),
+                ("energy_j:Q", "energy / J", ".1f"),
+                ("rms_error_m:Q", "RMS error / m", ".3f"),
+                ("worst_error_x_m:Q", "worst X / m", ".3f"),
+                ("worst_error_y_m:Q", "worst Y / m", ".3f"),
+                ("aoa_estimates:Q", "angle estimates", ".0f"),
+            ),
         )
         .add_params(budget, bound)
     )
-    lines, numbers = layers(base)
     limits = alt.Chart(pl.DataFrame({"any": [0]})).mark_rule(strokeDash=[4, 3])
-    vertical = limits.transform_calculate(limit=budget.name).encode(
-        x=_axis(alt.X, "limit", "energy of a trip / J", x_domain)
-    )
-    horizontal = limits.transform_calculate(limit=bound.name).encode(
-        y=_axis(alt.Y, "limit", "RMS error / m", y_domain)
-    )
+    vertical = limits.transform_calculate(limit=budget.name).encode(x=x.of(alt.X, "limit"))
+    horizontal = limits.transform_calculate(limit=bound.name).encode(y=y.of(alt.Y, "limit"))
     return finish(
         vertical + horizontal + lines + dots + numbers,
         height=SPACE_PX,

@@ -11,9 +11,9 @@ import polars as pl
 from access_av.paper.energy_fit import numbers
 from access_av.paper.findings import MissingFigureError, savings_percent
 from access_av.paper.statements import ADAPTIVE_LABEL, METHODS, paper_numbers
-from access_av.report.chart import finish
-from access_av.report.paper.lines import NAMES, by_mode, scale
-from access_av.report.parts import figure, table
+from access_av.report.chart import finish, tips
+from access_av.report.paper.lines import NAMES, by_mode, coloured
+from access_av.report.parts import Html, figure, records
 from access_av.signal.methods import LABELS, label
 from access_av.tables.numbers import number
 
@@ -76,30 +76,26 @@ def freedoms(study: Study) -> str:
     titles = {each.interpretation.name: each.interpretation.title for each in study.evaluations}
 
     def named(interpretations: tuple[str, ...]) -> str:
-        return escape(", ".join(titles[name] for name in interpretations) or "none")
+        return ", ".join(titles[name] for name in interpretations) or "none"
 
+    title = study.shown.interpretation.title
+    counted = f"“{title}”: reproduced / agree by construction / by arithmetic"
     rows = [
-        (
-            ("" if index == 0 else "and ")
-            + escape(each.says)
-            + (" <b>(judged by)</b>" if each.is_shipped else ""),
-            f"{each.free} / {each.solved}",
-            f"{each.reproduced} / {each.by_construction} / {each.by_arithmetic}",
-            number(each.average_saving_percent, 1),
-            named(each.energy),
-            named(each.both),
-        )
+        {
+            "Degree of freedom": Html(
+                ("" if index == 0 else "and ")
+                + escape(each.says)
+                + (" <b>(judged by)</b>" if each.is_shipped else "")
+            ),
+            "Parameters: free / solved": f"{each.free} / {each.solved}",
+            counted: f"{each.reproduced} / {each.by_construction} / {each.by_arithmetic}",
+            "Average saving / %": number(each.average_saving_percent, 1),
+            "Energy claims met by": named(each.energy),
+            "Both claim groups met by": named(each.both),
+        }
         for index, each in enumerate(study.fit_options)
     ]
-    head = (
-        "Degree of freedom",
-        "Parameters: free / solved",
-        f"“{study.shown.interpretation.title}”: reproduced / agree by construction / by arithmetic",
-        "Average saving / %",
-        "Energy claims met by",
-        "Both claim groups met by",
-    )
-    return table(head, rows)
+    return records(rows)
 
 
 def energy_table(evaluation: Evaluation) -> str:
@@ -110,23 +106,18 @@ def energy_table(evaluation: Evaluation) -> str:
         fixed = evaluation.campaign("Q").filter(pl.col("mode") == mode.number)
         adaptive = evaluation.campaign("R").filter(pl.col("mode") == mode.number)
         stated = paper.get(f"adaptive_mode_{mode.number}")
+        energies = [number(value, 1) for value in fixed["energy_j"]]
         rows.append(
-            (
-                f"{mode.number} {escape(mode.name)}",
-                *(number(value, 1) for value in fixed["energy_j"]),
-                number(adaptive["energy_j"].item(), 1) + (f" (paper {stated})" if stated else ""),
-                number(_savings(evaluation, mode.number), 1),
-                number(adaptive["aoa_estimates"].item(), 0),
-            )
+            {
+                "Mode": f"{mode.number} {mode.name}",
+                **{f"{label(m)} / J": it for m, it in zip(METHODS, energies, strict=True)},
+                "Adaptive / J": number(adaptive["energy_j"].item(), 1)
+                + (f" (paper {stated})" if stated else ""),
+                "Saved / %": number(_savings(evaluation, mode.number), 1),
+                "Angle estimates": number(adaptive["aoa_estimates"].item(), 0),
+            }
         )
-    head = (
-        "Mode",
-        *(f"{label(m)} / J" for m in METHODS),
-        "Adaptive / J",
-        "Saved / %",
-        "Angle estimates",
-    )
-    return table(head, rows, numbers=range(1, 7))
+    return records(rows, numbers=range(1, 7))
 
 
 def _energy_chart(evaluation: Evaluation) -> Spec:
@@ -149,10 +140,7 @@ def _energy_chart(evaluation: Evaluation) -> Spec:
             x="mode:O",
             xOffset=alt.XOffset("line:N", sort=NAMES),
             y="energy_j:Q",
-            tooltip=[
-                alt.Tooltip("line:N", title="the paper, method"),
-                alt.Tooltip("energy_j:Q", title="energy / J"),
-            ],
+            tooltip=tips(("line:N", "the paper, method"), ("energy_j:Q", "energy / J")),
         )
     )
     bars = _grouped_bars(evaluation, "energy_j", "energy of a trip / J", ".1f")
@@ -180,14 +168,14 @@ def _grouped_bars(evaluation: Evaluation, column: str, title: str, digits: str) 
             x=alt.X("mode:O", title="power mode", axis=alt.Axis(labelAngle=0)),
             xOffset=alt.XOffset("line:N", sort=NAMES),
             y=alt.Y(f"{column}:Q", title=title),
-            color=alt.Color("line:N", scale=scale(NAMES), legend=alt.Legend(title=None)),
-            tooltip=[
-                alt.Tooltip("mode:O", title="power mode"),
-                alt.Tooltip("line:N", title="method"),
-                alt.Tooltip(f"{column}:Q", title=title, format=digits),
-                alt.Tooltip("base_wake_up_ms:Q", title="base wake-up time / ms"),
-                alt.Tooltip("energy_provenance:N", title="energy per estimate"),
-            ],
+            color=coloured(NAMES),
+            tooltip=tips(
+                ("mode:O", "power mode"),
+                ("line:N", "method"),
+                (f"{column}:Q", title, digits),
+                ("base_wake_up_ms:Q", "base wake-up time / ms"),
+                ("energy_provenance:N", "energy per estimate"),
+            ),
         )
     )
     return bars

@@ -11,7 +11,7 @@ import polars as pl
 from access_av.economics import carbon, cost
 from access_av.paper.findings import MissingFigureError, saving
 from access_av.paper.statements import of_claim, paper_numbers
-from access_av.report.chart import BLUE, GREEN, ORANGE, finish
+from access_av.report.chart import BLUE, GREEN, ORANGE, colours, finish
 from access_av.report.parts import figure, table
 from access_av.tables.numbers import number
 
@@ -69,7 +69,8 @@ def carbon_section(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
     def span(values: carbon.Range) -> str:
         return f"{values.central:,.0f} ({values.low:,.0f}–{values.high:,.0f})"
 
-    rows = [
+    units, box = next(iter(avoided.values())), next(iter(onboard.values()))
+    values = [
         (
             _grid_name(grid),
             number(intensity, 0),
@@ -79,31 +80,18 @@ def carbon_section(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
         )
         for grid, intensity in carbon.grids().items()
     ]
-    rows.append(
-        (
-            "Embodied",
-            "–",
-            span(next(iter(avoided.values())).embodied_kg),
-            span(next(iter(onboard.values())).embodied_kg),
-            "–",
-        )
-    )
-    sources = (
-        ("Roadside units", next(iter(avoided.values())).source),
-        ("Onboard computer", next(iter(onboard.values())).source),
-        ("Grid", carbon.grid_source() + "."),
-    )
+    values.append(("Embodied", "–", span(units.embodied_kg), span(box.embodied_kg), "–"))
     head = (
-        "Grid",
-        "gCO2e/kWh",
-        f"{UNITS_NOT_BUILT} roadside units, use / kg",
+        "Grid", "gCO2e/kWh", f"{UNITS_NOT_BUILT} roadside units, use / kg",
         "Onboard computer, use / kg",
         f"Saved by {FLEET} vehicles in a year, mode {mode} / kg",
-    )
+    )  # fmt: skip
+    sources = {"Roadside units": units.source, "Onboard computer": box.source,
+               "Grid": f"{carbon.grid_source()}."}  # fmt: skip
     return (
         figure("carbon-chart", title=f"{UNITS_NOT_BUILT} avoided roadside units")
-        + table(head, rows, numbers=range(1, 5))
-        + "".join(f'<p class="note">{name}. {escape(text)}</p>' for name, text in sources)
+        + table(head, values, numbers=range(1, 5))
+        + "".join(f'<p class="note">{name}. {escape(text)}</p>' for name, text in sources.items())
     )
 
 
@@ -149,37 +137,15 @@ def _grid_name(grid: str) -> str:
 
 def _carbon_chart(footprints: dict[str, carbon.Footprint]) -> Spec:
     """Returns the chart of lifetime emissions by grid (value and range), and of production."""
-    any_one = next(iter(footprints.values()))
     rows = [
-        {
-            "what": f"use, {_grid_name(grid)}",
-            "low": one.use_kg.low,
-            "central": one.use_kg.central,
-            "high": one.use_kg.high,
-            "kind": "use",
-        }
+        {"what": f"use, {_grid_name(grid)}", **vars(one.use_kg), "kind": "use"}
         for grid, one in footprints.items()
     ]
-    embodied = any_one.embodied_kg
-    rows.append(
-        {
-            "what": "embodied, any grid",
-            "low": embodied.low,
-            "central": embodied.central,
-            "high": embodied.high,
-            "kind": "embodied",
-        }
-    )
+    embodied_kg = next(iter(footprints.values())).embodied_kg
+    rows.append({"what": "embodied, any grid", **vars(embodied_kg), "kind": "embodied"})
     base = alt.Chart(pl.DataFrame(rows)).encode(
         y=alt.Y("what:N", title=None, sort=[str(row["what"]) for row in rows]),
-        color=alt.Color(
-            "kind:N",
-            scale=alt.Scale(
-                domain=["use", "embodied"],
-                range=[ORANGE, GREEN],
-            ),
-            legend=alt.Legend(title=None),
-        ),
+        color=colours("kind:N", {"use": ORANGE, "embodied": GREEN}),
         tooltip=[
             "what:N",
             *(alt.Tooltip(f"{c}:Q", format=",.0f") for c in ("low", "central", "high")),

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from html import escape
 from importlib import resources
-from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from access_av.paper import summary
 from access_av.paper.claims import ARITHMETIC, BY_CONSTRUCTION, NO_EVIDENCE
 from access_av.paper.statements import METHODS
-from access_av.report.page import fill
+from access_av.report.page import VERSION, fill
 from access_av.report.paper import (
     accuracy,
     controller,
@@ -20,7 +19,7 @@ from access_av.report.paper import (
     interpretations,
     unknowns,
 )
-from access_av.report.parts import badge, source, table, tile
+from access_av.report.parts import badge, folded, records, source, tile
 from access_av.signal.methods import label
 from access_av.tables.numbers import number
 
@@ -109,13 +108,8 @@ def _tiles(study: Study) -> str:
     ]
     without_map = [each for each in study.proposed_vs_paper if not each.map]
     better = sum(each.is_better for each in without_map)
-    made.append(
-        tile(
-            f"{better} of {len(without_map)}",
-            "modes with less error and energy of the proposed method, both without a road map",
-        )
-    )
-    return "".join(made)
+    text = "modes with less error and energy of the proposed method, both without a road map"
+    return "".join([*made, tile(f"{better} of {len(without_map)}", text)])
 
 
 def _meta(study: Study) -> str:
@@ -123,7 +117,7 @@ def _meta(study: Study) -> str:
     return escape(
         f"{len(study.evaluations)} interpretations, platform “{evaluation.platform.name}”, "
         f"{evaluation.runs} runs per setting, seed {evaluation.seed}, "
-        f"version {version('access-av')}."
+        f"{VERSION}."
     )
 
 
@@ -134,24 +128,23 @@ def _provenance(evaluation: Evaluation) -> str:
             figure = mode.energy_per_execution_j.get(method)
             used_j = evaluation.outcome.energy_per_execution_j[mode.number].get(method)
             rows.append(
-                (
-                    f"{mode.number} {escape(mode.name)}",
-                    escape(label(method)),
-                    number(None if used_j is None else float(used_j.flat[0]), 4),
-                    badge("fitted" if evaluation.refitted else figure.provenance, "fit")
+                {
+                    "Mode": f"{mode.number} {mode.name}",
+                    "Method": label(method),
+                    "J per estimate": number(None if used_j is None else float(used_j.flat[0]), 4),
+                    "Provenance": badge(
+                        "fitted" if evaluation.refitted else figure.provenance, "fit"
+                    )
                     if figure
                     else "the platform has none",
-                    escape(figure.source) if figure else "",
-                )
+                    "Source": figure.source if figure else "",
+                }
             )
-    head = ("Mode", "Method", "J per estimate", "Provenance", "Source")
     return (
         f"<p>{escape(NO_FIGURES)}</p>"
         "<p>Errors, angle estimates and SNR are simulated by this version from the scenario below "
         "and the seed above. Prices and carbon factors are listed with their sources.</p>"
-        "<details><summary>Energy per estimate, with its sources</summary>"
-        + table(head, rows, numbers=(2,))
-        + "</details>"
+        + folded("Energy per estimate, with its sources", records(rows, numbers=(2,)))
         + source("Scenario, all defaults written out", evaluation.scenario.to_toml())
         + source("Platform", evaluation.platform.to_toml())
     )

@@ -15,9 +15,9 @@ from access_av.paper.claims import NO_EVIDENCE, NOT_REPRODUCED, REPRODUCED
 from access_av.paper.margins import ROUNDED
 from access_av.paper.statements import METHODS, of_claim, paper_numbers
 from access_av.paper.statements import half as half_of
-from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, finish
-from access_av.report.labels import domain, layers, placed
-from access_av.report.parts import badge, figure, table
+from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, colours, finish
+from access_av.report.labels import Axis, labelled
+from access_av.report.parts import Html, badge, code, figure, records, small, table
 from access_av.signal.methods import label
 from access_av.tables.numbers import value_text
 
@@ -40,35 +40,30 @@ def interpretations(study: Study) -> str:
         t_max = "kept" if half.keeps_t_max else "exceeded"
         if half.interpretation.keeps_t_max and not half.keeps_t_max:
             t_max = "claimed, and exceeded"
+        shown = half.interpretation
         rows.append(
-            (
-                f"<b>{index} {escape(half.interpretation.title)}</b>"
-                f"<small>{escape(half.interpretation.scenario.description)} · "
-                f"<code>{escape(half.interpretation.name)}</code></small>",
-                _met(half.accuracy),
-                _met(half.energy),
-                f"{t_max}, {half.longest_gap_s:.2f} s",
-                escape(summary.controller_text(half.controller)),
-                escape(summary.counts_text(claims)),
-            )
+            {
+                "Interpretation": Html(
+                    f"<b>{index} {escape(shown.title)}</b>"
+                    f"<small>{escape(shown.scenario.description)} · {code(shown.name)}</small>"
+                ),
+                "Accuracy half": _met(half.accuracy),
+                "Energy half": _met(half.energy),
+                "t_max": f"{t_max}, {half.longest_gap_s:.2f} s",
+                "Algorithm 1": summary.controller_text(half.controller),
+                "Claims": summary.counts_text(claims),
+            }
         )
-    head = (
-        "Interpretation",
-        "Accuracy half",
-        "Energy half",
-        "t_max",
-        "Algorithm 1",
-        "Claims",
-    )
     unusable = "".join(
         f'<p class="note">Not evaluated: {escape(name)}: {escape(why)}</p>'
         for name, why in study.unusable.items()
     )
-    return table(head, rows) + unusable
+    return records(rows) + unusable
 
 
 def overview(study: Study, specs: dict[str, Spec]) -> str:
     """Returns the chart of maximum error and average saving of each interpretation."""
+    kinds = {"neither": GREY, "accuracy": BLUE, "saving": ORANGE, "both": GREEN}
     rows = []
     for index, half in enumerate(summary.halves(study), start=1):
         by_id = {it.id: it.obtained for it in study.of(half.interpretation.name)}
@@ -80,52 +75,41 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
                     "interpretation": half.interpretation.title,
                     "worst": worst_m,
                     "saving": saving,
-                    "keeps": ("neither", "accuracy", "saving", "both")[
-                        half.accuracy + 2 * half.energy
-                    ],
+                    "keeps": list(kinds)[half.accuracy + 2 * half.energy],
                 }
             )
     if not rows:
         return ""
     bound_m, stated = (of_claim(half_of(name)[at]) for name, at in PROMISED)
     tolerance = of_claim(half_of("energy")[-1], "tolerance")
-    y = {"low": stated * (1 - tolerance), "high": stated * (1 + tolerance)}
+    low, high = stated * (1 - tolerance), stated * (1 + tolerance)
     table = pl.DataFrame(rows)
     least_m = min(0.1, *table["worst"])
-    x_domain = domain([least_m, bound_m, *table["worst"]], log=True)
-    y_domain = domain([*y.values(), *table["saving"]])
-    x_axis = alt.X(
-        "worst:Q",
-        title="worst error of adaptive MUSIC, any mode / m",
-        scale=alt.Scale(type="log", nice=False, domain=x_domain),
+    x = Axis(
+        "worst",
+        "worst error of adaptive MUSIC, any mode / m",
+        [least_m, bound_m, *table["worst"]],
+        log=True,
     )
-    y_axis = alt.Y(
-        "saving:Q",
-        title="energy saved, average / %",
-        scale=alt.Scale(zero=False, nice=False, domain=y_domain),
-    )
+    y = Axis("saving", "energy saved, average / %", [low, high, *table["saving"]])
+    field = {"worst": x.place[1][0], "right": bound_m, "saving": low, "high": high}
     promised = (
-        alt.Chart(pl.DataFrame([{"worst": x_domain[0], "right": bound_m,
-                                 "saving": y["low"], "high": y["high"]}]))
+        alt.Chart(pl.DataFrame([field]))
         .mark_rect(opacity=0.18, color=GREEN)
-        .encode(x=x_axis, x2="right:Q", y=y_axis, y2="high:Q")
-    )  # fmt: skip
-    axes = ("worst", x_domain, True), ("saving", y_domain, False)
-    base = alt.Chart(placed(table, "number", *axes, OVERVIEW_PX)).encode(
-        x=x_axis,
-        y=y_axis,
+        .encode(x=x.of(alt.X), x2="right:Q", y=y.of(alt.Y), y2="high:Q")
+    )
+    base, lines, numbers = labelled(
+        table,
+        "number",
+        x,
+        y,
+        OVERVIEW_PX,
         tooltip=["interpretation:N", alt.Tooltip("worst:Q", format=".3f"),
                  alt.Tooltip("saving:Q", format=".1f"), "keeps:N"],
     )  # fmt: skip
-    kinds = ["neither", "accuracy", "saving", "both"]
     dots = base.mark_circle(size=90, opacity=1.0).encode(
-        color=alt.Color(
-            "keeps:N",
-            scale=alt.Scale(domain=kinds, range=[GREY, BLUE, ORANGE, GREEN]),
-            legend=alt.Legend(title="keeps", orient="top"),
-        )
+        color=colours("keeps:N", kinds, title="keeps", orient="top")
     )
-    lines, numbers = layers(base)
     specs["overview"] = finish(
         promised + lines + dots + numbers,
         height=OVERVIEW_PX,
@@ -142,31 +126,27 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
 
 def chosen(study: Study) -> str:
     """Returns the table of assumptions, with the effects of alternatives."""
-    head = ("Unspecified", "Chosen", "Why")
     if not study.effects:
-        rows = [tuple(escape(it[key]) for key in ("what", "value", "why")) for it in entries()]
-        return table(head, rows)
-    driven = [
-        (
-            f"<b>{escape(each.what)}</b>" if each.is_shipped else "",
-            escape(each.value) if each.is_shipped else f"instead {escape(each.value)}",
-            escape(each.why) if each.is_shipped else "",
-            f"{each.aoa_estimates:.0f}",
-            f"{each.worst_error_m:.2f}",
-            f"{each.rms_error_m:.3f} ± {each.rms_std_m:.3f}",
-            f"{each.fixed_rms_m:.3f}",
-            f"{each.every_ssb_rms_m:.3f}",
+        return records(
+            [
+                {"Unspecified": it["what"], "Chosen": it["value"], "Why": it["why"]}
+                for it in entries()
+            ]
         )
+    driven = [
+        {
+            "Unspecified": Html(f"<b>{escape(each.what)}</b>") if each.is_shipped else "",
+            "Chosen": each.value if each.is_shipped else f"instead {each.value}",
+            "Why": each.why if each.is_shipped else "",
+            "Angle estimates": f"{each.aoa_estimates:.0f}",
+            "Worst / m": f"{each.worst_error_m:.2f}",
+            "RMS / m": f"{each.rms_error_m:.3f} ± {each.rms_std_m:.3f}",
+            "Every 80 ms: RMS / m": f"{each.fixed_rms_m:.3f}",
+            "Every SSB: RMS / m": f"{each.every_ssb_rms_m:.3f}",
+        }
         for each in study.effects
     ]
-    results = (
-        "Angle estimates",
-        "Worst / m",
-        "RMS / m",
-        "Every 80 ms: RMS / m",
-        "Every SSB: RMS / m",
-    )
-    return table((*head, *results), driven, numbers=(3, 4, 5, 6, 7))
+    return records(driven, numbers=(3, 4, 5, 6, 7))
 
 
 def matrix(study: Study) -> str:
@@ -175,11 +155,11 @@ def matrix(study: Study) -> str:
     head = ("Claim", "Paper", *(str(index) for index in range(1, len(columns) + 1)))
     rows = [
         (
-            f"<b>{escape(_short(claims[0]))}</b> <span>{escape(claims[0].statement)}</span>",
-            f"<span>{_value(claims[0], claims[0].stated)}</span>",
-            *(_cell(claim) for claim in claims),
+            Html(f"<b>{escape(_short(of[0]))}</b> <span>{escape(of[0].statement)}</span>"),
+            Html(f"<span>{escape(_value(of[0], of[0].stated))}</span>"),
+            *map(_cell, of),
         )
-        for claims in zip(*columns, strict=True)
+        for of in zip(*columns, strict=True)
     ]
     return table(head, rows, kind="matrix")
 
@@ -188,27 +168,27 @@ def claims(study: Study) -> str:
     """Returns the table of claims under the shown interpretation, with interval and evidence."""
     rows = []
     for claim in study.of(study.shown.interpretation.name):
-        turns = " " + badge("depends on the seed", "fit") if claim.seed_sensitive else ""
+        turns = [badge("depends on the seed", "fit")] if claim.seed_sensitive else []
+        verdict = small(Html(" ".join([_verdict(claim), *turns])))
         if claim.seeds_met:
-            turns += f"<small>met with {claim.seeds_met} seeds</small>"
-        obtained = _value(claim, claim.obtained)
+            verdict = small(verdict, f"met with {claim.seeds_met} seeds")
+        below = []
         if isinstance(claim.interval, list):
-            low, high = (value_text(end) for end in claim.interval)
-            obtained += f"<small>{low} … {high}</small>"
+            below.append(" … ".join(map(value_text, claim.interval)))
         if claim.deviation is not None and claim.tolerance is not None:
-            obtained += f"<small>{_deviation_text(claim.deviation, claim.tolerance)}</small>"
+            below.append(_deviation_text(claim.deviation, claim.tolerance))
+        where = Html(f"{escape(claim.paper_section)} · {code(claim.id)}")
         rows.append(
-            (
-                f"<b>{escape(claim.statement)}</b><small>{escape(claim.paper_section)} · "
-                f"<code>{escape(claim.id)}</code></small><small>{escape(claim.note)}</small>",
-                _value(claim, claim.stated),
-                obtained,
-                escape(claim.unit),
-                escape(claim.evidence),
-                _verdict(claim) + turns,
-            )
+            {
+                "Claim": small(Html(f"<b>{escape(claim.statement)}</b>"), where, claim.note),
+                "Paper": _value(claim, claim.stated),
+                "Obtained": small(_value(claim, claim.obtained), *below),
+                "Unit": claim.unit,
+                "Evidence": claim.evidence,
+                "Verdict": verdict,
+            }
         )
-    return table(("Claim", "Paper", "Obtained", "Unit", "Evidence", "Verdict"), rows)
+    return records(rows)
 
 
 def tolerances() -> str:
@@ -225,7 +205,7 @@ def power_modes(evaluation: Evaluation) -> str:
         times = [mode.base_wake_up_ms[method] for method in METHODS]
         rows.append(
             (
-                f"{mode.number} {escape(mode.name)}",
+                f"{mode.number} {mode.name}",
                 _pair(paper_mhz, mode.cpu_hz / 1e6),
                 *(_pair(*each) for each in zip(paper_ms, times, strict=True)),
             )
@@ -245,7 +225,7 @@ def _value(claim: Claim, value: object) -> str:
     """Returns a stated or obtained value; a table of settings is shown once, above the claims."""
     if claim.id.startswith("x2_") and isinstance(value, list):
         return "table of power modes"
-    return escape(summary.shown_value(value))
+    return summary.shown_value(value)
 
 
 def _short(claim: Claim) -> str:
@@ -261,7 +241,7 @@ def _kind(claim: Claim) -> str:
     return {REPRODUCED: "yes", NOT_REPRODUCED: "no"}.get(claim.verdict, "fit")
 
 
-def _verdict(claim: Claim) -> str:
+def _verdict(claim: Claim) -> Html:
     given = claim.evidence in NO_EVIDENCE and claim.is_judged
     text = f"{claim.evidence}: {claim.verdict}" if given else claim.verdict
     return badge(text, _kind(claim))
@@ -275,11 +255,11 @@ def _deviation_text(deviation: float, tolerance: float) -> str:
     )
 
 
-def _met(held: bool) -> str:
+def _met(held: bool) -> Html:
     return badge("holds", "yes") if held else badge("does not", "no")
 
 
-def _cell(claim: Claim) -> str:
+def _cell(claim: Claim) -> Html:
     """Returns value and verdict of a claim as a small table cell."""
     if not claim.is_judged:
         return badge("–", "fit")
@@ -287,5 +267,5 @@ def _cell(claim: Claim) -> str:
     if claim.seed_sensitive:
         sign += f" {claim.seeds_met or '?'}"
     plain = isinstance(claim.obtained, (int, float))
-    value = f"<small>{escape(summary.shown_value(claim.obtained))}</small>" if plain else ""
-    return badge(sign, _kind(claim)) + value
+    below = [summary.shown_value(claim.obtained)] if plain else []
+    return small(badge(sign, _kind(claim)), *below)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import altair as alt
 import polars as pl
 
 from access_av.paper.statements import ADAPTIVE_LABEL, METHODS
-from access_av.report.chart import PURPLE
+from access_av.report.chart import PURPLE, colours
 from access_av.signal.methods import LABELS, label
 
 if TYPE_CHECKING:
+    import altair as alt
+
     from access_av.paper.evaluation import Evaluation
 
 EVERY_SSB = "MUSIC, 20 ms"
@@ -27,9 +28,9 @@ COLOURS = {
 NAMES = [*(LABELS[method] for method in METHODS), ADAPTIVE_LABEL]
 
 
-def scale(names: list[str]) -> alt.Scale:
-    """Returns the colour scale of these lines."""
-    return alt.Scale(domain=names, range=[COLOURS[name] for name in names])
+def coloured(names: list[str]) -> alt.Color:
+    """Returns the colours of these lines."""
+    return colours("line:N", {name: COLOURS[name] for name in names})
 
 
 def by_mode(evaluation: Evaluation) -> pl.DataFrame:

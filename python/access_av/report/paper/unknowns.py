@@ -11,7 +11,7 @@ import polars as pl
 from access_av.paper.open_choices import GATE, OPEN_CONTROLLER, OPEN_WORLD
 from access_av.paper.unknowns import MATTERS
 from access_av.report.chart import BLUE, GREY, finish
-from access_av.report.parts import figure, table
+from access_av.report.parts import figure, folded, records
 
 if TYPE_CHECKING:
     from access_av.paper.study import Study
@@ -39,10 +39,7 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
         )
     specs["sobol"] = _index_chart(found)
     specs["share"] = _share_chart(found)
-    ranges = table(
-        ("Unspecified parameter", "Range"),
-        [(each.label, each.range_text) for each in DIMENSIONS],
-    )
+    ranges = [{"Unspecified parameter": it.label, "Range": it.range_text} for it in DIMENSIONS]
     return (
         f"<p>{found.interpretations} interpretations of {found.runs} runs each, drawn from the "
         "ranges below. A total index of 0.6 means: 60 % of the variance of the claim's margin "
@@ -56,7 +53,7 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
             "Bars are 95 % intervals over environments.",
             "Share of the drawn interpretations in which each claim holds",
         )
-        + f"<details><summary>The ranges</summary>{ranges}</details>"
+        + folded("The ranges", records(ranges))
     )
 
 
@@ -116,15 +113,12 @@ def _index_chart(found: Unknowns) -> Spec:
 def _share_chart(found: Unknowns) -> Spec:
     rows = pl.DataFrame(
         [
-            {
-                "claim": _short(claim),
-                "share": round(share, 4),
-                "low": round(found.holds_interval[claim][0], 4),
-                "high": round(found.holds_interval[claim][1], 4),
-            }
+            (_short(claim), share, *found.holds_interval[claim])
             for claim, share in found.holds.items()
-        ]
-    )
+        ],
+        schema=["claim", "share", "low", "high"],
+        orient="row",
+    ).with_columns(pl.col(pl.Float64).round(4))
     base = alt.Chart(rows).encode(
         y=alt.Y("claim:N", sort=None, title=None, axis=alt.Axis(labelLimit=170)),
         tooltip=["claim:N", "share:Q", "low:Q", "high:Q"],
