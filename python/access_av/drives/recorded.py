@@ -13,6 +13,7 @@ from access_av.drives import angle_log, truth_frame
 from access_av.errors import InputError
 from access_av.run.pairs import STRETCHES, ErrorSamples
 from access_av.run.service_levels import INDEPENDENT_S
+from access_av.statistics.consistency import DIMENSIONS, nees_of_step
 from access_av.tables.columns import TABLES
 
 if TYPE_CHECKING:
@@ -511,12 +512,9 @@ def _honesty(poses: pl.DataFrame, against: pl.DataFrame) -> dict[str, float]:
     Returns the mean NEES over both axes, the share of the time in state ``ok``, and the share of
     the time with state ``ok`` and an error above the protection level.
     """
-    xx, xy, yy = (pl.col(f"covariance_{it}_m2") for it in ("xx", "xy", "yy"))
-    dx, dy = pl.col("error_x_m"), pl.col("error_y_m")
-    squared = (yy * dx**2 - 2 * xy * dx * dy + xx * dy**2) / (xx * yy - xy**2)
     ok = pl.col("integrity") == "ok"
     row = poses.join(against, on="time_s").select(
-        nees_per_axis=squared.filter(squared.is_finite()).mean() / 2,
+        nees_per_axis=nees_of_step().mean() / DIMENSIONS,
         ok_share=ok.mean(),
         beyond_while_ok=(ok & (pl.col("error_m") > pl.col("protection_level_m"))).mean(),
     )

@@ -90,11 +90,6 @@ def plan(
     progress
         Called as ``progress(done, total)`` with the number of computed bounds.
 
-    Returns
-    -------
-    Plan
-        The choice.
-
     Raises
     ------
     InputError

@@ -160,11 +160,6 @@ def from_arrays(
         origin of the wave; the zenith angle is measured from the vertical.
     floor_db
         Paths weaker than the strongest one of their link by more than this are left out.
-
-    Returns
-    -------
-    polars.DataFrame
-        One row per path.
     """
     power = np.where(delay_s >= 0.0, np.abs(gain) ** 2, 0.0)
     strongest = power.max(axis=2, keepdims=True)

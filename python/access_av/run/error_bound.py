@@ -102,11 +102,6 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
         Side of the map's squares in metres. Default: a round length with about :data:`MAP_CELLS`
         squares.
 
-    Returns
-    -------
-    ErrorBound
-        Bound and tables.
-
     Raises
     ------
     SettingsError

@@ -88,7 +88,7 @@ class Verdict:
 
 
 def of_runs(errors_m: ArrayLike, step_s: float) -> list[Verdict]:
-    """Evaluates horizontal errors of many runs.
+    """Evaluates horizontal errors of many runs, for each of :data:`LEVELS`.
 
     The lower end is the minimum of two: the bootstrap over whole runs, which covers differences
     between runs, and the interval of Clopper and Pearson with one independent position every
@@ -101,11 +101,6 @@ def of_runs(errors_m: ArrayLike, step_s: float) -> list[Verdict]:
         accuracy.
     step_s
         Time between two steps.
-
-    Returns
-    -------
-    list of Verdict
-        One for each of :data:`LEVELS`.
 
     Examples
     --------
@@ -129,17 +124,14 @@ def of_runs(errors_m: ArrayLike, step_s: float) -> list[Verdict]:
 
 
 def of_bound(along_std_m: ArrayLike, across_std_m: ArrayLike) -> list[Verdict]:
-    """Evaluates a route with Gaussian errors as small as the bound.
+    """Evaluates a route with Gaussian errors as small as the bound, for each of :data:`LEVELS`.
+
+    No localizer exceeds the results.
 
     Parameters
     ----------
     along_std_m, across_std_m
         Bounds of the standard deviations in two perpendicular directions, shape (steps,).
-
-    Returns
-    -------
-    list of Verdict
-        One for each of :data:`LEVELS`; no localizer exceeds them.
 
     Examples
     --------
@@ -165,11 +157,6 @@ def within(first_std_m: ArrayLike, second_std_m: ArrayLike, radius_m: float) -> 
         Standard deviations along the axes.
     radius_m
         Radius of the circle.
-
-    Returns
-    -------
-    numpy.ndarray
-        Probabilities.
 
     Examples
     --------

@@ -295,11 +295,6 @@ def simulate(
     progress
         Called as ``progress(done, total)`` with numbers of runs.
 
-    Returns
-    -------
-    Simulation
-        Tables.
-
     Raises
     ------
     SettingsError

@@ -114,11 +114,6 @@ def sweep(
     progress
         Called as ``progress(done, total)`` with numbers of runs.
 
-    Returns
-    -------
-    Sweep
-        A table with one row per combination, and their results.
-
     Raises
     ------
     InputError

@@ -145,11 +145,6 @@ def fit_manifold(
     terms
         Order of the series; selected by cross-validation by default.
 
-    Returns
-    -------
-    ManifoldFit
-        The manifold and its residuals.
-
     Raises
     ------
     ValueError

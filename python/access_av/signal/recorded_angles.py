@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from access_av._core import Recording
 from access_av.errors import InputError
 from access_av.signal import aoa
 from access_av.signal.array_annotations import SPACINGS, ArrayTruth, from_broadside_deg
+from access_av.tables.columns import TABLES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,8 +69,9 @@ class BurstAngle:
     truth_deg: float | None = None
 
     def as_record(self) -> dict[str, Any]:
-        """Returns the values for JSON; ``truth_deg`` only if it is known."""
-        return {key: value for key, value in asdict(self).items() if value is not None}
+        """Returns a row of the table ``cells`` for JSON; ``truth_deg`` only if it is known."""
+        found = {key: value for key, value in vars(self).items() if value is not None}
+        return {name: found[name] for name in TABLES["cells"].columns if name in found}
 
 
 def estimate_bursts(

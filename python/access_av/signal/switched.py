@@ -84,10 +84,6 @@ def switched_direction(
     frequency_hz
         Lowest and highest frequency of the tone in Hz.
 
-    Returns
-    -------
-    SwitchedEstimate
-
     Raises
     ------
     ValueError

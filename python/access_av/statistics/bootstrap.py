@@ -40,11 +40,6 @@ def bootstrap_interval(
     seed
         Seed of the resamples.
 
-    Returns
-    -------
-    tuple of float
-        Lower and upper end.
-
     Raises
     ------
     ValueError

@@ -64,12 +64,17 @@ def nees(trajectories: pl.DataFrame) -> pl.DataFrame:
     >>> round(nees(pl.DataFrame([step | covariance]))["nees"][0], 9)
     5.0
     """
+    usable = ~pl.col("searching")
+    return trajectories.select("run", "time_s", nees=pl.when(usable).then(nees_of_step()))
+
+
+def nees_of_step() -> pl.Expr:
+    """Returns the NEES of the position of each row; null with a singular covariance."""
     dx, dy = pl.col("error_x_m"), pl.col("error_y_m")
     xx, xy, yy = (pl.col(f"covariance_{axes}_m2") for axes in ("xx", "xy", "yy"))
     determinant = xx * yy - xy**2
     squared = (yy * dx**2 - 2.0 * xy * dx * dy + xx * dy**2) / determinant
-    usable = ~pl.col("searching") & (determinant > 0.0)
-    return trajectories.select("run", "time_s", nees=pl.when(usable).then(squared))
+    return pl.when(determinant > 0.0).then(squared)
 
 
 def nees_band(
@@ -89,11 +94,6 @@ def nees_band(
         Share of the steps within the band.
     dimensions
         Dimension of the state of the NEES.
-
-    Returns
-    -------
-    tuple of float
-        Lower and upper end.
 
     Examples
     --------

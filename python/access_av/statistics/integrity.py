@@ -148,11 +148,6 @@ def stanford_counts(trajectories: pl.DataFrame, alert_limit_m: float) -> dict[st
     alert_limit_m
         Alert limit.
 
-    Returns
-    -------
-    dict
-        Number of epochs by region.
-
     Examples
     --------
     >>> trajectories = pl.DataFrame(

@@ -133,11 +133,6 @@ def percentiles(
     seed
         Seed of the resamples.
 
-    Returns
-    -------
-    list of Percentile
-        In the order of ``percents``.
-
     Raises
     ------
     ValueError

@@ -32,11 +32,6 @@ def clopper_pearson(
     probability
         Coverage, above 0 and below 1.
 
-    Returns
-    -------
-    tuple of float
-        Low and high end.
-
     Examples
     --------
     Nothing in 300 trials: below 1.2 %, the rule of three with 97.5 %.
@@ -68,11 +63,6 @@ def wilson(successes: int, trials: int, *, probability: float = 0.95) -> tuple[f
         Number of independent trials.
     probability
         Coverage, above 0 and below 1.
-
-    Returns
-    -------
-    tuple of float
-        Low and high end.
 
     Examples
     --------

@@ -81,11 +81,6 @@ class Result:
         path
             File to write, for example ``drives.zip``.
 
-        Returns
-        -------
-        Path
-            The file.
-
         Raises
         ------
         TypeError

@@ -232,11 +232,6 @@ def tum_trajectory(
     time_s, x_m, y_m, heading_rad
         Arrays of shape (n,): seconds, metres, and the heading counter-clockwise from +x.
 
-    Returns
-    -------
-    str
-        n lines of eight fields, separated by single spaces.
-
     Examples
     --------
     >>> tum_trajectory([0.02], [1.0], [2.0], [0.0])

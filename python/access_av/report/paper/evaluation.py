@@ -46,11 +46,6 @@ def render(study: Study, specs: dict[str, Spec] | None = None) -> str:
         Evaluation of several interpretations; the charts are those of the shown one.
     specs
         Dictionary to which the charts are added, by name.
-
-    Returns
-    -------
-    str
-        A self-contained HTML page.
     """
     specs = {} if specs is None else specs
     evaluation = study.shown

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
+import vl_convert
 
 from access_av.device.platform import Platform
 from access_av.errors import InputError
@@ -12,7 +13,6 @@ from access_av.paper.claims import as_records
 from access_av.paper.interpretations import SHIPPED, load_all
 from access_av.paper.study import Study, study
 from access_av.report.paper.evaluation import render
-from access_av.report.paper.figures import figures
 from access_av.tables import validation
 from access_av.tables.results_directory import RESULTS, ResultsDirectory
 
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 # Cost of the report, in runs of a setting of the evaluation on two cores.
 REPORT_COST = 4000
 POINTS_FILE = "operating_points.parquet"
+# Charts that are also written as SVG, and their width (px): those that need the whole study, and
+# two of the sensitivity analysis.
+PICTURES, WIDTH = ("ablation", "front", "sobol", "share"), 640
 
 
 def write(
@@ -40,8 +43,9 @@ def write(
     specs: dict[str, Spec] = {}
     directory.write_text("report.html", render(made, specs))
     progress(2, 4)
-    for name, picture in figures(specs).items():
-        directory.write_text(f"{name}.svg", picture)
+    for name in (it for it in PICTURES if it in specs):
+        drawn = specs[name] | {"width": WIDTH, "background": "white"}
+        directory.write_text(f"{name}.svg", vl_convert.vegalite_to_svg(drawn))
     shown = made.shown
     directory.write_text("scenario.toml", shown.scenario.resolved(shown.platform.core).to_toml())
     directory.write_text("platform.toml", shown.platform.to_toml())
