@@ -11,7 +11,6 @@ from string import Template
 from typing import TYPE_CHECKING
 
 from access_av.report.chart_code import chart_code
-
 from access_av.report.parts import tile
 
 if TYPE_CHECKING:
