@@ -24,14 +24,14 @@ use serde_json::{Value, json};
 
 use common::{odometry, scratch};
 
-/// Period of the odometry.
+/// Interval of the odometry.
 const PERIOD: Duration = Duration::from_millis(20);
-/// Required maximum time to recovery after the end of the cause.
+/// Required maximum time from the end of the cause to the recovery.
 const RECOVERY: Duration = Duration::from_secs(5);
-/// Required maximum time to the report of a failure, and the time that a loaded computer may add to it.
+/// Required maximum time to the report of a failure, including a margin for a loaded computer.
 const REPORT: Duration = Duration::from_secs(4);
 
-/// Odometry in real time to the standard input of a node, after a first pose.
+/// Thread that sends odometry in real time to the standard input of a node, after a first pose.
 struct Feed {
     stop: Arc<AtomicBool>,
     sent: Arc<AtomicU64>,
@@ -80,7 +80,7 @@ impl Drop for Feed {
     }
 }
 
-/// A node whose outputs are those of the test, with its page.
+/// A running node with its page, whose outputs the test configures.
 struct Running {
     process: Child,
     feed: Feed,
@@ -130,7 +130,7 @@ impl Running {
         body.to_owned()
     }
 
-    /// Health of an output on the page.
+    /// Returns the health of an output according to the page.
     fn output(&self, name: &str) -> Value {
         let state: Value = serde_json::from_str(&self.get("/state.json")).unwrap();
         let outputs = state["outputs"].as_array().unwrap();
@@ -154,7 +154,7 @@ impl Running {
         }
     }
 
-    /// Waits until the vehicle has driven for a time.
+    /// Waits until the vehicle has driven for the given time.
     fn drive(&self, duration_s: f64) {
         let until_s = self.feed.sent_s() + duration_s;
         while self.feed.sent_s() < until_s {
@@ -168,14 +168,14 @@ impl Running {
         assert!(sent.success());
     }
 
-    /// Ends the node; returns its exit code.
+    /// Terminates the node; returns its exit code.
     fn terminate(mut self) -> i32 {
         self.signal("-TERM");
         self.process.wait().unwrap().code().unwrap()
     }
 }
 
-/// Lines of a JSON file. Each must be complete.
+/// Returns the lines of a JSON file. Each must be complete.
 fn lines(file: &Path) -> Vec<Value> {
     let text = fs::read_to_string(file).unwrap();
     assert!(text.ends_with('\n'));
@@ -196,7 +196,7 @@ fn assert_no_gap(records: &[Value]) {
     }
 }
 
-/// Events of an output: one failure, one recovery.
+/// Asserts that the events of an output are one failure and one recovery.
 fn assert_one_failure_and_recovery(records: &[Value], name: &str) {
     let events = records
         .iter()
@@ -299,7 +299,7 @@ fn a_full_disk_under_mcap_and_tum_does_not_affect_other_outputs_and_both_recover
                 .any(|it| it["name"] == "tum" && it["ok"] == false)
     };
     assert!(records.iter().filter(is_failed).count() >= 2);
-    // No line is damaged, and both files hold what came before and after.
+    // No line is damaged, and both files contain the poses from before and after the failure.
     let poses = read_tum(&tum).unwrap();
     let times_s: Vec<f64> = poses.iter().map(|it| it.time_s).collect();
     assert!(times_s.is_sorted() && times_s[0] < 0.1 && *times_s.last().unwrap() > end_s - 0.5);
@@ -364,7 +364,7 @@ fn a_reader_that_closes_its_fifo_and_returns_gets_whole_lines_again() {
     );
     let outputs = format!("[output]\ntum = {tum:?}\njson.address = {fifo:?}");
     let node = Running::start(&folder, &outputs);
-    // No reader yet: reported, and nothing waits for it.
+    // A pipe without a reader is reported, and does not delay the other outputs.
     let failed = node.wait_for("json", false, REPORT);
     assert!(
         failed["cause"].as_str().unwrap().contains("no reader"),

@@ -35,7 +35,7 @@ struct Sleep {
 /// Cost of one estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum EstimateCost {
-    /// The platform's value for the vehicle's method.
+    /// The value that the platform specifies for the estimation method of the vehicle.
     #[default]
     OfMethod,
     /// Energy above idle in joules, of a custom estimator.

@@ -1,34 +1,37 @@
-//! Unit of the times of odometry and angles: seconds, or by mistake a thousandth, millionth or billionth of them.
+//! Detection of the unit of the time stamps of odometry and angles: seconds, or by mistake
+//! milliseconds, microseconds or nanoseconds.
 //!
-//! Absolute times show their unit by their size: seconds since 1970 stay below 10¹¹ until the year 5138, milliseconds
-//! exceed it since 1973. Relative times show it by the distance between samples, and by distances that the speeds
-//! contradict by a power of 1000.
+//! Absolute times show their unit by their size: seconds since 1970 stay below 10¹¹ until the year
+//! 5138, milliseconds exceed it since 1973. Relative times show it by the interval between samples,
+//! and by the ratio of the distances to the products of speed and time: a wrong unit makes this
+//! ratio a power of 1000.
 
 use crate::observation::OdometrySample;
 
-/// Largest time of a drive (s), whether it counts from 1970 or from the start.
+/// Maximum time of a drive (s), whether it counts from 1970 or from the start.
 pub const MAX_TIME_S: f64 = 1e11;
 
-/// Interval between odometry samples (s) above which the times cannot be seconds.
+/// Median interval between odometry samples (s) above which the times cannot be seconds.
 const MAX_STEP_S: f64 = 10.0;
 
-/// Interval between odometry samples (s) above which a contradiction between distances, speeds and times is a matter of
-/// the time unit. Milliseconds of samples at 2 kHz.
+/// Median interval between odometry samples (s) above which the distances are compared with the
+/// products of speed and time to determine the unit. An odometry at 2 kHz in milliseconds has this
+/// interval.
 const SUSPECT_STEP_S: f64 = 0.5;
 
-/// Largest interval between odometry samples (s) once the unit is corrected: 0.5 Hz.
+/// Maximum median interval between odometry samples (s) after the correction of the unit: 0.5 Hz.
 const USUAL_STEP_S: f64 = 2.0;
 
-/// Distance per time (m/s) below which a moving vehicle is implausibly slow.
+/// Speed (m/s) below which the average motion of a moving vehicle is implausibly slow.
 const CRAWL_MPS: f64 = 0.02;
 
-/// Bounds of the ratio of two distances that agree.
+/// Range of the ratio of two distances that agree.
 const AGREE: core::ops::Range<f64> = 0.7..1.5;
 
-/// Distance (m) by the speeds from which on it is compared with the distances.
+/// Minimum path length (m) for a comparison of the distances with the speeds.
 const LEAST_COMPARED_M: f64 = 1.0;
 
-/// Intervals from which a stream's time unit is judged.
+/// Number of intervals of an odometry stream from which its time unit is determined.
 const STREAM_STEPS: usize = 9;
 
 /// Unit of a time that is not in seconds.
@@ -43,10 +46,10 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
-    /// All of them, the longest first.
+    /// All units, the longest first.
     pub const ALL: [Self; 3] = [Self::Milliseconds, Self::Microseconds, Self::Nanoseconds];
 
-    /// Units per second.
+    /// Returns the number of units per second.
     pub const fn per_second(self) -> f64 {
         match self {
             Self::Milliseconds => 1e3,
@@ -55,7 +58,7 @@ impl TimeUnit {
         }
     }
 
-    /// Name in the plural.
+    /// Returns the name in the plural.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Milliseconds => "milliseconds",
@@ -64,8 +67,8 @@ impl TimeUnit {
         }
     }
 
-    /// Likely unit of a time that is too large to be in seconds, if it counts from 1970; `None` of one that may be in
-    /// seconds.
+    /// Returns the likely unit of a time that is too large to be in seconds since 1970; `None` if
+    /// the time may be in seconds.
     pub fn of_epoch(time: f64) -> Option<Self> {
         let mut units = Self::ALL.into_iter();
         let is_time = |unit: &Self| time.abs() / unit.per_second() <= MAX_TIME_S;
@@ -82,20 +85,21 @@ impl core::fmt::Display for TimeUnit {
 /// Quantities of an odometry that depend on the unit of its times.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OdometryTimes {
-    /// Time of any sample (s, if the unit is right).
+    /// Time stamp of any sample (s, if the unit is correct).
     pub time_s: f64,
-    /// Usual interval between samples: their median.
+    /// Median interval between samples.
     pub step_s: f64,
-    /// Duration in which the vehicle moved.
+    /// Duration for which the vehicle moved.
     pub moving_s: f64,
-    /// Path length by the distances (m).
+    /// Path length (m) according to the distances.
     pub by_distance_m: f64,
-    /// Path length by the speeds and the times (m); `None` if speeds or distances were derived from the others.
+    /// Path length (m) as the integral of the speeds over time; `None` if speeds or distances were
+    /// derived from the others.
     pub by_speed_m: Option<f64>,
 }
 
 impl OdometryTimes {
-    /// Unit of the times; `None` if they may be seconds.
+    /// Returns the unit of the times; `None` if they may be seconds.
     pub fn unit(&self) -> Option<TimeUnit> {
         if self.step_s <= SUSPECT_STEP_S {
             return TimeUnit::of_epoch(self.time_s);
@@ -124,7 +128,7 @@ impl OdometryTimes {
     }
 }
 
-/// Detector of the time unit of a stream of odometry, from its first intervals. It allocates no
+/// Detector of the time unit of an odometry stream, from its first intervals. It allocates no
 /// memory.
 #[derive(Debug, Clone, Default)]
 pub struct StreamTimes {
@@ -136,8 +140,9 @@ pub struct StreamTimes {
 }
 
 impl StreamTimes {
-    /// Takes a sample; returns the unit of the stream's times if they are not seconds, also for all later samples. A
-    /// distance of NaN is not given.
+    /// Adds a sample. Returns the unit of the stream's times if they are not seconds; the result of
+    /// the first intervals also applies to all later samples. A distance of NaN means that the
+    /// odometry provides no distance.
     pub fn add(&mut self, sample: &OdometrySample) -> Option<TimeUnit> {
         let Some(last) = self.last.replace(*sample) else {
             return TimeUnit::of_epoch(sample.time_s);
@@ -174,7 +179,8 @@ impl StreamTimes {
 mod tests {
     use super::*;
 
-    /// A vehicle at 1 m/s, sampled at a rate, its times in a unit (per second).
+    /// Returns the detected unit for a vehicle at 1 m/s, sampled at a rate, with times in a unit
+    /// (per second).
     fn first_unit(
         rate_hz: f64,
         per_second: f64,
@@ -192,7 +198,7 @@ mod tests {
             })
         });
         let units: Vec<_> = units.collect();
-        // The verdict of the first intervals holds for all later samples.
+        // The result of the first intervals holds for all later samples.
         let judged = &units[STREAM_STEPS..];
         assert!(judged.iter().all(|it| *it == judged[0]), "{units:?}");
         units.into_iter().find_map(|unit| unit)

@@ -7,7 +7,7 @@ use aoa::{
     Manifold, Method, Reason, estimate, maximum_likelihood_pilots,
 };
 
-/// Errors over their standard deviations.
+/// Statistics of errors divided by their standard deviations.
 #[derive(Default)]
 struct Errors {
     count: f64,
@@ -22,8 +22,9 @@ impl Errors {
         self.beyond += f64::from(u8::from(z.abs() > 3.0));
     }
 
-    /// RMS from 0.9 to 1.15 within three standard errors; that of a square is `sqrt(kurtosis - 1)`, which is below 2.5
-    /// for eight degrees of freedom.
+    /// Asserts an RMS from 0.9 to 1.15, within three standard errors. The standard error of a mean
+    /// square is `sqrt(kurtosis - 1)` over the root of the number of trials; `sqrt(kurtosis - 1)`
+    /// is below 2.5 for eight degrees of freedom.
     fn check_rms(&self, of: &str) {
         let mean = self.squares / self.count;
         let margin = 3.0 * 2.5 / self.count.sqrt();
@@ -34,7 +35,8 @@ impl Errors {
         );
     }
 
-    /// At most 0.6 % of `trials` beyond three standard deviations, within three standard errors.
+    /// Asserts that at most 0.6 % of `trials` exceed three standard deviations, within three
+    /// standard errors.
     fn check_beyond(&self, trials: f64, of: &str) {
         let share = self.beyond / trials;
         let most = 6e-3 + 3.0 * (6e-3 / trials).sqrt();
@@ -47,7 +49,7 @@ impl Errors {
     }
 }
 
-/// Snapshots of a source of constant power.
+/// Returns snapshots of a source of constant power.
 fn snapshots<const N: usize>(
     random: &mut Random,
     response: &[Complex64; N],
@@ -62,7 +64,8 @@ fn snapshots<const N: usize>(
     (0..count).map(one).collect()
 }
 
-/// Trials of one condition, by maximum likelihood from the covariance and from despread pilots.
+/// Runs trials of one condition, by maximum likelihood from the covariance and from despread
+/// pilots.
 fn condition<const N: usize>(
     random: &mut Random,
     count: usize,
@@ -94,7 +97,9 @@ fn condition<const N: usize>(
 const RMS_SHARE: f64 = 0.2;
 const BEYOND_SHARE: f64 = 0.85;
 
-/// Number of conditions with these shares.
+/// Checks all conditions for one number of antennas. Returns how many conditions have enough
+/// reliable estimates for the test of the RMS, and for that of the errors beyond three standard
+/// deviations.
 fn check_row<const N: usize>(trials: usize) -> [usize; 2] {
     let mut random = Random::new(N as u64);
     let mut counts = [0, 0];

@@ -32,7 +32,7 @@ impl Node {
         more: &str,
         environment: &[(&str, &str)],
     ) -> Self {
-        // A file is played as fast as possible.
+        // A file is played as fast as possible; messages on standard input arrive in real time.
         let pace = if Path::new(messages).is_file() {
             "fast"
         } else {
@@ -55,7 +55,7 @@ impl Node {
         Self { process, lines }
     }
 
-    /// Reads lines until one is as wanted, and returns it.
+    /// Reads lines until one satisfies the condition, and returns it.
     pub fn until(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
         loop {
             let mut line = String::new();

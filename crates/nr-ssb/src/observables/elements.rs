@@ -22,7 +22,8 @@ use crate::standard::grid::{SYMBOLS, SsbGrid, pss_indices};
 /// Iterations of Newton's method for the frequency offset.
 const ITERATIONS: usize = 3;
 
-/// Matched sums of one SSB.
+/// Amplitudes of one SSB by a matched filter over all known resource elements, with their
+/// uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Elements<const A: usize> {
     /// Amplitude of a resource element at every antenna, at the centre of the known elements.

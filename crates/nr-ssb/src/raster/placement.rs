@@ -78,9 +78,10 @@ pub(crate) fn placed_at(
             + oddness(frequency_hz)
     };
     let nearest = (received_hz / FINEST_HZ).round();
-    // Range of multiples of 5 kHz that contains an agreement of the phases for any offset: these
-    // multiples and a turn per symbol (about 14 times 1 kHz at 15 kHz spacing) have almost no
-    // common divisor.
+    // Half-width of the search in multiples of 5 kHz. The phase step per symbol determines the
+    // frequency up to multiples of the symbol rate (about 14 kHz at 15 kHz spacing). This period
+    // has almost no common divisor with 5 kHz, so that the range contains a frequency whose phases
+    // agree, for any offset.
     let reach = (2.5e-3 * spacing.hz()).floor();
     let best = (0..=2 * reach as usize)
         .map(|i| (nearest - reach + i as f64) * FINEST_HZ)

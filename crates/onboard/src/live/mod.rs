@@ -15,7 +15,7 @@
 //! let site = Site::from_library("yard", &Shipped)?;
 //! let vehicle = Vehicle::from_library("tugger", &Shipped)?;
 //! let platform = Platform::from_library(&vehicle.platform.name, &Shipped)?;
-//! // In search of its start, by angles of its own: no samples.
+//! // Without a start pose: the vehicle searches for it. Angles are given, and no samples.
 //! let mut live = Live::new(&site, &vehicle, &platform, None, None, Custom::default())?;
 //! live.odometry(&OdometrySample::of_speed(0.0, 1.5, None))?;
 //! live.angle(&AngleObservation {

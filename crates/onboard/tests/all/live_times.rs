@@ -1,4 +1,5 @@
-//! Faults of time stamps in a live drive: each is rejected or compensated, and reported, and the pose stays right.
+//! Faults of time stamps in a live drive: each is rejected or compensated, and reported, and the
+//! pose stays correct.
 
 use std::f64::consts::PI;
 
@@ -123,7 +124,7 @@ impl Drive {
         errors
     }
 
-    /// State, error of the position and protection level now.
+    /// Returns the state, the position error and the protection level.
     fn status(&self) -> (State, f64, f64) {
         let status = self
             .live
@@ -159,7 +160,8 @@ fn a_given_start_is_ok_once_angles_have_confirmed_it() {
     assert_eq!(drive.status().0, State::Unavailable);
     assert!(drive.drive(1.0).is_empty());
     assert_ne!(drive.reason(), Reason::Unconfirmed);
-    // Confirmed at once; the level of a start that is known to 0.5 m falls below the alert limit with more angles.
+    // The start is confirmed at once. The protection level of a start with a standard deviation of
+    // 0.5 m falls below the alert limit after more angles.
     assert!(drive.drive(4.0).is_empty());
     drive.assert_fine();
     // A wrong start is never confirmed.
@@ -275,7 +277,7 @@ fn clocks_that_differ_from_the_start_are_reported_and_the_pose_is_not_localized(
             drive.drive(0.1);
             assert!(!drive.status().0.is_localized());
         }
-        // The clock is set.
+        // The clock is set to another time.
         drive.odometry_clock_s = 0.0;
         drive.drive(4.0);
         assert!(!drive.misled);

@@ -1,4 +1,4 @@
-//! The search, the scan and the receivers, as one kind of function.
+//! Functions of the same signature for the search, the scan and the receivers.
 
 use nr_ssb::Complex32;
 use nr_ssb::receiver::ReceiverConfig;
@@ -10,18 +10,18 @@ use recording::scan::{
 use crate::air::{receivers, slices};
 use crate::{SPACING, Scene};
 
-/// SSBs of the cell that were detected, and reported tones.
+/// Detected SSBs of the cell, and reported tones.
 pub struct Detected {
-    /// Number of SSBs that there are.
+    /// Number of SSBs in the samples.
     pub bursts: usize,
     pub ssbs: usize,
-    /// Frequencies from the samples' centre.
+    /// Frequencies of the tones relative to the centre of the samples.
     pub tones_hz: Vec<f64>,
 }
 
 type Detector = fn(&Scene, &[Vec<Complex32>]) -> Detected;
 
-/// Name, whether for samples at twice the base rate, number of bursts.
+/// Name, whether the samples have twice the base rate, number of bursts, and function.
 pub const DETECTORS: [(&str, bool, usize, Detector); 4] = [
     ("search", false, 1, search),
     ("scan", true, 1, scan_band),
@@ -30,7 +30,7 @@ pub const DETECTORS: [(&str, bool, usize, Detector); 4] = [
 ];
 
 impl Scene {
-    /// Number of bursts of the cell among these SSBs, given by PCI and first sample at the base rate.
+    /// Counts the bursts of the cell among the given SSBs (PCI, and first sample at the base rate).
     fn detected(&self, ssbs: &[(u16, f64)], tones_hz: Vec<f64>) -> Detected {
         let first = self.cell.ssb_start(self.cell.ssb_indices[0]);
         let is_there = |number: &usize| {
@@ -113,7 +113,7 @@ fn window_of<const A: usize>(scene: &Scene, samples: &[Vec<Complex32>]) -> Detec
     scene.detected(&found, tones)
 }
 
-/// Angle of the only SSB.
+/// Returns the angle of the only SSB.
 pub fn angle_rad(scene: &Scene, samples: &[Vec<Complex32>]) -> Option<f64> {
     let frequency_hz = scene.cell.ssb_freq_hz;
     let config = SsbSearchConfig::new(

@@ -23,14 +23,15 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 const SPACING: SubcarrierSpacing = SubcarrierSpacing::Khz30;
-/// Powers of each tone relative to the SSB's, dB.
+/// Powers of each tone relative to the SSB, in dB.
 const ABOVE_SSB_DB: [f64; 5] = [-10.0, 0.0, 10.0, 15.0, 20.0];
-/// 240 subcarriers of power one over the 256 samples of an unnormalised transform, squared.
+/// Mean power of an SSB in the time domain: 240 subcarriers of unit power, divided by the squared
+/// number of samples of the unnormalised 256-point transform.
 const SSB_POWER: f64 = 240.0 / 65536.0;
 /// Half of the bandwidth of PSS and SSS: 127 subcarriers, Hz.
 const PSS_HALF_HZ: f64 = 63.5 * 30e3;
 
-/// Where tones are, from the centre of the samples.
+/// Positions of the tones in the band, and number of tones.
 const PLACES: [(&str, usize); 5] = [
     ("DC", 1),
     ("anywhere", 1),
@@ -39,18 +40,18 @@ const PLACES: [(&str, usize); 5] = [
     ("in the PSS", 4),
 ];
 
-/// Antennas and SNR per resource element in dB.
+/// Number of antennas, and SNR per resource element in dB.
 const SCENES: [(usize, f64); 3] = [(1, 20.0), (2, 0.0), (4, -9.0)];
 
-/// Samples of a cell, undisturbed.
+/// Samples of a cell without DC offset and tones.
 pub struct Scene {
     /// The cell.
     pub cell: Cell,
     /// Samples of each antenna.
     pub samples: Vec<Vec<Complex32>>,
-    /// Samples of the input for each one at the base rate.
+    /// Number of input samples per sample at the base rate.
     pub factor: usize,
-    /// Frequency of the SSB's centre from that of the samples, Hz.
+    /// Frequency of the SSB's centre relative to the centre of the samples, in Hz.
     pub offset_hz: f64,
     /// Number of SSBs, one in each period of 20 ms.
     pub bursts: usize,

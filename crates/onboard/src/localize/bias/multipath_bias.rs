@@ -13,7 +13,8 @@ use crate::gaussian::smoother::Journal;
 use crate::gaussian::{Innovation, Matrix, dot};
 use crate::localize::ekf::state::{Belief, STATES};
 
-/// Covariance of a quantity with an angle: with the bias of its radio head, and without.
+/// Covariance of a quantity with an angle that contains the bias of its radio head, and with an
+/// angle that does not.
 pub(super) type CrossCovariance = [f64; 2];
 
 /// Update of means and covariances by the mixture over the jump hypotheses of an angle.

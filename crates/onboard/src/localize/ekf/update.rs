@@ -50,7 +50,7 @@ pub(in crate::localize) struct PredictedMeasurement {
     pub innovation: Innovation,
     /// Variance of the angle's own noise (rad²).
     pub own_variance: f64,
-    /// See [`AngleModel`].
+    /// Aperture, direction cosine and variance of the surveys, as in [`AngleModel`].
     pub aperture: f64,
     pub direction_cosine: f64,
     pub survey_variance: f64,
@@ -58,8 +58,8 @@ pub(in crate::localize) struct PredictedMeasurement {
     /// head.
     pub elapsed_s: f64,
     pub moved: (f64, f64),
-    /// Variance due to odometry since its newest sample, and due to second-order terms of the
-    /// prediction (rad²).
+    /// Variance due to the extrapolation beyond the newest odometry sample, and variance due to the
+    /// second-order terms of the prediction (rad²).
     pub coasted_variance: f64,
     pub bend_variance: f64,
     /// Hypotheses for the time-correlated bias, if it is estimated and the radio head is used.
