@@ -39,7 +39,7 @@ pub struct Watchdog {
 }
 
 impl Watchdog {
-    /// The watchdog that the service manager requires by the environment.
+    /// Creates the watchdog that the service manager requests by environment variables.
     pub fn from_environment() -> Self {
         Self {
             period: sd_notify::watchdog_enabled().map(|it| it / 2),

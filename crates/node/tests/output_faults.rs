@@ -65,7 +65,7 @@ impl Feed {
         }
     }
 
-    /// Time of the newest odometry (s).
+    /// Returns the time of the newest odometry (s).
     fn sent_s(&self) -> f64 {
         0.02 * self.sent.load(Ordering::Relaxed) as f64
     }

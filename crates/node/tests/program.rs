@@ -303,7 +303,7 @@ fn the_schema_is_printed_and_contains_every_key() {
     assert_eq!(schema, serde_json::from_str::<Value>(&stated).unwrap());
 }
 
-/// Standard output of `access-av-node schema` with these options.
+/// Returns the standard output of `access-av-node schema` with these options.
 fn printed_schema(options: &[&str]) -> String {
     let done = Command::new(env!("CARGO_BIN_EXE_access-av-node"))
         .arg("schema")

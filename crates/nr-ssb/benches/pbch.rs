@@ -19,7 +19,7 @@ fn cell() -> (Pci, BchPayload) {
     (pci, payload)
 }
 
-/// One PBCH at −8 dB per resource element.
+/// Decodes one PBCH at −8 dB per resource element.
 #[divan::bench(args = [1, 8, 32])]
 fn decode_at_minus_8_db(bencher: Bencher, list_size: usize) {
     let (pci, payload) = cell();
@@ -42,7 +42,7 @@ fn encode_pbch(bencher: Bencher) {
     bencher.bench_local(|| pbch::encode(divan::black_box(&payload), pci, Lmax::L8));
 }
 
-/// Eight beams as IQ, by FFT size.
+/// Builds the IQ samples of eight beams at an FFT size.
 #[divan::bench(args = [256, 1024])]
 fn build_burst_of_8(bencher: Bencher, fft_size: usize) {
     let (pci, payload) = cell();

@@ -13,7 +13,7 @@ fn main() {
     divan::main();
 }
 
-/// 20 ms of a cell at 0 dB on four antennas, at 3.84 Msps.
+/// Returns 20 ms of a cell at 0 dB on four antennas, at 3.84 Msps.
 fn scene() -> (SearchConfig, Vec<Vec<nr_ssb::Complex32>>) {
     let mut rng = air::rng(1);
     let cell = air::Cell::random(&mut rng, SubcarrierSpacing::Khz15, 4);
@@ -52,7 +52,7 @@ fn track_one_ssb_of_4_antennas(bencher: divan::Bencher, decode_pbch: bool) {
     });
 }
 
-/// Delay, carrier phase, range rate and power of a tracked SSB.
+/// Measures delay, carrier phase, range rate and power of a tracked SSB.
 #[divan::bench]
 fn observe_one_ssb_of_4_antennas(bencher: divan::Bencher) {
     let (config, samples) = scene();
@@ -66,7 +66,8 @@ fn observe_one_ssb_of_4_antennas(bencher: divan::Bencher) {
     bencher.bench_local(|| tracker.observe(divan::black_box(&ssb)).is_some());
 }
 
-/// A cell off the raster at 5 dB, on one antenna at 46.08 Msps for 20 ms, with unknown parameters.
+/// Searches for a cell off the raster whose parameters are unknown: at 5 dB, on one antenna, in 20
+/// ms at 46.08 Msps.
 #[divan::bench(sample_count = 3, sample_size = 1)]
 fn scan_off_raster_20_ms_at_46_msps(bencher: divan::Bencher) {
     let (spacing, rate_hz, centre_hz) = (SubcarrierSpacing::Khz30, 46.08e6, 3.7e9);
@@ -85,7 +86,8 @@ fn scan_off_raster_20_ms_at_46_msps(bencher: divan::Bencher) {
     });
 }
 
-/// Reference for the speed of the computer: the transforms of four symbols of four antennas.
+/// Measures the speed of the computer as a reference: the transforms of four symbols of four
+/// antennas.
 #[divan::bench]
 fn yardstick_16_transforms_of_256(bencher: divan::Bencher) {
     let fft = rustfft::FftPlanner::new().plan_fft_forward(256);

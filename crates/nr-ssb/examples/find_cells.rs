@@ -44,7 +44,7 @@ fn read(file: &str) -> Result<Vec<Complex32>, Box<dyn Error>> {
     Ok(pairs.iter().map(sample).collect())
 }
 
-/// Two beams of a cell 1.3 MHz above the recording's centre.
+/// Creates the samples of two beams of a cell 1.3 MHz above the recording's centre.
 fn made() -> Result<Vec<Complex32>, nr_ssb::Error> {
     let burst = Burst {
         pci: Pci::new(601)?,

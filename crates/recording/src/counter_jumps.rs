@@ -102,7 +102,7 @@ fn neighbours_mps(steps: &[(f64, f64)], k: usize) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Starts, drives at 1 m/s, stops and reverses.
+    /// Returns times and distances of a vehicle that starts, drives at 1 m/s, stops and reverses.
     fn driven(rate_hz: f64) -> (Vec<f64>, Vec<f64>) {
         let times_s: Vec<f64> = (0..400).map(|k| f64::from(k) / rate_hz).collect();
         let speed = |time_s: f64| match (time_s * rate_hz) as usize {

@@ -102,7 +102,7 @@ fn usual(known: &[(usize, f64, f64)]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Starts, drives at 1 m/s, stops and reverses.
+    /// Returns times and speeds of a vehicle that starts, drives at 1 m/s, stops and reverses.
     fn driven(rate_hz: f64) -> (Vec<f64>, Vec<f64>) {
         let speed = |k: u32| match k {
             0..50 | 200..230 => 0.0,

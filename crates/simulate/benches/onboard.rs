@@ -100,7 +100,8 @@ fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
     bencher.bench_local(next);
 }
 
-/// Angle to pose, with and without a map, and with an estimate of correlated angle errors.
+/// Measures the time from angle to pose, with and without a map, and with an estimate of correlated
+/// angle errors.
 #[divan::bench(args = [(true, false), (false, false), (true, true)])]
 fn angle_to_pose(bencher: divan::Bencher, (map, estimates_bias): (bool, bool)) {
     let (site, mut vehicle) = nominal("trip-2");
@@ -142,8 +143,8 @@ fn angle_to_pose(bencher: divan::Bencher, (map, estimates_bias): (bool, bool)) {
         .bench_local_refs(|tracker| tracker.update(&heads[0], divan::black_box(&measured)));
 }
 
-/// One SSB of each of four radio heads, an odometry sample and the position query, with and without
-/// integrity monitoring.
+/// Measures the time for one SSB of each of four radio heads, an odometry sample and the position
+/// query, with and without integrity monitoring.
 #[divan::bench(args = [true, false])]
 fn burst_to_pose(bencher: divan::Bencher, guarded: bool) {
     let (site, mut vehicle) = nominal("trip-4");

@@ -53,8 +53,8 @@ impl Direction {
         Self::new(y.atan2(x), z.atan2(x.hypot(y)))
     }
 
-    /// Inverse of [`Direction::moved`] for nearby directions: returns the displacements along
-    /// azimuth and elevation, whose norm is the angle between the directions.
+    /// Inverts [`Direction::moved`] for nearby directions: returns the displacements along azimuth
+    /// and elevation, whose norm is the angle between the directions.
     pub(crate) fn step_to(&self, other: &Self) -> [f64; 2] {
         let (forward, tangents, there) = (self.unit_vector(), self.tangents(), other.unit_vector());
         let dot = |a: [f64; 3]| a.iter().zip(there).map(|(a, b)| a * b).sum::<f64>();

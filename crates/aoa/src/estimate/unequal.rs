@@ -19,8 +19,9 @@ const DIRECTIONS: usize = 64;
 /// Maximum relative side lobe power. Above it, a direction is ambiguous.
 const ALIKE: f64 = 0.98;
 
-/// [`maximum_likelihood_pilots`](crate::maximum_likelihood_pilots) for a different noise variance
-/// `noise_variances[n]` per block and antenna `n`, as received; infinite for a dead channel.
+/// Estimates the angle like [`maximum_likelihood_pilots`](crate::maximum_likelihood_pilots), but
+/// for different noise variances of the antennas: `noise_variances[n]` per block and antenna `n`,
+/// as received; infinite for a dead channel.
 ///
 /// With the weights `w_n = |gain_n|^2 / sigma_n^2`, the estimate maximises `sum_b |sum_n w_n a_n*
 /// x_nb|^2`. The variance is that of [`bound::known_signal_unequal`] plus, as with equal noise, the

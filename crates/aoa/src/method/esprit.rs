@@ -35,8 +35,8 @@ pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
     Places::of_directions::<FUSED>(&re, &im)
 }
 
-/// Least squares: the eigenvalues of `Psi = (U1^H U1)^-1 U1^H U2` are `exp(j omega)`. Returns
-/// `None` for a singular matrix.
+/// Computes the phases by least squares: the eigenvalues of `Psi = (U1^H U1)^-1 U1^H U2` are `exp(j
+/// omega)`. Returns `None` for a singular matrix.
 pub(crate) fn least_squares<const N: usize>(
     eigen: &HermitianEigen<N>,
     sources: usize,
@@ -54,9 +54,9 @@ pub(crate) fn least_squares<const N: usize>(
     Some(phases_of(rotation, sources))
 }
 
-/// Total least squares, with errors in both subspaces. With the eigenvectors `E` of `[U1 U2]^H [U1
-/// U2]` in order of descending eigenvalues, `Psi = -E12 E22^-1`. Returns `None` for a singular
-/// matrix.
+/// Computes the phases by total least squares, which allows for errors in both subspaces. With the
+/// eigenvectors `E` of `[U1 U2]^H [U1 U2]` in order of descending eigenvalues, `Psi = -E12 E22^-1`.
+/// Returns `None` for a singular matrix.
 pub(crate) fn total_least_squares<const N: usize>(
     eigen: &HermitianEigen<N>,
     sources: usize,

@@ -77,6 +77,8 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
         _ => 1,
     };
 
+    /// Checks that the first `count` spectra are those of valid covariances.
+    ///
     /// # Errors
     /// Index and error of the first spectrum that is not of a valid covariance.
     #[inline(always)]

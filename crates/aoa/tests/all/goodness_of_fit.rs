@@ -138,8 +138,8 @@ fn p_values_of_several_sources_and_of_other_arrays_are_uniform() {
     }
 }
 
-/// Snapshots of a source and its reflection, both angles at random but `apart` radians or more, in unit
-/// noise.
+/// Returns snapshots of a source and its reflection, both angles at random but `apart` radians or
+/// more, in unit noise.
 fn with_echo<const N: usize>(
     random: &mut Random,
     array: &Array<N>,

@@ -227,7 +227,7 @@ impl Runner {
         }
     }
 
-    /// The output works.
+    /// Records that the output works.
     fn succeed(&mut self) {
         self.lane
             .health

@@ -126,6 +126,8 @@ struct Header {
     length: usize,
 }
 
+/// Reads the header of a frame.
+///
 /// # Errors
 /// Errors of the stream; [`ErrorKind::InvalidData`] for a frame that is too long or of an unknown
 /// kind.

@@ -274,7 +274,7 @@ impl MatchedFilter {
     }
 }
 
-/// Elementwise product; further elements of `a` and `b` are ignored.
+/// Computes the elementwise product; further elements of `a` and `b` are ignored.
 fn multiply(product: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
     let n = product.len();
     let (a, b) = (&a[..n], &b[..n]);

@@ -386,7 +386,7 @@ fn replica(segment: usize) -> Vec<Complex32> {
         .collect()
 }
 
-/// Elementwise product.
+/// Computes the elementwise product.
 fn multiply(product: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
     for ((slot, a), b) in product.iter_mut().zip(a).zip(b) {
         *slot = Complex32::new(a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re);

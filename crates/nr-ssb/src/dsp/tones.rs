@@ -453,8 +453,8 @@ impl ToneCanceller {
     }
 }
 
-/// Inner products of the lines, `Σ exp(j2π (f_j − f_i) n)` over `length` samples; unused rows
-/// belong to lines that are orthogonal to all others.
+/// Returns the inner products of the lines, `Σ exp(j2π (f_j − f_i) n)` over `length` samples;
+/// unused rows belong to lines that are orthogonal to all others.
 fn gram(frequencies: &[f64], length: usize) -> Matrix<MOST_TONES> {
     let mut gram = [[Complex64::ZERO; MOST_TONES]; MOST_TONES];
     for (i, row) in gram.iter_mut().enumerate() {

@@ -2,7 +2,7 @@
 
 use num_complex::Complex32;
 
-/// White noise of unit power, nearly Gaussian, from a linear congruential generator.
+/// Returns white noise of unit power, nearly Gaussian, from a linear congruential generator.
 pub(crate) fn noise(seed: u64, length: usize) -> Vec<Complex32> {
     let mut state = seed;
     let mut next = || {

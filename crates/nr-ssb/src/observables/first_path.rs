@@ -68,7 +68,7 @@ const KNOWN: [fn(usize) -> f64; 2] = [
     |group| f64::from(16 + 4 * dmrs_of_sss(group) + sync(group)),
 ];
 
-/// Known elements of PSS and SSS, subcarriers 56 to 182.
+/// Returns the number of known elements of PSS and SSS (subcarriers 56 to 182) in a group.
 const fn sync(group: usize) -> u8 {
     match group {
         7..=21 => 16,
@@ -77,7 +77,7 @@ const fn sync(group: usize) -> u8 {
     }
 }
 
-/// DM-RS of a group in the symbol of the SSS.
+/// Returns the number of DM-RS elements of a group in the symbol of the SSS.
 const fn dmrs_of_sss(group: usize) -> u8 {
     match group {
         0..=5 | 24.. => 2,

@@ -94,8 +94,9 @@ impl Searcher {
         self.push_with(antennas, &mut |_, _| {})
     }
 
-    /// Like [`push`](Self::push), and passes every SSB to `inspect` upon detection, stronger ones
-    /// first. Its payload may become known later, from another SSB.
+    /// Processes a block like [`push`](Self::push), and passes every SSB to `inspect` upon
+    /// detection, stronger ones first. The payload of an SSB may become known later, from another
+    /// SSB.
     ///
     /// # Errors
     /// Those of [`push`](Self::push).

@@ -73,8 +73,9 @@ fn every_annotated_ssb_is_found_by_a_blind_search() {
     }
 }
 
-/// A recording of an operator contains weaker cells in addition to the annotated one. A false cell
-/// would have another time or message than the network.
+/// Asserts that weaker cells are cells of the same network. A recording of an operator contains
+/// weaker cells in addition to the annotated one. A false cell would have another time or message
+/// than the network.
 fn weaker_cells_belong_to_the_network(name: &str, annotations: &[Value], ssbs: &[DetectedSsb]) {
     let strong = ssbs.iter().filter(|ssb| ssb.snr_db > 0.0).count();
     assert_eq!(strong, annotations.len(), "{name}");

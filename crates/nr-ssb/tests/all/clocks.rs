@@ -116,9 +116,9 @@ impl Tally {
         }
     }
 
-    /// The standard deviation of the SNR of one SSB at 0 dB is 0.3 dB: noise from 125 second
-    /// differences per antenna (64 degrees of freedom), power from 398 pilots. The distribution is
-    /// skewed: 3 of 1000 errors exceed 1 dB.
+    /// Asserts the limits of the errors. The standard deviation of the SNR of one SSB at 0 dB is
+    /// 0.3 dB: noise from 125 second differences per antenna (64 degrees of freedom), power from
+    /// 398 pilots. The distribution is skewed: 3 of 1000 errors exceed 1 dB.
     fn must_hold(&self) {
         println!("{self:?}");
         assert!(

@@ -8,8 +8,8 @@ use nr_ssb::search::{SearchConfig, SearchError, Searcher};
 use nr_ssb::{Complex32, SubcarrierSpacing};
 use proptest::prelude::*;
 
-/// Standard deviation of the frequency from the phase between PSS and SSS, 127 elements each:
-/// `1/(2π · 2T √(127 Σ snr))`.
+/// Returns the standard deviation of the frequency from the phase between PSS and SSS, 127 elements
+/// each: `1/(2π · 2T √(127 Σ snr))`.
 fn phase_bound_hz(spacing: SubcarrierSpacing, antennas: usize, snr_db: f64) -> f64 {
     let symbol_s = 274.0 / spacing.base_rate_hz();
     let snr = antennas as f64 * 10f64.powf(0.1 * snr_db);

@@ -33,7 +33,7 @@ fn pci(text: &str) -> Pci {
     Pci::new(number(text)).unwrap()
 }
 
-/// The first `count` bits of hexadecimal digits.
+/// Returns the first `count` bits of hexadecimal digits.
 fn bits(hex: &str, count: usize) -> Vec<u8> {
     let digits = hex.chars().map(|digit| digit.to_digit(16).unwrap());
     let bits = digits.flat_map(|digit| (0..4).rev().map(move |bit| (digit >> bit & 1) as u8));
@@ -45,12 +45,12 @@ fn packed(hex: &str, count: usize) -> u32 {
     bits.iter().fold(0, |word, bit| word << 1 | u32::from(*bit))
 }
 
-/// 1 for −1.
+/// Returns the signs as bits: 1 for −1.
 fn signs(sequence: &[f32]) -> Vec<u8> {
     sequence.iter().map(|x| u8::from(*x < 0.0)).collect()
 }
 
-/// QPSK symbols as bits (TS 38.211, 5.1.3).
+/// Returns QPSK symbols as bits (TS 38.211, 5.1.3).
 fn qpsk_bits(symbols: &[Complex32]) -> Vec<u8> {
     for symbol in symbols {
         assert!((symbol.norm() - 1.0).abs() < 1e-6);

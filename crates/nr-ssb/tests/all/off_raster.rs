@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 const RATE_HZ: f64 = 15.36e6;
 
-/// A recording of 3 ms with one SSB `offset_hz` off its centre at 0 dB, and its cell.
+/// Returns a recording of 3 ms with one SSB `offset_hz` off its centre at 0 dB, and its cell.
 fn off_raster(
     spacing: SubcarrierSpacing,
     offset_hz: f64,
@@ -24,7 +24,7 @@ fn off_raster(
     (cell.clone(), on_the_air(&cell, offset_hz, 0.0, &mut rng))
 }
 
-/// 3 ms of the cell on one antenna, its SSBs `offset_hz` off the recording's centre.
+/// Returns 3 ms of the cell on one antenna, with SSBs `offset_hz` from the centre of the recording.
 fn on_the_air(
     cell: &air::Cell,
     offset_hz: f64,

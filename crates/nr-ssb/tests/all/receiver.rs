@@ -10,7 +10,7 @@ const SPACING: SubcarrierSpacing = SubcarrierSpacing::Khz30;
 const RATE_HZ: f64 = 15.36e6;
 const PERIODS: usize = 8;
 
-/// Eight periods of two beams, the second of which is silent from the fourth to the sixth.
+/// Creates eight periods of two beams, the second of which is silent from the fourth to the sixth.
 fn cell_and_samples() -> (Cell, Vec<Vec<Complex32>>) {
     let mut cell = Cell::random(&mut rng(4), SPACING, 3);
     (cell.lmax, cell.ssb_indices, cell.ssb_freq_hz) = (Lmax::L8, vec![2, 5], 3.6e9);

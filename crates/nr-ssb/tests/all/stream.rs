@@ -73,7 +73,8 @@ fn all_cells_of_one_raster_point_are_found() {
     }
 }
 
-/// Interference on the PBCH's own symbols only, so that an SSB is found and does not decode alone.
+/// Adds interference to the symbols that contain only PBCH, so that an SSB is detected but cannot
+/// be decoded by itself.
 fn disturb_pbch(samples: &mut [Vec<nr_ssb::Complex32>], start: f64, seed: u64) {
     for symbol in [1, 3] {
         let first = start as usize + 274 * symbol;

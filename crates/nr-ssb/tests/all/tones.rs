@@ -30,7 +30,7 @@ fn add_tone(samples: &mut [Vec<Complex32>], cycles: f64, above_ssb_db: f64, rng:
     }
 }
 
-/// A cell with one SSB in 20 ms.
+/// Creates a cell with one SSB in 20 ms.
 fn scene(seed: u64, antennas: usize, snr_db: f64) -> (Cell, Vec<Vec<Complex32>>, ChaCha8Rng) {
     let mut rng = rng(seed);
     let cell = Cell::random(&mut rng, SPACING, antennas);
@@ -132,7 +132,7 @@ fn tones_do_not_change_the_phases_between_antennas() {
     assert!(strong < 1.1 * without, "{strong} {without}");
 }
 
-/// Three periods of a cell at the base rate.
+/// Creates three periods of a cell at the base rate.
 fn three_periods(seed: u64, above_ssb_db: f64, cycles: f64) -> (Cell, Vec<Vec<Complex32>>) {
     let mut rng = rng(seed);
     let mut cell = Cell::random(&mut rng, SPACING, 2);

@@ -8,7 +8,7 @@ use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
 const SPACING: SubcarrierSpacing = SubcarrierSpacing::Khz30;
 const HALF_FRAME: usize = 38_400;
 
-/// A cell with two beams at Lmax 8, received by four antennas at this SNR.
+/// Creates a cell with two beams at Lmax 8, received by four antennas at this SNR.
 fn scene(seed: u64, snr_db: f64) -> (air::Cell, SearchConfig, Vec<Vec<Complex32>>) {
     let mut cell = air::Cell::random(&mut air::rng(seed), SPACING, 4);
     cell.lmax = Lmax::L8;

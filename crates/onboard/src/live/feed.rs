@@ -187,7 +187,7 @@ impl Live {
         Ok(continuity)
     }
 
-    /// Like [`samples`](Self::samples), but bursts are processed only when
+    /// Processes samples like [`samples`](Self::samples), but bursts only when
     /// [`process_until`](Self::process_until) is called: for recordings, whose odometry is read in
     /// advance.
     ///

@@ -6,7 +6,8 @@ const RATE_ERROR: f64 = 1e-4;
 /// Minimum time by which a block of a restarted stream precedes the end of the last block (s).
 const RESTART_S: f64 = 1.0;
 
-/// Resolution of the time of a block, in seconds: that of the number, and one sample.
+/// Returns the resolution of the time of a block, in seconds: the spacing of floating-point numbers
+/// at this time, plus one sample.
 fn resolution_s(time_s: f64, rate_hz: f64) -> f64 {
     (2.0 * time_s.abs() * f64::EPSILON).max(1.0 / rate_hz)
 }

@@ -110,7 +110,7 @@ fn hint(unit: Option<TimeUnit>) -> String {
 }
 
 impl TimeDefect {
-    /// Short name for counters and to group events.
+    /// Returns a short name for counters and for grouping events.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::NotFinite { .. } => "time not finite",
@@ -144,7 +144,7 @@ struct Stamp {
 }
 
 impl Stamp {
-    /// Time stamp minus arrival time, in seconds.
+    /// Returns the time stamp minus the arrival time, in seconds.
     fn lead_s(&self) -> Option<f64> {
         Some(self.time_s - self.arrival_s?)
     }
@@ -204,7 +204,7 @@ impl Run {
                 .is_none_or(|waited_s| waited_s >= RUN_S && (lasted_s - waited_s).abs() <= JITTER_S)
     }
 
-    /// Mean time between two messages, in seconds.
+    /// Returns the mean time between two messages, in seconds.
     fn spacing_s(&self) -> f64 {
         let steps = self.count.saturating_sub(1).max(1);
         (self.last.time_s - self.first.time_s) / f64::from(steps)
@@ -224,12 +224,13 @@ pub struct TimeCheck {
 }
 
 impl TimeCheck {
-    /// Time of the last accepted message, in seconds.
+    /// Returns the time of the last accepted message, in seconds.
     pub fn last_s(&self) -> Option<f64> {
         self.last.map(|it| it.time_s)
     }
 
-    /// Time since the last accepted message by the arrivals, in seconds; `None` without arrival times.
+    /// Returns the time since the last accepted message according to the arrival times, in seconds;
+    /// `None` without arrival times.
     pub fn waited_s(&self, arrival_s: Option<f64>) -> Option<f64> {
         let now = Stamp {
             time_s: 0.0,

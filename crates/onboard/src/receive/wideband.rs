@@ -281,7 +281,7 @@ impl Scatter {
         Some(scatter)
     }
 
-    /// `L⁻¹ v`.
+    /// Returns `L⁻¹ v`.
     fn whitened(&self, v: &Band) -> Band {
         let mut white = [Complex64::ZERO; GROUPS];
         for (i, row) in self.factor.iter().enumerate() {
@@ -310,7 +310,7 @@ fn delayed(band: &Band, delay: f64) -> Band {
     })
 }
 
-/// Σ a* b.
+/// Returns the inner product `Σ a* b`.
 fn product(a: &Band, b: &Band) -> Complex64 {
     a.iter().zip(b).map(|(a, b)| a.conj() * b).sum()
 }

@@ -384,7 +384,7 @@ fn solve(bands: Vec<[f64; 3]>, mut right: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 mod tests {
     use super::*;
 
-    /// A left bend of 20 m radius between straights, sampled at a spacing.
+    /// Creates a left bend of 20 m radius between straights, sampled at a spacing.
     fn bend(spacing_m: f64) -> (Road, Road) {
         let segment = |length_m: f64, turn_rad: f64| super::super::build::Segment {
             length_m,

@@ -79,7 +79,7 @@ impl Default for FaultProbability {
 }
 
 impl IntegritySettings {
-    /// Integrity monitoring switched off: every source is trusted.
+    /// Returns settings without integrity monitoring: every source is trusted.
     pub fn off() -> Self {
         Self {
             enabled: false,

@@ -104,7 +104,7 @@ impl Default for SsbSettings {
 }
 
 impl SsbSettings {
-    /// Period in seconds.
+    /// Returns the period in seconds.
     pub fn period_s(&self) -> f64 {
         self.period_ms * 1e-3
     }

@@ -89,7 +89,7 @@ impl Default for RangingSettings {
 const UNSTATED_SCALE_STD: f64 = 0.1;
 
 impl RangingSettings {
-    /// Standard deviation of the relative scale error.
+    /// Returns the standard deviation of the relative scale error.
     pub fn scale_std(&self) -> f64 {
         self.scale_std.unwrap_or(match self.kind {
             RangingKind::TwoWay => UNSTATED_SCALE_STD,

@@ -230,7 +230,7 @@ fn refuse_not_finite(value: &Value, path: &str, file: &str) -> Result<(), Settin
     }
 }
 
-/// `path.key`.
+/// Returns `path.key`.
 pub fn join(path: &str, key: &str) -> String {
     if path.is_empty() {
         key.to_owned()

@@ -64,7 +64,7 @@ const fn fair_weather() -> f64 {
 pub const SPEED_OF_LIGHT_MPS: f64 = 299_792_458.0;
 
 impl Site {
-    /// Wavelength of the carrier in metres.
+    /// Returns the wavelength of the carrier in metres.
     pub fn wavelength_m(&self) -> f64 {
         SPEED_OF_LIGHT_MPS / (self.carrier_mhz * 1e6)
     }

@@ -121,7 +121,7 @@ impl Vehicle {
             && matches!(self.localizer, LocalizerSettings::Tracker(_))
     }
 
-    /// Top speed in m/s.
+    /// Returns the top speed in m/s.
     pub fn top_speed_mps(&self) -> f64 {
         self.top_speed_kmh / 3.6
     }

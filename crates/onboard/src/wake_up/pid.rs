@@ -25,7 +25,7 @@ pub struct Pid {
 }
 
 impl Pid {
-    /// Lines 1–6: `Initialize`.
+    /// Creates the controller: lines 1–6 of the algorithm, `Initialize`.
     pub fn new(settings: &PidSettings, base_s: f64, max_s: f64) -> Self {
         Self {
             kp: settings.kp,                           // 2
@@ -48,7 +48,8 @@ impl Pid {
         }
     }
 
-    /// Lines 7–18: `CalculateWakeUpTime`.
+    /// Calculates the time until the next wake-up: lines 7–18 of the algorithm,
+    /// `CalculateWakeUpTime`.
     pub fn calculate_wake_up_time(
         &mut self,
         snr_error: f64,

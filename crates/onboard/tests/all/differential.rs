@@ -20,7 +20,8 @@ position_std_m = 0.01
 heading_std_rad = 0.005
 ";
 
-/// Five metres, a quarter turn to the left on the spot, five metres; each at 50 samples a second.
+/// Returns the odometry of three sections, at 50 samples per second: five metres, a left turn by
+/// 90° on the spot, and five metres.
 fn legs(sees_turns: bool) -> Vec<OdometrySample> {
     let (mut samples, mut distance_m) = (Vec::new(), 0.0);
     for (seconds, speed_mps, yaw_rate_radps) in [

@@ -41,7 +41,7 @@ fn tracker(at_m: f64, aside_m: f64, position_std_m: f64) -> (Ekf, Gap) {
     (Ekf::new(config, Some(map), &[], &start), gap)
 }
 
-/// Odometry at 4 m/s.
+/// Returns an odometry sample at 4 m/s.
 fn sample(number: u32) -> OdometrySample {
     let time_s = 0.02 * f64::from(number);
     OdometrySample {

@@ -43,13 +43,13 @@ struct Kinds {
 }
 
 impl Kinds {
-    /// Random walk of the vehicle clock (ns/√s): that of an OCXO with carrier phases.
+    /// Returns the random walk of the vehicle clock (ns/√s): with carrier phases, that of an OCXO.
     const fn wander_ns(self) -> f64 {
         if self.phase { 0.003 } else { 0.1 }
     }
 
-    /// Standard deviation of a range rate (m/s) and its interval (s): of a phase difference, or
-    /// within an SSB next to carrier phases.
+    /// Returns the standard deviation of a range rate (m/s) and its time interval (s): that of a
+    /// phase difference; with carrier phases, that of the measurement within an SSB.
     const fn rate(self) -> [f64; 2] {
         if self.phase {
             [0.3, 2e-4]
@@ -225,7 +225,8 @@ impl Bound {
     }
 }
 
-/// Variance of a range rate: noise, the clock within its interval, and the odometer's speed.
+/// Returns the variance of a range rate, due to noise, the clock within the interval, and the speed
+/// of the odometer.
 fn rate_variance(rate_mps: f64, kinds: Kinds) -> f64 {
     let [sigma_mps, interval_s] = kinds.rate();
     let along = rate_mps / SPEED_MPS;
@@ -234,7 +235,8 @@ fn rate_variance(rate_mps: f64, kinds: Kinds) -> f64 {
         + along * along * speed_variance()
 }
 
-/// Variance of the odometer's speed, whose error the rates of all radio heads share.
+/// Returns the variance of the speed of the odometer. The range rates of all radio heads share its
+/// error.
 fn speed_variance() -> f64 {
     SPEED_NOISE_MPS.powi(2) + ODOMETER_NOISE.powi(2) * SPEED_MPS / STEP_S
 }

@@ -220,7 +220,7 @@ fn any_oscillator_is_found_from_cold_and_sleep_is_bridged() {
     }
 }
 
-/// A vehicle clock that is 3 ppm fast, and beams that arrive together.
+/// Creates a channel with a vehicle clock that is 3 ppm fast, and beams that arrive together.
 fn ranging_air() -> Air {
     let mut air = Air::new(SubcarrierSpacing::Khz30, 3.0, 15.0, 3);
     air.cell.gains = vec![Complex32::ONE; 4];

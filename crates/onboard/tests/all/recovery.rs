@@ -121,8 +121,8 @@ impl Drive {
     }
 }
 
-/// Ninety seconds of a winding path in the hall: returns the maximum error after sixty seconds, and
-/// whether a search relocated the vehicle.
+/// Drives a winding path in the hall for 90 s: returns the maximum error after 60 s, and whether a
+/// search relocated the vehicle.
 fn drive(start: Pose) -> (f64, bool) {
     let mut drive = Drive::new(start);
     let worst_m = drive.wind(90.0, 60.0);

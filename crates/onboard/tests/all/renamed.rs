@@ -27,7 +27,7 @@ impl Library for WithOldFile {
     }
 }
 
-/// File, old key and new key of the error.
+/// Returns the file, the old key and the new key of the error.
 fn refusal(outcome: Result<Vehicle, SettingsError>) -> [String; 3] {
     match outcome.unwrap_err() {
         SettingsError::RenamedKey { file, key, new } => [file, key, new],

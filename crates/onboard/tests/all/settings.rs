@@ -41,7 +41,7 @@ fn site(text: &str) -> Result<Site, SettingsError> {
     Site::from_toml(text, "site.toml", &EMPTY)
 }
 
-/// File, key and what is allowed there.
+/// Returns the file, the key and the allowed values of the error.
 fn refusal<T>(outcome: Result<T, SettingsError>) -> (String, String, String) {
     let error = outcome.map(drop).unwrap_err();
     let message = error.to_string();

@@ -66,7 +66,8 @@ const CORRIDOR: Environment = Environment {
 };
 
 impl Environment {
-    /// Pose after a distance along the path, counter-clockwise from the middle of the lower straight.
+    /// Returns the pose after a distance along the path, counter-clockwise from the middle of the
+    /// lower straight.
     fn pose(&self, distance_m: f64) -> Pose {
         let half_m = 0.5 * self.straight_m;
         let bend_m = PI * self.radius_m;

@@ -13,7 +13,7 @@ use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
 
 const PERIOD_S: f64 = 0.1;
 
-/// A road of a straight and a bend of 30 m radius.
+/// Creates a road that consists of a straight and a bend of 30 m radius.
 fn road() -> Road {
     let text = "name = 'bend'\nradio_heads = [{ position_m = [50.0, 50.0, 0.0] }]\n[road]\n\
                 segments = [{ length_m = 40.0 }, { length_m = 45.0, turn_rad = 1.5 }]";
@@ -21,8 +21,8 @@ fn road() -> Road {
     site.build_road().unwrap().unwrap()
 }
 
-/// A tracker with a good gyroscope and a poor odometer at the beginning of the road, with a map of
-/// it or without.
+/// Creates a tracker with a good gyroscope and a poor odometer at the beginning of the road, with
+/// or without a map of the road.
 fn tracker(map: bool, position_std_m: f64) -> Ekf {
     let site = Site::from_library("trip-1", &Shipped).unwrap();
     let text = "name = 'tug'\n[gyroscope]\nnoise_rad_per_sqrt_s = 1e-4\n\

@@ -58,13 +58,13 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Samples per second and antenna.
+    /// Returns the sample rate in samples per second.
     pub fn rate_hz(&self) -> f64 {
         self.factor as f64 * SPACING.base_rate_hz()
     }
 
-    /// One SSB in each of `bursts` periods of 20 ms in white noise; at twice the base rate off the centre
-    /// if `is_wide`.
+    /// Creates one SSB in each of `bursts` periods of 20 ms in white noise. If `is_wide`, the
+    /// samples have twice the base rate and the SSB is off their centre.
     fn new(
         seed: u64,
         (antennas, snr_db): (usize, f64),
@@ -105,7 +105,8 @@ impl Scene {
         (scene, rng)
     }
 
-    /// The samples with tones of this power, and the tones' frequencies from the samples' centre.
+    /// Returns the samples with tones of this power, and the frequencies of the tones relative to
+    /// the centre of the samples.
     fn disturbed(
         &self,
         (place, count): (&str, usize),
@@ -223,7 +224,7 @@ fn main() {
     }
 }
 
-/// RMS errors of angles, with and without a DC offset, at a CFO of 3 kHz.
+/// Prints the RMS errors of angles, with and without a DC offset, at a CFO of 3 kHz.
 fn angles(trials: u64) {
     println!(
         "angle: DC offset above the SSB in dB, RMS error in degrees; CFO 3 kHz, four antennas, 20 dB"

@@ -92,12 +92,12 @@ pub struct Capture {
 }
 
 impl Capture {
-    /// Index of the first sample since the start of the receiver (`core:global_index`).
+    /// Returns the index of the first sample since the start of the receiver (`core:global_index`).
     pub fn global_index(&self) -> Option<u64> {
         self.other.get("core:global_index").and_then(Value::as_u64)
     }
 
-    /// Date of the first sample as written (`core:datetime`).
+    /// Returns the date of the first sample as written (`core:datetime`).
     pub fn datetime(&self) -> Option<&str> {
         self.other.get("core:datetime").and_then(Value::as_str)
     }

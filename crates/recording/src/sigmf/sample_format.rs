@@ -46,7 +46,7 @@ pub fn contradiction(stated: Datatype, bytes: &[u8]) -> Option<Datatype> {
 mod tests {
     use super::*;
 
-    /// Uniformly distributed values in ±1 from a linear congruential generator.
+    /// Returns uniformly distributed values in ±1 from a linear congruential generator.
     fn noise() -> impl Iterator<Item = f64> {
         let mut state = 1_u64;
         std::iter::repeat_with(move || {

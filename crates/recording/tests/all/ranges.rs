@@ -109,7 +109,7 @@ const VEHICLE: &str = "name = \"robot\"\ndrive = \"differential\"\n\
                        [start]\npose = [0.0, 0.0, 0.0]\n";
 const SITE: &str = "name = \"hall\"\n[[radio_heads]]\npci = 1\nposition_m = [30.0, 5.0, 3.0]\n";
 
-/// Folder of the drive, if it exists.
+/// Returns the folder of the drive, if it exists.
 fn data() -> Option<PathBuf> {
     common::data_dir().map(|it| it.join("ranges/plaza1"))
 }
@@ -194,8 +194,8 @@ impl Plaza {
         locate_ranges(&self.site, &carrier, start, &self.odometry, &self.log).unwrap()
     }
 
-    /// Squared error (m²) and NEES of both axes per pose, and whether the pose is `ok` and whether
-    /// its error exceeds the level; after `from_s`.
+    /// Compares the poses after `from_s` with the truth: squared error (m²) and NEES of both axes
+    /// per pose, whether the pose is `ok`, and whether its error exceeds the protection level.
     fn compare(&self, drive: &LocatedDrive, from_s: f64) -> Comparison {
         let mut sums = Comparison::default();
         let mut at = 0;

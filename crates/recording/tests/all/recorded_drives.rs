@@ -211,7 +211,7 @@ fn odometry_is_read_from_mcap() {
     );
 }
 
-/// Compressed chunks of the same messages, as most recorders write them.
+/// Rewrites a file with compressed chunks of the same messages, as most recorders write them.
 fn compress(file: &Path, compression: Compression) {
     let whole = fs::read(file).unwrap();
     let options = WriteOptions::new()

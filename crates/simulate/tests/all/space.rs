@@ -7,8 +7,8 @@ use toml::Value;
 
 use crate::common::{campaign, changed, unguarded, value};
 
-/// Radio heads at a height of 8 m, and an array 1.2 m above and 0.8 m in front of the odometer's
-/// reference point.
+/// Returns a scenario with radio heads at a height of 8 m, and an array 1.2 m above and 0.8 m in
+/// front of the odometer's reference point.
 fn high() -> Scenario {
     let mut changes: Vec<(String, Value)> = Vec::new();
     for (index, head) in unguarded("paper-real-odometry-4")

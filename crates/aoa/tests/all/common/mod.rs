@@ -22,7 +22,7 @@ impl Random {
         Self(ChaCha8Rng::seed_from_u64(seed))
     }
 
-    /// Circular complex Gaussian of unit variance.
+    /// Returns a circularly symmetric complex Gaussian number of unit variance.
     pub fn gaussian(&mut self) -> Complex64 {
         let [re, im]: [f64; 2] = std::array::from_fn(|_| StandardNormal.sample(&mut self.0));
         Complex64::new(re, im) * 0.5_f64.sqrt()

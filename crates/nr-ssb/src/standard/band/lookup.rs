@@ -45,8 +45,9 @@ pub struct LikelyLmax {
     pub certain: bool,
 }
 
-/// The sizes that the bands at a frequency leave open. Where no band is, any pattern of that spacing
-/// may be; without a frequency, 15 kHz speaks for bands below 3 GHz and 30 kHz for those above.
+/// Returns the burst set sizes of the bands at a frequency. Outside all bands, every SSB pattern of
+/// the spacing is possible. Without a frequency, 15 kHz indicates a band below 3 GHz, and 30 kHz a
+/// band above.
 ///
 /// ```
 /// use nr_ssb::{Lmax, SubcarrierSpacing::Khz30, band::likely_lmax};

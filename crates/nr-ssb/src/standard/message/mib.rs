@@ -57,16 +57,18 @@ pub struct Mib {
 }
 
 impl Mib {
-    /// `controlResourceSetZero`, 0 to 15: row of TS 38.213 Tables 13-1 to 13-10.
+    /// Returns `controlResourceSetZero`, 0 to 15: the row of TS 38.213 Tables 13-1 to 13-10.
     pub const fn control_resource_set_zero(&self) -> u8 {
         self.pdcch_config_sib1 >> 4
     }
 
-    /// `searchSpaceZero`, 0 to 15: row of TS 38.213 Tables 13-11 to 13-15.
+    /// Returns `searchSpaceZero`, 0 to 15: the row of TS 38.213 Tables 13-11 to 13-15.
     pub const fn search_space_zero(&self) -> u8 {
         self.pdcch_config_sib1 & 0xF
     }
 
+    /// Checks the ranges of all fields.
+    ///
     /// # Errors
     /// [`Error::MibField`] for a field beyond its bits.
     pub fn check(&self) -> Result<(), Error> {
@@ -95,7 +97,7 @@ impl Mib {
             | u32::from(self.spare)
     }
 
-    /// Inverse of [`bits`](Self::bits).
+    /// Decodes a MIB; inverse of [`bits`](Self::bits).
     ///
     /// # Errors
     /// [`Error::MibTooLong`] beyond 24 bits; [`Error::MessageClassExtension`] if the choice bit is 1.

@@ -91,6 +91,8 @@ impl BchPayload {
         Ok(payload)
     }
 
+    /// Checks the ranges of all fields.
+    ///
     /// # Errors
     /// [`Error::MibField`] for a field beyond its bits, [`Error::SsbIndex`] beyond 63.
     pub fn check(&self) -> Result<(), Error> {
@@ -153,8 +155,8 @@ impl BchPayload {
             })
     }
 
-    /// Inverse of [`bits`](Self::bits), for an SSB with the low index bits `index_lsb`
-    /// ([`Lmax::index_lsb`]).
+    /// Decodes a payload; inverse of [`bits`](Self::bits), for an SSB with the low index bits
+    /// `index_lsb` ([`Lmax::index_lsb`]).
     ///
     /// # Errors
     /// [`Error::MessageClassExtension`] if the payload holds no MIB.

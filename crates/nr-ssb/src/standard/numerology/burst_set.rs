@@ -35,6 +35,8 @@ impl Lmax {
         }
     }
 
+    /// Checks that the burst set contains an SSB index.
+    ///
     /// # Errors
     /// [`Error::SsbIndex`] for an index that this burst set does not have.
     pub fn check_index(self, index: u8) -> Result<(), Error> {

@@ -23,6 +23,8 @@ pub struct Numerology {
 }
 
 impl Numerology {
+    /// Creates a numerology with `fft_size` samples per OFDM symbol without its cyclic prefix.
+    ///
     /// # Errors
     /// [`Error::FftSize`] unless `fft_size` is a positive multiple of 256.
     pub fn new(spacing: SubcarrierSpacing, fft_size: usize) -> Result<Self, Error> {
@@ -46,32 +48,33 @@ impl Numerology {
         Self::new(spacing, 256 * multiple as usize)
     }
 
-    /// The subcarrier spacing.
+    /// Returns the subcarrier spacing.
     pub const fn spacing(self) -> SubcarrierSpacing {
         self.spacing
     }
 
-    /// Samples of an OFDM symbol without its cyclic prefix.
+    /// Returns the number of samples of an OFDM symbol without its cyclic prefix.
     pub const fn fft_size(self) -> usize {
         self.fft_size
     }
 
-    /// In hertz.
+    /// Returns the sample rate in hertz.
     pub fn sample_rate_hz(self) -> f64 {
         self.fft_size as f64 * self.spacing.hz()
     }
 
-    /// Samples of the cyclic prefix inside an SSB, 18 per 256.
+    /// Returns the number of samples of the cyclic prefix inside an SSB, 18 per 256.
     pub const fn ssb_cp_len(self) -> usize {
         9 * (self.fft_size / 128)
     }
 
-    /// Samples from one OFDM symbol of an SSB to the next, 274 per 256.
+    /// Returns the number of samples from one OFDM symbol of an SSB to the next, 274 per 256.
     pub const fn ssb_symbol_len(self) -> usize {
         self.fft_size + self.ssb_cp_len()
     }
 
-    /// Samples of the cyclic prefix of OFDM symbol `symbol` of the half frame.
+    /// Returns the number of samples of the cyclic prefix of OFDM symbol `symbol` of the half
+    /// frame.
     pub const fn cp_len(self, symbol: usize) -> usize {
         if symbol.is_multiple_of(self.spacing.symbols_per_half_ms()) {
             self.ssb_cp_len() + self.long_cp_extra()
@@ -80,18 +83,20 @@ impl Numerology {
         }
     }
 
-    /// First sample of the cyclic prefix of OFDM symbol `symbol`, from the start of the half frame.
+    /// Returns the first sample of the cyclic prefix of OFDM symbol `symbol`, from the start of the
+    /// half frame.
     pub const fn symbol_start(self, symbol: usize) -> usize {
         let long_ones_before = symbol.div_ceil(self.spacing.symbols_per_half_ms());
         symbol * self.ssb_symbol_len() + long_ones_before * self.long_cp_extra()
     }
 
-    /// Samples of a half frame of 5 ms.
+    /// Returns the number of samples of a half frame of 5 ms.
     pub const fn half_frame_len(self) -> usize {
         self.symbol_start(self.spacing.symbols_per_half_frame())
     }
 
-    /// 16κ: 16 samples at 30.72 Msps.
+    /// Returns the additional samples of a long cyclic prefix: 16κ, which are 16 samples at 30.72
+    /// Msps.
     const fn long_cp_extra(self) -> usize {
         self.fft_size / 128 * (self.spacing.khz() / 15) as usize
     }

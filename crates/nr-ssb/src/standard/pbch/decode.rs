@@ -68,7 +68,8 @@ pub struct Decoder {
 }
 
 impl Default for Decoder {
-    /// List of 8 paths, and a second attempt with 32 paths if no path has a correct CRC.
+    /// Creates a decoder with a list of 8 paths, and a second attempt with 32 paths if no path has
+    /// a correct CRC.
     fn default() -> Self {
         Self {
             retry: Some(ListDecoder::with_list_of::<32>()),

@@ -19,9 +19,9 @@ pub fn ibar_ssb(lmax: Lmax, ssb_index: u8, half_frame: bool) -> u8 {
     }
 }
 
-/// r(m) = ((1 − 2c(2m)) + j(1 − 2c(2m+1)))/√2 in the order of
-/// [`dmrs_indices`](crate::grid::dmrs_indices) (TS 38.211 §7.4.1.4.1), with
-/// c_init = 2¹¹(i̅+1)(⌊PCI/4⌋+1) + 2⁶(i̅+1) + PCI mod 4.
+/// Returns the DM-RS sequence r(m) = ((1 − 2c(2m)) + j(1 − 2c(2m+1)))/√2 in the order of
+/// [`dmrs_indices`](crate::grid::dmrs_indices) (TS 38.211 §7.4.1.4.1), with c_init =
+/// 2¹¹(i̅+1)(⌊PCI/4⌋+1) + 2⁶(i̅+1) + PCI mod 4.
 ///
 /// `ibar_ssb` is 0 to 7, see [`ibar_ssb`].
 pub fn dmrs(pci: Pci, ibar_ssb: u8) -> [Complex32; DMRS_LEN] {

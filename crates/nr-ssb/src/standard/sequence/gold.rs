@@ -98,7 +98,7 @@ impl Iterator for Gold {
 mod tests {
     use super::*;
 
-    /// Reference: the definition, one sample at a time.
+    /// Returns the sequence by its definition, one sample at a time, as a reference.
     fn naive(c_init: u32, length: usize) -> Vec<u8> {
         let total = length + NC as usize + 31;
         let mut x1 = vec![0u8; total];

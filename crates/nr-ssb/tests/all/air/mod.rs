@@ -33,7 +33,7 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// A random cell of one SSB with unit gains of random phase.
+    /// Creates a random cell of one SSB with unit gains of random phase.
     pub fn random(rng: &mut ChaCha8Rng, spacing: SubcarrierSpacing, antennas: usize) -> Self {
         let lmax = match spacing {
             SubcarrierSpacing::Khz120 | SubcarrierSpacing::Khz240 => Lmax::L64,
@@ -159,7 +159,7 @@ pub fn resampled(samples: &[Complex32], up: usize, down: usize) -> Vec<Complex32
     wide.iter().map(|x| x / n as f32).collect()
 }
 
-/// Noise such that a resource element of unit gain has this SNR.
+/// Adds noise such that a resource element of unit gain has this SNR.
 pub fn add_noise(antennas: &mut [Vec<Complex32>], snr_db: f64, rng: &mut ChaCha8Rng) {
     let scale = (0.5 / 256.0 / 10f64.powf(0.1 * snr_db)).sqrt() as f32;
     for sample in antennas.iter_mut().flatten() {

@@ -35,7 +35,7 @@ impl Vectors {
         bytes
     }
 
-    /// One array, flattened in C order.
+    /// Returns an array, flattened in C order.
     pub fn array<T: Deserialize>(&self, key: &str) -> Vec<T> {
         let npy = self.npy(key);
         let array = NpyFile::new(&*npy).unwrap();
@@ -43,7 +43,7 @@ impl Vectors {
         array.into_vec().unwrap()
     }
 
-    /// A zero-dimensional array of text (NumPy's UTF-32).
+    /// Returns a zero-dimensional array of text (NumPy's UTF-32).
     pub fn text(&self, key: &str) -> String {
         let npy = self.npy(key);
         let mut bytes = Vec::new();
@@ -67,7 +67,7 @@ pub struct Cell {
     pub payload: BchPayload,
 }
 
-/// All cells of `pbch.npz` or `pbch_extra.npz`.
+/// Returns all cells of `pbch.npz` or `pbch_extra.npz`.
 pub fn cells(vectors: &Vectors) -> Vec<Cell> {
     let column = |key| vectors.array::<i32>(key);
     let (pci, lmax, index) = (column("pci"), column("lmax"), column("ssb_idx"));

@@ -22,7 +22,7 @@ impl Recording {
     }
 }
 
-/// All recordings with an `nr:ssb` annotation.
+/// Returns all recordings with an `nr:ssb` annotation.
 pub fn annotated() -> Vec<Recording> {
     let dir = data_dir();
     assert!(dir.is_dir(), "no recordings at {}", dir.display());

@@ -423,8 +423,8 @@ mod tests {
     /// With this prior probability, all levels are equally probable.
     const EVEN: f64 = 0.75;
 
-    /// A state with a standard deviation of one radian, whose first component is measured by
-    /// angles.
+    /// Returns a state with a standard deviation of one radian, whose first component is measured
+    /// by angles.
     fn unknown() -> Belief {
         let mut sigma = [0.0; STATES];
         (sigma[0], sigma[1]) = (1.0, 0.5);
@@ -452,7 +452,7 @@ mod tests {
 
     const ALL: usize = STATES + 2;
 
-    /// State and biases as one Gaussian.
+    /// Returns state and biases as one Gaussian.
     fn whole(belief: &Belief, errors: &MultipathBias) -> Gaussian<ALL> {
         let mut whole = Gaussian::<ALL>::independent([0.0; ALL], [0.0; ALL]);
         for i in 0..STATES {
@@ -482,7 +482,7 @@ mod tests {
         }
     }
 
-    /// Mixture over all hypotheses of an angle, each updated separately.
+    /// Returns the mixture over all hypotheses of an angle, each updated separately.
     fn mixture(
         before: &Gaussian<ALL>,
         levels: [f64; LEVELS],

@@ -391,7 +391,8 @@ mod tests {
         position_std_m: 0.0,
     };
 
-    /// State (s, d, ψ) on a circle of radius 1/κ through the origin, with heading +x.
+    /// Returns pose and road frame for the state (s, d, ψ) on a circle of radius 1/κ through the
+    /// origin, with heading +x.
     fn on_circle(s: f64, d: f64, psi: f64, kappa: f64) -> (Pose, RoadFrame) {
         let lane = Pose::default().along_arc(s, kappa);
         let pose = lane.offset_left(d);

@@ -23,8 +23,9 @@ impl Ekf {
             .map(OffMap::Gap)
     }
 
-    /// Off the map, the curvature model without a map applies; along, across and heading are
-    /// unchanged. Back on the map, the lane constraint applies again.
+    /// Updates whether the vehicle is off the map. Off the map, the curvature model without a map
+    /// applies; along, across and heading are unchanged. Back on the map, the lane constraint
+    /// applies again.
     pub(super) fn update_off_map(&mut self) {
         let off_map = self.off_map();
         let (was_off, is_off) = (self.off_map.is_some(), off_map.is_some());

@@ -408,7 +408,8 @@ mod tests {
         steering_rad_per_sqrt_m: 0.0,
     };
 
-    /// Along, across, heading relative to the road, curvature of the path, odometer scale.
+    /// Creates a state from along, across, heading relative to the road, curvature of the path, and
+    /// odometer scale.
     fn state(values: [f64; 5]) -> [f64; STATES] {
         let mut state = [0.0; STATES];
         for (index, value) in [ALONG, ACROSS, HEADING, CURVATURE, SCALE]

@@ -220,11 +220,11 @@ impl IntegrityMonitor {
             main.odometer_departs() || (self.has_departed && !main.knows_odometer());
     }
 
-    /// If a fault is not identified, the filters may diverge so far that they reject correct angles
-    /// as outliers. A second bank then starts from a pose with the uncertainty of the elapsed
-    /// distance, and takes over once no test contradicts it. Until then, or until the first bank is
-    /// free of contradictions, the state is not `ok`. The result of a search with possibly faulty
-    /// angles is confirmed in the same way.
+    /// Starts or ends the recovery from an unidentified fault. If a fault is not identified, the
+    /// filters may diverge so far that they reject correct angles as outliers. A second bank then
+    /// starts from a pose with the uncertainty of the elapsed distance, and takes over once no test
+    /// contradicts it. Until then, or until the first bank is free of contradictions, the state is
+    /// not `ok`. The result of a search with possibly faulty angles is confirmed in the same way.
     fn recover(&mut self) {
         let (now_s, patience_s) = (self.now_s, RECOVERY_S);
         let lost = self.bank.is_lost();

@@ -551,8 +551,8 @@ mod tests {
     use crate::observation::MeasurementKind;
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
 
-    /// One minute of driving past four radio heads, of which number 2 has a bias of `bias_rad`;
-    /// `sinks` receive the measurements.
+    /// Simulates one minute of driving past four radio heads, of which number 2 has a bias of
+    /// `bias_rad`; `sinks` receive the measurements.
     fn drive(
         bias_rad: f64,
         mut sink: impl FnMut(Option<&OdometrySample>, usize, &AngleMeasurement),

@@ -146,7 +146,7 @@ mod tests {
     use super::*;
     use crate::gaussian::Innovation;
 
-    /// An angle with a specified standard deviation of 0.1 rad.
+    /// Predicts an angle with a specified standard deviation of 0.1 rad.
     fn predict_measurement(place_wavelengths: f64, residual: f64) -> ExcludedInnovation {
         ExcludedInnovation {
             innovation: Innovation {

@@ -141,7 +141,7 @@ impl Clone for Subsets {
         }
     }
 
-    /// Unused filters are kept for reuse.
+    /// Copies all subsets; keeps unused filters for reuse.
     fn clone_from(&mut self, source: &Self) {
         (self.used, self.angles) = (source.used, source.angles);
         self.last.clone_from(&source.last);

@@ -35,8 +35,8 @@ pub(super) fn message_of(u: &Codeword) -> u64 {
     })
 }
 
-/// u ← u·G_64, which is its own inverse. With leading zeros it is u·G_n for every smaller power of
-/// two.
+/// Computes u ← u·G_64, which is its own inverse. With leading zeros it is u·G_n for every smaller
+/// power of two.
 pub(super) const fn transform_word(mut word: u64) -> u64 {
     const BUTTERFLIES: [(u32, u64); 6] = [
         (1, 0x5555_5555_5555_5555),
@@ -55,7 +55,7 @@ pub(super) const fn transform_word(mut word: u64) -> u64 {
     word
 }
 
-/// u ← u·G_N, which is its own inverse: butterflies within the words, then between words.
+/// Computes u ← u·G_N, which is its own inverse: butterflies within the words, then between words.
 fn transform(u: &mut Codeword) {
     for word in u.iter_mut() {
         *word = transform_word(*word);

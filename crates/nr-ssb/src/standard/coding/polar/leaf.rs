@@ -107,7 +107,7 @@ fn walsh_function(walsh: usize) -> u64 {
         .fold(0, |word, (_, digit)| word ^ digit)
 }
 
-/// x(j) ← Σ x(i)·(−1)^{⟨i, j⟩}.
+/// Computes the Hadamard transform x(j) ← Σ x(i)·(−1)^{⟨i, j⟩}.
 fn hadamard(x: &mut [f32]) {
     let (quads, rest) = x.as_chunks_mut::<4>();
     for quad in quads {

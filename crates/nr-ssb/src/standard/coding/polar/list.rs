@@ -146,6 +146,8 @@ pub struct ListDecoder {
 }
 
 impl ListDecoder {
+    /// Creates a decoder for a list size.
+    ///
     /// # Errors
     /// [`Error::ListSize`] unless `list_size` is 1 to 32.
     pub fn new(list_size: usize) -> Result<Self, Error> {
