@@ -361,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_that_are_late_by_half_a_second_are_not_missing() {
+    fn samples_delayed_by_half_a_second_are_not_reported_as_missing() {
         let mut clock = ArrivalClock::new(RATE_HZ);
         let mut found = Vec::new();
         for number in 0..8_000 {
@@ -427,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn delays_that_vary_are_no_wrong_rate() {
+    fn varying_delays_are_not_reported_as_a_wrong_rate() {
         // The delay varies by 0.2 s with a period of 1.7 s.
         let mut clock = ArrivalClock::new(RATE_HZ);
         let found: Vec<Finding> = (0..20_000)

@@ -160,7 +160,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn measured_values_do_not_distinguish_causes_and_whole_numbers_do() {
+    fn integers_distinguish_causes_and_measured_values_do_not() {
         for (text, expected) in [
             (
                 "no data has arrived for 0.5 s",

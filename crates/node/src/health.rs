@@ -223,7 +223,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failure_and_its_recovery_are_one_change_each() {
+    fn a_failure_and_its_recovery_are_reported_once_each() {
         let health = OutputHealth::new("tum");
         health.fail("disk full".to_owned());
         health.count_dropped(3);

@@ -394,7 +394,7 @@ fn a_reader_that_closes_its_fifo_and_returns_gets_whole_lines_again() {
 }
 
 #[test]
-fn a_closed_standard_output_is_in_the_status_of_the_service() {
+fn a_closed_standard_output_is_reported_in_the_service_status() {
     let folder = scratch("closed-stdout");
     let manager = UnixDatagram::bind(folder.join("notify")).unwrap();
     manager

@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use common::{Node, odometry, scratch};
 
 #[test]
-fn sources_vanish_and_return_and_each_silence_is_reported_within_a_second() {
+fn interruptions_of_sources_are_reported_within_a_second() {
     let folder = scratch("vanish");
     let address = {
         let free = TcpListener::bind("127.0.0.1:0").unwrap();

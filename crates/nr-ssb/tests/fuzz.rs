@@ -14,7 +14,7 @@ mod receiver;
 mod short_run;
 
 #[test]
-fn no_ratios_make_the_decoder_panic() {
+fn no_likelihood_ratios_make_the_decoder_panic() {
     let seeds: Vec<Vec<u8>> = (0..=255_u8)
         .step_by(5)
         .map(|settings| {

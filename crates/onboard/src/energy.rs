@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn papers_mode_0() {
+    fn the_energy_of_mode_0_equals_that_of_the_paper() {
         let model = model(&platform("jetson-agx-xavier"), Extent::Value);
         let energy = model.run_energy(1005, 4018, 80.33);
         assert!(
@@ -325,7 +325,7 @@ mod tests {
     "#;
 
     #[test]
-    fn cycles_make_time_and_energy() {
+    fn time_and_energy_follow_from_cycles() {
         let platform = Platform::from_toml(CONTROLLED, "test", &Shipped).unwrap();
         let model = model(&platform, Extent::Value);
         let energy = model.run_energy(10, 100, 10.0);
@@ -360,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_hold_the_value_between_them() {
+    fn ranges_contain_the_value() {
         let platform = Platform::from_toml(CONTROLLED, "test", &Shipped).unwrap();
         let total_j = |extent| {
             model(&platform, extent)

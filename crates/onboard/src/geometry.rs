@@ -200,7 +200,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn angles_wrap_to_the_half_open_turn() {
+    fn angles_are_wrapped_to_a_half_open_interval() {
         for (angle, wrapped) in [
             (0.0, 0.0),
             (PI, PI),
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn arcs_are_continuous_into_straight_lines() {
+    fn arcs_converge_to_straight_lines() {
         let bent = Pose::default().along_arc(100.0, 2.1e-6);
         let barely = Pose::default().along_arc(100.0, 1.9e-6);
         assert!((bent.y_m - barely.y_m - 0.5 * 0.2e-6 * 1e4).abs() < 1e-9);

@@ -50,7 +50,7 @@ mod tests {
     use crate::settings::{Shipped, TomlFile};
 
     #[test]
-    fn papers_numbers_by_hand() {
+    fn the_link_budget_equals_that_of_the_paper() {
         let site = Site::from_library("paper", &Shipped).unwrap();
         let vehicle = Vehicle::from_library("paper", &Shipped).unwrap();
         let budget = LinkBudget::new(&site, &vehicle);

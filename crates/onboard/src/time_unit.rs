@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn a_unit_of_distances_is_no_unit_of_times() {
+    fn a_wrong_unit_of_distances_is_not_reported_as_a_unit_of_times() {
         let times = OdometryTimes {
             step_s: 0.05,
             moving_s: 60.0,

@@ -84,7 +84,7 @@ mod tests {
     use crate::settings::{Shipped, TomlFile, WallSettings};
 
     #[test]
-    fn a_concrete_wall_hides_a_radio_head_and_glass_attenuates_it() {
+    fn a_concrete_wall_blocks_a_radio_head_and_glass_attenuates_it() {
         let mut site = Site::from_library("yard", &Shipped).unwrap();
         let head = RadioHead {
             position: Point::new(0.0, 10.0),

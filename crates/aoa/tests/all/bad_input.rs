@@ -7,7 +7,7 @@ use aoa::{
 };
 
 #[test]
-fn each_invalid_input_has_its_error() {
+fn every_invalid_input_gives_a_specific_error() {
     let good = [Complex64::ONE; 4];
     assert_eq!(
         Covariance::<4>::from_snapshots(&[]),

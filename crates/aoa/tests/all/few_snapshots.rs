@@ -175,7 +175,7 @@ fn table_of_few_snapshots() {
 }
 
 #[test]
-fn a_circle_of_antennas_is_as_consistent_as_a_row() {
+fn errors_of_a_circular_array_are_consistent() {
     let array = ArbitraryArray::<5>::circular(0.4).unwrap();
     let finder = DirectionFinder::new(array, [0.0, 0.0]).unwrap();
     let mut random = Random::new(3);

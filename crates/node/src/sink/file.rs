@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stopped_file_is_cut_and_completed() {
+    fn a_stopped_file_is_truncated_and_completed() {
         let folder = scratch("complete");
         let path = folder.join("log");
         let mut file = GrowingFile::create_with_end(&path, b" end").unwrap();

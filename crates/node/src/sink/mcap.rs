@@ -440,7 +440,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_map_holds_odom_holds_the_vehicle() {
+    fn frames_are_nested_from_map_over_odom_to_the_vehicle() {
         let in_map = Pose {
             x_m: 3.0,
             y_m: -4.0,

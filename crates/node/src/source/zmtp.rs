@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn a_peer_must_greet_and_answer_requests() {
+    fn a_peer_without_greeting_or_answer_is_rejected() {
         let mut greeting = [0; 64];
         greeting[0] = 0xff;
         greeting[9..12].copy_from_slice(&[0x7f, 3, 1]);

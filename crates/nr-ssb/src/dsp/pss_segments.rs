@@ -469,7 +469,7 @@ mod tests {
     /// statistic is distributed as in noise: the sum of three powers of mean one exceeds 40 with a
     /// probability of 4e-15.
     #[test]
-    fn the_edge_of_an_empty_band_resembles_no_pss() {
+    fn the_edge_of_an_empty_band_gives_no_pss_detection() {
         let mut planner = FftPlanner::new();
         let (forward, inverse) = (
             planner.plan_fft_forward(8192),

@@ -136,7 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_ramp_gives_its_delay() {
+    fn the_delay_is_estimated_from_a_phase_ramp() {
         for truth in [-1.3, -0.25, 0.0, 0.113, 0.9] {
             let row: [Complex32; SUBCARRIERS] = std::array::from_fn(|k| {
                 let phase = -TAU * (k as f64 - 120.0) * truth / SYMBOL_FFT as f64;

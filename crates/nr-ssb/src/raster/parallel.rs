@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn results_come_in_order_and_the_first_error_counts() {
+    fn results_are_ordered_and_the_first_error_is_returned() {
         let items: Vec<u32> = (0..1000).collect();
         let squares = in_parallel(
             &items,

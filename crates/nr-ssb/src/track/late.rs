@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_delay_within_reach_is_found_to_a_tenth_of_a_sample() {
+    fn a_delay_within_the_search_range_is_estimated_to_a_tenth_of_a_sample() {
         let search = DelaySearch::new();
         for step in -55..=55 {
             let truth = 0.1 * f64::from(step);

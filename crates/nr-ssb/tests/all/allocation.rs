@@ -22,7 +22,7 @@ fn scene(snr_db: f64) -> (SearchConfig, Vec<Vec<nr_ssb::Complex32>>) {
 }
 
 #[test]
-fn the_counter_counts() {
+fn allocations_are_counted() {
     assert_eq!(
         allocations(|| drop(std::hint::black_box(vec![0_u8; 100]))),
         1

@@ -66,7 +66,7 @@ fn one_ssb_in_20_ms_is_decoded_by_one_antenna_at_minus_3_db() {
 /// probability of 0.33. A tenfold rate is detected here with a probability of 0.98. The example
 /// `false_cells` simulates enough searches to test 1e-3.
 #[test]
-fn noise_causes_no_cell() {
+fn noise_gives_no_detection() {
     let mut all = noise_only::Tally::default();
     for (antennas, searches) in [(1, 300), (4, 100)] {
         all.add(noise_only::search_noise(antennas, 0..searches));
@@ -86,7 +86,7 @@ fn the_upper_limit_is_that_of_clopper_and_pearson() {
 }
 
 #[test]
-fn bursts_in_silence_or_next_to_none_are_found() {
+fn bursts_without_or_with_little_noise_are_detected() {
     for trial in 0..24 {
         let mut rng = air::rng(trial);
         let spacing = [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30][trial as usize % 2];

@@ -51,7 +51,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn any_cell_is_read_exactly(seed: u64, wide: bool, rate in 1_usize..5, offset in -0.5..0.5_f64) {
+    fn every_cell_is_decoded_and_measured_exactly(seed: u64, wide: bool, rate in 1_usize..5, offset in -0.5..0.5_f64) {
         let spacing = if wide { SubcarrierSpacing::Khz30 } else { SubcarrierSpacing::Khz15 };
         let mut rng = air::rng(seed);
         let mut cell = air::Cell::random(&mut rng, spacing, 2);
@@ -195,7 +195,7 @@ fn invalid_input_is_reported() {
 
 /// Broken channels do not keep the healthy ones from finding the cell.
 #[test]
-fn channels_may_be_silent_broken_or_doubled() {
+fn cells_are_detected_despite_silent_broken_or_duplicated_channels() {
     let spacing = SubcarrierSpacing::Khz15;
     let mut rng = air::rng(9);
     let cell = air::Cell::random(&mut rng, spacing, 4);

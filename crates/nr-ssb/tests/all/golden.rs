@@ -85,7 +85,7 @@ fn sequences() {
 }
 
 #[test]
-fn places_in_the_grid() {
+fn positions_in_the_grid() {
     assert_eq!((pss_indices(), sss_indices()), (56..183, 536..663));
     let used = |indices: &[usize]| {
         assert!(indices.is_sorted());
@@ -104,7 +104,7 @@ fn places_in_the_grid() {
 }
 
 #[test]
-fn every_stage_of_the_pbch_and_back() {
+fn every_stage_of_pbch_encoding_and_decoding() {
     let mut decoder = Decoder::default();
     let mut chains = 0;
     for line in lines("pbch") {
@@ -187,7 +187,7 @@ fn cases_and_raster() {
 /// of the table. (In the shared spectrum n46 and n96, the first 20 MHz channel begins farther
 /// inside.)
 #[test]
-fn raster_entries_reach_from_edge_to_edge_of_their_bands() {
+fn raster_entries_cover_their_bands() {
     for band in band::all() {
         let [low_hz, high_hz] = band.downlink_mhz.map(|mhz| 1e6 * mhz);
         let points: Vec<_> = synchronization_raster(low_hz, high_hz).collect();

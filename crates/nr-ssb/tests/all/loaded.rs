@@ -24,7 +24,7 @@ fn loaded(rng: &mut ChaCha8Rng) -> Vec<Complex32> {
 }
 
 #[test]
-fn a_loaded_neighbour_offers_few_candidates_and_hides_no_weak_cell() {
+fn a_loaded_neighbour_gives_few_candidates_and_does_not_mask_a_weak_cell() {
     let trials = 40;
     let (mut found, mut most, mut false_cells) = (0, 0, 0);
     for trial in 0..trials {
@@ -61,7 +61,7 @@ fn a_loaded_neighbour_offers_few_candidates_and_hides_no_weak_cell() {
 
 /// A transmitter under test may send an undecodable PBCH; the cell is detected nevertheless.
 #[test]
-fn a_strong_cell_whose_message_fails_is_reported_without_it() {
+fn a_strong_cell_with_an_undecodable_message_is_reported_without_the_message() {
     let mut rng = air::rng(31);
     let mut cell = air::Cell::random(&mut rng, SPACING, 2);
     cell.lmax = Lmax::L8;

@@ -47,7 +47,7 @@ fn errors(ssbs: &[SsbErrors], of: Select) -> Vec<Error> {
 }
 
 #[test]
-fn errors_in_noise_reach_the_bound_and_their_standard_deviations() {
+fn errors_attain_the_bound_and_agree_with_their_standard_deviations() {
     let ssbs = received(&[0.0, 15.0, 30.0], 5, None);
     assert_eq!(ssbs.len(), 2 * 3 * 5 * (RUN - SETTLE));
     let quantities: [(&str, Select); 4] = [

@@ -28,7 +28,7 @@ fn few_block_errors_at_minus_8_db() {
 
 /// A list of 32 decodes most PBCHs that a list of 8 does not, without false messages.
 #[test]
-fn the_retry_finds_most_of_what_a_list_of_8_misses() {
+fn a_list_of_32_decodes_most_messages_that_a_list_of_8_does_not() {
     let blocks = 4000;
     let alone = block_errors(&mut Decoder::new(8).unwrap(), -8.0, blocks, 2);
     let retried = block_errors(&mut Decoder::default(), -8.0, blocks, 2);

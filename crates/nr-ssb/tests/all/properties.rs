@@ -43,7 +43,7 @@ fn any_cell() -> impl Strategy<Value = (Pci, Lmax, BchPayload)> {
 
 proptest! {
     #[test]
-    fn what_is_encoded_is_decoded((pci, lmax, payload) in any_cell(), list_size in 1..=32_usize) {
+    fn encoded_messages_are_decoded((pci, lmax, payload) in any_cell(), list_size in 1..=32_usize) {
         let symbols = pbch::encode(&payload, pci, lmax);
         let mut llr = [0.0; 864];
         pbch::llr(&symbols, 1.0, &mut llr);
@@ -114,7 +114,7 @@ proptest! {
 
     /// Any bit patterns as ratios: huge, tiny, subnormal, NaN, infinite.
     #[test]
-    fn no_ratio_makes_the_decoder_panic(
+    fn no_likelihood_ratios_make_the_decoder_panic(
         (pci, lmax, _) in any_cell(),
         seed in any::<u64>(),
         list_size in 1..=32_usize,
@@ -133,7 +133,7 @@ proptest! {
 }
 
 #[test]
-fn degenerate_ratios_decode_to_nothing_or_to_an_error() {
+fn degenerate_likelihood_ratios_give_no_message_or_an_error() {
     let mut decoder = Decoder::default();
     let pci = Pci::new(3).unwrap();
     for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
@@ -151,7 +151,7 @@ proptest! {
     #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
 
     #[test]
-    fn no_other_scrambling_decodes((pci, lmax, payload) in any_cell(), list_size in 1..=32_usize) {
+    fn a_message_with_another_scrambling_is_not_decoded((pci, lmax, payload) in any_cell(), list_size in 1..=32_usize) {
         let symbols = pbch::encode(&payload, pci, lmax);
         let mut llr = [0.0; 864];
         pbch::llr(&symbols, 1.0, &mut llr);
@@ -166,7 +166,7 @@ proptest! {
 /// 20 000 decodings of noise with a list of 8: 0.04 expected false alarms, from 21 unused CRC bits
 /// and the choice bit.
 #[test]
-fn noise_holds_no_mib() {
+fn noise_gives_no_mib() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let mut decoder = Decoder::new(8).unwrap();
     for _ in 0..20_000 {
@@ -177,7 +177,7 @@ fn noise_holds_no_mib() {
 }
 
 #[test]
-fn bad_input_has_its_own_error() {
+fn every_invalid_input_gives_a_specific_error() {
     let pci = Pci::new(1).unwrap();
     let payload = BchPayload::default();
     assert_eq!(Pci::new(1008), Err(Error::Pci(1008)));
@@ -210,7 +210,7 @@ fn bad_input_has_its_own_error() {
 }
 
 #[test]
-fn bad_bursts_are_refused() {
+fn invalid_bursts_are_rejected() {
     let burst = Burst {
         pci: Pci::new(1).unwrap(),
         case: Case::C,

@@ -150,7 +150,7 @@ fn invalid_settings_are_rejected() {
 }
 
 #[test]
-fn an_oscillator_20_ppm_off_is_found_within_three_bursts_of_the_longest_period() {
+fn an_oscillator_error_of_20_ppm_is_found_within_three_bursts_of_the_longest_period() {
     for (spacing, ppm) in [
         (SubcarrierSpacing::Khz15, -20.0),
         (SubcarrierSpacing::Khz30, 20.0),

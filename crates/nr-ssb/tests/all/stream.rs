@@ -19,7 +19,7 @@ fn config(cell: &air::Cell) -> SearchConfig {
 }
 
 #[test]
-fn every_ssb_of_a_stream_is_found_once_wherever_the_blocks_end() {
+fn every_ssb_of_a_stream_is_found_once_for_any_block_boundaries() {
     let mut cell = cell(3, 2);
     cell.ssb_indices = vec![0, 1, 2, 3];
     cell.delay = 700.4;

@@ -154,7 +154,7 @@ fn a_moved_cell_is_tracked_and_a_lost_one_is_reported() {
 }
 
 #[test]
-fn bad_windows_and_settings_are_refused() {
+fn invalid_windows_and_settings_are_rejected() {
     let (cell, config, samples) = scene(70, 5.0);
     let found = first(&config, &samples);
     assert!(matches!(

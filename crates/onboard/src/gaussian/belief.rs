@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_covariance_without_width_stays_positive_in_other_coordinates() {
+    fn a_singular_covariance_stays_semidefinite_after_a_change_of_coordinates() {
         // Heading and path direction cancel, so that the third variance is zero except for rounding
         // errors.
         for curvature in [0.3, -0.07, 1e-3, 12.7] {

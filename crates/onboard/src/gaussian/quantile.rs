@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn line_and_circle_are_the_textbook_quantiles() {
+    fn quantiles_of_line_and_circle_equal_textbook_values() {
         for (risk, line, circle) in [
             (0.05, 1.959_964, 2.447_747),
             (1e-3, 3.290_527, 3.716_922),
@@ -106,14 +106,14 @@ mod tests {
     }
 
     #[test]
-    fn normal_quantiles_are_the_textbook_ones() {
+    fn normal_quantiles_equal_textbook_values() {
         for (risk, quantile) in [(0.5, 0.0), (0.025, 1.959_964), (5e-5, 3.890_592)] {
             assert!((normal_quantile(risk) - quantile).abs() < 1e-3);
         }
     }
 
     #[test]
-    fn grows_with_the_smaller_axis() {
+    fn the_radius_increases_with_the_smaller_axis() {
         let quantile = RadialQuantile::new(1e-3);
         let radii: Vec<f64> = (0..=100)
             .map(|i| quantile.radius([1.0, f64::from(i) * 0.01]))
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn exact_knowledge_needs_no_radius() {
+    fn the_radius_of_a_zero_covariance_is_zero() {
         assert_eq!(RadialQuantile::new(1e-3).radius([0.0, 0.0]), 0.0);
     }
 }

@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn the_covariance_grows_by_the_counted_distance_or_by_the_reach() {
+    fn the_covariance_increases_by_the_counted_distance_or_the_reachable_distance() {
         let by = |state: SavedState, elapsed_s, distance_m| {
             state.resumption(elapsed_s, &odometry(distance_m), 2.0)
         };
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn a_saved_state_is_the_same_after_a_file() {
+    fn a_saved_state_round_trips_through_a_file() {
         let state = saved(None);
         let text = serde_json::to_string(&state).unwrap();
         assert_eq!(serde_json::from_str::<SavedState>(&text).unwrap(), state);

@@ -137,7 +137,7 @@ mod tests {
     const RATE_HZ: f64 = 3.84e6;
 
     #[test]
-    fn times_by_counting_are_contiguous_whatever_the_epoch_and_the_drift() {
+    fn counted_times_are_contiguous_for_any_epoch_and_drift() {
         for (epoch_s, drift) in [(0.0, 0.0), (1.7e9, 0.0), (1.7e9, 5e-5), (12.0, -5e-5)] {
             let mut clock = StreamClock::new(RATE_HZ);
             let mut sent = 0_u64;
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_packet_of_a_radio_that_is_lost_is_a_gap() {
+    fn a_lost_packet_is_a_gap() {
         let mut clock = StreamClock::new(RATE_HZ);
         clock.block(1.7e9, 3840);
         let (continuity, left_out) = clock.block(1.7e9 + 1e-3 + 360.0 / RATE_HZ, 3840);

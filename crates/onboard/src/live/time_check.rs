@@ -382,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_repeated_for_ever_never_becomes_a_time_base() {
+    fn a_repeated_message_never_becomes_the_time_base() {
         let mut check = warm(0.0);
         for number in 50..5000 {
             let error = check.next(0.98, Some(f64::from(number) * PERIOD_S), true);
@@ -453,7 +453,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_of_messages_is_no_step() {
+    fn a_gap_of_messages_is_not_reported_as_a_clock_step() {
         let mut check = warm(0.0);
         let verdict = check.next(8.98, Some(9.01), false);
         assert_eq!(verdict, Ok(TimeVerdict::Continues));
@@ -465,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn without_arrivals_a_step_back_requires_several_messages() {
+    fn without_arrival_times_a_backward_step_requires_several_messages() {
         let mut check = TimeCheck::default();
         for number in 0..100 {
             assert!(
@@ -487,7 +487,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_units_are_reported_and_never_become_a_time_base() {
+    fn wrong_units_are_reported_and_never_become_the_time_base() {
         for unit in TimeUnit::ALL {
             // Times since start-up of the computer, and since 1970.
             for epoch_s in [3.0, 1.7e9] {

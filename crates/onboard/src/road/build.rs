@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn papers_track_is_an_arc_of_1200_m() {
+    fn the_track_of_the_paper_is_an_arc_of_1200_m() {
         let end = paper().pose(300.0);
         assert!((end.x_m - 1200.0 * 0.25_f64.sin()).abs() < 1e-9);
         assert!((end.y_m - 1200.0 * (1.0 - 0.25_f64.cos())).abs() < 1e-9);
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_roads_are_refused() {
+    fn impossible_roads_are_rejected() {
         let bad = [Segment {
             length_m: -3.0,
             turn_rad: 0.0,

@@ -147,7 +147,7 @@ mod tests {
     };
 
     #[test]
-    fn two_steps_are_one() {
+    fn two_steps_equal_one_step_of_the_total_length() {
         let (one, two) = (KEEPING.transition(1.7), KEEPING.transition(3.4));
         for i in 0..2 {
             for j in 0..2 {
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn solves_its_equation() {
+    fn the_transition_solves_the_differential_equation() {
         let h = 1e-4;
         let [[a, b], [c, e]] = KEEPING.transition(h);
         let natural = TAU / 60.0;
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn short_and_long_steps_meet() {
+    fn the_noise_is_continuous_between_short_and_long_steps() {
         let most_m = SHORT * KEEPING.wavelength_m;
         let (short, long) = (
             KEEPING.noise(most_m * (1.0 - 1e-12)),

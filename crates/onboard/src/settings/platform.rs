@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn xavier_has_the_papers_modes() {
+    fn the_xavier_platform_has_the_modes_of_the_paper() {
         let xavier = xavier();
         let base_ms: Vec<f64> = xavier
             .modes
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_hold_their_values() {
+    fn ranges_contain_their_values() {
         for name in Platform::names() {
             Platform::from_library(name, &Shipped).unwrap();
         }
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_figures_are_refused() {
+    fn invalid_figures_are_rejected() {
         let xavier = xavier();
         let mode_0 = "modes[0].energy_per_execution_j.music.value";
         let error = xavier

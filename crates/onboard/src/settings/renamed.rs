@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_that_end_alike_are_not_rejected() {
+    fn current_keys_with_the_ending_of_an_old_key_are_accepted() {
         for path in ["motion.bound_m", "dislike", "my_wake_up.due", "overdue"] {
             refuse_renamed(&only(path), "", "mine.toml").unwrap();
         }

@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn number_of_estimates_on_the_papers_trip() {
+    fn the_number_of_estimates_equals_that_of_the_paper() {
         for (interval_s, after, before) in [
             (0.02, 4018, 4018),
             (0.065, 1005, 1340), // an SSB every 20 ms: 80 ms or 60

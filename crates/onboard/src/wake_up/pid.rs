@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn algorithm_1_by_hand() {
+    fn the_controller_equals_algorithm_1_of_the_paper() {
         // t_base 0.08 s, t_max 0.24 s, Δt 0.1 s, the paper's gains and weights.
         // combined = 0.6·snr + 0.4·velocity; integral += combined·0.1; derivative = change/0.1.
         let table = [

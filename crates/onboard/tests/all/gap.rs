@@ -88,7 +88,7 @@ fn the_gap_is_reported_and_increases_the_covariance_until_the_lane_is_followed_a
 }
 
 #[test]
-fn a_start_in_the_gap_is_not_drawn_to_the_guess() {
+fn a_start_in_the_gap_is_not_biased_towards_the_assumed_road() {
     let (tracker, _) = tracker(130.0, 2.0, 0.5);
     let (on_the_guess, _) = self::tracker(130.0, 0.0, 0.5);
     let pose = tracker.pose(0.0);

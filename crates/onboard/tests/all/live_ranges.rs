@@ -68,7 +68,7 @@ fn ranges_locate_a_vehicle() {
 }
 
 #[test]
-fn other_kinds_and_units_are_rejected() {
+fn unknown_kinds_and_units_are_rejected() {
     let rejected = |live: &mut Live, value| match live.range(&range(0.0, 0, value)) {
         Err(LiveError::Value { allowed, .. }) => allowed,
         other => panic!("{other:?}"),

@@ -153,7 +153,7 @@ impl Drive {
 }
 
 #[test]
-fn a_given_start_is_ok_once_angles_have_confirmed_it() {
+fn a_given_start_is_ok_after_confirmation_by_angles() {
     let mut drive = Drive::new();
     drive.odometry().unwrap();
     assert_eq!(drive.reason(), Reason::Unconfirmed);
@@ -239,7 +239,7 @@ fn a_step_of_the_odometry_clock_resumes_the_pose() {
 }
 
 #[test]
-fn clocks_that_step_together_or_the_angles_alone_are_compensated() {
+fn steps_of_both_clocks_or_of_the_angle_clock_are_compensated() {
     for (odometry_s, angles_s) in [(-5.0, -5.0), (60.0, 60.0), (0.0, -5.0), (0.0, 60.0)] {
         let mut drive = Drive::new();
         assert!(drive.drive(5.0).is_empty());
@@ -265,7 +265,7 @@ fn a_restarted_source_counts_time_and_distance_from_zero() {
 }
 
 #[test]
-fn clocks_that_differ_from_the_start_are_reported_and_the_pose_is_not_localized() {
+fn clocks_that_differ_at_the_start_are_reported_and_the_pose_is_not_localized() {
     for offset_s in [60.0, -60.0, 3.0] {
         let mut drive = Drive::new();
         drive.odometry_clock_s = offset_s;
@@ -368,7 +368,7 @@ fn a_gap_of_all_messages_adds_the_odometry_error_of_the_driven_distance() {
 }
 
 #[test]
-fn a_saved_state_is_resumed_and_to_be_confirmed() {
+fn a_saved_state_is_resumed_and_requires_confirmation() {
     for (down_s, has_counter) in [(1.0, true), (1.0, false), (60.0, true)] {
         let mut drive = Drive::new();
         assert!(drive.drive(20.0).is_empty());
@@ -402,7 +402,7 @@ fn a_saved_state_is_resumed_and_to_be_confirmed() {
 }
 
 #[test]
-fn without_a_pose_there_is_nothing_to_save() {
+fn without_a_pose_no_state_is_saved() {
     let mut live = new_live(None);
     assert_eq!(live.saved_state().unwrap(), None);
     live.odometry(&OdometrySample::of_speed(0.0, 1.0, None))

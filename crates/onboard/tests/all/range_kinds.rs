@@ -428,7 +428,7 @@ fn with_fault(kinds: Kinds, fault: Fault) -> [f64; 2] {
 const FAULT_STEP: i32 = STEPS / 2;
 
 #[test]
-fn clock_step_and_blocked_path_are_absorbed() {
+fn a_clock_step_and_a_blocked_path_do_not_bias_the_position() {
     let kinds = Kinds {
         rate: true,
         phase: false,

@@ -198,7 +198,7 @@ fn a_briefly_hidden_beam_causes_no_search() {
 }
 
 #[test]
-fn any_oscillator_is_found_from_cold_and_sleep_is_bridged() {
+fn every_oscillator_error_is_found_and_sleep_is_bridged() {
     for spacing in [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30] {
         for ppm in [-20.0, -2.0, 7.0, 20.0, 45.0] {
             let air = Air::new(spacing, ppm, 5.0, 3);

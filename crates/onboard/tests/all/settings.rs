@@ -158,7 +158,7 @@ fn entries_of_a_list_are_overridden_by_name_or_all_at_once() {
 }
 
 #[test]
-fn overrides_go_by_path_and_are_checked_like_a_file() {
+fn overrides_are_given_by_path_and_checked_like_a_file() {
     let yard = Site::from_library("yard", &Shipped).unwrap();
     let louder = yard
         .with_overrides([("radio_heads[2].eirp_dbm", 20.into())], &Shipped)
@@ -194,7 +194,7 @@ fn overrides_go_by_path_and_are_checked_like_a_file() {
 }
 
 #[test]
-fn a_site_need_not_have_a_road() {
+fn a_site_without_a_road_is_valid() {
     let roaming = "name = 'hall'\nradio_heads = [{ position_m = [9.0, 9.0, 6.0] }]";
     let hall = site(roaming).unwrap();
     assert_eq!(hall.build_road().unwrap(), None);

@@ -292,7 +292,7 @@ fn a_correct_start_stays_available() {
 }
 
 #[test]
-fn a_wrong_start_costs_seconds() {
+fn a_wrong_start_is_corrected_within_seconds() {
     // Seed 2 of the one-sided place begins on the lower straight, outside the bounding box of the radio heads.
     for (name, environment, seed) in [
         ("hall", &HALL, 0),

@@ -69,7 +69,7 @@ fn a_gyroscope_corrects_the_odometer_in_a_bend() {
 }
 
 #[test]
-fn the_turn_while_samples_are_lost_is_not_known() {
+fn the_heading_change_during_lost_samples_is_unknown() {
     for map in [true, false] {
         let mut tracker = tracker(map, 0.05);
         // The heading oscillates by 0.05 rad with a period of 4 s; every fifth sample is lost.

@@ -105,7 +105,7 @@ fn bad_odometry_rows_are_reported_one_by_one_and_the_rest_is_kept() {
 
 /// Notations of spreadsheets, other locales and manual editing.
 #[test]
-fn odometry_csv_of_any_kind_is_read() {
+fn odometry_csv_of_all_notations_is_read() {
     let file = common::scratch("odometry-kinds").join("odo.csv");
     let samples: Vec<_> = (0..5).map(|k| sample(f64::from(k) * 0.02)).collect();
     write_odometry_csv(&file, &samples).unwrap();
@@ -254,7 +254,7 @@ fn is_truncated(log: &OdometryLog) -> bool {
 
 /// A damaged length of a name is reported, without an allocation of that size.
 #[test]
-fn mcap_names_longer_than_their_record_are_refused() {
+fn mcap_names_longer_than_their_record_are_rejected() {
     let file = common::scratch("odometry-mcap-damaged").join("odo.mcap");
     write_mcap(&file, &["/odom"], 0.02);
     let whole = fs::read(&file).unwrap();
@@ -273,7 +273,7 @@ fn mcap_names_longer_than_their_record_are_refused() {
 }
 
 #[test]
-fn mcap_files_without_the_one_topic_are_refused() {
+fn mcap_files_without_a_unique_topic_are_rejected() {
     let file = common::scratch("odometry-mcap-bad").join("odo.mcap");
     write_mcap(&file, &["/a", "/b"], 0.0);
     assert!(matches!(
@@ -347,7 +347,7 @@ fn angle_logs_round_trip_and_invalid_lines_are_omitted() {
 }
 
 #[test]
-fn angles_are_read_from_the_verdicts_of_mcap_and_those_without_an_angle_passed_over() {
+fn angles_are_read_from_mcap_verdicts_and_verdicts_without_an_angle_skipped() {
     let folder = common::scratch("angles-mcap");
     let file = folder.join("drive.mcap");
     let verdict = |time_s: f64, angle: Option<(f64, bool)>| {
@@ -509,7 +509,7 @@ proptest! {
 
     /// Any damage to a file gives an error or what is left of it, never a panic.
     #[test]
-    fn damage_never_panics(
+    fn damaged_files_never_cause_a_panic(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
         cut in prop::option::of(any::<prop::sample::Index>()),
         kind in 0..5usize,

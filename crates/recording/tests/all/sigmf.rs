@@ -328,7 +328,7 @@ proptest! {
 
     /// Any damage to either file gives an error or a readable recording, never a panic.
     #[test]
-    fn damage_never_panics(
+    fn damaged_files_never_cause_a_panic(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
         cut in prop::option::of(any::<prop::sample::Index>()),
         in_meta in any::<bool>(),

@@ -439,7 +439,7 @@ mod tests {
     }
 
     #[test]
-    fn prices_in_another_unit_are_doubted() {
+    fn prices_in_another_unit_cause_a_warning() {
         for (price, hint) in [
             ("electricity_per_kwh = 25.0", "25 cents are 0.25"),
             ("grid_g_per_kwh = 0.381", "0.381 kg are 381"),

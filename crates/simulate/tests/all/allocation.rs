@@ -15,7 +15,7 @@ use crate::common::{Burst, changed, shipped, simulation, unguarded, value};
 use crate::counting::allocations;
 
 #[test]
-fn the_counter_counts() {
+fn allocations_are_counted() {
     assert_eq!(allocations(|| drop(std::hint::black_box(vec![0_u8; 9]))), 1);
 }
 

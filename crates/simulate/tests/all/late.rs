@@ -149,7 +149,7 @@ fn drives() -> Vec<Drive> {
 }
 
 #[test]
-fn late_ssbs_give_the_same_final_pose_as_punctual_ones() {
+fn late_and_timely_ssbs_give_equal_final_poses() {
     for mut drive in drives() {
         let name = drive.scenario.name.clone();
         for odometry_every in [1, 5] {

@@ -71,7 +71,7 @@ fn additional_runs_do_not_change_earlier_ones() {
 }
 
 #[test]
-fn all_policies_see_the_same_radio_channel() {
+fn all_policies_receive_over_the_same_radio_channel() {
     let every = simulation(&fixed("music", 20.0)).run(3, 0, NONE).unwrap();
     let fourth = simulation(&fixed("music", 80.0)).run(3, 0, NONE).unwrap();
     let mut compared = 0;

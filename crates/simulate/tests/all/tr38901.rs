@@ -238,7 +238,7 @@ fn clusters_are_correlated_over_metres_only() {
 }
 
 #[test]
-fn a_blocked_line_of_sight_returns() {
+fn a_blocked_line_of_sight_becomes_free_again() {
     let settings = ChannelSettings {
         blockage: Some(BlockageSettings {
             per_minute: 2.0,

@@ -169,7 +169,7 @@ fn std_factor_scales_all_deviations_and_draw_none_removes_them() {
 }
 
 #[test]
-fn a_given_true_value_holds_in_every_run() {
+fn a_given_true_value_applies_to_every_run() {
     let heads = "{ roadside.position_m = [200.0, 90.0, 5.0], all.eirp_dbm = 3.0 }";
     let scenario = uncertain(&[
         ("truth.site.radio_heads", value(heads)),

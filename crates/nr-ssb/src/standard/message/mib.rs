@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_bits_and_fields_are_refused() {
+    fn invalid_bits_and_fields_are_rejected() {
         assert_eq!(Mib::from_bits(1 << 23), Err(Error::MessageClassExtension));
         assert_eq!(Mib::from_bits(1 << 24), Err(Error::MibTooLong(1 << 24)));
         let mib = Mib {

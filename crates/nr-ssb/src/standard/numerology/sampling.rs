@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_rates_between_multiples() {
+    fn fft_sizes_that_are_no_multiple_of_256_are_rejected() {
         let spacing = SubcarrierSpacing::Khz30;
         assert_eq!(
             Numerology::from_sample_rate(spacing, 15.36e6).map(Numerology::fft_size),

@@ -585,7 +585,7 @@ mod tests {
     }
 
     #[test]
-    fn two_heads_and_the_road_are_enough() {
+    fn two_radio_heads_and_the_road_determine_the_pose() {
         let right = (0..100)
             .filter_map(search)
             .filter(|(error_m, sigmas)| *error_m < 2.0 && *sigmas < 4.5)

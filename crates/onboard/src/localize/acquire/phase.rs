@@ -150,7 +150,7 @@ mod tests {
     };
 
     #[test]
-    fn phases_follow_the_table() {
+    fn phase_transitions_equal_the_table() {
         use Ordering::{Greater, Less};
         use Phase::{Confirming, Given, Relocalizing, Searching, Tracking};
         use Transition::{Begin, End, Report, Stay, TakeOver};

@@ -589,7 +589,7 @@ mod tests {
     }
 
     #[test]
-    fn the_wrong_lobe_is_as_frequent_as_simulated() {
+    fn the_probability_of_a_wrong_lobe_equals_the_simulated_frequency() {
         // Fraction of errors above a quarter turn among 40,000 estimates of an independent
         // simulation.
         for (k_db, share) in [(0.0, 0.1199), (3.0, 0.0270), (5.0, 0.0040)] {
@@ -601,7 +601,7 @@ mod tests {
     }
 
     #[test]
-    fn correlation_is_the_sum_of_the_scatters_autocorrelation() {
+    fn correlation_is_the_sum_over_the_autocorrelation_of_the_scatter() {
         // Autocorrelation sin(x)/x over the distance, times the Doppler phase of the line of sight;
         // Cesàro sum.
         let summed = |wavelengths: f64, direction_cosine: f64| {

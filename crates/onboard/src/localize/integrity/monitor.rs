@@ -396,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn an_uncalibrated_array_that_becomes_nominal_leaves_the_state_ok() {
+    fn the_state_stays_ok_when_an_uncalibrated_array_becomes_nominal() {
         const TURNED_RAD: f64 = 0.02;
         let (heads, road, ekf) = trip_with_bias(0.0);
         let settings = IntegritySettings::default();

@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn without_separation_they_are_the_quantiles() {
+    fn without_separation_the_levels_are_the_quantiles() {
         for risk in [1e-2, 1e-3, 1e-8] {
             for small in [0.0, 0.04, 0.3, 1.0] {
                 let found = levels(
@@ -423,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rarer_fault_counts_less_and_no_fault_costs_nothing() {
+    fn a_rarer_fault_increases_the_level_less() {
         let nominal = hypothesis(1.0, [0.0; 2], [[0.01, 0.0], [0.0, 0.01]]);
         let fault = |probability| hypothesis(probability, [0.3, 0.1], [[0.04, 0.0], [0.0, 0.02]]);
         let with = |probability| levels(1e-3, &[nominal, fault(probability)]).horizontal_m;
@@ -432,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn exact_knowledge_needs_only_the_separation() {
+    fn the_level_of_a_zero_covariance_is_the_separation() {
         let exact = |separation_m| levels(1e-2, &[hypothesis(1.0, separation_m, [[0.0; 2]; 2])]);
         assert_eq!(exact([0.0, 0.0]).horizontal_m, 0.0);
         let radius_m = exact([0.3, 0.4]).horizontal_m;

@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_noisier_odometer_leaves_nine_times_its_variance() {
+    fn the_hypothesis_of_a_noisy_odometer_has_nine_times_the_variance() {
         let world = World {
             received_until_s: 1e-3,
             ..World::default()
@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn an_odometer_far_beyond_its_scale_departs() {
+    fn a_scale_error_of_20_standard_deviations_is_reported() {
         let (_, _, ekf) = trip();
         for (deviations, departs) in [(1.0, false), (20.0, true)] {
             let scale = (deviations * ekf.config().odometer_scale_std, 0.0);
@@ -412,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_of_the_speed_counts_as_slip_before_the_next_angle() {
+    fn a_speed_jump_is_treated_as_slip_before_the_next_angle() {
         for scale in [-0.1, 0.1] {
             let world = World {
                 scale: (scale, 20.0),
