@@ -81,6 +81,11 @@ def test_displaced_radio_head_and_array_are_estimated(logged: Path) -> None:
     assert heads[0]["position_m"][0] == by_key["radio_heads[0].position_m[0]"].found
     # The specified noise is conservative: the innovations are within the model.
     assert 0.3 < found.nis < 1.1
+    # The plan is displaced with a lower probability than before (0.01). The vehicle file has it.
+    assert found.site_frame_offset is not None
+    assert 0.0 < found.site_frame_offset < 0.01
+    faults = json.loads(found.vehicle.to_json())["integrity"]["fault_probability"]
+    assert faults["site_frame_offset"] == found.site_frame_offset
     assert found.origin.version == __version__
 
 

@@ -59,7 +59,8 @@ def survey(
     Estimates the positions, the mounting of the array and its phase per element jointly from the
     angles of all drives. The road and the start poses define the frame. Parameters that the drives
     do not determine are reported and stay unchanged. Writes site.toml and vehicle.toml with the
-    estimates and their standard deviations, survey.parquet, covariance.json and manifest.json.
+    estimates, their standard deviations, and the posterior probability of a displaced site plan,
+    survey.parquet, covariance.json and manifest.json.
     """
     from access_av.drives import self_survey
     from access_av.tables.results_directory import ResultsDirectory, json_text
@@ -95,7 +96,12 @@ def survey(
         warnings=plant.warnings(carrier),
     )
     if as_json:
-        figures = {"angles": found.angles, "used": found.used, "nis": found.nis}
+        figures = {
+            "angles": found.angles,
+            "used": found.used,
+            "nis": found.nis,
+            "site_frame_offset": found.site_frame_offset,
+        }
         print(json_text({**figures, "parameters": rows.to_dicts(), "directory": directory.path}))
         return
     made = table(["parameter", "unit", "before", "estimate", "σ"], title="Survey", text=2)
@@ -120,4 +126,10 @@ def survey(
         f"{found.nis:.2f} (expected: 1)",
         soft_wrap=True,
     )
+    if found.site_frame_offset is not None:
+        console.print(
+            f"posterior probability of a displaced site plan: {found.site_frame_offset:.1g} "
+            f"(vehicle.toml, {self_survey.OFFSET_KEY})",
+            soft_wrap=True,
+        )
     console.print(f"{directory.path}/site.toml, vehicle.toml", soft_wrap=True)

@@ -24,6 +24,7 @@ import numpy as np
 import polars as pl
 
 from access_av import _core
+from access_av.drives.site_frame import displacement_probability
 from access_av.errors import InputError
 from access_av.settings import as_dict
 from access_av.signal.manifold import wrapped
@@ -43,6 +44,8 @@ LEARNT = 0.7
 MOST_ITERATIONS = 20
 # Convergence: maximum step of a parameter relative to its standard deviation.
 STILL = 0.05
+# Probability that the site plan is displaced against the road.
+OFFSET_KEY = "integrity.fault_probability.site_frame_offset"
 # Steps of the central differences: small against the curvature, large against rounding.
 STEP_M, STEP_RAD = 0.02, 2e-4
 
@@ -112,6 +115,9 @@ class Survey(Result):
         Covariance of the parameters, shape (n, n).
     site, vehicle
         Settings with the estimates and their standard deviations.
+    site_frame_offset
+        Posterior probability that the surveyed radio heads are displaced against the road, written
+        to the vehicle's ``integrity.fault_probability.site_frame_offset``; ``None`` without a road.
     angles, used
         Number of angles, and number without outliers.
     nis
@@ -126,6 +132,7 @@ class Survey(Result):
     covariance: NDArray[np.floating[Any]]
     site: _core.Site
     vehicle: _core.Vehicle
+    site_frame_offset: float | None
     angles: int
     used: int
     nis: float
@@ -248,6 +255,10 @@ class _Model:
             before.append(array[f"{name}_rad"])
             stds.append(array.get(f"{name}_std_rad") or default)
         self.keys = keys
+        # Setting any key of the table fills in the defaults of the others.
+        complete = as_dict(vehicle.with_overrides({"integrity.enabled": True}))
+        faults = complete["integrity"]["fault_probability"]
+        self.offset_before = float(faults["site_frame_offset"])
         self.before, self.stds_before = np.array(before), np.array(stds)
         self.steps = np.where(np.arange(len(keys)) < 2 * len(heads), STEP_M, STEP_RAD)
 
@@ -336,7 +347,7 @@ def _identify(problem: _Problem) -> Survey:
         # Exclude outliers with respect to the present uncertainty.
         used = [each[2] for each in problem.meet(values, stds, None)]
         gradient, information = problem.linearised(values, used)
-        covariance = np.linalg.inv(information)
+        covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
         stds = np.sqrt(np.diag(covariance))
         step = -covariance @ gradient
         here = problem.misfit(values, used)
@@ -350,9 +361,24 @@ def _identify(problem: _Problem) -> Survey:
     # Accept both coordinates of a position, or none.
     places = learnt[: 2 * len(model.heads)].reshape(-1, 2)
     places[:] = places.any(axis=1, keepdims=True)
-    site, vehicle = model.nominal(
-        np.where(learnt, values, model.before), np.where(learnt, stds, model.stds_before)
-    )
+    written = np.where(learnt, values, model.before)
+    written_stds = np.where(learnt, stds, model.stds_before)
+    site, vehicle = model.nominal(written, written_stds)
+    nis = sum(_normalised(*each) for each in met) / max(counted, 1)
+    offset = None
+    if as_dict(site).get("road") is not None:
+        positions = slice(2 * len(model.heads))
+        offset = displacement_probability(
+            model.offset_before,
+            model.before[positions],
+            model.stds_before[positions],
+            values[positions],
+            covariance[positions, positions],
+            written[positions],
+            written_stds[positions],
+            nis,
+        )
+        vehicle = vehicle.with_overrides({OFFSET_KEY: offset})
     columns = (model.keys, model.before, model.stds_before, values, stds)
     return Survey(
         parameters=[
@@ -362,9 +388,10 @@ def _identify(problem: _Problem) -> Survey:
         covariance=covariance,
         site=site,
         vehicle=vehicle,
+        site_frame_offset=offset,
         angles=sum(len(drive.log) for drive in problem.drives),
         used=counted,
-        nis=sum(_normalised(*each) for each in met) / max(counted, 1),
+        nis=nis,
         iterations=iterations,
     )
 
