@@ -1,6 +1,8 @@
 //! Transformations of a covariance before estimation: calibration, forward–backward averaging and
 //! spatial smoothing.
 
+use num_complex::Complex64;
+
 use super::sample::Covariance;
 use crate::array::linear::Array;
 use crate::linalg::matrix::zeros;
@@ -49,18 +51,25 @@ impl<const N: usize> Covariance<N> {
     /// Returns the spatially smoothed covariance without the compile-time check of `M <= N`.
     pub(crate) fn over_subarrays<const M: usize>(&self) -> Covariance<M> {
         let mut sum = zeros::<M>();
-        let scale = 1.0 / (N - M + 1) as f64;
-        for first in 0..=N - M {
-            for i in 0..M {
-                for j in 0..M {
-                    sum[i][j] += self.sum[first + i][first + j] * scale;
-                }
-            }
-        }
+        let size = [N, M];
+        average_of_subarrays(self.sum.as_flattened(), sum.as_flattened_mut(), size);
         Covariance {
             sum,
             weight: self.weight,
             snapshots: self.snapshots,
+        }
+    }
+}
+
+/// Writes the average over the blocks of `m` rows and columns on the diagonal of an `n` by `n`
+/// matrix to `average`, which is zero.
+fn average_of_subarrays(matrix: &[Complex64], average: &mut [Complex64], [n, m]: [usize; 2]) {
+    let scale = 1.0 / (n - m + 1) as f64;
+    for first in 0..=n - m {
+        for (i, row) in average.chunks_exact_mut(m).enumerate() {
+            for (j, entry) in row.iter_mut().enumerate() {
+                *entry += matrix[(first + i) * n + first + j] * scale;
+            }
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::error::Error;
 use crate::kernel::real::Real;
 use crate::result::angle::{AngleEstimate, UntestedEstimate};
 use crate::result::direction::Output;
+use crate::simd::instructions::LARGEST_VECTORISED;
 
 /// Number of items that are estimated together: large enough to hide instruction latency, and small
 /// enough for the data to stay in the cache.
@@ -153,7 +154,7 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
             forward_backward,
             snapshots: self.snapshots,
         };
-        if self.len() * 8 > BLOCK {
+        if const { N <= LARGEST_VECTORISED } && self.len() * 8 > BLOCK {
             self.in_blocks::<O, BLOCK>(side_by_side, estimates)
         } else {
             self.in_blocks::<O, 1>(side_by_side, estimates)

@@ -21,7 +21,7 @@ use crate::result::direction::{
     Described, Output, direction, geometric_doubt, no_more_than_ignorance, threshold_doubt,
 };
 use crate::result::goodness_of_fit::{Model, Tested};
-use crate::simd::instructions::dispatch;
+use crate::simd::instructions::{LARGEST_VECTORISED, dispatch};
 use crate::simd::math::{log10, times_plus};
 use crate::spectrum::side_by_side::{Places, Spectra};
 
@@ -60,11 +60,25 @@ impl<const N: usize> SideBySide<'_, N> {
         self.of_covariances(&covariances, estimates)
     }
 
+    // Both sample types share one copy of the code.
+    #[inline(never)]
     fn of_covariances<O: Output, const W: usize>(
         &self,
         covariances: &Hermitians<N, W>,
         estimates: &mut [O],
     ) -> Result<(), (usize, Error)> {
+        if const { N > LARGEST_VECTORISED } {
+            return self.of_covariances_generic::<O, false, W>(covariances, estimates);
+        }
+        if const { W == 1 } {
+            // A single item uses scalar instructions, which AVX-512 does not change.
+            return dispatch!(
+                self.of_covariances_generic::<O, false, W>(covariances, estimates),
+                self.of_covariances_generic::<O, true, W>(covariances, estimates),
+                self.of_covariances_avx2(covariances, estimates),
+                self.of_covariances_avx2(covariances, estimates)
+            );
+        }
         dispatch!(
             self.of_covariances_generic::<O, false, W>(covariances, estimates),
             self.of_covariances_generic::<O, true, W>(covariances, estimates),

@@ -19,67 +19,27 @@
 use num_complex::Complex64;
 
 use super::choice::Method;
+use super::whole_array::WholeArray;
 use crate::bound::steering_matrix;
-use crate::covariance::sample::Covariance;
 use crate::linalg::dense::{adjoint, inverse, product};
 use crate::linalg::eigen::HermitianEigen;
-use crate::linalg::matrix::{Matrix, zeros};
+use crate::linalg::matrix::Matrix;
 use crate::list::List;
 use crate::method::alternating_projection::Fit;
 
-/// Average over the subarrays of `M` antennas, optionally with forward–backward averaging.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Averaging<const N: usize, const M: usize> {
-    pub(super) forward_backward: bool,
-}
-
-impl<const N: usize, const M: usize> Averaging<N, M> {
-    pub(super) fn average(self, covariance: &Covariance<N>) -> Covariance<M> {
-        let smoothed = covariance.over_subarrays::<M>();
-        if self.forward_backward {
-            smoothed.forward_backward()
-        } else {
-            smoothed
-        }
-    }
-
-    /// Converts the `H` of the average to the `H` of the original covariance.
-    fn spread_out(self, of_average: &Matrix<M>) -> Matrix<N> {
-        let mut h = *of_average;
-        if self.forward_backward {
-            for i in 0..M {
-                for j in 0..M {
-                    let mirrored = of_average[M - 1 - i][M - 1 - j].conj();
-                    h[i][j] = (of_average[i][j] + mirrored) * 0.5;
-                }
-            }
-        }
-        let mut spread = zeros::<N>();
-        let scale = 1.0 / (N - M + 1) as f64;
-        for first in 0..=N - M {
-            for i in 0..M {
-                for j in 0..M {
-                    spread[first + i][first + j] += h[i][j] * scale;
-                }
-            }
-        }
-        spread
-    }
-}
-
 /// Inputs of the asymptotic variance.
-pub(super) struct Spread<'a, const N: usize, const M: usize> {
+pub(super) struct Spread<'a, const M: usize> {
     /// Eigendecomposition of the averaged covariance.
     pub(super) eigen: &'a HermitianEigen<M>,
     pub(super) sources: usize,
     pub(super) noise_variance: f64,
-    pub(super) averaging: Averaging<N, M>,
+    /// Whether the covariance was averaged forward and backward after the average over subarrays.
+    pub(super) forward_backward: bool,
     /// Original covariance.
-    pub(super) covariance: &'a Matrix<N>,
-    pub(super) snapshots: usize,
+    pub(super) whole: &'a dyn WholeArray,
 }
 
-impl<const N: usize, const M: usize> Spread<'_, N, M> {
+impl<const M: usize> Spread<'_, M> {
     /// Returns the standard deviations in rad; `None` if the steering vectors are linearly
     /// dependent.
     pub(super) fn phase_sigmas_rad(&self, method: Method, phases: &[f64]) -> Option<List<f64, M>> {
@@ -117,7 +77,7 @@ impl<const N: usize, const M: usize> Spread<'_, N, M> {
     pub(super) fn mixing(&self) -> f64 {
         let weakest = self.eigen.values[self.sources - 1];
         let gap = weakest - self.noise_variance;
-        let each = self.noise_variance * weakest / (self.snapshots as f64 * gap * gap);
+        let each = self.noise_variance * weakest / (self.whole.snapshots() as f64 * gap * gap);
         each * (M - self.sources) as f64
     }
 
@@ -144,17 +104,18 @@ impl<const N: usize, const M: usize> Spread<'_, N, M> {
         result
     }
 
-    /// Returns `tr(H R H R) / L`.
+    /// Returns the variance for the `H` of the averaged covariance.
     fn variance(&self, of_average: &Matrix<M>) -> f64 {
-        let h = self.averaging.spread_out(of_average);
-        let hr = product(&h, self.covariance, [N; 3]);
-        let mut trace = 0.0;
-        for i in 0..N {
-            for j in 0..N {
-                trace += (hr[i][j] * hr[j][i]).re;
+        let mut h = *of_average;
+        if self.forward_backward {
+            for i in 0..M {
+                for j in 0..M {
+                    let mirrored = of_average[M - 1 - i][M - 1 - j].conj();
+                    h[i][j] = (of_average[i][j] + mirrored) * 0.5;
+                }
             }
         }
-        trace / self.snapshots as f64
+        self.whole.variance(h.as_flattened(), M)
     }
 }
 

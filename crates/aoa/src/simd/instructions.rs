@@ -1,5 +1,9 @@
 //! Detection of the processor's vector instructions.
 
+/// Largest number of antennas with code for each set of vector instructions. The sums of larger
+/// arrays do not fit in the registers, and their code is most of the build time.
+pub(crate) const LARGEST_VECTORISED: usize = 8;
+
 /// Vector instructions of the processor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Instructions {
