@@ -16,7 +16,7 @@ use nr_ssb::track::Tracker;
 use nr_ssb::{BchPayload, Complex32, Lmax, Mib, Numerology, Ofdm, Pci, SubcarrierSpacing};
 
 const SPACINGS: [SubcarrierSpacing; 2] = [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30];
-const MOST_ANTENNAS: usize = 4;
+const MAX_ANTENNAS: usize = 4;
 
 thread_local! {
     /// Cached searchers, because planning takes longer than a search.
@@ -24,7 +24,7 @@ thread_local! {
         SPACINGS
             .into_iter()
             .flat_map(|spacing| {
-                (1..=MOST_ANTENNAS).map(move |antennas| {
+                (1..=MAX_ANTENNAS).map(move |antennas| {
                     Searcher::new(SearchConfig::new(spacing, antennas)).expect("allowed")
                 })
             })
@@ -97,7 +97,7 @@ fn spoil(antennas: &mut [Vec<Complex32>], damage: [u8; 8]) {
 
 fn receive(spacing_index: usize, frequency_known: bool, antennas: &[&[Complex32]]) {
     SEARCHERS.with_borrow_mut(|searchers| {
-        let searcher = &mut searchers[spacing_index * MOST_ANTENNAS + antennas.len() - 1];
+        let searcher = &mut searchers[spacing_index * MAX_ANTENNAS + antennas.len() - 1];
         let frequency = frequency_known.then_some(3.5e9);
         searcher.tune(frequency).expect("a finite frequency");
         let config = searcher.config().clone();

@@ -13,11 +13,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Maximum size of waiting samples in bytes: 0.1 s of four antennas at 3.84 Msps.
-pub const MOST_SAMPLE_BYTES: usize = 12 << 20;
+pub const MAX_SAMPLE_BYTES: usize = 12 << 20;
 /// Maximum number of waiting inputs other than samples.
-pub const MOST_OTHERS: usize = 4096;
+pub const MAX_WAITING_INPUTS: usize = 4096;
 /// Maximum number of buffers kept for reuse.
-const MOST_SPARE: usize = 8;
+const MAX_REUSED_BUFFERS: usize = 8;
 
 /// Samples of every antenna in the order of the array.
 #[derive(Debug, Default)]
@@ -170,7 +170,7 @@ impl Inbox {
     /// Adds an input. If the queue is full, drops the oldest input of its kind or waits for space.
     pub fn put(&self, input: Input) {
         let mut waiting = self.lock();
-        while self.waits && waiting.others >= MOST_OTHERS && !waiting.is_closed {
+        while self.waits && waiting.others >= MAX_WAITING_INPUTS && !waiting.is_closed {
             waiting = (self.taken.wait(waiting)).unwrap_or_else(PoisonError::into_inner);
         }
         let waiting = &mut *waiting;
@@ -181,11 +181,11 @@ impl Inbox {
             }
             (Input::Samples(block), _) => {
                 waiting.sample_bytes += block.bytes();
-                while waiting.sample_bytes > MOST_SAMPLE_BYTES && waiting.drop_oldest(true) {}
+                while waiting.sample_bytes > MAX_SAMPLE_BYTES && waiting.drop_oldest(true) {}
             }
             _ => {
                 waiting.others += 1;
-                while waiting.others > MOST_OTHERS && waiting.drop_oldest(false) {}
+                while waiting.others > MAX_WAITING_INPUTS && waiting.drop_oldest(false) {}
             }
         }
         // The consumer waits only for the first input; each notification is a system call.
@@ -200,11 +200,11 @@ impl Inbox {
     pub fn take(&self, wait: Duration) -> Option<(Instant, Input)> {
         let mut waiting = self.lock();
         if waiting.inputs.is_empty() && !waiting.is_closed {
-            let (woken, _) = self
+            let (wait_result, _) = self
                 .came
                 .wait_timeout(waiting, wait)
                 .unwrap_or_else(PoisonError::into_inner);
-            waiting = woken;
+            waiting = wait_result;
         }
         let (came, input) = waiting.inputs.pop_front()?;
         match &input {
@@ -240,7 +240,7 @@ impl Inbox {
     pub fn give_back(&self, mut antennas: Vec<Vec<Complex32>>) {
         antennas.iter_mut().for_each(Vec::clear);
         let mut waiting = self.lock();
-        if waiting.spare.len() < MOST_SPARE {
+        if waiting.spare.len() < MAX_REUSED_BUFFERS {
             waiting.spare.push(antennas);
         }
     }
@@ -340,7 +340,7 @@ mod tests {
     #[test]
     fn a_producer_that_reads_files_waits_and_nothing_is_dropped() {
         let inbox = Inbox::new(true);
-        let sent = MOST_OTHERS + 1000;
+        let sent = MAX_WAITING_INPUTS + 1000;
         std::thread::scope(|scope| {
             scope.spawn(|| {
                 for number in 0..sent {
@@ -369,7 +369,7 @@ mod tests {
             Some((_, Input::Slept(9999.0)))
         ));
         assert!(inbox.take(Duration::ZERO).is_none());
-        for _ in 0..MOST_OTHERS + 3 {
+        for _ in 0..MAX_WAITING_INPUTS + 3 {
             inbox.put(Input::Command(Command::Reset));
         }
         assert_eq!(inbox.dropped(), [0, 3]);

@@ -51,7 +51,7 @@ fn main() -> ExitCode {
     }
     let arguments = Arguments::parse();
     match run(&arguments) {
-        Ok(text) => say(&text),
+        Ok(text) => print_text(&text),
         Err(error) => {
             let _ = writeln!(std::io::stderr(), "error: {error:#}");
             ExitCode::from(2)
@@ -63,9 +63,9 @@ fn main() -> ExitCode {
 fn print_schema(arguments: &[String]) -> ExitCode {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments[..] {
-        [] => say(&NodeSettings::schema_json()),
-        ["--outputs"] => say(&format!("{:#}", sink::schema())),
-        ["--outputs", "--markdown"] => say(sink::reference().trim_end()),
+        [] => print_text(&NodeSettings::schema_json()),
+        ["--outputs"] => print_text(&format!("{:#}", sink::schema())),
+        ["--outputs", "--markdown"] => print_text(sink::reference().trim_end()),
         _ => {
             let usage = "usage: access-av-node schema [--outputs [--markdown]]";
             let _ = writeln!(
@@ -77,7 +77,7 @@ fn print_schema(arguments: &[String]) -> ExitCode {
     }
 }
 
-fn say(text: &str) -> ExitCode {
+fn print_text(text: &str) -> ExitCode {
     if !text.is_empty() {
         // A closed standard output is not an error.
         let _ = writeln!(std::io::stdout(), "{text}");

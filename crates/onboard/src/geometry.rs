@@ -275,7 +275,7 @@ mod tests {
     #[test]
     fn arcs_converge_to_straight_lines() {
         let bent = Pose::default().along_arc(100.0, 2.1e-6);
-        let barely = Pose::default().along_arc(100.0, 1.9e-6);
-        assert!((bent.y_m - barely.y_m - 0.5 * 0.2e-6 * 1e4).abs() < 1e-9);
+        let nearly_straight = Pose::default().along_arc(100.0, 1.9e-6);
+        assert!((bent.y_m - nearly_straight.y_m - 0.5 * 0.2e-6 * 1e4).abs() < 1e-9);
     }
 }

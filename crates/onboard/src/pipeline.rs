@@ -33,7 +33,7 @@ pub struct Pipeline {
     wake_up_time_s: f64,
     odometry: Option<OdometrySample>,
     /// Speed of the previous sample if it was rejected as impossible (m/s).
-    doubted_mps: Option<f64>,
+    suspect_speed_mps: Option<f64>,
     top_speed_mps: f64,
     sensed: Vec<SsbDetection>,
     chosen: Vec<bool>,
@@ -245,7 +245,7 @@ impl Pipeline {
             policy,
             wake_up_time_s: 0.0,
             odometry: None,
-            doubted_mps: None,
+            suspect_speed_mps: None,
             top_speed_mps: vehicle.top_speed_mps(),
             sensed: Vec::with_capacity(heads.len()),
             chosen: Vec::with_capacity(heads.len()),
@@ -294,10 +294,10 @@ impl Pipeline {
             return Ok(Err(OdometryDefect::TimeReversed));
         }
         if self.is_spike(sample) {
-            self.doubted_mps = Some(sample.speed_mps);
+            self.suspect_speed_mps = Some(sample.speed_mps);
             return Ok(Err(OdometryDefect::SpeedSpike));
         }
-        self.doubted_mps = None;
+        self.suspect_speed_mps = None;
         self.odometry = Some(*sample);
         let Some(monitors) = &mut self.monitors else {
             return self.localizer.odometry(sample).map(Ok);
@@ -317,7 +317,7 @@ impl Pipeline {
         let is_near = |other_mps: f64| (sample.speed_mps - other_mps).abs() <= possible_mps;
         sample.speed_mps.abs() > TIMES_TOP_SPEED * self.top_speed_mps
             && !is_near(last.speed_mps)
-            && !self.doubted_mps.is_some_and(is_near)
+            && !self.suspect_speed_mps.is_some_and(is_near)
     }
 
     /// Changes the localizer at the start and end of odometry faults.
@@ -472,7 +472,7 @@ impl Pipeline {
 
     /// Whether a monitor requests the burst at `time_s`.
     fn is_wanted(&self, time_s: f64) -> bool {
-        (self.monitors.as_ref()).is_some_and(|monitors| monitors.wants(time_s))
+        (self.monitors.as_ref()).is_some_and(|monitors| monitors.requests_burst(time_s))
     }
 
     /// Passes the angles of the burst at `time_s` to the monitors.

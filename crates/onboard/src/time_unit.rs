@@ -29,7 +29,7 @@ const CRAWL_MPS: f64 = 0.02;
 const AGREE: core::ops::Range<f64> = 0.7..1.5;
 
 /// Minimum path length (m) for a comparison of the distances with the speeds.
-const LEAST_COMPARED_M: f64 = 1.0;
+const MIN_COMPARED_M: f64 = 1.0;
 
 /// Number of intervals of an odometry stream from which its time unit is determined.
 const STREAM_STEPS: usize = 9;
@@ -104,7 +104,7 @@ impl OdometryTimes {
         if self.step_s <= SUSPECT_STEP_S {
             return TimeUnit::of_epoch(self.time_s);
         }
-        let by_speed_m = self.by_speed_m.filter(|it| *it > LEAST_COMPARED_M);
+        let by_speed_m = self.by_speed_m.filter(|it| *it > MIN_COMPARED_M);
         let contradicts = |unit: &TimeUnit| {
             by_speed_m
                 .is_some_and(|it| AGREE.contains(&(self.by_distance_m / it * unit.per_second())))
@@ -114,7 +114,7 @@ impl OdometryTimes {
         }
         let agrees = by_speed_m.is_some_and(|it| AGREE.contains(&(self.by_distance_m / it)));
         let crawls =
-            self.by_distance_m > LEAST_COMPARED_M && self.by_distance_m < CRAWL_MPS * self.moving_s;
+            self.by_distance_m > MIN_COMPARED_M && self.by_distance_m < CRAWL_MPS * self.moving_s;
         if self.step_s <= MAX_STEP_S && (agrees || !crawls) {
             return TimeUnit::of_epoch(self.time_s);
         }

@@ -339,9 +339,9 @@ impl Request<'_, '_> {
         let share = batch.len().div_ceil(threads).max(1);
         let parts = batch.split(share).zip(values.chunks_mut(share * sources));
         let parts = Mutex::new(parts.enumerate());
-        let take_part = || parts.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let next_part = || parts.lock().unwrap_or_else(PoisonError::into_inner).next();
         let work = || {
-            while let Some((index, (part, places))) = take_part() {
+            while let Some((index, (part, places))) = next_part() {
                 run(part, places).map_err(|error| error.shifted(index * share))?;
             }
             Ok(())

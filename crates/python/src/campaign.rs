@@ -28,7 +28,7 @@ use crate::settings::{Platform, Scenario, settings_error};
 use crate::threads::at_most_one_per_core;
 
 /// Maximum number of runs of a campaign; larger campaigns must be split.
-const MOST_RUNS: usize = 1_000_000;
+const MAX_RUNS: usize = 1_000_000;
 
 /// Result of a campaign as columns of equal length.
 #[pyclass(frozen, get_all, module = "access_av._core")]
@@ -132,8 +132,8 @@ fn check(
     threads: Option<usize>,
     errors_every: Option<usize>,
 ) -> PyResult<Option<usize>> {
-    if !(1..=MOST_RUNS).contains(&runs) {
-        let message = format!("`runs` is {runs}; it must be between 1 and {MOST_RUNS}");
+    if !(1..=MAX_RUNS).contains(&runs) {
+        let message = format!("`runs` is {runs}; it must be between 1 and {MAX_RUNS}");
         return Err(PyValueError::new_err(message));
     }
     if errors_every == Some(0) {

@@ -251,7 +251,7 @@ toml_file! {
     /// `SettingsError` if the vehicle's platform lacks a required capability.
     fn warnings(&self) -> PyResult<Vec<SettingsWarning>> {
         let of_platform = platform_warnings(&self.0.vehicle)
-            .map_err(|error| settings_error(error.beneath(&self.0.name, "vehicle")))?;
+            .map_err(|error| settings_error(error.with_path_prefix(&self.0.name, "vehicle")))?;
         let mut found = self.0.warnings().map_err(settings_error)?;
         found.extend(of_platform);
         Ok(wrapped(found))
@@ -305,7 +305,7 @@ toml_file! {
     /// `SettingsError` if the vehicle's platform lacks a required capability.
     fn warnings(&self) -> PyResult<Vec<SettingsWarning>> {
         let of_platform = platform_warnings(&self.0.vehicle)
-            .map_err(|error| settings_error(error.beneath(&self.0.name, "vehicle")))?;
+            .map_err(|error| settings_error(error.with_path_prefix(&self.0.name, "vehicle")))?;
         let mut found = self.0.warnings().map_err(settings_error)?;
         found.extend(of_platform);
         Ok(wrapped(found))
@@ -378,7 +378,7 @@ fn resolve(vehicle: &CoreVehicle, platform: Option<&Platform>) -> Result<CoreVeh
 
 fn platform_of(vehicle: &CoreVehicle) -> Result<CorePlatform, CoreError> {
     recording::load(&vehicle.platform.name)
-        .map_err(|error| error.beneath(&vehicle.name, "platform.name"))
+        .map_err(|error| error.with_path_prefix(&vehicle.name, "platform.name"))
 }
 
 /// Returns warnings about the platform that a vehicle names; an error if it lacks a required
@@ -388,7 +388,9 @@ fn platform_warnings(vehicle: &CoreVehicle) -> Result<Vec<Warning>, CoreError> {
     platform.mode(&vehicle.platform, &vehicle.name)?;
     wake_up::resolve(vehicle, &platform)?;
     let found = plausible::of_platform(&platform).into_iter();
-    Ok(found.map(|it| it.beneath(&platform.name)).collect())
+    Ok(found
+        .map(|it| it.with_path_prefix(&platform.name))
+        .collect())
 }
 
 fn pairs(overrides: &Bound<'_, PyDict>) -> PyResult<Vec<(String, Value)>> {

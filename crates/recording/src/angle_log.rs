@@ -62,7 +62,7 @@ const DEVIATIONS: &str = "# phase_sigma_rad: total modelled error: receiver nois
                           not included\n";
 
 /// Standard deviation of a uniformly distributed angle, π/√3 (rad).
-const MOST_SIGMA_RAD: f64 = 1.813_799_364_234_217_8;
+const MAX_SIGMA_RAD: f64 = 1.813_799_364_234_217_8;
 
 /// Default SNR (dB) of an angle, sufficient for any policy.
 const UNSTATED_SNR_DB: f64 = 20.0;
@@ -330,7 +330,7 @@ pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     // Without a phase, the standard deviation is that of the angle until the array's spacing is
     // known.
     let deviation = |value: Option<f64>, name: &str| match needed(value, name)? {
-        value if value > 0.0 && value < MOST_SIGMA_RAD => Ok(value),
+        value if value > 0.0 && value < MAX_SIGMA_RAD => Ok(value),
         value if value > 0.0 => Err(format!(
             "{name} {value} is too large for an angle; check its unit"
         )),

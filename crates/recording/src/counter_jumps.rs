@@ -151,8 +151,8 @@ mod tests {
         for rate_hz in [5.0, 20.0, 100.0] {
             let (times_s, given_m) = driven(rate_hz);
             for (number, spoil) in faults.iter().enumerate() {
-                let spoilt = given_m.iter().enumerate().map(|(k, it)| spoil(k, *it));
-                let mut distances_m: Vec<f64> = spoilt.collect();
+                let corrupted = given_m.iter().enumerate().map(|(k, it)| spoil(k, *it));
+                let mut distances_m: Vec<f64> = corrupted.collect();
                 let jumps = replace_jumps(&times_s, &mut distances_m);
                 assert_eq!(
                     jumps.len(),

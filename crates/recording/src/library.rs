@@ -8,7 +8,7 @@ use crate::road_file::read_points_m;
 use crate::text::read_text;
 
 /// Maximum size of a settings file in bytes.
-const MOST_BYTES: u64 = 4 << 20;
+const MAX_BYTES: u64 = 4 << 20;
 
 /// Library of shipped files by name and other files by path. Relative paths in a file refer to its
 /// folder.
@@ -35,7 +35,7 @@ impl Library for Files {
         match Shipped.text(what, shipped, name, referrer) {
             Err(unknown) if !path.exists() => Err(unknown),
             Err(_) => Ok(NamedText {
-                text: read_text(&path, MOST_BYTES)?,
+                text: read_text(&path, MAX_BYTES)?,
                 origin: path.display().to_string(),
             }),
             found => found,

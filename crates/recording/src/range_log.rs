@@ -23,10 +23,10 @@ const OPTIONAL: [&str; 5] = [
 ];
 
 /// Maximum distance of a range (m).
-const MOST_RANGE_M: f64 = 1e7;
+const MAX_RANGE_M: f64 = 1e7;
 
 /// Delay (ns) below which a whole log of delays is in seconds: a delay of 10 km is 3e-5 s.
-const LEAST_DELAY_NS: f64 = 1e-3;
+const MIN_DELAY_NS: f64 = 1e-3;
 
 /// Range with its radio head.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,7 +109,7 @@ pub fn read_range_log(file: &Path) -> Result<RangeLog, RecordingError> {
     log.ranges
         .sort_by(|one, other| time_s(one).total_cmp(&time_s(other)));
     let delays_ns = || (log.ranges.iter()).map(|it| it.measured.value.abs() / METRES_PER_NS);
-    let is_of_seconds = delays_ns().all(|ns| ns < LEAST_DELAY_NS) && delays_ns().any(|ns| ns > 0.0);
+    let is_of_seconds = delays_ns().all(|ns| ns < MIN_DELAY_NS) && delays_ns().any(|ns| ns > 0.0);
     if has_delays && is_of_seconds {
         let most = delays_ns().fold(0.0, f64::max);
         let allowed = "delays must be in nanoseconds, and these are probably in seconds: multiply \
@@ -160,10 +160,8 @@ fn range(values: &[Option<f64>], has_delays: bool) -> Result<LoggedRange, String
         (range_m, sigma_m, ["range_m", "sigma_m"], 1.0)
     };
     let range_m = metres * needed(value, name)?;
-    if range_m.abs() > MOST_RANGE_M {
-        return Err(format!(
-            "{name} is above {MOST_RANGE_M:e} m; check its unit"
-        ));
+    if range_m.abs() > MAX_RANGE_M {
+        return Err(format!("{name} is above {MAX_RANGE_M:e} m; check its unit"));
     }
     let sigma_m = match sigma {
         Some(sigma) if sigma > 0.0 && sigma.is_finite() => Some(metres * sigma),

@@ -10,7 +10,7 @@ use crate::table::Table;
 use crate::text::read_text;
 
 /// Maximum size of a road file in bytes, about a million points.
-const MOST_BYTES: u64 = 64 << 20;
+const MAX_BYTES: u64 = 64 << 20;
 
 /// Semi-major axis of the WGS 84 ellipsoid in metres (EPSG:7030).
 const SEMI_MAJOR_M: f64 = 6_378_137.0;
@@ -57,7 +57,7 @@ const IN_METRES: &str = "coordinates in metres are read from CSV with the column
 /// [`SettingsError`] with the position in the file.
 pub fn read_points_m(path: &Path) -> Result<Vec<[f64; 2]>, SettingsError> {
     let file = path.display().to_string();
-    let text = read_text(path, MOST_BYTES)?;
+    let text = read_text(path, MAX_BYTES)?;
     let is_json = path
         .extension()
         .is_some_and(|end| end.eq_ignore_ascii_case("geojson") || end.eq_ignore_ascii_case("json"));
@@ -148,8 +148,8 @@ fn not_degrees([longitude, latitude]: [f64; 2]) -> Option<String> {
         ));
     }
     let is_polar = !(-60.0..=72.0).contains(&latitude);
-    let off_somalia = (41.0..=60.0).contains(&longitude) && (-6.0..=16.0).contains(&latitude);
-    (is_polar || off_somalia).then(|| {
+    let is_swapped_europe = (41.0..=60.0).contains(&longitude) && (-6.0..=16.0).contains(&latitude);
+    (is_polar || is_swapped_europe).then(|| {
         let place = if is_polar {
             "in the polar ice"
         } else {

@@ -7,7 +7,7 @@ use crate::record::RunRecord;
 
 /// Minimum error in metres in the ratio of protection level to error; smaller errors are replaced
 /// by this value.
-const LEAST_ERROR_M: f64 = 1e-3;
+const MIN_ERROR_M: f64 = 1e-3;
 
 /// Statistics of protection levels and alarms of one run. Epochs within a run are correlated; runs
 /// are independent.
@@ -77,7 +77,7 @@ impl IntegritySummary {
             } else {
                 exceeded_since_s = None;
             }
-            let ratio = integrity.protection_level_m / error_m.max(LEAST_ERROR_M);
+            let ratio = integrity.protection_level_m / error_m.max(MIN_ERROR_M);
             summary.ratios.add(ratio);
             was_ok = ok;
         }

@@ -10,13 +10,13 @@ const ROUNDER: f64 = 6_755_399_441_055_744.0;
 /// exact.
 const HALF_PI: [f64; 2] = [1.570_796_326_734_125_6, 6.077_100_506_506_192e-11];
 /// Maximum magnitude of the argument reduction (rad).
-const MOST_RAD: f64 = 1e6;
+const MAX_RAD: f64 = 1e6;
 
 /// Returns e^(jφ) with an error of 1e-10 cycles at a million radians and 1e-15 near zero. A fast
 /// implementation matters because a simulated drive spends most of its time here. The argument is
 /// reduced to an eighth of a cycle (Cody and Waite); fdlibm's polynomials follow.
 pub fn phasor(angle_rad: f64) -> Complex64 {
-    if angle_rad.abs() > MOST_RAD {
+    if angle_rad.abs() > MAX_RAD {
         return Complex64::cis(angle_rad);
     }
     let quarters = angle_rad * FRAC_2_PI + ROUNDER - ROUNDER;

@@ -42,8 +42,8 @@ impl Step {
     /// Returns the protection level in metres; `None` unless the state is `ok` and the first pose
     /// is found.
     pub fn level_while_ok_m(&self) -> Option<f32> {
-        let relied_on = |it: &Integrity| it.state == IntegrityState::Ok && !self.searching;
-        let level_m = self.integrity.filter(relied_on);
+        let is_valid = |it: &Integrity| it.state == IntegrityState::Ok && !self.searching;
+        let level_m = self.integrity.filter(is_valid);
         level_m.map(|it| it.protection_level_m as f32)
     }
 

@@ -103,7 +103,7 @@ impl World {
     /// Whether the vehicle receives equal signals in another environment in each run. Both
     /// environments are assumed to use the propagation of their scenario.
     pub(crate) fn has_equal_signals(&self, other: &Self) -> bool {
-        let besides = |scenario: &Scenario| Scenario {
+        let without_compared_parts = |scenario: &Scenario| Scenario {
             name: String::new(),
             description: String::new(),
             site: self.site.clone(),
@@ -117,7 +117,7 @@ impl World {
         self.site == other.site
             && physical_properties(&self.vehicle) == physical_properties(&other.vehicle)
             && self.road == other.road
-            && besides(&self.scenario) == besides(&other.scenario)
+            && without_compared_parts(&self.scenario) == without_compared_parts(&other.scenario)
     }
 
     /// Draws the truth of the run that `streams` belongs to. Each value gets an error with its
@@ -134,8 +134,8 @@ impl World {
             let eirp_dbm = head.eirp_dbm + head.eirp_std_db * normal();
             // Limit the drawn power to the range of a site file.
             let (least, most) = (
-                RadioHeadSettings::LEAST_EIRP_DBM,
-                RadioHeadSettings::MOST_EIRP_DBM,
+                RadioHeadSettings::MIN_EIRP_DBM,
+                RadioHeadSettings::MAX_EIRP_DBM,
             );
             head.eirp_dbm = eirp_dbm.clamp(least, most);
         }

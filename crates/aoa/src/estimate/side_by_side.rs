@@ -18,7 +18,7 @@ use crate::linalg::matrix::Matrix;
 use crate::method::maximum_likelihood::{residual_power, snr};
 use crate::method::{esprit, music, root_music};
 use crate::result::direction::{
-    Described, Output, direction, geometric_doubt, no_more_than_ignorance, threshold_doubt,
+    Described, Output, direction, geometric_doubt, limit_to_uniform_sigma, threshold_doubt,
 };
 use crate::result::goodness_of_fit::{Model, Tested};
 use crate::simd::instructions::{LARGEST_VECTORISED, dispatch};
@@ -168,7 +168,7 @@ impl<const N: usize> SideBySide<'_, N> {
             let inverse = 1.0 / snr;
             let variance = times_plus::<FUSED>(inverse * (1.0 / N as f64), inverse, inverse);
             let variance = variance * (per_snapshot * tests.variance_factor(snr, needed));
-            noise_sigma[w] = no_more_than_ignorance(variance.sqrt());
+            noise_sigma[w] = limit_to_uniform_sigma(variance.sqrt());
             if let Some(residuals) = residuals {
                 let tested = tests.of(&residuals.item(w), power, spectra.re[0][w]);
                 (coherent[w], noise[w]) = (tested.coherent, tested.noise);

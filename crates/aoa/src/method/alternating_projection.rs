@@ -232,12 +232,12 @@ pub(crate) fn phases<const N: usize>(matrix: &Matrix<N>, sources: usize) -> Opti
             break;
         }
     }
-    settle(matrix, &mut phases[..sources]);
+    refine_phases(matrix, &mut phases[..sources]);
     Some(List::collect(0.0, phases[..sources].iter().copied()))
 }
 
 /// Applies scoring steps, halved until `V` decreases.
-fn settle<const N: usize>(matrix: &Matrix<N>, phases: &mut [f64]) {
+fn refine_phases<const N: usize>(matrix: &Matrix<N>, phases: &mut [f64]) {
     let Some(mut here) = Fit::<N>::at(matrix, phases) else {
         return;
     };

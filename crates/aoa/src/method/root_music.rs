@@ -25,7 +25,9 @@ pub(crate) fn phases<const N: usize>(null: &Spectrum<N>, sources: usize) -> List
     roots[..N - 1].sort_unstable_by(|a, b| b.norm_sqr().total_cmp(&a.norm_sqr()));
     List::collect(
         0.0,
-        roots[..sources].iter().map(|root| settled(null, *root)),
+        roots[..sources]
+            .iter()
+            .map(|root| refined_phase(null, *root)),
     )
 }
 
@@ -101,7 +103,7 @@ pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
 /// Returns the phase of a root. A root on the unit circle is double, and rounding moves it along
 /// the circle by the square root of eps. The spectrum has a zero there, whose minimum is well
 /// determined.
-fn settled<const N: usize>(null: &Spectrum<N>, root: Complex64) -> f64 {
+fn refined_phase<const N: usize>(null: &Spectrum<N>, root: Complex64) -> f64 {
     let phase = root.arg();
     if root.norm_sqr() > 1.0 - 1e-4 {
         let minimum = null.negated().refined_maximum(phase, 1e-3);

@@ -28,7 +28,7 @@ pub(crate) fn describe<O: Output, const N: usize>(found: &Found, array: &Array<N
         tested,
         ..
     } = *found;
-    let noise_sigma = no_more_than_ignorance(found.noise_sigma_rad);
+    let noise_sigma = limit_to_uniform_sigma(found.noise_sigma_rad);
     let sigma = noise_sigma * tested.inflation.sqrt();
     let (phase_sigma_rad, angle_rad, sigma_rad) = direction::<false>(phase_rad, sigma, end_fire);
     let described = Described {
@@ -127,12 +127,12 @@ pub(crate) fn threshold_doubt(snr: f64, needed: f64) -> Option<Reason> {
 
 /// Limits a standard deviation to that of a uniformly distributed phase, `pi / sqrt(3)`.
 #[inline(always)]
-pub(crate) fn no_more_than_ignorance(phase_sigma_rad: f64) -> f64 {
-    const IGNORANCE: f64 = 1.813_799_364_234_217_8;
-    if phase_sigma_rad < IGNORANCE {
+pub(crate) fn limit_to_uniform_sigma(phase_sigma_rad: f64) -> f64 {
+    const UNIFORM_SIGMA_RAD: f64 = 1.813_799_364_234_217_8;
+    if phase_sigma_rad < UNIFORM_SIGMA_RAD {
         phase_sigma_rad
     } else {
-        IGNORANCE
+        UNIFORM_SIGMA_RAD
     }
 }
 
@@ -144,8 +144,8 @@ pub(crate) fn direction<const FUSED: bool>(
     phase_sigma_rad: f64,
     end_fire_rad: f64,
 ) -> (f64, f64, f64) {
-    let lesser = |a: f64, b: f64| if a < b { a } else { b };
-    let phase_sigma_rad = no_more_than_ignorance(phase_sigma_rad);
+    let minimum_of = |a: f64, b: f64| if a < b { a } else { b };
+    let phase_sigma_rad = limit_to_uniform_sigma(phase_sigma_rad);
     let cosine = phase_rad / end_fire_rad;
     let cosine = if cosine > 1.0 { 1.0 } else { cosine };
     let cosine = if cosine < -1.0 { -1.0 } else { cosine };
@@ -153,11 +153,11 @@ pub(crate) fn direction<const FUSED: bool>(
     let spread = phase_sigma_rad / end_fire_rad;
     // acos(1 - x) is sqrt(2 x) near the axis, so that the standard deviation is of this size
     // instead of infinite.
-    let sigma_rad = lesser(spread / sine, (2.0 * spread).sqrt());
+    let sigma_rad = minimum_of(spread / sine, (2.0 * spread).sqrt());
     (
         phase_sigma_rad,
         acos::<FUSED>(cosine),
-        lesser(sigma_rad, FRAC_PI_2),
+        minimum_of(sigma_rad, FRAC_PI_2),
     )
 }
 

@@ -242,8 +242,12 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
                 }
                 // If the spectrum is convex, move uphill instead.
                 let newton = -slope / curvature;
-                let uphill = (0.5 * reach).copysign(slope);
-                let step = if curvature < 0.0 { newton } else { uphill };
+                let gradient_step = (0.5 * reach).copysign(slope);
+                let step = if curvature < 0.0 {
+                    newton
+                } else {
+                    gradient_step
+                };
                 let target = offset[w] + step;
                 let target = if target > reach { reach } else { target };
                 let target = if target < -reach { -reach } else { target };

@@ -33,7 +33,7 @@ pub struct NodeSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angles: Option<AngleFile>,
     /// Whether samples between required SSBs are dropped unprocessed and the radio is switched off.
-    #[serde(default = "yes")]
+    #[serde(default = "default_true")]
     pub sleep: bool,
     /// Time without input after which a source is reported as silent, in seconds.
     #[serde(default = "half")]
@@ -52,7 +52,7 @@ pub struct NodeSettings {
     pub page: Option<PageSettings>,
 }
 
-const fn yes() -> bool {
+const fn default_true() -> bool {
     true
 }
 const fn half() -> f64 {

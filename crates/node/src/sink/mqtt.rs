@@ -147,8 +147,8 @@ impl Sink for Mqtt {
         let Some(link) = &self.link else {
             return Ok(true);
         };
-        while let Ok(news) = link.network.try_recv() {
-            if let Network::Failed(error) = news {
+        while let Ok(event_result) = link.network.try_recv() {
+            if let Network::Failed(error) = event_result {
                 return Err(anyhow!(error)).context(self.named());
             }
         }
@@ -207,7 +207,7 @@ impl Sink for Mqtt {
 /// Runs a connection until it ends.
 fn run(mut connection: Connection, sender: &Sender<Network>) {
     for event in connection.iter() {
-        let news = match event {
+        let event_result = match event {
             Ok(Event::Incoming(Packet::ConnAck(answer))) => match answer.code {
                 ConnectReturnCode::Success => Network::Connected,
                 code => Network::Failed(format!("it refuses the connection: {code:?}")),
@@ -217,9 +217,9 @@ fn run(mut connection: Connection, sender: &Sender<Network>) {
             Ok(_) => continue,
             Err(error) => Network::Failed(error.to_string()),
         };
-        let has_failed = matches!(news, Network::Failed(_));
+        let has_failed = matches!(event_result, Network::Failed(_));
         // The receiver is gone once the output was abandoned.
-        if sender.send(news).is_err() || has_failed {
+        if sender.send(event_result).is_err() || has_failed {
             return;
         }
     }

@@ -35,8 +35,8 @@ impl Queue {
     pub fn put(&self, record: Arc<Record>, waits: impl Fn() -> bool) -> u64 {
         let mut waiting = self.lock();
         while waiting.records.len() >= CAPACITY && !waiting.is_closed && waits() {
-            let woken = self.taken.wait_timeout(waiting, CHECK);
-            (waiting, _) = woken.unwrap_or_else(PoisonError::into_inner);
+            let wait_result = self.taken.wait_timeout(waiting, CHECK);
+            (waiting, _) = wait_result.unwrap_or_else(PoisonError::into_inner);
         }
         let mut dropped = 0;
         if waiting.records.len() >= CAPACITY {
@@ -57,8 +57,8 @@ impl Queue {
     pub fn take(&self, wait: Duration, into: &mut VecDeque<Arc<Record>>) -> bool {
         let mut waiting = self.lock();
         if waiting.records.is_empty() && !waiting.is_closed {
-            let woken = self.came.wait_timeout(waiting, wait);
-            (waiting, _) = woken.unwrap_or_else(PoisonError::into_inner);
+            let wait_result = self.came.wait_timeout(waiting, wait);
+            (waiting, _) = wait_result.unwrap_or_else(PoisonError::into_inner);
         }
         into.append(&mut waiting.records);
         self.taken.notify_one();

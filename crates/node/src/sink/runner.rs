@@ -102,8 +102,8 @@ impl Running {
                     progress = (Instant::now(), done);
                 }
                 // In playback, the reader of an output determines the speed.
-                let gives_up = !self.records.waits() || !status.ok;
-                if gives_up && progress.0.elapsed() > END_PATIENCE {
+                let may_abandon = !self.records.waits() || !status.ok;
+                if may_abandon && progress.0.elapsed() > END_PATIENCE {
                     lane.health
                         .fail("it was not complete 5 s after the last record".to_owned());
                     break;

@@ -12,7 +12,7 @@ use crate::settings::{Clock, SampleFormat, Stream};
 use crate::statistics::SourceHealth;
 
 /// Maximum number of samples per channel in a block.
-const MOST_FRAMES: usize = 1 << 15;
+const MAX_FRAMES: usize = 1 << 15;
 /// Interval in seconds at which dropped samples before a window are reported; the pipeline is idle
 /// then.
 const REPORT_INTERVAL_S: f64 = 0.02;
@@ -194,7 +194,7 @@ impl Framing {
             Times::Arrival(clock) => clock.next_s(),
         };
         match (next_s, self.gate.wanted()) {
-            (Some(next_s), Some([_, until_s])) if next_s >= until_s => MOST_FRAMES,
+            (Some(next_s), Some([_, until_s])) if next_s >= until_s => MAX_FRAMES,
             (Some(next_s), Some(window_s)) => {
                 ((time_s(window_s) - next_s) * self.rate_hz).max(0.0) as usize
             }
@@ -247,7 +247,7 @@ impl Framing {
         let rate_hz = self.rate_hz;
         let mut first = 0;
         while first < frames {
-            let count = MOST_FRAMES.min(frames - first);
+            let count = MAX_FRAMES.min(frames - first);
             let block_s = start_s + first as f64 / rate_hz;
             let place =
                 |time_s: f64| ((time_s - block_s) * rate_hz).clamp(0.0, count as f64) as usize;
@@ -442,7 +442,7 @@ mod tests {
         framing.interleaved(&[1; 2 * 210]);
         assert_eq!([framing.unwanted(), framing.deferrable()], [0, 0]);
         framing.pass_over(10);
-        assert_eq!(framing.unwanted(), MOST_FRAMES);
+        assert_eq!(framing.unwanted(), MAX_FRAMES);
         // Expected inputs: the first report, the report before the window, the required samples,
         // and the end of the window.
         let times_s: Vec<f64> = std::iter::from_fn(|| framing.inbox.take(Duration::ZERO))

@@ -32,7 +32,7 @@ struct Angle {
     phase_rad: f64,
     phase_sigma_rad: f64,
     snr_db: Option<f64>,
-    #[serde(default = "yes")]
+    #[serde(default = "default_true")]
     resolved: bool,
     #[serde(default)]
     at_head: bool,
@@ -71,7 +71,7 @@ struct Cell {
     pci: u16,
 }
 
-const fn yes() -> bool {
+const fn default_true() -> bool {
     true
 }
 
@@ -120,13 +120,13 @@ fn read<T: DeserializeOwned>(message: Map<String, Value>) -> Result<T, String> {
         if key == "." {
             why.to_string()
         } else {
-            format!("{key}: {}", in_words(&why.to_string()))
+            format!("{key}: {}", plain_message(&why.to_string()))
         }
     })
 }
 
 /// Replaces the names of Rust's types in a message of serde.
-fn in_words(why: &str) -> String {
+fn plain_message(why: &str) -> String {
     let Some((found, expected)) = why.split_once(", expected ") else {
         return why.to_owned();
     };

@@ -67,7 +67,7 @@ fn session(endpoints: &[Address], framing: &mut Framing, inbox: &Inbox) -> (io::
                 Err(error) => return (named(endpoint, &error), received),
             }
         }
-        hand_on(&mut channels, framing);
+        forward_samples(&mut channels, framing);
     }
     (io::ErrorKind::Interrupted.into(), received)
 }
@@ -158,7 +158,7 @@ impl Channel {
 
 /// Delivers the samples that every channel has. Samples that one channel has dropped are dropped
 /// for all.
-fn hand_on(channels: &mut [Channel], framing: &mut Framing) {
+fn forward_samples(channels: &mut [Channel], framing: &mut Framing) {
     let stride = framing.sample_bytes();
     loop {
         let whole = channels.iter().map(Channel::length).min().unwrap_or(0) / stride * stride;
@@ -223,7 +223,7 @@ mod tests {
         let health = Arc::new(SourceHealth::new("samples"));
         let format = SampleFormat::Ci8;
         let mut framing = Framing::new(&stream, format, Arc::default(), Arc::clone(&inbox), health);
-        hand_on(&mut channels, &mut framing);
+        forward_samples(&mut channels, &mut framing);
         let mut blocks = Vec::new();
         while let Some((_, input)) = inbox.take(Duration::ZERO) {
             if let Input::Samples(block) = input {

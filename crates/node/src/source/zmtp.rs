@@ -11,7 +11,7 @@ pub const LONGEST: usize = 32 << 20;
 /// Number of bytes that are allocated at once for a frame.
 const CHUNK: usize = 1 << 16;
 /// Maximum number of read timeouts within a frame.
-const MOST_IDLE: u32 = 10;
+const MAX_READ_TIMEOUTS: u32 = 10;
 
 const MORE: u8 = 1;
 const LONG: u8 = 2;
@@ -184,7 +184,9 @@ fn piece_by_piece(
             Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
             Ok(count) => (missing, idle) = (missing.saturating_sub(count), 0),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) if super::connection::is_idle(&error) && idle < MOST_IDLE => idle += 1,
+            Err(error) if super::connection::is_idle(&error) && idle < MAX_READ_TIMEOUTS => {
+                idle += 1;
+            }
             Err(error) => return Err(error),
         }
     }
@@ -202,7 +204,9 @@ fn read_exact(stream: &mut impl Read, mut into: &mut [u8]) -> io::Result<()> {
             Ok(count) => into = into.get_mut(count..).unwrap_or_default(),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(error)
-                if super::connection::is_idle(&error) && into.len() < whole && idle < MOST_IDLE =>
+                if super::connection::is_idle(&error)
+                    && into.len() < whole
+                    && idle < MAX_READ_TIMEOUTS =>
             {
                 idle += 1;
             }

@@ -30,7 +30,7 @@ use crate::numeric::phasors::fill_phasors;
 /// Samples of a frame at the base rate: 3.75 kHz per bin at 30 kHz subcarrier spacing.
 const FRAME: usize = 2048;
 /// Maximum number of frames: further frames hardly change the median.
-const MOST_FRAMES: usize = 16;
+const MAX_FRAMES: usize = 16;
 /// Minimum number of samples for the detection of lines, in frames: about one SSB.
 const SHORTEST_FRAMES: f64 = 0.5;
 /// Minimum ratio of a line's power per bin to that of its surroundings, 16 dB. White noise exceeds it in one
@@ -48,7 +48,7 @@ const LOBE: usize = 4;
 /// Farthest bin of a line's surroundings, in half main lobes.
 const SURROUNDINGS: usize = 4;
 /// Maximum number of lines.
-const MOST_TONES: usize = 16;
+const MAX_TONES: usize = 16;
 /// Amplitudes are fitted again after this number of samples.
 const STRETCH: usize = 4096;
 /// Minimum number of samples that amplitudes are fitted to.
@@ -95,7 +95,7 @@ pub(crate) struct ToneCanceller {
     /// Frame of every antenna.
     work: Vec<Vec<Complex32>>,
     /// Power per bin and frame; the frames of a bin are adjacent in memory.
-    powers: Vec<[f32; MOST_FRAMES]>,
+    powers: Vec<[f32; MAX_FRAMES]>,
     median: Vec<f32>,
     phasors: Vec<Complex32>,
     lines: Vec<Line>,
@@ -119,7 +119,7 @@ impl Frames {
             return None;
         }
         let length = available.min(full) & !1;
-        let count = (available / length).clamp(1, MOST_FRAMES);
+        let count = (available / length).clamp(1, MAX_FRAMES);
         let step = (available - length) / (count - 1).max(1);
         Some(Self {
             first,
@@ -149,10 +149,10 @@ impl ToneCanceller {
             scratch,
             taper: blackman_harris(frame),
             work: vec![vec![Complex32::ZERO; frame]; antennas],
-            powers: vec![[0.0; MOST_FRAMES]; frame],
+            powers: vec![[0.0; MAX_FRAMES]; frame],
             median: vec![0.0; frame],
             phasors: vec![Complex32::ZERO; frame.max(2 * STRETCH)],
-            lines: Vec::with_capacity(MOST_TONES),
+            lines: Vec::with_capacity(MAX_TONES),
         }
     }
 
@@ -185,7 +185,7 @@ impl ToneCanceller {
             self.taper = blackman_harris(frames.length);
         }
         self.lines.clear();
-        while self.lines.len() < MOST_TONES {
+        while self.lines.len() < MAX_TONES {
             self.measure(antennas, frames);
             let Some(bin) = self.most_prominent(frames.length) else {
                 break;
@@ -236,12 +236,12 @@ impl ToneCanceller {
         range: std::ops::Range<usize>,
         without: Option<usize>,
         subtract: bool,
-    ) -> [f64; MOST_TONES] {
-        let mut powers = [0.0; MOST_TONES];
+    ) -> [f64; MAX_TONES] {
+        let mut powers = [0.0; MAX_TONES];
         let length = range.len();
         let lines = self.lines.iter().enumerate();
         let lines = lines.filter(|(index, _)| Some(*index) != without);
-        let mut frequencies = [0.0; MOST_TONES];
+        let mut frequencies = [0.0; MAX_TONES];
         let mut count = 0;
         for ((_, line), slot) in lines.zip(&mut frequencies) {
             *slot = line.frequency;
@@ -252,7 +252,7 @@ impl ToneCanceller {
             return powers;
         };
         let phasors = &mut self.phasors[..length];
-        let mut amplitudes = [[Complex64::ZERO; MOST_TONES]; MAX_ANTENNAS];
+        let mut amplitudes = [[Complex64::ZERO; MAX_TONES]; MAX_ANTENNAS];
         for (index, frequency) in frequencies.iter().enumerate() {
             fill_phasors(phasors, 0.0, *frequency);
             for (samples, amplitudes) in antennas.iter().zip(&mut amplitudes) {
@@ -433,7 +433,7 @@ impl ToneCanceller {
             return;
         }
         let lines = std::mem::take(&mut self.lines);
-        let mut powers = [0.0; MOST_TONES];
+        let mut powers = [0.0; MAX_TONES];
         for number in 0..frames.count {
             self.load(antennas, frames, number, None);
             self.lines.extend_from_slice(&lines);
@@ -455,8 +455,8 @@ impl ToneCanceller {
 
 /// Returns the inner products of the lines, `Σ exp(j2π (f_j − f_i) n)` over `length` samples;
 /// unused rows belong to lines that are orthogonal to all others.
-fn gram(frequencies: &[f64], length: usize) -> Matrix<MOST_TONES> {
-    let mut gram = [[Complex64::ZERO; MOST_TONES]; MOST_TONES];
+fn gram(frequencies: &[f64], length: usize) -> Matrix<MAX_TONES> {
+    let mut gram = [[Complex64::ZERO; MAX_TONES]; MAX_TONES];
     for (i, row) in gram.iter_mut().enumerate() {
         row[i] = Complex64::new(length as f64, 0.0);
         for (j, entry) in row.iter_mut().enumerate() {
@@ -590,9 +590,9 @@ mod tests {
         canceller.detect(&[&silence[..]], 0);
         assert!(!canceller.is_needed());
         canceller.detect(&[&silence[..7]], 0);
-        let mut spoiled = noise(5, 5000);
-        spoiled[100].re = f32::NAN;
-        canceller.detect(&[&spoiled[..]], 0);
+        let mut corrupted = noise(5, 5000);
+        corrupted[100].re = f32::NAN;
+        canceller.detect(&[&corrupted[..]], 0);
         assert!(!canceller.is_needed());
         // A frame with the length of one SSB is sufficient for a strong tone.
         let mut short = noise(6, 1100);

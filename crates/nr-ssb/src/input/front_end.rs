@@ -18,16 +18,16 @@ use crate::dsp::base_rate::SYMBOL_FFT;
 use crate::dsp::received_grid::MAX_ANTENNAS;
 
 /// Maximum ratio of the input rate to the base rate.
-const MOST_OVERSAMPLING: f64 = 4096.0;
+const MAX_OVERSAMPLING: f64 = 4096.0;
 /// Maximum numerator of the ratio of base rate to input rate.
-const MOST_INTERPOLATION: usize = 1024;
+const MAX_INTERPOLATION: usize = 1024;
 /// Maximum relative error of that ratio: a tenth of a good oscillator's error.
 const RATE_TOLERANCE: f64 = 1e-7;
 /// Maximum number of samples in an output block of the overlap-save method, at the base rate.
-const MOST_BLOCK: usize = 4096;
+const MAX_BLOCK: usize = 4096;
 /// Minimum number of samples that are discarded on each side of a block, at the base rate: the
 /// length of the low-pass filter.
-const LEAST_MARGIN: usize = 128;
+const MIN_MARGIN: usize = 128;
 /// Carrier frequency offset within the passband of the filter, in subcarriers.
 const CFO_MARGIN_SUBCARRIERS: f64 = 0.7;
 
@@ -139,12 +139,12 @@ impl FrontEnd {
         }
         let base_rate_hz = SYMBOL_FFT as f64 * scs_hz;
         let (interpolation, decimation) = rate_ratio(input_rate_hz, base_rate_hz)?;
-        let repeats = (1..=MOST_BLOCK / interpolation)
+        let repeats = (1..=MAX_BLOCK / interpolation)
             .rev()
             .find(|repeats| is_smooth(*repeats))
             .unwrap_or(1);
         let (block, input_block) = (repeats * interpolation, repeats * decimation);
-        let margin = LEAST_MARGIN.next_multiple_of(interpolation);
+        let margin = MIN_MARGIN.next_multiple_of(interpolation);
         let mut planner = FftPlanner::new();
         let forward = planner.plan_fft_forward(input_block);
         let inverse = planner.plan_fft_inverse(block);
@@ -443,14 +443,14 @@ fn low_pass(block: usize, input_block: usize) -> Vec<f32> {
 
 /// Returns L and M; the base rate is L/M of the input rate.
 fn rate_ratio(input_hz: f64, base_hz: f64) -> Result<(usize, usize), FrontEndError> {
-    if !(input_hz > 0.0 && base_hz > 0.0 && input_hz <= MOST_OVERSAMPLING * base_hz) {
+    if !(input_hz > 0.0 && base_hz > 0.0 && input_hz <= MAX_OVERSAMPLING * base_hz) {
         return Err(FrontEndError::Rate { input_hz, base_hz });
     }
     if input_hz < base_hz * (1.0 - RATE_TOLERANCE) {
         return Err(FrontEndError::RateTooLow { input_hz, base_hz });
     }
     let ratio = |up: usize| (up, input_hz / base_hz * up as f64);
-    (1..=MOST_INTERPOLATION)
+    (1..=MAX_INTERPOLATION)
         .map(ratio)
         .find(|(_, down)| (down - down.round()).abs() < RATE_TOLERANCE * down)
         .map(|(up, down)| (up, down.round() as usize))

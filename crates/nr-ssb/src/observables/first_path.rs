@@ -35,7 +35,7 @@ const SPREADS: usize = 8;
 const SHORTEST: f64 = 0.02;
 /// Number of K factors, the smallest one and their distance, in dB.
 const FACTORS: usize = 14;
-const LEAST_K_DB: f64 = -7.5;
+const MIN_K_DB: f64 = -7.5;
 const STEP_K_DB: f64 = 2.5;
 /// Mean and standard deviation of K, in dB.
 const PRIOR_K_DB: [f64; 2] = [7.0, 8.0];
@@ -232,7 +232,7 @@ fn centre(group: usize) -> f64 {
 }
 
 fn k_factor(index: usize) -> f64 {
-    10.0_f64.powf(0.1 * (LEAST_K_DB + STEP_K_DB * index as f64))
+    10.0_f64.powf(0.1 * (MIN_K_DB + STEP_K_DB * index as f64))
 }
 
 /// Returns the prior probability of every delay spread and K factor.
@@ -242,7 +242,7 @@ fn prior(base_rate_hz: f64) -> [[f64; FACTORS]; SPREADS] {
     let mut prior: [[f64; FACTORS]; SPREADS] = std::array::from_fn(|spread| {
         let lg_spread = (SHORTEST * f64::from(1_u16 << spread) / base_rate_hz).log10();
         std::array::from_fn(|factor| {
-            let k_db = LEAST_K_DB + STEP_K_DB * factor as f64;
+            let k_db = MIN_K_DB + STEP_K_DB * factor as f64;
             normal(lg_spread, PRIOR_LG_SPREAD) * normal(k_db, PRIOR_K_DB)
         })
     });

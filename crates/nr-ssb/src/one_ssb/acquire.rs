@@ -98,7 +98,7 @@ impl Acquirer {
             phase_step: 0.0,
         };
         // The channel estimate for the SSS detection uses the PSS.
-        self.know_pss(candidate.n_id_2);
+        self.add_known_pss(candidate.n_id_2);
         let flat = [Complex32::ONE; SYMBOLS];
         self.demodulator
             .run(antennas, &alignment, &mut self.grids)?;
@@ -119,7 +119,7 @@ impl Acquirer {
         }
         // The channel estimate for the DM-RS detection uses PSS and SSS with aligned phases.
         let pci = cell.hypothesis;
-        self.know_sss(pci);
+        self.add_known_sss(pci);
         let phases = [
             Complex32::ONE,
             Complex32::ONE,
@@ -130,7 +130,7 @@ impl Acquirer {
         self.estimate.fit(&self.grids, &self.reference);
         let beam = dmrs_hypothesis(pci, &self.grids, &self.estimate);
         let ibar_ssb = beam.hypothesis;
-        self.know_dmrs(pci, ibar_ssb);
+        self.add_known_dmrs(pci, ibar_ssb);
         self.align(antennas, &mut alignment)?;
         let statistic = pss_statistic(candidate.n_id_2, &self.grids);
         Some(Acquired {
@@ -218,7 +218,7 @@ impl Acquirer {
             .sum()
     }
 
-    fn know_pss(&mut self, n_id_2: u8) {
+    fn add_known_pss(&mut self, n_id_2: u8) {
         self.reference.elements_mut().fill(Complex32::ZERO);
         self.reference.put(
             pss_indices(),
@@ -226,24 +226,24 @@ impl Acquirer {
         );
     }
 
-    fn know_sss(&mut self, pci: Pci) {
+    fn add_known_sss(&mut self, pci: Pci) {
         self.reference.put(
             sss_indices(),
             sss(pci).map(|chip| Complex32::new(chip, 0.0)),
         );
     }
 
-    fn know_dmrs(&mut self, pci: Pci, ibar_ssb: u8) {
+    fn add_known_dmrs(&mut self, pci: Pci, ibar_ssb: u8) {
         self.reference.put(*dmrs_indices(pci), dmrs(pci, ibar_ssb));
     }
 
     /// Adds the decoded and re-encoded PBCH to the known elements.
-    pub(crate) fn know_pbch(&mut self, pci: Pci, symbols: &[Complex32; PBCH_LEN]) {
+    pub(crate) fn add_known_pbch(&mut self, pci: Pci, symbols: &[Complex32; PBCH_LEN]) {
         self.reference.put(*pbch_indices(pci), *symbols);
     }
 
     /// Removes the PSS, which other cells may share, from the known elements and returns it.
-    pub(crate) fn forget_pss(&mut self) -> [Complex32; SYNC_LEN] {
+    pub(crate) fn remove_known_pss(&mut self) -> [Complex32; SYNC_LEN] {
         let mut pss = [Complex32::ZERO; SYNC_LEN];
         let known = &mut self.reference.elements_mut()[pss_indices()];
         pss.copy_from_slice(known);

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 /// Maximum number of threads; more would wait for memory, not for processors.
-const MOST_THREADS: usize = 16;
+const MAX_THREADS: usize = 16;
 
 /// Returns the result of `work` for each item, in the order of the items. Each thread has its own
 /// worker (plans and buffers) from `worker`.
@@ -39,7 +39,7 @@ pub(super) fn in_parallel<T: Sync, W, R: Send, E: Send>(
     };
     let processors = thread::available_parallelism().map_or(1, NonZero::get);
     let others = processors
-        .min(MOST_THREADS)
+        .min(MAX_THREADS)
         .min(items.len())
         .saturating_sub(1);
     let mut done = thread::scope(|scope| {

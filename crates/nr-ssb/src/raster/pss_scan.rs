@@ -18,7 +18,7 @@ pub(super) const OFFSET_UNIT_HZ: f64 = 15e3;
 /// Four times as many would recover half of the loss due to the addition of powers.
 const NOISE_CANDIDATES: f64 = 16.0;
 /// Maximum number of offsets that are searched.
-const MOST_OFFSETS: usize = 24;
+const MAX_OFFSETS: usize = 24;
 /// Number of lags per thread and chunk, at the base rate.
 const CHUNK: usize = 4 * HOP;
 /// Additional samples before and after a chunk, for the front end's filter and the PSS itself.
@@ -108,7 +108,7 @@ fn strongest(mut seen: Vec<PssDetection>, near: f64, scs_hz: f64) -> Vec<PssDete
     let mut kept: Vec<PssDetection> = Vec::new();
     let mut likeliest: Vec<usize> = Vec::new();
     for one in seen {
-        if likeliest.len() == MOST_OFFSETS {
+        if likeliest.len() == MAX_OFFSETS {
             break;
         }
         let shadow = kept.iter().any(|it| {

@@ -4,7 +4,7 @@ use crate::search::{SearchConfig, SearchError};
 use crate::standard::numerology::SubcarrierSpacing;
 
 /// Maximum frequency offset in subcarriers. At larger offsets, the filter attenuates PSS and SSS.
-const MOST_SUBCARRIERS: f64 = 15.0;
+const MAX_SUBCARRIERS: f64 = 15.0;
 
 /// Receiver configuration.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +52,7 @@ impl ReceiverConfig {
 
     /// Returns the maximum `oscillator_ppm` at a frequency: 15 subcarriers.
     pub fn widest_ppm(ssb_freq_hz: f64, spacing: SubcarrierSpacing) -> f64 {
-        1e6 * MOST_SUBCARRIERS * spacing.hz() / ssb_freq_hz.abs().max(1.0)
+        1e6 * MAX_SUBCARRIERS * spacing.hz() / ssb_freq_hz.abs().max(1.0)
     }
 
     /// Returns the number of frequency offsets of the search, one subcarrier apart.
@@ -61,7 +61,7 @@ impl ReceiverConfig {
         let largest_hz = 1e-6 * self.oscillator_ppm * ssb_freq_hz;
         let beyond_hz = largest_hz - self.search.cfo_range_hz;
         let steps = (beyond_hz / self.search.spacing.hz()).ceil();
-        2 * steps.clamp(0.0, MOST_SUBCARRIERS) as u32 + 1
+        2 * steps.clamp(0.0, MAX_SUBCARRIERS) as u32 + 1
     }
 
     /// Returns the period in samples at the base rate.

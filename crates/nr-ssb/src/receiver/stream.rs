@@ -53,7 +53,7 @@ impl<const A: usize> StreamReceiver<A> {
             next_input: 0,
             searched: 0,
         };
-        made.go_on_at(0);
+        made.resume_at_sample(0);
         Ok(made)
     }
 
@@ -137,7 +137,7 @@ impl<const A: usize> StreamReceiver<A> {
     fn resume_at(&mut self, sample: u64) {
         self.next_input = sample;
         let next = self.front_end.resume_at(sample);
-        self.go_on_at(next as i64);
+        self.resume_at_sample(next as i64);
     }
 
     /// Removes beams and samples, for a restarted stream.
@@ -154,7 +154,7 @@ impl<const A: usize> StreamReceiver<A> {
     }
 
     /// Continues at this sample of the base rate, after silence. An SSB may begin at it.
-    fn go_on_at(&mut self, number: i64) {
+    fn resume_at_sample(&mut self, number: i64) {
         for samples in &mut self.base {
             samples.clear();
             samples.resize(GUARD as usize, Complex32::ZERO);

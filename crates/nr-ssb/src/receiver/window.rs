@@ -25,7 +25,7 @@ const LOST_INTERVAL_S: f64 = 0.1;
 /// Period (s) per frequency offset that is searched in a burst without beams, and maximum number of
 /// offsets.
 const PERIOD_OF_OFFSET_S: f64 = 0.04;
-const MOST_OFFSETS: f64 = 4.0;
+const MAX_OFFSETS: f64 = 4.0;
 /// Interval of the measurement of DC offset and tones, in seconds; [`LOST_INTERVAL_S`] if an SSB is
 /// missing.
 const TONE_INTERVAL_S: f64 = 1.0;
@@ -186,7 +186,7 @@ impl<const A: usize> WindowReceiver<A> {
             self.search_until = f64::NEG_INFINITY;
             self.count_failed_searches();
         }
-        if self.all_come() {
+        if self.all_received() {
             return false;
         }
         let came = self.beams.iter().any(|beam| beam.tracker.misses() == 0);
@@ -206,17 +206,17 @@ impl<const A: usize> WindowReceiver<A> {
     }
 
     /// Whether all known beams are received; updates the frequency offset of the beams.
-    fn all_come(&mut self) -> bool {
+    fn all_received(&mut self) -> bool {
         let (beams, known) = (&self.beams, &self.config.beams);
         let comes = |known: &(u16, u8)| {
             let is_it = |it: &&Beam<A>| (it.pci.get(), it.ssb_index) == *known;
             (beams.iter().find(is_it)).is_some_and(|it| it.tracker.misses() == 0)
         };
-        let all_come = !known.is_empty() && known.iter().all(comes);
-        if let (true, Some(beam)) = (all_come, beams.first()) {
+        let all_received = !known.is_empty() && known.iter().all(comes);
+        if let (true, Some(beam)) = (all_received, beams.first()) {
             self.offset_hz = beam.tracker.cfo_hz();
         }
-        all_come
+        all_received
     }
 
     /// Records a search over a whole period.
@@ -229,7 +229,7 @@ impl<const A: usize> WindowReceiver<A> {
     /// Returns the number of frequency offsets that are searched together.
     fn at_once(&self) -> u32 {
         let offsets = (self.config.period_s / PERIOD_OF_OFFSET_S).round();
-        (offsets.clamp(1.0, MOST_OFFSETS) as u32).min(self.config.offsets())
+        (offsets.clamp(1.0, MAX_OFFSETS) as u32).min(self.config.offsets())
     }
 
     /// Returns the frequency offset of search number `number`: that of the beams, otherwise the
@@ -263,7 +263,7 @@ impl<const A: usize> WindowReceiver<A> {
     fn search_around(&mut self, cfo_hz: f64, window: &Window<'_>) -> Result<(), ReceiverError> {
         let period = self.config.period();
         self.searcher.centre(cfo_hz)?;
-        let mut none_came = self.beams.iter().all(|beam| beam.tracker.misses() > 0);
+        let mut none_received = self.beams.iter().all(|beam| beam.tracker.misses() > 0);
         for found in self.searcher.search(window.antennas)? {
             let wanted = self.config.cells.as_ref();
             if wanted.is_some_and(|cells| !cells.contains(&found.pci.get())) {
@@ -277,10 +277,10 @@ impl<const A: usize> WindowReceiver<A> {
             match self.beams.iter_mut().find(same) {
                 Some(beam) if beam.tracker.misses() > 0 => {
                     let off = beam.found(&found, period);
-                    if none_came && off.abs() > OFF_PERIOD {
+                    if none_received && off.abs() > OFF_PERIOD {
                         self.unreported_gap += (-off).rem_euclid(period);
                     }
-                    none_came = false; // the other beams have equal information
+                    none_received = false; // the other beams have equal information
                 }
                 Some(_) => {}
                 None => self.beams.push(Beam::new(&self.config.search, &found)?),

@@ -180,7 +180,8 @@ impl Examiner {
             }
         }
         if let Some(broadcast) = &broadcast {
-            self.acquirer.know_pbch(acquired.pci, &broadcast.symbols);
+            self.acquirer
+                .add_known_pbch(acquired.pci, &broadcast.symbols);
             self.acquirer.align(samples, &mut acquired.alignment)?;
             self.complete_earlier(&acquired, broadcast, time);
         }
@@ -279,7 +280,7 @@ impl Examiner {
     /// Subtracts the SSB. Its channel estimate does not use the PSS, which other cells may share.
     fn remove(&mut self, samples: &mut [Vec<Complex32>], alignment: &Alignment) {
         let phases = alignment.symbol_phases();
-        let pss = self.acquirer.forget_pss();
+        let pss = self.acquirer.remove_known_pss();
         let Acquirer {
             estimate,
             grids,

@@ -356,7 +356,7 @@ impl<const A: usize> Tracker<A> {
             statistic: 0.0,
         };
         let broadcast = self.decoder.decode(&self.acquirer, &acquired)?;
-        self.acquirer.know_pbch(self.pci, &broadcast.symbols);
+        self.acquirer.add_known_pbch(self.pci, &broadcast.symbols);
         Some(broadcast.payload)
     }
 }

@@ -155,7 +155,7 @@ fn three_periods(seed: u64, above_ssb_db: f64, cycles: f64) -> (Cell, Vec<Vec<Co
 #[test]
 fn both_receivers_track_through_tones_and_report_them() {
     // Noise of 10 dB on 830 elements: 0.011 rad; five standard deviations.
-    const MOST_RAD: f64 = 0.055;
+    const MAX_RAD: f64 = 0.055;
     for (seed, above_ssb_db, cycles) in [
         (1, -300.0, 0.0),
         (1, -10.0, 0.0),
@@ -177,7 +177,7 @@ fn both_receivers_track_through_tones_and_report_them() {
         });
         assert_eq!(reported.len(), tones, "stream, {above_ssb_db} dB");
         assert_eq!(errors.len(), 3, "stream, {above_ssb_db} dB");
-        assert!(errors.iter().all(|it| *it < MOST_RAD), "{errors:?}");
+        assert!(errors.iter().all(|it| *it < MAX_RAD), "{errors:?}");
 
         let mut errors = Vec::new();
         let first = (cell.delay as usize).saturating_sub(300);
@@ -187,7 +187,7 @@ fn both_receivers_track_through_tones_and_report_them() {
         });
         assert_eq!(reported.len(), tones, "window, {above_ssb_db} dB");
         assert_eq!(errors.len(), 3, "window, {above_ssb_db} dB");
-        assert!(errors.iter().all(|it| *it < MOST_RAD), "{errors:?}");
+        assert!(errors.iter().all(|it| *it < MAX_RAD), "{errors:?}");
     }
 }
 

@@ -29,7 +29,7 @@ const SPACING_S: f64 = HISTORY_S / (COPIES - 2) as f64;
 const USUAL_EVENTS: usize = 256;
 
 /// ... and its maximum; above it, the oldest copies are removed early.
-const MOST_EVENTS: usize = 4096;
+const MAX_EVENTS: usize = 4096;
 
 /// Localizer with replay of late angles.
 pub struct OutOfSequenceBuffer {
@@ -167,7 +167,7 @@ impl OutOfSequenceBuffer {
     /// Errors of the localizer.
     pub fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryResult, BoxError> {
         let verdict = self.localizer.odometry(sample)?;
-        self.remember(Event::Odometry(*sample));
+        self.store_event(Event::Odometry(*sample));
         Ok(verdict)
     }
 
@@ -203,7 +203,7 @@ impl OutOfSequenceBuffer {
             if let Some(verdict) = self.process(&event)? {
                 update.set(verdict);
             }
-            self.remember(event);
+            self.store_event(event);
         }
         Ok(())
     }
@@ -297,7 +297,7 @@ impl OutOfSequenceBuffer {
         Ok(())
     }
 
-    fn remember(&mut self, event: Event) {
+    fn store_event(&mut self, event: Event) {
         if let Event::Odometry(sample) = event {
             self.now_s = sample.time_s;
         }
@@ -339,7 +339,7 @@ impl OutOfSequenceBuffer {
 
     /// Removes the oldest copies if too many inputs are stored.
     fn forget(&mut self) {
-        while self.events.len() > MOST_EVENTS && self.copies > 0 {
+        while self.events.len() > MAX_EVENTS && self.copies > 0 {
             if self.copies == 1 {
                 // More inputs at one time than can be stored: the history restarts here.
                 self.events.clear();

@@ -22,19 +22,19 @@ use crate::settings::{Site, Vehicle};
 const FADING_M: f64 = 0.1;
 const FADING_S: f64 = 1.0;
 /// Minimum SNR of an SSB with all its snapshots, in dB.
-const LEAST_SNR_DB: f64 = 10.0;
+const MIN_SNR_DB: f64 = 10.0;
 /// Number of steering vectors to which the signal is fitted. Between two of them, the loss of power
 /// is at most 0.3 % with 4 antennas.
 const DIRECTIONS: usize = 64;
 /// Maximum number of antennas for which hypotheses are compared; 8 antennas have 36 hypotheses.
-const MOST_ANTENNAS: usize = 8;
+const MAX_ANTENNAS: usize = 8;
 /// Maximum number of hypotheses.
-const MOST_HYPOTHESES: usize = MOST_ANTENNAS * (MOST_ANTENNAS - 1) / 2 + MOST_ANTENNAS;
+const MAX_HYPOTHESES: usize = MAX_ANTENNAS * (MAX_ANTENNAS - 1) / 2 + MAX_ANTENNAS;
 /// Fraction of the power in the residual due to calibration errors, in addition to that of the
 /// site's scatter.
 const CALIBRATION: f64 = 0.02;
 /// Maximum evidence of one SSB for or against a hypothesis, in units of log-likelihood.
-const MOST_OF_ONE: f64 = 4.0;
+const MAX_EVIDENCE_PER_SSB: f64 = 4.0;
 /// Drift of the sums per SSB, so that hypotheses with the same fit as the nominal channels gain no
 /// evidence.
 const DRIFT: f64 = 0.3;
@@ -129,8 +129,8 @@ impl ChannelMonitor {
         for (gain, known) in gains.iter_mut().zip(vehicle.array.calibration()) {
             *gain = known;
         }
-        let is_compared = vehicle.array.shape.is_row() && (3..=MOST_ANTENNAS).contains(&elements);
-        let mut hypotheses = Vec::with_capacity(MOST_HYPOTHESES);
+        let is_compared = vehicle.array.shape.is_row() && (3..=MAX_ANTENNAS).contains(&elements);
+        let mut hypotheses = Vec::with_capacity(MAX_HYPOTHESES);
         let mut steps = Vec::new();
         if is_compared {
             let channels = 0..vehicle.array.elements;
@@ -181,7 +181,7 @@ impl ChannelMonitor {
             10.0 * (total / noise).log10()
         });
         if !(total.is_finite()
-            && snr_db >= LEAST_SNR_DB
+            && snr_db >= MIN_SNR_DB
             && self.is_independent(observation, distance_m))
         {
             return;
@@ -318,6 +318,6 @@ impl ChannelMonitor {
 /// Returns a cumulative sum after an SSB. `difference` is a difference of residuals relative to the
 /// expected residual.
 fn cumulated(evidence: f64, difference: f64) -> f64 {
-    let one = difference.clamp(-MOST_OF_ONE, MOST_OF_ONE);
+    let one = difference.clamp(-MAX_EVIDENCE_PER_SSB, MAX_EVIDENCE_PER_SSB);
     (evidence + one - DRIFT).max(0.0)
 }

@@ -10,20 +10,20 @@ use crate::observation::OdometrySample;
 /// Minimum speed in m/s. Slower wheels may repeat their speed because of the resolution.
 const MOVING_MPS: f64 = 0.1;
 /// Maximum interval between two samples in seconds; a longer one interrupts the run.
-const MOST_S: f64 = 0.5;
+const MAX_S: f64 = 0.5;
 /// Minimum number of samples in motion from which the rate is estimated, and number at which all counts are halved.
-const LEAST_SAMPLES: u32 = 50;
-const MOST_SAMPLES: u32 = 400;
+const MIN_SAMPLES: u32 = 50;
+const MAX_SAMPLES: u32 = 400;
 /// Minimum fraction of samples at which the change alternates its sign. Independent noise has two
 /// thirds; a smooth motion has almost none.
 const ALTERNATING_SHARE: f64 = 0.2;
 /// Negative logarithm of the probability of a suspicious run without a fault: 1e-6.
 const EVIDENCE: f64 = 13.8;
 /// Minimum number of repetitions of a suspicious run.
-const LEAST_RUN: u32 = 5;
+const MIN_RUN: u32 = 5;
 /// Maximum duration of a run in seconds; a longer run is normal, because a source without noise has
 /// replaced the odometer.
-const MOST_RUN_S: f64 = 60.0;
+const MAX_RUN_S: f64 = 60.0;
 /// Maximum deviation of a repeated step of the distance: relative to the integrated speed, and in
 /// metres.
 const STEP_SHARE: f64 = 1e-3;
@@ -54,7 +54,7 @@ impl Constancy {
         };
         let duration_s = sample.time_s - last.time_s;
         let is_moving = sample.speed_mps.abs() >= MOVING_MPS && last.speed_mps.abs() >= MOVING_MPS;
-        if !is_moving || duration_s > MOST_S {
+        if !is_moving || duration_s > MAX_S {
             (self.run, self.is_fault, self.last_changes) = (0, false, [0.0; 2]);
             return;
         }
@@ -71,7 +71,7 @@ impl Constancy {
                 self.run_since_s = sample.time_s;
             }
             self.run += 1;
-            if sample.time_s - self.run_since_s > MOST_RUN_S {
+            if sample.time_s - self.run_since_s > MAX_RUN_S {
                 self.count_run();
             }
             return;
@@ -95,7 +95,7 @@ impl Constancy {
             self.samples = self.samples.saturating_add(run);
             self.repeated = self.repeated.saturating_add(run);
         }
-        while self.samples >= MOST_SAMPLES {
+        while self.samples >= MAX_SAMPLES {
             self.samples /= 2;
             self.repeated /= 2;
             self.alternating /= 2;
@@ -105,10 +105,10 @@ impl Constancy {
     /// Whether the current run is improbable for the odometer.
     pub fn is_suspicious(&self) -> bool {
         let samples = f64::from(self.samples);
-        let has_noise = self.samples >= LEAST_SAMPLES
+        let has_noise = self.samples >= MIN_SAMPLES
             && f64::from(self.alternating) >= ALTERNATING_SHARE * samples;
         let rate = f64::from(self.repeated + 1) / (samples + 2.0);
-        has_noise && self.run >= LEAST_RUN && -f64::from(self.run) * rate.ln() >= EVIDENCE
+        has_noise && self.run >= MIN_RUN && -f64::from(self.run) * rate.ln() >= EVIDENCE
     }
 
     /// Marks the current run as that of a fault.

@@ -10,7 +10,7 @@ use crate::observation::OdometrySample;
 const MEMORY_S: f64 = 1.0;
 /// Minimum summed difference of a fault, in metres. The resolution of encoders and of rounded
 /// speeds causes smaller differences.
-const LEAST_M: f64 = 0.15;
+const MIN_M: f64 = 0.15;
 /// Minimum summed difference of a fault, as a fraction of the summed distance. A wrong scale or
 /// noise causes smaller fractions; a frozen value has 1, and a halved speed has 0.5.
 const SHARE: f64 = 0.25;
@@ -18,9 +18,9 @@ const SHARE: f64 = 0.25;
 const BOUND: f64 = 2.0;
 /// Maximum difference that one sample adds at zero speed, in metres. A counter that is reset once
 /// is no fault, because the localizer then uses the speed.
-const MOST_OF_ONE_M: f64 = 0.1;
+const MAX_DIFFERENCE_PER_SAMPLE_M: f64 = 0.1;
 /// Maximum duration of an interval in seconds. In a longer interval, the speed is unknown.
-const MOST_S: f64 = 0.5;
+const MAX_S: f64 = 0.5;
 
 /// Exponentially weighted sums of distance and difference.
 #[derive(Debug, Clone, Copy, Default)]
@@ -38,18 +38,18 @@ impl Contradiction {
             return false;
         };
         let duration_s = sample.time_s - last.time_s;
-        if duration_s > MOST_S {
+        if duration_s > MAX_S {
             return self.is_faulty;
         }
         // Forget, then add the newest interval.
         let kept = (-duration_s / MEMORY_S).exp();
         let by_speed_m = 0.5 * (last.speed_mps + sample.speed_mps) * duration_s;
         let by_distance_m = sample.distance_m - last.distance_m;
-        let most_m = MOST_OF_ONE_M + 2.0 * by_speed_m.abs();
+        let most_m = MAX_DIFFERENCE_PER_SAMPLE_M + 2.0 * by_speed_m.abs();
         let difference_m = (by_distance_m - by_speed_m).clamp(-most_m, most_m);
         self.driven_m =
             kept * self.driven_m + by_speed_m.abs().max(by_distance_m.abs().min(most_m));
-        let threshold_m = LEAST_M + SHARE * self.driven_m;
+        let threshold_m = MIN_M + SHARE * self.driven_m;
         // The sum is limited, so that large and small faults end after the same time.
         let bound_m = BOUND * threshold_m;
         self.difference_m = (kept * self.difference_m + difference_m).clamp(-bound_m, bound_m);

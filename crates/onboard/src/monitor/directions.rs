@@ -24,23 +24,23 @@ const ENDS: u32 = 4;
 /// wavelength. At standstill, scatter is as constant as a second wave.
 const FADING_M: f64 = 0.03;
 /// Minimum SNR of an SSB with all its snapshots, in dB.
-const LEAST_SNR_DB: f64 = 13.0;
+const MIN_SNR_DB: f64 = 13.0;
 /// Minimum fraction of the power in the second wave.
-const LEAST_SHARE: f64 = 0.15;
+const MIN_SHARE: f64 = 0.15;
 /// Minimum ratio of the power of the second wave to the residual of both waves. Scatter has a ratio
 /// of about 1, because the second wave explains at most half of the three dimensions that the first
 /// wave leaves.
-const LEAST_RATIO: f64 = 4.0;
+const MIN_RATIO: f64 = 4.0;
 /// Number of steering vectors.
 const DIRECTIONS: usize = 64;
 /// Maximum squared correlation between the steering vectors of both directions.
-const MOST_CORRELATION: f64 = 0.8;
+const MAX_CORRELATION: f64 = 0.8;
 /// Minimum Rician K of the site in dB. With stronger scatter, up to one false report per run was
 /// measured, because reflections resemble a second radio head over 16 SSBs.
-const LEAST_K_DB: f64 = 13.0;
+const MIN_K_DB: f64 = 13.0;
 /// Minimum and maximum number of antennas.
-const LEAST_ANTENNAS: usize = 3;
-const MOST_ANTENNAS: usize = 8;
+const MIN_ANTENNAS: usize = 3;
+const MAX_ANTENNAS: usize = 8;
 
 type Vector = [Complex64; MAX_ELEMENTS];
 
@@ -73,9 +73,9 @@ impl DirectionMonitor {
     /// Creates the monitor for the array of a vehicle at a site with this number of radio heads.
     pub fn new(site: &Site, vehicle: &Vehicle, heads: usize) -> Self {
         let elements = usize::from(vehicle.array.elements);
-        let is_used = site.rician_k_db >= LEAST_K_DB
+        let is_used = site.rician_k_db >= MIN_K_DB
             && vehicle.array.shape.is_row()
-            && (LEAST_ANTENNAS..=MOST_ANTENNAS).contains(&elements);
+            && (MIN_ANTENNAS..=MAX_ANTENNAS).contains(&elements);
         let phase_rad = |number: usize| TAU * number as f64 / DIRECTIONS as f64;
         let vector = |number: usize| {
             std::array::from_fn(|antenna| Complex64::cis(phase_rad(number) * antenna as f64))
@@ -106,7 +106,7 @@ impl DirectionMonitor {
         let noise = (observation.noise_variance).map(|it| it * values.len() as f64);
         let snr_db = noise.map_or(observation.ssb.snr_db, |it| 10.0 * (power / it).log10());
         let is_usable = observation.elements() == elements && power.is_finite() && power > 0.0;
-        if self.steering.is_empty() || !is_usable || snr_db < LEAST_SNR_DB {
+        if self.steering.is_empty() || !is_usable || snr_db < MIN_SNR_DB {
             return;
         }
         let Some(place) = self.window(observation, distance_m) else {
@@ -131,7 +131,7 @@ impl DirectionMonitor {
         let covariance = std::mem::take(&mut window.covariance);
         let [one, two] = self.residuals(&covariance);
         let second = one - two;
-        let is_double = second >= LEAST_SHARE && second >= LEAST_RATIO * two;
+        let is_double = second >= MIN_SHARE && second >= MIN_RATIO * two;
         let Some(window) = self.windows.get_mut(place) else {
             return;
         };
@@ -207,7 +207,7 @@ impl DirectionMonitor {
                 // matrix.
                 let correlation = dot(a, b) / norm;
                 let independent = 1.0 - correlation.norm_sqr();
-                if independent < 1.0 - MOST_CORRELATION {
+                if independent < 1.0 - MAX_CORRELATION {
                     continue;
                 }
                 let power_b = dot(b, of_b).re / norm;

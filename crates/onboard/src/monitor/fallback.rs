@@ -21,7 +21,7 @@ const HEADING_STD_RAD: f64 = 0.2;
 /// Noise of the distance in m/√m, and minimum speed of the prediction in m/s; the noise is at least
 /// 0.8 m/√s.
 const NOISE_M_PER_SQRT_M: f64 = 1.5;
-const LEAST_MPS: f64 = 0.3;
+const MIN_MPS: f64 = 0.3;
 /// Noise of the heading in rad/√s, because the yaw rate may also be faulty.
 const NOISE_RAD_PER_SQRT_S: f64 = 0.3;
 /// Interval over which the speed is measured, in seconds.
@@ -32,8 +32,8 @@ const LEVEL_SIGMAS: f64 = 5.0;
 /// without odometry.
 const MARGIN: f64 = 1.0;
 /// Minimum initial standard deviations after the fault, in metres and radians.
-const LEAST_STD_M: f64 = 0.3;
-const LEAST_STD_RAD: f64 = 0.05;
+const MIN_STD_M: f64 = 0.3;
+const MIN_STD_RAD: f64 = 0.05;
 
 /// Factory of filters without odometry, and of localizers after the fault.
 #[derive(Debug)]
@@ -91,7 +91,7 @@ impl Fallback {
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometrySample {
         let duration_s =
             sample.time_s - self.last_s.replace(sample.time_s).unwrap_or(sample.time_s);
-        let speed_mps = self.speed_mps.abs().max(LEAST_MPS).copysign(self.speed_mps);
+        let speed_mps = self.speed_mps.abs().max(MIN_MPS).copysign(self.speed_mps);
         self.distance_m += speed_mps * duration_s;
         OdometrySample {
             distance_m: self.distance_m,
@@ -134,8 +134,8 @@ impl Fallback {
             .covariance
             .map_or(0.0, |[.., [.., heading]]| heading);
         vehicle.start.known = true;
-        vehicle.start.position_std_m = (MARGIN * largest.sqrt()).max(LEAST_STD_M);
-        vehicle.start.heading_std_rad = (MARGIN * heading.sqrt()).max(LEAST_STD_RAD);
+        vehicle.start.position_std_m = (MARGIN * largest.sqrt()).max(MIN_STD_M);
+        vehicle.start.heading_std_rad = (MARGIN * heading.sqrt()).max(MIN_STD_RAD);
         localize::built_in(&self.site, &vehicle, estimate.pose)
     }
 }

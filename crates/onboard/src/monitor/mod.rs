@@ -139,11 +139,11 @@ impl Monitors {
     }
 
     /// Whether the burst at `time_s` must be received, independent of the wake-up policy.
-    pub fn wants(&self, time_s: f64) -> bool {
+    pub fn requests_burst(&self, time_s: f64) -> bool {
         self.faults.has_of_vehicle()
             || !self.confirmation.is_confirmed()
             || self.constancy.is_suspicious()
-            || self.motion.wants(time_s)
+            || self.motion.requests_burst(time_s)
     }
 
     /// Records that the burst at `time_s` is received.

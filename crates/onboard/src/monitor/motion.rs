@@ -26,7 +26,7 @@ const STANDSTILL_INTERVAL_S: f64 = 0.5;
 /// Maximum speed of a standing vehicle, in m/s.
 const STANDING_MPS: f64 = 0.01;
 /// Minimum speed for the confirmation of a standstill, in m/s.
-const LEAST_MOVING_MPS: f64 = 0.5;
+const MIN_MOVING_MPS: f64 = 0.5;
 /// Maximum motion between two angles at standstill, in metres and radians.
 const STANDING_M: f64 = 0.02;
 const STANDING_RAD: f64 = 0.1;
@@ -49,7 +49,7 @@ const CONFIRMATIONS: u32 = 2;
 const EVIDENCE: f64 = 13.8;
 /// Maximum of one radio head's sum. If there are two radio heads, one of them alone can reach the
 /// threshold.
-const MOST_EVIDENCE: f64 = 14.5;
+const MAX_EVIDENCE: f64 = 14.5;
 /// Drift of the sum at each angle, so that hypotheses with the same fit as the odometry gain no
 /// evidence.
 const DRIFT: f64 = 0.25;
@@ -139,7 +139,7 @@ impl MotionMonitor {
             references: Vec::with_capacity(heads),
             last: None,
             yaw_rad: 0.0,
-            moving_mps: LEAST_MOVING_MPS,
+            moving_mps: MIN_MOVING_MPS,
             standing_since_s: None,
             received_s: f64::NEG_INFINITY,
             suspicions: 0,
@@ -169,7 +169,7 @@ impl MotionMonitor {
         let duration_s = sample.time_s - last.time_s;
         self.yaw_rad += sample.yaw_rate_radps.unwrap_or(0.0) * duration_s;
         if sample.speed_mps.abs() > STANDING_MPS {
-            self.moving_mps = sample.speed_mps.abs().max(LEAST_MOVING_MPS);
+            self.moving_mps = sample.speed_mps.abs().max(MIN_MOVING_MPS);
         }
         let change_mps = (sample.speed_mps - last.speed_mps).abs();
         let is_sudden = change_mps >= SUDDEN_MPS && change_mps > FRICTION_MPS2 * duration_s;
@@ -194,7 +194,7 @@ impl MotionMonitor {
 
     /// Whether the burst at `time_s` must be received: periodically at standstill, and while a
     /// fault is suspected.
-    pub fn wants(&self, time_s: f64) -> bool {
+    pub fn requests_burst(&self, time_s: f64) -> bool {
         let due = |since_s: f64| {
             self.received_s < since_s || time_s - self.received_s >= STANDSTILL_INTERVAL_S - 1e-5
         };
@@ -334,7 +334,7 @@ impl MotionMonitor {
                 for (evidence, other_rad) in next.evidence.iter_mut().zip(others_rad) {
                     let other = other_rad.powi(2) / variance;
                     let ratio = 0.5 * (squared.min(OUTLIER) - other.min(OUTLIER));
-                    *evidence = (*evidence + ratio - DRIFT).clamp(0.0, MOST_EVIDENCE);
+                    *evidence = (*evidence + ratio - DRIFT).clamp(0.0, MAX_EVIDENCE);
                 }
                 if squared >= OUTLIER {
                     burst.bad += 1;

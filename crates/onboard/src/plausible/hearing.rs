@@ -15,7 +15,7 @@ const FOUND_DB: f64 = -10.0;
 /// Number of radio heads that determine a position without a road.
 const FOR_A_PLACE: usize = 3;
 /// Maximum number of positions that are examined along a road.
-const MOST_PLACES: f64 = 400.0;
+const MAX_PLACES: f64 = 400.0;
 const STEP_M: f64 = 5.0;
 /// Minimum distance of a vehicle from a radio head (m).
 const NEAREST_M: f64 = 10.0;
@@ -81,7 +81,7 @@ pub(super) fn steps_along(
 }
 
 fn along(road: &Road) -> Vec<Point> {
-    let steps = steps_along(road, STEP_M, MOST_PLACES);
+    let steps = steps_along(road, STEP_M, MAX_PLACES);
     steps.map(|(_, place)| place).collect()
 }
 

@@ -92,9 +92,9 @@ const DEGREES: f64 = 0.3;
 const SAME_PLACE_M: f64 = 0.05;
 /// Step along the road, and maximum number of steps.
 const STEP_M: f64 = 1.0;
-const MOST_STEPS: f64 = 2000.0;
+const MAX_STEPS: f64 = 2000.0;
 /// Minimum bend radius of a vehicle's road (m).
-const LEAST_RADIUS_M: f64 = 0.3;
+const MIN_RADIUS_M: f64 = 0.3;
 
 /// Returns the warnings of a site, without those of reception.
 pub(super) fn written(site: &Site, road: Option<&Road>) -> Vec<Warning> {
@@ -102,7 +102,7 @@ pub(super) fn written(site: &Site, road: Option<&Road>) -> Vec<Warning> {
     found.extend(carrier(site));
     found.extend(coordinates(site, road));
     found.extend(indices(site));
-    found.extend(twins(site));
+    found.extend(duplicate_heads(site));
     found.extend(bends(site));
     found.extend(road.into_iter().flat_map(|road| across(site, road)));
     found.extend(road.into_iter().flat_map(|road| other_side(site, road)));
@@ -207,7 +207,7 @@ fn indices(site: &Site) -> Vec<Warning> {
 }
 
 /// Returns warnings for radio heads with identical positions or names.
-fn twins(site: &Site) -> Vec<Warning> {
+fn duplicate_heads(site: &Site) -> Vec<Warning> {
     let mut found = Vec::new();
     let point = |position_m: [f64; 3]| Point::new(position_m[0], position_m[1]);
     for (index, head) in site.radio_heads.iter().enumerate() {
@@ -247,7 +247,7 @@ fn bends(site: &Site) -> Vec<Warning> {
         .flat_map(|road| road.segments.iter().flatten());
     let narrow = segments.enumerate().filter(|(_, it)| {
         // Heading changes above one turn have a separate warning.
-        it.turn_rad.abs() <= TAU && it.length_m < LEAST_RADIUS_M * it.turn_rad.abs()
+        it.turn_rad.abs() <= TAU && it.length_m < MIN_RADIUS_M * it.turn_rad.abs()
     });
     narrow
         .map(|(index, it)| Warning {
@@ -272,7 +272,7 @@ fn other_side(site: &Site, road: &Road) -> Vec<Warning> {
     if site.walls.is_empty() {
         return Vec::new();
     }
-    let route: Vec<(f64, Point)> = steps_along(road, STEP_M, MOST_STEPS).collect();
+    let route: Vec<(f64, Point)> = steps_along(road, STEP_M, MAX_STEPS).collect();
     let is_hidden = |from: Point, to: Point| {
         let mut walls = site.walls.iter().flat_map(|wall| wall.points_m.windows(2));
         walls.any(|ends| cross([from, to], [ends[0].into(), ends[1].into()]))
@@ -329,7 +329,7 @@ fn across(site: &Site, road: &Road) -> Vec<Warning> {
     if site.walls.is_empty() {
         return Vec::new();
     }
-    let route: Vec<(f64, Point)> = steps_along(road, STEP_M, MOST_STEPS).collect();
+    let route: Vec<(f64, Point)> = steps_along(road, STEP_M, MAX_STEPS).collect();
     let blocked_m = |ends: &[[f64; 2]]| {
         let wall = [ends[0].into(), ends[1].into()];
         let mut steps = route.windows(2);

@@ -23,8 +23,8 @@ pub fn of_site(site: &Site) -> Vec<Warning> {
 /// `vehicle`.
 pub fn of_site_and_vehicle(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
     let road = site.build_road().ok().flatten();
-    beneath("site", in_reach(site, vehicle, road.as_ref()))
-        .chain(beneath("vehicle", on_site(site, vehicle)))
+    with_path_prefix("site", in_reach(site, vehicle, road.as_ref()))
+        .chain(with_path_prefix("vehicle", on_site(site, vehicle)))
         .collect()
 }
 
@@ -33,13 +33,13 @@ pub fn of_site_and_vehicle(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
 pub fn of_site_and_vehicle_along(site: &Site, vehicle: &Vehicle, route: &Road) -> Vec<Warning> {
     let mut of_site = in_reach(site, vehicle, Some(route));
     of_site.extend(with_interference(site, vehicle, Some(route)));
-    beneath("site", of_site)
-        .chain(beneath("vehicle", on_site(site, vehicle)))
+    with_path_prefix("site", of_site)
+        .chain(with_path_prefix("vehicle", on_site(site, vehicle)))
         .collect()
 }
 
-fn beneath(path: &str, found: Vec<Warning>) -> impl Iterator<Item = Warning> {
-    found.into_iter().map(move |it| it.beneath(path))
+fn with_path_prefix(path: &str, found: Vec<Warning>) -> impl Iterator<Item = Warning> {
+    found.into_iter().map(move |it| it.with_path_prefix(path))
 }
 
 /// Returns the warnings of the site, and of radio heads that are received nowhere on the path.
@@ -60,7 +60,7 @@ fn on_site(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
     found.extend(
         start_off_road(site, vehicle).or_else(|| without_reception_at_start(site, vehicle)),
     );
-    found.extend(strays(site, vehicle));
+    found.extend(lane_keeping_exceeds_road(site, vehicle));
     found.extend(one_head_only(site, vehicle));
     found.extend(below_array(site, vehicle));
     found
@@ -136,7 +136,7 @@ fn start_off_road(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
 }
 
 /// Returns a warning if the lane keeping leaves the road.
-fn strays(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
+fn lane_keeping_exceeds_road(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
     let (rms_m, width_m) = (vehicle.lane_keeping.rms_m, site.road.as_ref()?.width_m);
     (vehicle.follows_road() && rms_m > 0.5 * width_m).then(|| Warning {
         key: "lane_keeping.rms_m".to_owned(),

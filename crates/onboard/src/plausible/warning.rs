@@ -18,7 +18,7 @@ pub struct Warning {
 impl Warning {
     /// Returns the warning with the path of the enclosing table, for a table of another file.
     #[must_use]
-    pub fn beneath(mut self, path: &str) -> Self {
+    pub fn with_path_prefix(mut self, path: &str) -> Self {
         self.key = format!("{path}.{}", self.key);
         self
     }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 /// Maximum damping ratio of an oscillation.
-const MOST_DAMPING: f64 = 0.99;
+const MAX_DAMPING: f64 = 0.99;
 
 /// Fraction of the wavelength below which a step is short.
 const SHORT: f64 = 0.05;
@@ -91,7 +91,7 @@ impl LaneKeeping {
         Self {
             rms_m: offset.sqrt(),
             wavelength_m: TAU / natural,
-            damping: (density / (4.0 * natural * heading)).min(MOST_DAMPING),
+            damping: (density / (4.0 * natural * heading)).min(MAX_DAMPING),
         }
     }
 

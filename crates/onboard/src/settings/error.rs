@@ -85,7 +85,7 @@ impl SettingsError {
     /// Returns the error with the path of the enclosing table, for a table that is part of another
     /// file.
     #[must_use]
-    pub fn beneath(mut self, holder: &str, path: &str) -> Self {
+    pub fn with_path_prefix(mut self, holder: &str, path: &str) -> Self {
         if let Self::UnknownName { name, .. } = &self {
             return Self::Value {
                 value: format!("{name:?}"),

@@ -41,7 +41,7 @@ impl Walk<'_> {
                 .into_iter()
                 .flatten()
             {
-                if is_meant(value, variant) {
+                if is_selected_variant(value, variant) {
                     self.visit(value, variant, path)?;
                 }
             }
@@ -137,7 +137,7 @@ fn unit_hint(path: &str, value: f64) -> String {
 }
 
 /// Whether `variant` is the selected one: its tag has the value's tag, or it has no tag.
-fn is_meant(value: &Value, variant: &Value) -> bool {
+fn is_selected_variant(value: &Value, variant: &Value) -> bool {
     let tags = variant.get("properties").and_then(Value::as_object);
     tags.into_iter().flatten().all(|(name, schema)| {
         schema

@@ -40,7 +40,7 @@ pub use figure::{Boundary, Extent, Figure, Provenance, Quantity};
 pub use integrity::{FaultProbability, IntegritySettings};
 pub use localizer::{DeadReckoningSettings, HeadingBetween, LocalizerSettings, TrackerSettings};
 pub use odometry::{DriveKind, GyroscopeSettings, LaneKeepingSettings, OdometerSettings};
-pub use overlay::lay_over;
+pub use overlay::merge_table;
 pub use platform::Platform;
 pub use power::{CorePower, CpuSettings, IdleSettings, PowerMode, ReceiverPower, SuspendSettings};
 pub use radio::{HeadArraySettings, RadioHeadSettings, SsbSettings};

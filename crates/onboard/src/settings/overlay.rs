@@ -14,7 +14,7 @@ const TAGS: [&str; 2] = ["policy", "kind"];
 ///
 /// # Errors
 /// [`SettingsError::Value`] if the list has no entry of that name.
-pub fn lay_over(
+pub fn merge_table(
     base: &mut Table,
     over: Table,
     path: &str,
@@ -30,11 +30,11 @@ pub fn lay_over(
         let path = super::read::join(path, &key);
         match (base.get_mut(&key), value) {
             (Some(Value::Table(below)), Value::Table(value)) => {
-                lay_over(below, value, &path, check)?;
+                merge_table(below, value, &path, check)?;
             }
             (Some(Value::Array(entries)), Value::Table(by_name)) => {
                 for (name, value) in by_name {
-                    lay_over_entries(entries, &name, &value, &path, check)?;
+                    merge_entries(entries, &name, &value, &path, check)?;
                 }
             }
             // The base is the name of a file: override keys of that file.
@@ -51,7 +51,7 @@ pub fn lay_over(
     Ok(())
 }
 
-fn lay_over_entries(
+fn merge_entries(
     entries: &mut [Value],
     name: &str,
     value: &Value,
@@ -66,7 +66,7 @@ fn lay_over_entries(
     for entry in entries.iter_mut().filter_map(Value::as_table_mut) {
         if name == "all" || entry.get("name").and_then(Value::as_str) == Some(name) {
             met = true;
-            lay_over(entry, value.clone(), &path, check)?;
+            merge_table(entry, value.clone(), &path, check)?;
         }
     }
     let names: Vec<&str> = entries
@@ -85,7 +85,7 @@ fn lay_over_entries(
 /// # Errors
 /// [`SettingsError::Shape`] if the path does not exist.
 pub fn set(table: &mut Table, path: &str, value: Value, file: &str) -> Result<(), SettingsError> {
-    let no_such = || SettingsError::Shape {
+    let missing_key = || SettingsError::Shape {
         file: file.to_owned(),
         key: path.to_owned(),
         message: "there is nothing at this path to override".to_owned(),
@@ -97,7 +97,10 @@ pub fn set(table: &mut Table, path: &str, value: Value, file: &str) -> Result<()
     let mut here = table;
     for step in parents.split('.').filter(|step| !step.is_empty()) {
         let (name, index) = match step.strip_suffix(']').and_then(|s| s.split_once('[')) {
-            Some((name, index)) => (name, Some(index.parse::<usize>().map_err(|_| no_such())?)),
+            Some((name, index)) => (
+                name,
+                Some(index.parse::<usize>().map_err(|_| missing_key())?),
+            ),
             None => (step, None),
         };
         let entry = here
@@ -107,7 +110,9 @@ pub fn set(table: &mut Table, path: &str, value: Value, file: &str) -> Result<()
             Some(index) => entry.as_array_mut().and_then(|items| items.get_mut(index)),
             None => Some(entry),
         };
-        here = entry.and_then(Value::as_table_mut).ok_or_else(no_such)?;
+        here = entry
+            .and_then(Value::as_table_mut)
+            .ok_or_else(missing_key)?;
     }
     if TAGS.contains(&key) && here.get(key) != Some(&value) {
         here.clear();

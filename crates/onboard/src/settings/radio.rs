@@ -28,7 +28,7 @@ pub struct RadioHeadSettings {
     pub ssb_index: u8,
     /// Equivalent isotropically radiated power (EIRP) in dBm: transmit power plus antenna gain.
     #[serde(default = "small_cell")]
-    #[schemars(range(min = Self::LEAST_EIRP_DBM, max = Self::MOST_EIRP_DBM))]
+    #[schemars(range(min = Self::MIN_EIRP_DBM, max = Self::MAX_EIRP_DBM))]
     pub eirp_dbm: f64,
     /// Standard deviation of the EIRP, in dB.
     #[serde(default)]
@@ -73,9 +73,9 @@ pub struct HeadArraySettings {
 
 impl RadioHeadSettings {
     /// Minimum EIRP of a radio head (dBm).
-    pub const LEAST_EIRP_DBM: f64 = -150.0;
+    pub const MIN_EIRP_DBM: f64 = -150.0;
     /// Maximum EIRP of a radio head (dBm).
-    pub const MOST_EIRP_DBM: f64 = 120.0;
+    pub const MAX_EIRP_DBM: f64 = 120.0;
 }
 
 const fn small_cell() -> f64 {

@@ -78,7 +78,7 @@ enum Step {
 }
 
 /// Maximum number of keys of a table that is searched for the invalid key.
-const MOST_KEYS: usize = 200;
+const MAX_KEYS: usize = 200;
 
 fn read<T: DeserializeOwned>(value: &Value) -> Result<T, Defect> {
     serde_path_to_error::deserialize(value.clone()).map_err(|error| Defect {
@@ -103,7 +103,7 @@ fn step(segment: &Segment) -> Option<Step> {
 fn precise_path<T: DeserializeOwned>(value: &Value, defect: &Defect) -> Vec<Step> {
     let mut path = defect.path.clone();
     while let Some(Value::Table(table)) = at(value, &path) {
-        if table.len() > MOST_KEYS {
+        if table.len() > MAX_KEYS {
             break;
         }
         let gone = |key: &&String| match read::<T>(&without(value, &path, key)) {

@@ -26,12 +26,12 @@ pub struct Site {
     #[serde(default)]
     pub description: String,
     /// Carrier frequency of the SSBs' centre, in MHz.
-    #[serde(default = "mid_band")]
+    #[serde(default = "default_carrier_mhz")]
     #[schemars(range(min = 100.0, max = 100_000.0))]
     pub carrier_mhz: f64,
     /// Expected Rician K-factor in dB: power of the line of sight divided by the power of the
     /// scatter.
-    #[serde(default = "fair_weather")]
+    #[serde(default = "default_rician_k_db")]
     #[schemars(range(min = -30.0, max = 200.0))]
     pub rician_k_db: f64,
     /// SSBs that the cells transmit.
@@ -52,11 +52,11 @@ pub struct Site {
     pub underlay: Option<UnderlaySettings>,
 }
 
-const fn mid_band() -> f64 {
+const fn default_carrier_mhz() -> f64 {
     3500.0
 }
 
-const fn fair_weather() -> f64 {
+const fn default_rician_k_db() -> f64 {
     10.0
 }
 

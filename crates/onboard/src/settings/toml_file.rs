@@ -13,7 +13,7 @@ use toml::{Table, Value};
 use super::check::Check;
 use super::error::SettingsError;
 use super::limits::check_limits;
-use super::overlay::{ends_in_tag, lay_over, set};
+use super::overlay::{ends_in_tag, merge_table, set};
 use super::read::{from_table, parse};
 use super::renamed::refuse_renamed;
 
@@ -211,11 +211,11 @@ fn apply_extends<T: TomlFile>(
             }
         };
         let base = library.text(T::WHAT, T::SHIPPED, &name, &referrer);
-        let base = base.map_err(|error| error.beneath(&referrer, "extends"))?;
-        let mut laid = parse(&base.text, &base.origin)?;
-        refuse_renamed(&laid, "", &base.origin)?;
-        lay_over(&mut laid, std::mem::take(table), "", check)?;
-        *table = laid;
+        let base = base.map_err(|error| error.with_path_prefix(&referrer, "extends"))?;
+        let mut merged = parse(&base.text, &base.origin)?;
+        refuse_renamed(&merged, "", &base.origin)?;
+        merge_table(&mut merged, std::mem::take(table), "", check)?;
+        *table = merged;
         referrer = base.origin;
     }
     let allowed = format!("a chain of `extends` may contain at most {MAX_EXTENDS} files");

@@ -29,7 +29,7 @@ pub struct Vehicle {
     #[serde(default)]
     pub drive: DriveKind,
     /// Top speed in km/h.
-    #[serde(default = "walking_pace")]
+    #[serde(default = "default_top_speed_kmh")]
     #[schemars(range(min = 0.1, max = 200.0))]
     pub top_speed_kmh: f64,
     /// Acceleration and deceleration in m/s².
@@ -82,7 +82,7 @@ pub struct Vehicle {
     pub platform: PlatformSettings,
 }
 
-const fn walking_pace() -> f64 {
+const fn default_top_speed_kmh() -> f64 {
     15.0
 }
 

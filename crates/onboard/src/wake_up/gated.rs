@@ -44,8 +44,8 @@ impl WakeUpPolicy for Gated {
     ) -> Result<f64, BoxError> {
         if let Some((ssb, head)) = now.strongest(sensed) {
             let due = self.due.sense(now, ssb, head)?;
-            let worth_it = now.snr_shortfall_db(self.set_point, ssb, head)? <= 0.0;
-            if due && (worth_it || self.due.has_passed(now.time_s, self.latest_s)) {
+            let has_required_snr = now.snr_shortfall_db(self.set_point, ssb, head)? <= 0.0;
+            if due && (has_required_snr || self.due.has_passed(now.time_s, self.latest_s)) {
                 self.due.estimated(now.time_s);
                 chosen.fill(true);
             }

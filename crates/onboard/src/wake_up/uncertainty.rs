@@ -38,7 +38,7 @@ const HORIZON_S: f64 = 20.0;
 const LOOK_AHEAD_M: f64 = 10.0;
 
 /// Maximum number of radio heads to choose from.
-const MOST_HEADS: usize = 64;
+const MAX_HEADS: usize = 64;
 
 /// Wake-up policy driven by the covariance.
 #[derive(Clone, Debug)]
@@ -106,8 +106,8 @@ impl UncertaintyDriven {
         let before = spread(&belief);
         let (mut taken, mut best, mut most_m2) = (0u64, 0u64, 0.0);
         let (mut improving, mut kept) = (true, !demanded);
-        for count in 1..=heads.len().min(MOST_HEADS) {
-            let next = (heads.iter().enumerate().take(MOST_HEADS))
+        for count in 1..=heads.len().min(MAX_HEADS) {
+            let next = (heads.iter().enumerate().take(MAX_HEADS))
                 .filter(|(index, _)| taken >> index & 1 == 0)
                 .filter_map(|(index, head)| {
                     let sigma_rad = |distance_m| self.thermal.sigma_rad(snr_db(head, distance_m));
@@ -206,7 +206,7 @@ impl WakeUpPolicy for UncertaintyDriven {
         for (ssb, chosen) in sensed.iter().zip(chosen) {
             let sends = |head: &RadioHead| head.sends(ssb.pci, ssb.ssb_index);
             *chosen = (now.heads.iter().position(sends))
-                .is_some_and(|index| index < MOST_HEADS && choice >> index & 1 == 1);
+                .is_some_and(|index| index < MAX_HEADS && choice >> index & 1 == 1);
         }
         Ok(self.wake_up_time_s(ekf, now.now_s))
     }

@@ -97,15 +97,15 @@ fn invalid_angles_are_reported_and_do_not_change_the_state() {
 
 #[test]
 fn an_unverified_angle_is_weighted_by_its_likelihood() {
-    let sure = angle(0.12, 0.0, 0.01);
+    let precise = angle(0.12, 0.0, 0.01);
     let after = |off_rad: f64, resolved: bool| {
         let (mut tracker, head) = tracker();
         // The predicted angle plus a small deviation.
-        let residual_rad = tracker.innovation(&head, &sure).unwrap().residual;
+        let residual_rad = tracker.innovation(&head, &precise).unwrap().residual;
         let measured = AngleMeasurement {
             phase_rad: off_rad - residual_rad,
             resolved,
-            ..sure
+            ..precise
         };
         let before = tracker.pose(0.12);
         let verdict = tracker.update(&head, &measured);

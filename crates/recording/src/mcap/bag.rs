@@ -8,7 +8,7 @@ use crate::error::RecordingError;
 use crate::file as files;
 
 /// Maximum size of `metadata.yaml` in bytes; a bag of many thousand files has a shorter one.
-const MOST_METADATA_BYTES: u64 = 16 << 20;
+const MAX_METADATA_BYTES: u64 = 16 << 20;
 
 /// Whether a path is a rosbag2 folder or one of its files, judged by the name.
 pub fn is_bag(path: &Path) -> bool {
@@ -78,7 +78,7 @@ fn announced(bag: &Path) -> Result<Vec<String>, RecordingError> {
     if !file.exists() {
         return Ok(Vec::new());
     }
-    let bytes = files::read(&file, MOST_METADATA_BYTES)
+    let bytes = files::read(&file, MAX_METADATA_BYTES)
         .map_err(|source| RecordingError::io(&file, source))?;
     let text = String::from_utf8_lossy(&bytes);
     let items = text.lines().filter_map(|line| {

@@ -30,9 +30,9 @@ const CONSTANT_RAD: f64 = 1e-6;
 /// Minimum fraction of the squared steps across the heading that is reported (8° RMS).
 const REPORTED_ACROSS: f64 = 0.02;
 /// Minimum path length (m) of a contradiction.
-const LEAST_PATH_M: f64 = 0.3;
+const MIN_PATH_M: f64 = 0.3;
 /// Minimum fraction of the path of a contradiction.
-const LEAST_SHARE: f64 = 0.02;
+const MIN_SHARE: f64 = 0.02;
 
 const POSITION: &str = OdometryFields::ROS.distance;
 const SPEED: &str = OdometryFields::ROS.speed;
@@ -103,7 +103,7 @@ pub struct Motion {
     /// Properties of the file as sentences.
     pub notes: Vec<String>,
     /// Properties of the file that may cause a position error, as sentences.
-    pub doubts: Vec<String>,
+    pub warnings: Vec<String>,
     /// Whether the position moves along a constant heading.
     pub is_straight: bool,
     /// Replaced steps of the distance.
@@ -132,14 +132,14 @@ fn of_twist(readings: &[Reading], is_filled: bool) -> Motion {
         return Motion {
             distances_m: zeros.clone(),
             speeds_mps: zeros,
-            doubts: vec![doubt],
+            warnings: vec![doubt],
             ..Motion::default()
         };
     }
     let mut notes = vec![format!(
         "{POSITION} never changes; the distance is taken from {SPEED}"
     )];
-    let mut doubts = Vec::new();
+    let mut warnings = Vec::new();
     // Compare the motion across the vehicle for a velocity in the vehicle's frame and in the frame
     // of the pose.
     let steps = || {
@@ -158,7 +158,7 @@ fn of_twist(readings: &[Reading], is_filled: bool) -> Motion {
     if is_of_map {
         notes.push(twist_in_map());
     } else if is_contradiction(own_m, along_m) {
-        doubts.push(linear_y(own_m));
+        warnings.push(linear_y(own_m));
     }
     let speed = |it: &Reading| {
         if is_of_map {
@@ -178,7 +178,7 @@ fn of_twist(readings: &[Reading], is_filled: bool) -> Motion {
         distances_m,
         speeds_mps,
         notes,
-        doubts,
+        warnings,
         ..Motion::default()
     }
 }
@@ -262,7 +262,7 @@ struct Path<'a> {
     follows_heading: bool,
     length_m: f64,
     notes: Vec<String>,
-    doubts: Vec<String>,
+    warnings: Vec<String>,
 }
 
 impl<'a> Path<'a> {
@@ -276,7 +276,7 @@ impl<'a> Path<'a> {
             steps,
             follows_heading: false,
             length_m: 0.0,
-            doubts: Vec::new(),
+            warnings: Vec::new(),
             notes: Vec::new(),
         }
     }
@@ -299,12 +299,12 @@ impl<'a> Path<'a> {
         let speeds_mps = self.speeds_mps(meaning, &distances_m);
         let known = || self.readings.iter().map(|it| it.heading_rad);
         let is_straight =
-            self.follows_heading && self.length_m > LEAST_PATH_M && known().all(|it| it.is_some());
+            self.follows_heading && self.length_m > MIN_PATH_M && known().all(|it| it.is_some());
         Motion {
             distances_m,
             speeds_mps,
             notes: self.notes,
-            doubts: self.doubts,
+            warnings: self.warnings,
             is_straight,
             jumps,
             has_both: has_twist,
@@ -353,13 +353,13 @@ impl<'a> Path<'a> {
         self.follows_heading = across2 < max_across * known2 || is_explained;
         self.length_m = path_m;
         if !self.follows_heading {
-            self.doubts.push(format!(
+            self.warnings.push(format!(
                 "{POSITION} does not move along the heading of pose.pose.orientation ({across_m:.1} m of {path_m:.1} m \
                  across it); the distance is the length of the path, backwards if {SPEED} is below 0; check whether \
                  pose.pose.orientation is filled and both are in one frame"
             ));
         } else if across2 > REPORTED_ACROSS * known2 && is_contradiction(across_m, path_m) {
-            self.doubts.push(format!(
+            self.warnings.push(format!(
                 "{POSITION} moves {across_m:.1} m of {path_m:.1} m across the heading of pose.pose.orientation; only the \
                  motion along the heading is used"
             ));
@@ -403,7 +403,7 @@ impl<'a> Path<'a> {
             TwistMeaning::Unsigned
         } else {
             if is_contradiction(sideways_m, path_m) {
-                self.doubts.push(linear_y(sideways_m));
+                self.warnings.push(linear_y(sideways_m));
             }
             TwistMeaning::OfVehicle
         }
@@ -469,7 +469,7 @@ impl<'a> Path<'a> {
 
 /// Whether a part of a path is long enough for a contradiction.
 fn is_contradiction(part_m: f64, path_m: f64) -> bool {
-    part_m > LEAST_PATH_M && part_m > LEAST_SHARE * path_m
+    part_m > MIN_PATH_M && part_m > MIN_SHARE * path_m
 }
 
 fn twist_in_map() -> String {

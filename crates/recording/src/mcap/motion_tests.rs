@@ -81,7 +81,7 @@ fn assert_right(motion: &Motion, tolerance_m: f64, what: &str) {
 }
 
 fn assert_remark(motion: &Motion, expected: &str) {
-    let remarks: Vec<&String> = motion.notes.iter().chain(&motion.doubts).collect();
+    let remarks: Vec<&String> = motion.notes.iter().chain(&motion.warnings).collect();
     assert!(
         remarks.iter().any(|it| it.contains(expected)),
         "{expected}: {remarks:?}"
@@ -93,7 +93,7 @@ fn correctly_filled_messages_are_not_reported() {
     let motion = found(|_, _| {});
     // Relative difference of chord and arc: square of half the turn in a step, divided by six.
     assert_right(&motion, 2e-3, "right");
-    assert!(motion.notes.is_empty() && motion.doubts.is_empty() && motion.jumps.is_empty());
+    assert!(motion.notes.is_empty() && motion.warnings.is_empty() && motion.jumps.is_empty());
     let (_, readings) = driven();
     let given = readings.iter().map(|it| it.linear_mps[0]);
     assert!(

@@ -159,7 +159,7 @@ fn used(mut messages: Vec<Message>) -> (Vec<Reading>, Motion, OdometryCollector)
     for note in &motion.notes {
         collector.remark(OdometryIssue::Noted(note.clone()));
     }
-    for doubt in &motion.doubts {
+    for doubt in &motion.warnings {
         collector.remark(OdometryIssue::Doubtful(doubt.clone()));
     }
     for jump in &motion.jumps {

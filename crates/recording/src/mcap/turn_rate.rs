@@ -8,11 +8,11 @@ use onboard::geometry::wrap_angle;
 use crate::value_spikes::{Limits, replace_spikes};
 
 /// Minimum fraction of a step that readings must cover.
-const LEAST_COVERED: f64 = 0.5;
+const MIN_COVERED_FRACTION: f64 = 0.5;
 /// Minimum interval of two readings, in median intervals, that is a gap without information.
 const GAP_STEPS: f64 = 5.0;
 /// Minimum total change of a heading that is not a constant with rounding (rad).
-const LEAST_TURN_RAD: f64 = 1e-6;
+const MIN_TURN_RAD: f64 = 1e-6;
 /// Maximum deviation of a unit quaternion's squared norm from 1.
 const NORM_TOLERANCE: f64 = 1e-3;
 
@@ -86,7 +86,7 @@ impl Gyroscope {
                 turned_rad += (a + middle * (b - a)) * (end_s - start_s);
                 covered_s += end_s - start_s;
             }
-            (covered_s >= LEAST_COVERED * (to_s - from_s)).then_some(turned_rad / covered_s)
+            (covered_s >= MIN_COVERED_FRACTION * (to_s - from_s)).then_some(turned_rad / covered_s)
         })
     }
 
@@ -106,7 +106,7 @@ impl Gyroscope {
 pub fn rates_of_headings(times_s: &[f64], headings_rad: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut known = headings_rad.iter().flatten();
     let first = known.next().copied().unwrap_or(0.0);
-    let turns = known.any(|heading| wrap_angle(heading - first).abs() > LEAST_TURN_RAD);
+    let turns = known.any(|heading| wrap_angle(heading - first).abs() > MIN_TURN_RAD);
     let mut pairs = headings_rad.windows(2);
     over_steps(times_s, |from_s, to_s| match pairs.next()? {
         [Some(before), Some(after)] if turns => Some(wrap_angle(after - before) / (to_s - from_s)),

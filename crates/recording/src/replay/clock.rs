@@ -18,7 +18,7 @@ use crate::angle_log::LoggedAngle;
 
 /// Maximum time offset of the search in either direction (s); buffers and drivers are assumed to
 /// delay by at most one second.
-const MOST_S: f64 = 1.5;
+const MAX_S: f64 = 1.5;
 /// Spacing of the search grid (s), less than the time over which the speed changes.
 const GRID_S: f64 = 0.5;
 
@@ -112,7 +112,7 @@ pub fn angle_time_offset(given: &Drive<'_>) -> Result<Option<AngleTimeOffset>, R
     let mut likelihood = |late_s: f64| Ok(log_likelihood(of(late_s)?));
     let mut best = (0.0, likelihood(0.0)?);
     let in_time = best.1;
-    let steps = (MOST_S / GRID_S) as i32;
+    let steps = (MAX_S / GRID_S) as i32;
     for step in (-steps..=steps).filter(|step| *step != 0) {
         let late_s = GRID_S * f64::from(step);
         let tried = (late_s, likelihood(late_s)?);
@@ -122,7 +122,7 @@ pub fn angle_time_offset(given: &Drive<'_>) -> Result<Option<AngleTimeOffset>, R
     }
     // A likelihood that rises to the end of the search range has no maximum within it: on a straight
     // road from standstill, an earlier time is a shorter distance with fewer independent angles.
-    if best.0.abs() >= MOST_S {
+    if best.0.abs() >= MAX_S {
         return Ok(None);
     }
     let around_s = [best.0 - GRID_S, best.0 + GRID_S];

@@ -27,10 +27,10 @@ use crate::angle_log::LoggedAngle;
 use crate::odometry::{OdometryFields, OdometryIssue};
 
 /// Maximum number of angles used for the diagnosis, spread over the drive. Angles of one radio head
-/// are at least [`LEAST_APART_S`] apart.
-const MOST_ANGLES: usize = 3000;
+/// are at least [`MIN_SEPARATION_S`] apart.
+const MAX_ANGLES: usize = 3000;
 /// Minimum time between two used angles of a radio head (s).
-const LEAST_APART_S: f64 = 0.2;
+const MIN_SEPARATION_S: f64 = 0.2;
 
 /// Minimum log-likelihood ratio of a reported hypothesis: each has a prior probability of 1/1000,
 /// and at most one of a thousand reports may be wrong.
@@ -41,13 +41,13 @@ const LOG_ODDS: f64 = 13.8;
 const AS_LIKELY: f64 = 5.0;
 
 /// Maximum fraction of rejected angles of a correctly configured drive.
-const MOST_REFUSED: f64 = 0.2;
+const MAX_REJECTED_FRACTION: f64 = 0.2;
 
 /// Maximum fraction of a radio head's angles beyond three standard deviations from the prediction.
 /// Correlated errors are estimated while driving, so that no angle is rejected because of them.
-const MOST_MISFITS: f64 = 0.1;
-/// Minimum number of angles of a radio head for the fraction [`MOST_MISFITS`].
-const LEAST_OF_HEAD: usize = 10;
+const MAX_MISFITS: f64 = 0.1;
+/// Minimum number of angles of a radio head for the fraction [`MAX_MISFITS`].
+const MIN_ANGLES_PER_HEAD: usize = 10;
 
 /// Maximum number of hypotheses that are tested with the localizer itself.
 const CONFIRMED: usize = 4;
@@ -57,7 +57,7 @@ const CONFIRMED: usize = 4;
 const CLOSE: f64 = 30.0;
 
 /// Minimum displacement of a radio head that is reported (m).
-const LEAST_MOVED_M: f64 = 2.0;
+const MIN_MOVED_M: f64 = 2.0;
 
 /// Maximum change of the path by a harmless misconfiguration (m, RMS).
 const HARMLESS_M: f64 = 0.5;
@@ -126,7 +126,7 @@ pub fn spread<'a>(given: &Drive<'a>) -> Drive<'a> {
     };
     angles.retain(|it| sends(it));
     angles.sort_by(|a, b| a.measured.time_s.total_cmp(&b.measured.time_s));
-    let mut apart_s = LEAST_APART_S;
+    let mut apart_s = MIN_SEPARATION_S;
     loop {
         let mut last_s: BTreeMap<HeadId, f64> = BTreeMap::new();
         let mut kept = angles.clone();
@@ -142,7 +142,7 @@ pub fn spread<'a>(given: &Drive<'a>) -> Drive<'a> {
             }
             is_kept
         });
-        if kept.len() <= MOST_ANGLES {
+        if kept.len() <= MAX_ANGLES {
             *angles = kept;
             return given;
         }
@@ -152,8 +152,8 @@ pub fn spread<'a>(given: &Drive<'a>) -> Drive<'a> {
 
 /// Whether the angles agree with the predictions, overall and for each radio head.
 pub fn is_understood(evidence: &Evidence) -> bool {
-    let is_off = |it: &Count| it.angles >= LEAST_OF_HEAD && it.misfit_share() > MOST_MISFITS;
-    evidence.all.refused_share() < MOST_REFUSED && !evidence.heads.values().any(is_off)
+    let is_off = |it: &Count| it.angles >= MIN_ANGLES_PER_HEAD && it.misfit_share() > MAX_MISFITS;
+    evidence.all.refused_share() < MAX_REJECTED_FRACTION && !evidence.heads.values().any(is_off)
 }
 
 /// Evaluates a drive with the vehicle's own localizer; `None` if it is lost.
@@ -196,7 +196,7 @@ fn better_explanations(
             continue;
         };
         let log_odds = evidence.log_likelihood - as_given.log_likelihood - hypothesis.penalty;
-        let fits = evidence.all.refused_share() < MOST_REFUSED
+        let fits = evidence.all.refused_share() < MAX_REJECTED_FRACTION
             && 2 * evidence.all.misfits < as_given.all.misfits;
         if log_odds > LOG_ODDS && fits {
             confirmed_hypotheses.push((log_odds, hypothesis, evidence));
@@ -254,7 +254,7 @@ fn hypotheses(given: &Drive<'_>) -> Result<Vec<Hypothesis>, ReplayError> {
         let path: Vec<Option<Pose>> = steps.iter().map(|step| step.pose).collect();
         let id = (settings.pci, settings.ssb_index);
         let place = triangulate(given, id, &path);
-        let is_elsewhere = |place: &Point| place.distance_m(head.position) > LEAST_MOVED_M;
+        let is_elsewhere = |place: &Point| place.distance_m(head.position) > MIN_MOVED_M;
         let place = place.filter(is_elsewhere);
         hypotheses.extend(place.and_then(|place| moved(site, number, place)));
     }
@@ -357,7 +357,7 @@ fn add_yaw_rate(fields: &OdometryFields) -> &'static str {
 
 /// Returns the reported defects of the odometry that affected the result.
 fn doubtful_odometry(given: &Drive<'_>) -> impl Iterator<Item = Diagnosis> {
-    let doubts = given
+    let warnings = given
         .odometry
         .remarks
         .iter()
@@ -365,7 +365,7 @@ fn doubtful_odometry(given: &Drive<'_>) -> impl Iterator<Item = Diagnosis> {
             OdometryIssue::Doubtful(text) => Some(text),
             _ => None,
         });
-    doubts.map(|text| Diagnosis {
+    warnings.map(|text| Diagnosis {
         text: format!("the angles contradict the configuration, and {text}"),
         is_of_start: false,
         is_harmless: false,

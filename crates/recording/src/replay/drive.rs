@@ -18,9 +18,9 @@ use crate::odometry::{OdometryLog, number};
 use crate::range_log::LoggedRange;
 
 /// Minimum deviation of the odometer's scale that is reported.
-const LEAST_SCALE: f64 = 0.03;
+const MIN_SCALE: f64 = 0.03;
 /// Minimum deviation of the array's mounting that is reported (rad).
-const LEAST_MOUNTING_RAD: f64 = 0.05;
+const MIN_MOUNTING_RAD: f64 = 0.05;
 
 /// Checks that the odometry has two usable samples.
 ///
@@ -169,21 +169,21 @@ impl<'a> Replay<'a> {
             mounting_rad,
             ..
         } = constants;
-        if odometer_scale.is_remarkable(LEAST_SCALE) {
+        if odometer_scale.certainly_differs_by(MIN_SCALE) {
             let text = format!(
                 "the odometer reads {:.3} ± {:.3} m per metre driven; check odometer.scale",
                 odometer_scale.found, odometer_scale.std
             );
             self.remark(time_s, text);
         }
-        if mounting_rad.is_remarkable(LEAST_MOUNTING_RAD) {
+        if mounting_rad.certainly_differs_by(MIN_MOUNTING_RAD) {
             let text = format!(
                 "the array's axis is at {:.3} ± {:.3} rad, not at {:.3}; check array.mounting_rad",
                 mounting_rad.found, mounting_rad.std, mounting_rad.stated
             );
             self.remark(time_s, text);
         }
-        if angle_time_offset_s.is_remarkable(MIN_ANGLE_TIME_OFFSET_S) {
+        if angle_time_offset_s.certainly_differs_by(MIN_ANGLE_TIME_OFFSET_S) {
             let text = format!(
                 "by the odometry's clock, the angles are {:.0} ± {:.0} ms later than configured; \
                  this is compensated; check the clocks, receiver.angle_time_offset_s, and whether \
@@ -265,7 +265,7 @@ impl<'a> Replay<'a> {
     ///
     /// # Errors
     /// [`ReplayError::Custom`].
-    pub fn drive_on(&mut self) -> Result<(), ReplayError> {
+    pub fn process_remaining_odometry(&mut self) -> Result<(), ReplayError> {
         self.odometry_until(f64::INFINITY)
     }
 

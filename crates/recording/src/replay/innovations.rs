@@ -96,7 +96,7 @@ fn known_start(vehicle: &Vehicle) -> Result<Pose, ReplayError> {
 }
 
 /// Maximum fraction of the angles at which a localizer is lost; with more, the evaluation stops.
-const MOST_LOST: f64 = 0.2;
+const MAX_LOST: f64 = 0.2;
 
 /// Processes a drive with a localizer and returns the estimated pose and the innovation at each
 /// angle, until the localizer is lost for long. A search would take the time of a hundred filters.
@@ -114,7 +114,7 @@ pub fn replay_angles(
     let heads = RadioHead::received_by(site, vehicle);
     let mut odometry = odometry.samples.iter().peekable();
     let measurand = vehicle.array.measurand();
-    let most_lost = (MOST_LOST * angles.len() as f64) as usize;
+    let most_lost = (MAX_LOST * angles.len() as f64) as usize;
     let (mut lost, mut steps) = (0, Vec::with_capacity(angles.len()));
     for (index, logged) in angles.iter().enumerate() {
         let mut measured = with_phase(logged, &measurand).measured;

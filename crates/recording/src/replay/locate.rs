@@ -176,7 +176,7 @@ fn resolved(
     let is_suspect = drive.suspicions().next().is_some();
     let estimate = drive.constants.map(|it| it.angle_time_offset_s);
     Ok(estimate
-        .filter(|it| !is_suspect && it.is_remarkable(MIN_ANGLE_TIME_OFFSET_S))
+        .filter(|it| !is_suspect && it.certainly_differs_by(MIN_ANGLE_TIME_OFFSET_S))
         .map_or(late, |it| AngleTimeOffset {
             found_s: it.found - it.stated,
             left_std_s: it.std,
@@ -199,7 +199,7 @@ fn explain(
     odometry: &OdometryLog,
     angles: &[LoggedAngle],
 ) -> Result<(), ReplayError> {
-    replay.drive_on()?;
+    replay.process_remaining_odometry()?;
     let given = as_given(site, vehicle, odometry, angles);
     for mut diagnosis in diagnose(&given, replay.located())? {
         diagnosis.text = odometry.fields.named(&diagnosis.text);
@@ -279,16 +279,16 @@ fn smoothed_poses(
     // The smoothed filter estimates biases if the monitored filter did.
     let multipath_bias_probability = EkfConfig::new(site, vehicle).multipath_bias_probability;
     unguarded.receiver.multipath_bias_probability = Some(multipath_bias_probability);
-    let mut mistrusted_until_s = BTreeMap::new();
+    let mut excluded_until_s = BTreeMap::new();
     for angle_result in aoa_estimates {
         if angle_result.verdict.reason == UpdateReason::Excluded {
             let ssb = &angle_result.ssb;
-            mistrusted_until_s.insert((ssb.pci, ssb.ssb_index), ssb.time_s);
+            excluded_until_s.insert((ssb.pci, ssb.ssb_index), ssb.time_s);
         }
     }
     let trusted = |angle_result: &&AngleResult| {
         let ssb = angle_result.ssb;
-        let until_s = mistrusted_until_s.get(&(ssb.pci, ssb.ssb_index));
+        let until_s = excluded_until_s.get(&(ssb.pci, ssb.ssb_index));
         until_s.is_none_or(|until_s| ssb.time_s > *until_s)
     };
     let aoa_estimates = aoa_estimates.iter().filter(trusted);

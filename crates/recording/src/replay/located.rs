@@ -107,14 +107,14 @@ pub struct Diagnosis {
 }
 
 /// Maximum fraction of the time in state `lost` of a usable result.
-const MOST_LOST: f64 = 0.2;
+const MAX_LOST: f64 = 0.2;
 
 impl LocatedDrive {
     /// Whether the result is unusable: lost for more than 20 % of the time, lost at the end, or
     /// never found.
     pub fn is_lost_for_long(&self) -> bool {
         let ends_lost = self.poses.last().is_none_or(|last| last.is_lost);
-        ends_lost || self.lost_share() > MOST_LOST
+        ends_lost || self.lost_share() > MAX_LOST
     }
 
     /// Returns the fraction of the time without a valid position: the angles contradict the pose,

@@ -23,14 +23,14 @@ const REFINED: usize = 12;
 const FINEST_M: f64 = 0.05;
 
 /// Maximum number of moves with one step size: one to each side of a cell along both axes.
-const MOST_MOVES: usize = 4;
+const MAX_MOVES: usize = 4;
 
 /// Log-likelihood difference below which positions are equally good; the one nearest to the site
 /// file's position is selected.
 const AS_GOOD: f64 = 3.0;
 
 /// Minimum number of angles for an estimate.
-const LEAST_ANGLES: usize = 10;
+const MIN_ANGLES: usize = 10;
 
 /// An angle, the position of the vehicle's array, and the direction of azimuth 0 of the array that measured it.
 struct Sighted {
@@ -66,7 +66,7 @@ pub fn triangulate(drive: &Drive<'_>, head: HeadId, path: &[Option<Pose>]) -> Op
             })
         })
         .collect();
-    if sighted.len() < LEAST_ANGLES {
+    if sighted.len() < MIN_ANGLES {
         return None;
     }
     let stated = Point::new(x_m, y_m);
@@ -101,8 +101,8 @@ pub fn triangulate(drive: &Drive<'_>, head: HeadId, path: &[Option<Pose>]) -> Op
         .iter()
         .map(|it| it.0)
         .fold(f64::NEG_INFINITY, f64::max);
-    let as_good = refined.iter().filter(|it| best - it.0 < AS_GOOD);
-    let nearest = as_good
+    let equally_likely = refined.iter().filter(|it| best - it.0 < AS_GOOD);
+    let nearest = equally_likely
         .min_by(|(_, one), (_, other)| one.distance_m(stated).total_cmp(&other.distance_m(stated)));
     nearest.map(|(_, place)| *place)
 }
@@ -136,7 +136,7 @@ fn refine(
     likelihood: impl Fn(Point) -> f64,
 ) -> (f64, Point) {
     while step_m > FINEST_M {
-        for _ in 0..MOST_MOVES {
+        for _ in 0..MAX_MOVES {
             let Point { x_m, y_m } = best.1;
             let around = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)];
             let tried = around.map(|(dx, dy)| {

@@ -15,7 +15,7 @@ use crate::odometry::OdometryLog;
 use crate::range_log::RangeLog;
 
 /// Minimum number of ranges of a radio head whose consistency is reported.
-const LEAST_RANGES: usize = 20;
+const MIN_RANGES: usize = 20;
 
 /// Fraction of rejected ranges of a radio head that is reported.
 const MANY_REJECTED: f64 = 0.3;
@@ -64,7 +64,7 @@ pub fn locate_ranges(
         replay.remark(*time_s, text.clone());
     }
     replay.with_ranges(&log.ranges);
-    replay.drive_on()?;
+    replay.process_remaining_odometry()?;
     let mut texts = inconsistent(site, replay.located());
     texts.extend(displaced(site, &vehicle, &replay));
     for text in texts {
@@ -157,7 +157,7 @@ fn inconsistent(site: &Site, drive: &LocatedDrive) -> Vec<String> {
             matches!(reason, UpdateReason::Outlier | UpdateReason::Excluded)
         };
         let rejected = all.filter(is_rejected).count();
-        if count >= LEAST_RANGES && rejected as f64 > MANY_REJECTED * count as f64 {
+        if count >= MIN_RANGES && rejected as f64 > MANY_REJECTED * count as f64 {
             texts.push(format!(
                 "{rejected} of {count} ranges of pci {} ssb_index {} contradict the drive; check \
                  position_m of the radio head, and ranging.offset_std_m (and clock_offset_std_ns \

@@ -12,7 +12,7 @@ const CONSTANT_RADPS: f64 = 1e-9;
 const WINDOW_S: f64 = 2.0;
 
 /// Minimum change of heading for a comparison (rad).
-const LEAST_TURNED_RAD: f64 = 0.5;
+const MIN_TURNED_RAD: f64 = 0.5;
 
 /// Maximum relative deviation of a ratio from an expected factor.
 const ABOUT: f64 = 0.25;
@@ -56,7 +56,7 @@ pub fn measured_per_true(poses: &[LocatedPose]) -> Option<f64> {
     }
     let correlation2 = cross_sum * cross_sum / (measured_square * true_square);
     let is_determined =
-        most_rad - least_rad > LEAST_TURNED_RAD && (measured_square == 0.0 || correlation2 > 0.5);
+        most_rad - least_rad > MIN_TURNED_RAD && (measured_square == 0.0 || correlation2 > 0.5);
     is_determined.then_some(cross_sum / true_square)
 }
 

@@ -11,7 +11,7 @@ use crate::file as files;
 use crate::foreign::text_of;
 
 /// Maximum size of a metadata file in bytes: some hours of annotated SSBs.
-const MOST_BYTES: u64 = 512 << 20;
+const MAX_BYTES: u64 = 512 << 20;
 
 /// Maximum number of channels.
 const MAX_CHANNELS: usize = 1024;
@@ -202,7 +202,7 @@ impl Metadata {
             ),
         ];
         for (key, allowed) in unsupported {
-            if let Some(value) = global.other.get(key).filter(|value| !is_nothing(value)) {
+            if let Some(value) = global.other.get(key).filter(|value| !is_unset(value)) {
                 return Err(RecordingError::value(
                     file,
                     format!("global.{key}"),
@@ -214,7 +214,7 @@ impl Metadata {
         for (index, capture) in self.captures.iter().enumerate() {
             let key = |name| format!("captures[{index}].{name}");
             let header = capture.other.get("core:header_bytes");
-            if let Some(value) = header.filter(|value| !is_nothing(value)) {
+            if let Some(value) = header.filter(|value| !is_unset(value)) {
                 let allowed = "only conforming data, without header bytes, is read";
                 return Err(RecordingError::value(
                     file,
@@ -282,10 +282,10 @@ fn check_frequencies(before: &Capture, capture: &Capture) -> Result<(), String> 
 /// # Errors
 /// [`RecordingError::Io`].
 pub(super) fn read_text(file: &Path) -> Result<Vec<u8>, RecordingError> {
-    files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))
+    files::read(file, MAX_BYTES).map_err(|source| RecordingError::io(file, source))
 }
 
-fn is_nothing(value: &Value) -> bool {
+fn is_unset(value: &Value) -> bool {
     matches!(value, Value::Null | Value::Bool(false)) || value.as_u64() == Some(0)
 }
 

@@ -11,7 +11,7 @@ pub const JUDGED_BYTES: usize = 1 << 16;
 /// Usual magnitudes of float samples: from 1e-12 of full scale to unscaled 32-bit integers.
 const USUAL: std::ops::Range<f32> = 1e-12..1e10;
 /// Minimum number of nonzero values for a check.
-const LEAST_VALUES: usize = 64;
+const MIN_VALUES: usize = 64;
 /// Minimum fraction of usual magnitudes for floats. Random bits have a fraction of 0.29, that of
 /// the exponents.
 const MOSTLY: f64 = 0.95;
@@ -31,7 +31,7 @@ pub fn contradiction(stated: Datatype, bytes: &[u8]) -> Option<Datatype> {
         all += 1;
         usual += usize::from(USUAL.contains(&value.abs()));
     }
-    if all < LEAST_VALUES {
+    if all < MIN_VALUES {
         return None;
     }
     let share = usual as f64 / all as f64;

@@ -354,9 +354,9 @@ fn unsuitable_recordings_are_rejected_with_a_reason() {
     let error = scan(&mut block(&antennas), &ScanSettings { array, ..known() }).unwrap_err();
     assert!(matches!(error, ScanError::Array(_)));
 
-    let mut spoilt = antennas.clone();
-    spoilt[2][77].im = f32::NAN;
-    let error = scan(&mut block(&spoilt), &known()).unwrap_err();
+    let mut corrupted = antennas.clone();
+    corrupted[2][77].im = f32::NAN;
+    let error = scan(&mut block(&corrupted), &known()).unwrap_err();
     assert!(
         error.to_string().contains("sample 77 of channel 2"),
         "{error}"

@@ -242,9 +242,9 @@ fn kinds_of_damage_are_distinguished() {
         ]
     ));
 
-    let mut spoilt = good.clone();
-    spoilt[24 * 2 + 8..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
-    fs::write(&data, &spoilt).unwrap();
+    let mut corrupted = good.clone();
+    corrupted[24 * 2 + 8..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    fs::write(&data, &corrupted).unwrap();
     let mut recording = Recording::open(&data).unwrap();
     assert!(matches!(
         recording.warnings(),

@@ -244,13 +244,13 @@ fn stated<T: TomlFile>(
     match table.get(T::WHAT) {
         Some(Value::String(name)) => {
             let named = library.text(T::WHAT, T::SHIPPED, name, origin);
-            let named = named.map_err(|error| error.beneath(origin, T::WHAT))?;
+            let named = named.map_err(|error| error.with_path_prefix(origin, T::WHAT))?;
             // A text that is not TOML is rejected by its reader, which reports the position.
             let keys = named.text.parse().unwrap_or_default();
             T::stated_keys(keys, &named.origin, library)
         }
         Some(Value::Table(held)) => T::stated_keys(held.clone(), origin, library)
-            .map_err(|error| error.beneath(origin, T::WHAT)),
+            .map_err(|error| error.with_path_prefix(origin, T::WHAT)),
         _ => Ok(Table::new()),
     }
 }

@@ -55,11 +55,11 @@ const ROWS: &[Usual] = &[
     },
 ];
 /// Maximum lateral acceleration of rubber on dry ground, about 0.8 g (m/s²).
-const MOST_ACROSS_MPS2: f64 = 8.0;
+const MAX_LATERAL_ACCELERATION_MPS2: f64 = 8.0;
 /// Maximum unnoticed rotation of an array, 20 degrees (rad).
-const MOST_TURNED_RAD: f64 = 0.35;
+const MAX_TURNED_RAD: f64 = 0.35;
 /// Maximum unnoticed displacement of a mast (m).
-const MOST_MOVED_M: f64 = 100.0;
+const MAX_MOVED_M: f64 = 100.0;
 /// Step at which the curvature of the road is evaluated (m).
 const STEP_M: f64 = 1.0;
 
@@ -91,7 +91,7 @@ impl Scenario {
         let mut found = of_vehicle(&vehicle);
         found.retain(|it| !nominal.contains(it));
         let turned_rad = vehicle.array.mounting_rad - self.vehicle.array.mounting_rad;
-        if turned_rad.abs() > MOST_TURNED_RAD {
+        if turned_rad.abs() > MAX_TURNED_RAD {
             found.push(Warning {
                 key: "array.mounting_rad".to_owned(),
                 value: vehicle.array.mounting_rad.to_string(),
@@ -107,12 +107,15 @@ impl Scenario {
             .iter()
             .zip(&self.site.radio_heads)
             .enumerate();
-        found = found.into_iter().map(|it| it.beneath("vehicle")).collect();
+        found = found
+            .into_iter()
+            .map(|it| it.with_path_prefix("vehicle"))
+            .collect();
         found.extend(heads.filter_map(|(index, (head, nominal))| {
             let [at, plan] =
                 [head, nominal].map(|it| Point::new(it.position_m[0], it.position_m[1]));
             let moved_m = at.distance_m(plan);
-            (moved_m > MOST_MOVED_M).then(|| Warning {
+            (moved_m > MAX_MOVED_M).then(|| Warning {
                 key: format!("site.radio_heads[{index}].position_m"),
                 value: format!("{:?}", head.position_m),
                 why: format!("that is {moved_m:.0} m from the nominal position"),
@@ -122,7 +125,10 @@ impl Scenario {
                         .to_owned(),
             })
         }));
-        Ok(found.into_iter().map(|it| it.beneath("truth")).collect())
+        Ok(found
+            .into_iter()
+            .map(|it| it.with_path_prefix("truth"))
+            .collect())
     }
 
     fn faster_than_it_is(&self) -> Option<Warning> {
@@ -156,14 +162,14 @@ impl Scenario {
         });
         let (curvature_per_m, along_m) = bends.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let across_mps2 = (speed_kmh / 3.6).powi(2) * curvature_per_m;
-        (across_mps2 > MOST_ACROSS_MPS2).then(|| {
-            let most_kmh = 3.6 * (0.25 * MOST_ACROSS_MPS2 / curvature_per_m).sqrt();
+        (across_mps2 > MAX_LATERAL_ACCELERATION_MPS2).then(|| {
+            let most_kmh = 3.6 * (0.25 * MAX_LATERAL_ACCELERATION_MPS2 / curvature_per_m).sqrt();
             Warning {
                 key: key.to_owned(),
                 value: speed_kmh.to_string(),
                 why: format!(
                     "in the bend of {:.1} m radius at {along_m:.0} m, the lateral acceleration is \
-                     {across_mps2:.0} m/s², and tyres permit {MOST_ACROSS_MPS2}",
+                     {across_mps2:.0} m/s², and tyres permit {MAX_LATERAL_ACCELERATION_MPS2}",
                     1.0 / curvature_per_m
                 ),
                 write: format!("write at most {most_kmh:.0} km/h, or a larger radius"),

@@ -178,12 +178,11 @@ pub(super) fn hold<T: TomlFile>(
     let held = match table.get(T::WHAT).cloned() {
         Some(Value::String(name)) => {
             let named = library.text(T::WHAT, T::SHIPPED, &name, origin);
-            let named = named.map_err(|error| error.beneath(origin, T::WHAT))?;
+            let named = named.map_err(|error| error.with_path_prefix(origin, T::WHAT))?;
             T::from_toml(&named.text, &named.origin, library)?
         }
-        Some(Value::Table(held)) => {
-            T::from_table(held, origin, library).map_err(|error| error.beneath(origin, T::WHAT))?
-        }
+        Some(Value::Table(held)) => T::from_table(held, origin, library)
+            .map_err(|error| error.with_path_prefix(origin, T::WHAT))?,
         _ => return Ok(()), // the deserializer reports a missing value or a wrong type
     };
     let held = Table::try_from(&held).unwrap_or_default();
@@ -298,9 +297,9 @@ impl Scenario {
                 "stops must be in driving order and on the road, here between {before_m} and \
                  {length_m:.1} m"
             );
-            let on_the_way = stop.at_m > before_m && stop.at_m < length_m;
+            let is_on_road = stop.at_m > before_m && stop.at_m < length_m;
             let key = format!("motion.stops[{index}].at_m");
-            check.that(on_the_way, &key, stop.at_m, &allowed)?;
+            check.that(is_on_road, &key, stop.at_m, &allowed)?;
             before_m = stop.at_m;
         }
         Ok(())

@@ -9,7 +9,7 @@ use super::motion::MotionSettings;
 /// several hours with four radio heads.
 const MAX_SSBS: f64 = 5e6;
 /// Maximum memory without `allow_large`, in bytes.
-const MOST_BYTES: f64 = 1.5e9;
+const MAX_BYTES: f64 = 1.5e9;
 /// Memory of the statistics of one burst over all runs in bytes, mainly for the quantiles.
 const BYTES_PER_BURST: f64 = 1300.0;
 /// Memory of a step of a run, including its table row, in bytes.
@@ -67,23 +67,23 @@ impl DriveSize {
             (self.duration_s / 3600.0, self.angles, self.bytes(1) * 1e-9);
         let most = self.angles.max(self.odometry_samples);
         check.that(
-            most <= MAX_SSBS && self.bytes(1) <= MOST_BYTES,
+            most <= MAX_SSBS && self.bytes(1) <= MAX_BYTES,
             "motion",
             format!("a drive of {hours:.1} h, {angles:.1e} SSBs and {gigabytes:.1} GB"),
             &format!(
                 "at most {MAX_SSBS:.0e} SSBs or odometry samples and {:.1} GB are allowed \
                  without allow_large = true (--allow-large); shorten the road or the stops, or \
                  raise top_speed_kmh",
-                MOST_BYTES * 1e-9
+                MAX_BYTES * 1e-9
             ),
         )
     }
 
     /// Rejects a campaign whose runs do not fit into the usual memory.
     pub(super) fn check_runs(&self, runs: usize, check: Check<'_>) -> Result<(), SettingsError> {
-        let most_gb = MOST_BYTES * 1e-9;
+        let most_gb = MAX_BYTES * 1e-9;
         check.that(
-            self.bytes(runs) <= MOST_BYTES,
+            self.bytes(runs) <= MAX_BYTES,
             "runs",
             format!("{runs} in memory, {:.1} GB", self.bytes(runs) * 1e-9),
             &format!(

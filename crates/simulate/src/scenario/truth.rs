@@ -1,7 +1,7 @@
 //! Deviations of the truth from the nominal models.
 
 use onboard::settings::{
-    Check, Library, SettingsError, Shipped, Site, TomlFile, Vehicle, lay_over,
+    Check, Library, SettingsError, Shipped, Site, TomlFile, Vehicle, merge_table,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -113,13 +113,13 @@ fn depart<T: TomlFile + Clone>(
     let path = format!("truth.{}", T::WHAT);
     let mut table = Table::try_from(nominal).unwrap_or_default();
     let base = table.clone();
-    let mut laid = over.clone();
-    not_drawn(&mut laid);
-    lay_over(&mut table, laid, &path, check)?;
+    let mut merged = over.clone();
+    not_drawn(&mut merged);
+    merge_table(&mut table, merged, &path, check)?;
     // All referenced files are already part of the table.
     let library: &dyn Library = &Shipped;
-    let departed =
-        T::from_table(table, check.file, library).map_err(|error| error.beneath(check.file, &path));
+    let departed = T::from_table(table, check.file, library)
+        .map_err(|error| error.with_path_prefix(check.file, &path));
     for key in over.keys() {
         // Errors of unknown keys are reported by the deserializer.
         let exists = base.contains_key(key) || departed.is_ok();

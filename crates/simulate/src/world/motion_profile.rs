@@ -71,9 +71,9 @@ impl Leg {
                 self.acceleration_mps2 * elapsed_s,
             )
         } else if remaining_s < self.ramp_s {
-            let to_go_m = half_a * remaining_s * remaining_s;
+            let remaining_m = half_a * remaining_s * remaining_s;
             (
-                self.length_m - to_go_m,
+                self.length_m - remaining_m,
                 self.acceleration_mps2 * remaining_s,
             )
         } else {

@@ -9,7 +9,7 @@ use simulate::scenario::Scenario;
 use crate::common::{changed, logs};
 
 /// Maximum time offset that is not corrected (s).
-const LEAST_S: f64 = 0.03;
+const MIN_S: f64 = 0.03;
 
 /// Three standard deviations of an uncertain time offset (s), which is a filter state instead of a
 /// correction.
@@ -53,7 +53,7 @@ fn agreeing_clocks_are_not_corrected() {
         let (scenario, odometry, angles, start) = drive(seed);
         for until_s in [16.0, 40.0, 100.0] {
             let [found_s, std_s] = found_s(&scenario, (&odometry, &angles), start, until_s, 0.0);
-            let most_s = LEAST_S.max(3.0 * std_s).min(DOUBTED_S);
+            let most_s = MIN_S.max(3.0 * std_s).min(DOUBTED_S);
             assert!(
                 found_s.abs() < most_s,
                 "seed {seed}, {until_s} s: {found_s} s ± {std_s} s"

@@ -114,7 +114,7 @@ fn the_last_smoothed_pose_equals_the_filtered_pose() {
     let yaw = value("{ noise_rad_per_sqrt_s = 1e-3 }");
     // The covariance with integrity monitoring also includes alternative hypotheses. Here they are
     // excluded, or improbable at the end of this drive: biases, outliers and a noisier odometer.
-    let sure = [
+    let precise = [
         ("vehicle.array.mounting_std_rad", 0.0.into()),
         ("vehicle.array.phase_std_rad", 0.0.into()),
         ("vehicle.receiver.multipath_bias_probability", 0.0.into()),
@@ -123,13 +123,13 @@ fn the_last_smoothed_pose_equals_the_filtered_pose() {
             value("{ fault_probability = { odometer = 1e-9, site_frame_offset = 0 } }"),
         ),
     ];
-    let mut rarely_noisy = sure.to_vec();
+    let mut rarely_noisy = precise.to_vec();
     rarely_noisy[3].1 = value("{ fault_probability = { odometer = 3e-6, site_frame_offset = 0 } }");
     for (changes, covered) in [
         (vec![], 0.0),
         (vec![("vehicle.gyroscope", yaw)], 0.0),
         (vec![("vehicle.localizer.map", Value::from(false))], 0.0),
-        (sure.to_vec(), 1e-6),
+        (precise.to_vec(), 1e-6),
         (rarely_noisy, 0.01),
         (vec![("vehicle.integrity", value("{}"))], 1.0),
     ] {

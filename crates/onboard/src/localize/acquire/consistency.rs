@@ -111,7 +111,7 @@ impl ConsistencyMonitor {
     }
 
     /// Whether most radio heads are consistent with the filter.
-    pub fn is_sure(&self) -> bool {
+    pub fn is_consistent(&self) -> bool {
         self.off(SURE).is_some_and(|share| share < 0.5)
     }
 }

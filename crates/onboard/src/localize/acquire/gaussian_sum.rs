@@ -41,19 +41,19 @@ const MAX_OPPOSITE_ODDS: f64 = 1e-5;
 const FOUND_STD_RAD: f64 = 0.2;
 
 /// Minimum number of radio heads that determine a position without a road.
-pub(super) const LEAST_HEADS: usize = 3;
+pub(super) const MIN_HEADS: usize = 3;
 
 /// Number of initial headings in each grid cell, and maximum number of hypotheses.
 const HEADINGS: u32 = 12;
-const MOST_HYPOTHESES: f64 = 4000.0;
+const MAX_HYPOTHESES: f64 = 4000.0;
 
 /// Minimum weight of a remaining hypothesis relative to the best, in the reported covariance. The
 /// next angles may make it the best one, and its position is then at most five standard deviations
 /// away.
-const LEAST_WEIGHT: f64 = 0.05;
+const MIN_WEIGHT: f64 = 0.05;
 
 /// Maximum number of hypotheses that the protection level covers one by one.
-const MOST_SINGLE: usize = 64;
+const MAX_SEPARATE_HYPOTHESES: usize = 64;
 
 /// Region of the search.
 #[derive(Clone, Debug)]
@@ -190,7 +190,7 @@ impl GaussianSum {
 
     /// Whether these radio heads determine a position with the specified noise only.
     pub(super) fn serves_as_stated(heads: &[RadioHead]) -> bool {
-        heads.len() >= LEAST_HEADS && !Self::is_small(heads)
+        heads.len() >= MIN_HEADS && !Self::is_small(heads)
     }
 
     /// Returns the area of a search without a road.
@@ -205,7 +205,7 @@ impl GaussianSum {
 
     /// Whether the whole area of these radio heads can be searched with a fine grid.
     pub fn is_small(heads: &[RadioHead]) -> bool {
-        Self::about(heads).spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
+        Self::about(heads).spacing_m(MAX_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
     }
 
     /// Whether its filters have the same states as a filter that they are compared with.
@@ -257,7 +257,7 @@ impl GaussianSum {
                 }
             }
             Ground::Plane(area) => {
-                let spacing_m = area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M);
+                let spacing_m = area.spacing_m(MAX_HYPOTHESES / f64::from(HEADINGS), SPACING_M);
                 let turn_rad = TAU / f64::from(HEADINGS);
                 for Point { x_m, y_m } in area.places(spacing_m) {
                     self.hypotheses.extend((0..HEADINGS).map(|number| {
@@ -468,7 +468,7 @@ impl GaussianSum {
     /// covers every hypothesis that may become the best one. The distribution is far from Gaussian
     /// while several hypotheses remain.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
-        Self::mixture(&self.hypotheses, time_s, LEAST_WEIGHT)
+        Self::mixture(&self.hypotheses, time_s, MIN_WEIGHT)
     }
 
     /// Returns the most probable hypotheses, each with its weight, and one Gaussian with mean and
@@ -477,7 +477,8 @@ impl GaussianSum {
         let best = self.best();
         let weight = move |it: &Hypothesis| (it.log_likelihood - best).exp();
         let total: f64 = self.hypotheses.iter().map(weight).sum();
-        let (single, rest) = (self.hypotheses).split_at(self.hypotheses.len().min(MOST_SINGLE));
+        let (single, rest) =
+            (self.hypotheses).split_at(self.hypotheses.len().min(MAX_SEPARATE_HYPOTHESES));
         let rest_weight = rest.iter().map(weight).sum::<f64>() / total;
         let rest = (!rest.is_empty()).then(|| (rest_weight, Self::mixture(rest, time_s, 0.0)));
         let single = single.iter();

@@ -121,7 +121,7 @@ impl HeadingSearch {
     }
 
     /// Whether another heading is more probable than that of the solution.
-    pub fn doubts(&self) -> bool {
+    pub fn other_heading_is_likelier(&self) -> bool {
         self.advantage() > DOUBT
     }
 
@@ -135,6 +135,6 @@ impl HeadingSearch {
     /// Whether the search has ended without a result.
     pub fn is_over(&self, solution: &Ekf) -> bool {
         let driven_m = solution.driven_m() - self.begun_m;
-        driven_m > MAX_DRIVEN_M && !self.doubts()
+        driven_m > MAX_DRIVEN_M && !self.other_heading_is_likelier()
     }
 }

@@ -29,9 +29,9 @@ pub(super) struct Evidence {
     /// Whether the angles of most radio heads agree with the prediction.
     pub is_consistent: bool,
     /// Whether the selected hypothesis explains contradicting angles without a lost vehicle.
-    pub may_mislead: bool,
+    pub may_explain_contradictions: bool,
     /// Whether the minimum time since the last search has elapsed.
-    pub is_rested: bool,
+    pub pause_has_elapsed: bool,
     /// Comparison of the likelihoods at the best position of the search and at the filter's
     /// position.
     pub search: Ordering,
@@ -42,7 +42,7 @@ pub(super) struct Evidence {
     /// Whether the filter of a given start and its search have reached one position.
     pub is_merged: bool,
     /// Whether another start is more probable than the given one.
-    pub doubts_start: bool,
+    pub other_start_is_likelier: bool,
     /// Whether the search of a given start has found the reported position.
     pub agrees: bool,
     /// Whether no odometry has arrived since the search was reported; the covariance then covers
@@ -52,7 +52,7 @@ pub(super) struct Evidence {
     pub has_moved: bool,
     pub has_moved_far: bool,
     /// Whether angles were received for the maximum duration of a search.
-    pub is_patient: bool,
+    pub maximum_search_duration_reached: bool,
 }
 
 /// Action between two phases.
@@ -78,29 +78,37 @@ impl Phase {
         // also be less probable.
         let is_confirmed = by.search == Ordering::Less && by.is_consistent;
         match self {
-            Self::Tracking => match (by.is_lost && by.is_rested, by.may_mislead) {
+            Self::Tracking => match (
+                by.is_lost && by.pause_has_elapsed,
+                by.may_explain_contradictions,
+            ) {
                 (false, _) => Transition::Stay,
                 (true, true) => Transition::Begin(Self::Confirming),
                 (true, false) => Transition::Begin(Self::Relocalizing { wide: false }),
             },
             Self::Confirming => {
-                let is_long = by.is_patient || (by.may_mislead && by.has_moved_far);
+                let is_long = by.maximum_search_duration_reached
+                    || (by.may_explain_contradictions && by.has_moved_far);
                 let is_over = if by.is_of_start {
                     // Until one position remains, another one may still be correct. A long search
                     // ends, unless the angles favour another position.
                     by.search == Ordering::Less
-                        && (by.agrees || (!by.doubts_start && (by.is_patient || by.has_moved_far)))
+                        && (by.agrees
+                            || (!by.other_start_is_likelier
+                                && (by.maximum_search_duration_reached || by.has_moved_far)))
                 } else {
                     !is_ahead && (is_confirmed || is_long || by.is_found)
                 };
                 // Given start and search agree, so that a solution elsewhere has diverged.
                 if by.is_merged && by.is_found && by.has_moved && !by.agrees {
                     Transition::TakeOver
-                } else if (is_ahead && by.has_moved) || (by.is_lost && !by.may_mislead) {
+                } else if (is_ahead && by.has_moved)
+                    || (by.is_lost && !by.may_explain_contradictions)
+                {
                     Transition::Report
                 } else if is_over {
                     Transition::End {
-                        rests: by.may_mislead,
+                        rests: by.may_explain_contradictions,
                     }
                 } else {
                     Transition::Stay
@@ -119,7 +127,7 @@ impl Phase {
             {
                 Transition::End { rests: true }
             }
-            Self::Relocalizing { wide: false } if by.is_patient => {
+            Self::Relocalizing { wide: false } if by.maximum_search_duration_reached => {
                 Transition::Begin(Self::Relocalizing { wide: true })
             }
             Self::Searching | Self::Given | Self::Relocalizing { .. } => Transition::Stay,
@@ -135,18 +143,18 @@ mod tests {
     const NONE: Evidence = Evidence {
         is_lost: false,
         is_consistent: false,
-        may_mislead: false,
-        is_rested: true,
+        may_explain_contradictions: false,
+        pause_has_elapsed: true,
         search: Ordering::Equal,
         is_found: false,
         is_of_start: false,
         is_merged: false,
-        doubts_start: false,
+        other_start_is_likelier: false,
         agrees: false,
         is_just_reported: false,
         has_moved: false,
         has_moved_far: false,
-        is_patient: false,
+        maximum_search_duration_reached: false,
     };
 
     #[test]
@@ -191,19 +199,19 @@ mod tests {
             (Tracking, is_lost, Begin(near)),
             (
                 Tracking,
-                is(|it| (it.is_lost, it.is_rested) = (true, false)),
+                is(|it| (it.is_lost, it.pause_has_elapsed) = (true, false)),
                 Stay,
             ),
             (
                 Tracking,
-                is(|it| (it.is_lost, it.may_mislead) = (true, true)),
+                is(|it| (it.is_lost, it.may_explain_contradictions) = (true, true)),
                 Begin(Confirming),
             ),
             (Confirming, NONE, Stay),
             (Confirming, is_lost, Report),
             (
                 Confirming,
-                is(|it| (it.is_lost, it.may_mislead) = (true, true)),
+                is(|it| (it.is_lost, it.may_explain_contradictions) = (true, true)),
                 Stay,
             ),
             (Confirming, ahead(NONE), Stay),
@@ -243,18 +251,24 @@ mod tests {
             ),
             (
                 Confirming,
-                is(|it| (it.is_of_start, it.is_patient) = (true, true)),
+                is(|it| (it.is_of_start, it.maximum_search_duration_reached) = (true, true)),
                 Stay,
             ),
             (
                 Confirming,
-                behind(is(|it| (it.is_of_start, it.is_patient) = (true, true))),
+                behind(is(|it| {
+                    (it.is_of_start, it.maximum_search_duration_reached) = (true, true);
+                })),
                 End { rests: false },
             ),
             (
                 Confirming,
                 behind(is(|it| {
-                    (it.is_of_start, it.is_patient, it.doubts_start) = (true, true, true);
+                    (
+                        it.is_of_start,
+                        it.maximum_search_duration_reached,
+                        it.other_start_is_likelier,
+                    ) = (true, true, true);
                 })),
                 Stay,
             ),
@@ -265,27 +279,33 @@ mod tests {
             ),
             (
                 Confirming,
-                is(|it| it.is_patient = true),
+                is(|it| it.maximum_search_duration_reached = true),
                 End { rests: false },
             ),
             (Confirming, is(|it| it.has_moved_far = true), Stay),
             (
                 Confirming,
-                is(|it| (it.has_moved_far, it.may_mislead) = (true, true)),
+                is(|it| (it.has_moved_far, it.may_explain_contradictions) = (true, true)),
                 End { rests: true },
             ),
             (near, NONE, Stay),
             (
                 wide,
-                ahead(is(|it| (it.agrees, it.doubts_start) = (true, true))),
+                ahead(is(|it| {
+                    (it.agrees, it.other_start_is_likelier) = (true, true);
+                })),
                 End { rests: true },
             ),
             (
                 near,
-                is(|it| (it.is_patient, it.is_just_reported) = (true, true)),
+                is(|it| (it.maximum_search_duration_reached, it.is_just_reported) = (true, true)),
                 Stay,
             ),
-            (near, is(|it| it.is_patient = true), Begin(wide)),
+            (
+                near,
+                is(|it| it.maximum_search_duration_reached = true),
+                Begin(wide),
+            ),
             (near, ahead(is_found), Stay),
             (
                 near,
@@ -301,7 +321,11 @@ mod tests {
                 behind(is(|it| it.is_consistent = true)),
                 End { rests: true },
             ),
-            (wide, is(|it| it.is_patient = true), Stay),
+            (
+                wide,
+                is(|it| it.maximum_search_duration_reached = true),
+                Stay,
+            ),
             (
                 wide,
                 ahead(Evidence {

@@ -14,7 +14,7 @@ use crate::settings::IntegritySettings;
 
 /// Minimum distance driven before a result of the search is accepted (m): at standstill, the same
 /// errors repeat.
-const LEAST_WAY_M: f64 = 0.5;
+const MIN_DRIVEN_M: f64 = 0.5;
 
 /// Distance within which angles of one radio head are dependent (m): a cluster of scatterers biases
 /// the angle over this distance.
@@ -41,7 +41,7 @@ clone_in_place! {
         /// covariance.
         pub refutes: bool,
         /// Whether the selected hypothesis explains contradicting angles without a lost vehicle.
-        may_mislead: bool,
+        may_explain_contradictions: bool,
         /// Prior probability that the given start is wrong, and the vehicle is anywhere in the area
         /// of the radio heads: that of a radio head fault.
         wrong_start: f64,
@@ -67,14 +67,14 @@ clone_in_place! {
 
 impl RelocalizationTest {
     /// Creates a test that starts now.
-    pub fn new(search: GaussianSum, ekf: &Ekf, may_mislead: bool) -> Self {
+    pub fn new(search: GaussianSum, ekf: &Ekf, may_explain_contradictions: bool) -> Self {
         let heads = search.heads().len();
         Self {
             search,
             given: None,
             reported_s: ekf.time_s(),
             refutes: false,
-            may_mislead,
+            may_explain_contradictions,
             wrong_start: 0.0,
             epochs: 1.0,
             confirmed_at: f64::NEG_INFINITY,
@@ -176,7 +176,7 @@ impl RelocalizationTest {
             (self.log_odds(), self.confirmed_at, greater)
         } else {
             let ratio = self.search.best() - self.of_filter;
-            let share = if is_confirming || self.may_mislead {
+            let share = if is_confirming || self.may_explain_contradictions {
                 self.information_fraction()
             } else {
                 1.0
@@ -219,16 +219,16 @@ impl RelocalizationTest {
     }
 
     /// Whether another start is more probable than the given one.
-    pub fn doubts_start(&self) -> bool {
+    pub fn other_start_is_likelier(&self) -> bool {
         self.is_of_start() && self.log_odds() > 0.0
     }
 
     /// Returns the minimum distance driven before a result is accepted (m).
     pub const fn min_driven_m(&self) -> f64 {
-        if self.may_mislead {
+        if self.may_explain_contradictions {
             INDEPENDENT_M
         } else {
-            LEAST_WAY_M
+            MIN_DRIVEN_M
         }
     }
 

@@ -18,7 +18,7 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 use super::consistency::ConsistencyMonitor;
-use super::gaussian_sum::{GaussianSum, LEAST_HEADS};
+use super::gaussian_sum::{GaussianSum, MIN_HEADS};
 use super::heading_search::HeadingSearch;
 use super::phase::{Evidence, Phase, Transition};
 use super::relocalization_test::{PATIENCE_S, RelocalizationTest};
@@ -43,7 +43,7 @@ use crate::settings::IntegritySettings;
 const NEARBY_M: f64 = 2.0;
 
 /// Maximum of three standard deviations for a nearby search (m).
-const MOST_NEARBY_M: f64 = 10.0;
+const MAX_NEARBY_M: f64 = 10.0;
 
 /// Minimum time between a search without a better position and the next search (s).
 const REST_S: f64 = 10.0;
@@ -122,8 +122,8 @@ impl Solution {
     }
 
     /// Whether the selected hypothesis explains contradicting angles without a lost vehicle.
-    fn may_mislead(&self) -> bool {
-        (self.monitor()).is_some_and(|it| it.bank().may_mislead())
+    fn may_explain_contradictions(&self) -> bool {
+        (self.monitor()).is_some_and(|it| it.bank().may_explain_contradictions())
     }
 
     /// Returns the ratio of the angles' measured variance to the specified one, if it is estimated.
@@ -333,10 +333,10 @@ impl Relocalizer {
     }
 
     /// Whether another start is more probable than the given one.
-    fn doubts_start(&self) -> bool {
+    fn other_start_is_likelier(&self) -> bool {
         self.test
             .as_ref()
-            .is_some_and(RelocalizationTest::doubts_start)
+            .is_some_and(RelocalizationTest::other_start_is_likelier)
     }
 
     /// Starts a search in parallel to the solution.
@@ -344,8 +344,12 @@ impl Relocalizer {
         let is_wide = phase == Phase::Relocalizing { wide: true };
         let test = (self.solution.as_ref()).and_then(|solution| {
             let search = self.search_about(solution, now_s, is_wide)?;
-            let may_mislead = solution.may_mislead();
-            Some(RelocalizationTest::new(search, solution.ekf(), may_mislead))
+            let may_explain_contradictions = solution.may_explain_contradictions();
+            Some(RelocalizationTest::new(
+                search,
+                solution.ekf(),
+                may_explain_contradictions,
+            ))
         });
         self.phase = if test.is_some() {
             phase
@@ -366,14 +370,14 @@ impl Relocalizer {
         let road = self.drive_config.road.as_ref();
         let mut search = match road {
             Some(_) => GaussianSum::new(config, road.cloned(), true, heads),
-            None if heads.len() < LEAST_HEADS => return None,
+            None if heads.len() < MIN_HEADS => return None,
             None if is_wide || GaussianSum::is_small(heads) => {
                 GaussianSum::new(config, None, true, heads)
             }
             None => {
                 let here = solution.pose(now_s);
                 let three_m = 3.0 * here.principal_variances()[0].sqrt();
-                let nearby_m = NEARBY_M + three_m.min(MOST_NEARBY_M);
+                let nearby_m = NEARBY_M + three_m.min(MAX_NEARBY_M);
                 let area = Area::around(here.pose.point(), nearby_m);
                 GaussianSum::in_plane(config, area, heads)
             }
@@ -390,19 +394,19 @@ impl Relocalizer {
         let is_of_start = self.is_of_start();
         Evidence {
             is_lost: self.consistency.is_lost(),
-            is_consistent: self.consistency.is_sure(),
-            may_mislead: solution.may_mislead(),
-            is_rested: now_s >= self.rests_until_s,
+            is_consistent: self.consistency.is_consistent(),
+            may_explain_contradictions: solution.may_explain_contradictions(),
+            pause_has_elapsed: now_s >= self.rests_until_s,
             search,
             is_found: is(&|it| it.search.found().is_some()),
             is_of_start,
             is_merged: is(&RelocalizationTest::is_merged),
-            doubts_start: self.doubts_start(),
+            other_start_is_likelier: self.other_start_is_likelier(),
             agrees: is(&|it| it.agrees_with(solution.ekf())),
             is_just_reported: is(&|it| it.reported_s == odometry_s),
             has_moved: is(&|it| it.driven_m >= it.min_driven_m()),
             has_moved_far: is(&|it| it.driven_m > LONG_DISTANCE_M),
-            is_patient: is(&|it| it.listened_s > PATIENCE_S),
+            maximum_search_duration_reached: is(&|it| it.listened_s > PATIENCE_S),
         }
     }
 
@@ -550,7 +554,10 @@ impl Localizer for Relocalizer {
                 integrity.raise(level_m);
             }
         }
-        if self.heading.as_ref().is_some_and(HeadingSearch::doubts)
+        if self
+            .heading
+            .as_ref()
+            .is_some_and(HeadingSearch::other_heading_is_likelier)
             && let Some(integrity) = &mut estimate.integrity
         {
             integrity.state = IntegrityState::Unavailable;
@@ -567,7 +574,7 @@ impl Localizer for Relocalizer {
     }
 
     fn is_lost(&self) -> bool {
-        matches!(self.phase, Phase::Relocalizing { .. }) || self.doubts_start()
+        matches!(self.phase, Phase::Relocalizing { .. }) || self.other_start_is_likelier()
     }
 
     fn recovered(&self) -> Option<Recovered> {

@@ -19,7 +19,7 @@ pub(super) const VARIANCES: [f64; LEVELS] = [0.02 * 0.02, 0.1 * 0.1, 0.3 * 0.3, 
 /// From this level on, a radio head contributes almost no information, and a larger deviation is an
 /// outlier.
 const LARGE: usize = 2;
-pub const MOST_VARIANCE: f64 = VARIANCES[LARGE];
+pub const MAX_VARIANCE: f64 = VARIANCES[LARGE];
 
 /// Correlation distance of bias and level (m).
 pub(super) const VALUE_M: f64 = 1.0;
@@ -30,7 +30,7 @@ pub(super) const SOON_M: f64 = 0.3;
 
 /// Minimum distance between two angles, as a fraction of the correlation distance. At standstill
 /// there is no new information, but the variance must remain finite.
-const LEAST_SHARE: f64 = 1e-5;
+const MIN_SHARE: f64 = 1e-5;
 
 /// Returns the independent fraction of an angle `travelled_m` after the previous one: one
 /// independent angle in twice the correlation distance.
@@ -45,7 +45,7 @@ pub(super) fn kept(travelled_m: f64) -> f64 {
 
 /// Returns the independent fraction of the short-lived error.
 pub fn share(travelled_m: f64) -> f64 {
-    (travelled_m / SOON_M).clamp(LEAST_SHARE, 1.0)
+    (travelled_m / SOON_M).clamp(MIN_SHARE, 1.0)
 }
 
 /// Level of a radio head's bias: the probability of each level, current and prior.
@@ -137,7 +137,7 @@ impl JumpProcess {
     /// Returns the jump hypotheses of an angle, `travelled_m` after the previous one, with the
     /// innovation `seen` without bias. `value_rad` is the mean of the bias, and `known` is the
     /// contribution of its variance and covariance to the variance of the innovation.
-    pub fn weigh(
+    pub fn jump_hypotheses(
         &self,
         travelled_m: f64,
         seen: &Innovation,
@@ -217,7 +217,7 @@ impl JumpProcess {
 
     /// Returns the expected `E 1/S` (1/rad²) of an angle for a retained and for a new bias, each
     /// weighted by its probability, a distance after the previous angle of the radio head. `seen` is
-    /// the variance of the innovation without bias; `known` as in [`Self::weigh`].
+    /// the variance of the innovation without bias; `known` as in [`Self::jump_hypotheses`].
     pub fn expected_gains(&self, travelled_m: f64, seen: f64, known: f64) -> [f64; 2] {
         let stays = kept(travelled_m);
         let repetition = share(travelled_m).recip();

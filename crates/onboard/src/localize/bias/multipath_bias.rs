@@ -7,7 +7,7 @@
 //! state's part of it. Every covariance after an angle is therefore a bilinear form of these two
 //! vectors.
 
-use super::jump_process::{JumpHypotheses, JumpProcess, MOST_VARIANCE};
+use super::jump_process::{JumpHypotheses, JumpProcess, MAX_VARIANCE};
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::smoother::Journal;
 use crate::gaussian::{Innovation, Matrix, dot};
@@ -170,7 +170,7 @@ impl MultipathBias {
     /// information.
     pub fn is_large(&self, head: usize) -> bool {
         self.bias(head).is_some_and(|error| {
-            error.size.is_large() || error.mean_rad * error.mean_rad > MOST_VARIANCE
+            error.size.is_large() || error.mean_rad * error.mean_rad > MAX_VARIANCE
         })
     }
 
@@ -212,9 +212,9 @@ impl MultipathBias {
         }
     }
 
-    /// Returns the jump hypotheses of an angle to a radio head; see [`JumpProcess::weigh`]. `None`
+    /// Returns the jump hypotheses of an angle to a radio head; see [`JumpProcess::jump_hypotheses`]. `None`
     /// if its bias is not estimated.
-    pub fn weigh(
+    pub fn jump_hypotheses(
         &self,
         head: usize,
         travelled_m: f64,
@@ -223,7 +223,7 @@ impl MultipathBias {
     ) -> Option<JumpHypotheses> {
         let error = self.bias(head)?;
         let known = 2.0 * error.along(row) + self.covariance(head, head);
-        Some((error.size).weigh(travelled_m, seen, error.mean_rad, known))
+        Some((error.size).jump_hypotheses(travelled_m, seen, error.mean_rad, known))
     }
 
     /// Updates state and biases with an angle to a radio head and its jump hypotheses.
@@ -446,7 +446,9 @@ mod tests {
         rad: f64,
     ) {
         let seen = belief.innovation(rad - belief.mean[0], &row(), OWN_VARIANCE);
-        let hypotheses = errors.weigh(head, travelled_m, &seen, &row()).unwrap();
+        let hypotheses = errors
+            .jump_hypotheses(head, travelled_m, &seen, &row())
+            .unwrap();
         errors.update_with_angle(belief, head, travelled_m, &row(), &hypotheses, None);
     }
 

@@ -8,7 +8,7 @@ use crate::road::LaneKeeping;
 use crate::settings::{DriveKind, LocalizerSettings, RoadSettings, Site, TrackerSettings, Vehicle};
 
 /// Minimum lateral standard deviation of the lane keeping, whatever is configured (m).
-const LEAST_LANE_RMS_M: f64 = 0.02;
+const MIN_LANE_RMS_M: f64 = 0.02;
 
 /// Maximum yaw rate of the lane keeping, in standard deviations.
 const SIGMAS_OF_SWING: f64 = 5.0;
@@ -207,7 +207,7 @@ impl EkfConfig {
         let keeping = vehicle.lane_keeping.process();
         let survey_std_m = site.road.as_ref().map_or(0.0, RoadSettings::survey_std_m);
         let lane_keeping = LaneKeeping {
-            rms_m: keeping.rms_m.max(LEAST_LANE_RMS_M),
+            rms_m: keeping.rms_m.max(MIN_LANE_RMS_M),
             ..keeping
         }
         .and(&LaneKeeping {

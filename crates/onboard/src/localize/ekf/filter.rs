@@ -244,7 +244,7 @@ impl EstimatedConstant {
     }
 
     /// Whether the difference exceeds `least` with certainty.
-    pub fn is_remarkable(&self, least: f64) -> bool {
+    pub fn certainly_differs_by(&self, least: f64) -> bool {
         let by = self.departure().abs();
         by > least && by > 2.0 * self.std
     }

@@ -5,7 +5,7 @@ use super::angle_model::{AngleModel, locate};
 use super::config::CorrelatedNoise;
 use super::filter::Ekf;
 use super::motion::{Reading, Step};
-use super::predict::MOST_STEPS;
+use super::predict::MAX_STEPS;
 use super::state::{Belief, SCALE, STATES};
 use crate::gaussian::smoother::Journal;
 use crate::gaussian::{
@@ -112,12 +112,17 @@ impl Ekf {
 
     /// Returns a state predicted over an odometer distance without measurements.
     pub fn carry(&self, belief: Belief, reading_m: f64) -> Belief {
-        self.carry_by(belief, reading_m, |_| ())
+        self.extrapolate_by(belief, reading_m, |_| ())
     }
 
     /// Predicts a state step by step.
-    fn carry_by(&self, mut belief: Belief, reading_m: f64, mut by: impl FnMut(&Step)) -> Belief {
-        let steps = (reading_m.abs() / FORECAST_STEP_M).ceil().min(MOST_STEPS);
+    fn extrapolate_by(
+        &self,
+        mut belief: Belief,
+        reading_m: f64,
+        mut by: impl FnMut(&Step),
+    ) -> Belief {
+        let steps = (reading_m.abs() / FORECAST_STEP_M).ceil().min(MAX_STEPS);
         for _ in 0..steps as usize {
             let step = self.step(&belief, &Reading::exact(reading_m / steps));
             step.apply(&mut belief);
@@ -130,7 +135,7 @@ impl Ekf {
     pub fn transition(&self, belief: &Belief, reading_m: f64) -> Transition {
         let mut jacobian = identity();
         let mut noise = Belief::independent(belief.mean, [0.0; STATES]);
-        self.carry_by(*belief, reading_m, |step| {
+        self.extrapolate_by(*belief, reading_m, |step| {
             step.apply(&mut noise);
             jacobian = product(&step.jacobian, &jacobian);
         });
@@ -186,7 +191,7 @@ impl Ekf {
 
 /// Minimum variance of the reported covariance, of a nanometre and a nanoradian, for states with an
 /// exact start.
-const LEAST_VARIANCE: f64 = 1e-18;
+const MIN_VARIANCE: f64 = 1e-18;
 
 impl Ekf {
     /// Returns the pose at `time_s`, extrapolated from the newest odometry with its speed.
@@ -244,7 +249,7 @@ impl Ekf {
         inner[0][0] += lag_variance;
         let mut covariance = transformed(&jacobian, &inner);
         for i in 0..3 {
-            covariance[i][i] += LEAST_VARIANCE;
+            covariance[i][i] += MIN_VARIANCE;
         }
         PoseEstimate {
             time_s,

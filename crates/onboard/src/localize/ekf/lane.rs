@@ -5,7 +5,7 @@ use super::state::{ACROSS, ALONG, CURVATURE, HEADING, STATES};
 use crate::gaussian::{CERTAIN_SIGMAS, identity};
 
 /// Minimum standard deviation of the lane position, in metres or radians, for an exactly kept lane.
-const LEAST_LANE_STD: f64 = 1e-6;
+const MIN_LANE_STD: f64 = 1e-6;
 
 impl Ekf {
     /// Returns the current position off the map. Beyond an end of the road, the road probably
@@ -72,7 +72,7 @@ impl Ekf {
     /// smaller one of the state's and the lane's.
     fn apply_lane_constraint(&mut self) {
         let lane = self.config.lane_keeping.stationary();
-        let [offset_m, heading_rad] = lane.map(|variance| variance.sqrt().max(LEAST_LANE_STD));
+        let [offset_m, heading_rad] = lane.map(|variance| variance.sqrt().max(MIN_LANE_STD));
         let covariance = &self.belief.covariance;
         let (dd, dp, pp) = (
             covariance[ACROSS][ACROSS] / (offset_m * offset_m),

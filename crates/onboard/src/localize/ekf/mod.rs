@@ -25,7 +25,7 @@ pub use config::EkfConfig;
 pub use filter::{Ekf, EstimatedConstant, EstimatedConstants};
 pub(in crate::localize) use forecast::ExcludedInnovation;
 pub use motion::{MotionNoise, PathBend};
-pub(in crate::localize) use predict::MOST_SLIP;
+pub(in crate::localize) use predict::MAX_SLIP;
 pub(in crate::localize) use range::PredictedRange;
 pub use range::RangeState;
 pub(in crate::localize) use update::PredictedMeasurement;

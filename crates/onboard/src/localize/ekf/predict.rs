@@ -14,7 +14,7 @@ const STEP_M: f64 = 1.0;
 
 /// Maximum number of steps per sample. After a kilometre without odometry, the number of bends is
 /// unknown anyway.
-pub(super) const MOST_STEPS: f64 = 1000.0;
+pub(super) const MAX_STEPS: f64 = 1000.0;
 
 /// Speeds above this multiple of the vehicle's top speed are replaced by it.
 const WILD: f64 = 10.0;
@@ -22,7 +22,7 @@ const WILD: f64 = 10.0;
 /// Minimum change of the speed for slip, in standard deviations of a speed measurement, and maximum
 /// increase of the odometer scale's standard deviation by slip.
 const SIGMAS_OF_SLIP: f64 = 5.0;
-pub(in crate::localize) const MOST_SLIP: f64 = 0.3;
+pub(in crate::localize) const MAX_SLIP: f64 = 0.3;
 
 /// Range of the ratio between the distance by the speeds and the measured distance in which the
 /// distance by the speeds is used.
@@ -152,7 +152,7 @@ impl Ekf {
         let sets_off = previous.speed_mps == 0.0 && sample.speed_mps != 0.0;
         let unseen = self.config.may_slip && sets_off;
         self.slip(if unseen {
-            MOST_SLIP
+            MAX_SLIP
         } else {
             self.speed_jumps.speed_jump
         });
@@ -193,7 +193,7 @@ impl Ekf {
     /// Adds the variance of a relative change of the odometer scale.
     fn slip(&mut self, by: f64) {
         let variance = &mut self.belief.covariance[SCALE][SCALE];
-        *variance = variance.max((*variance + by * by).min(MOST_SLIP * MOST_SLIP));
+        *variance = variance.max((*variance + by * by).min(MAX_SLIP * MAX_SLIP));
     }
 
     /// Returns the yaw rate measurement of a step.
@@ -230,9 +230,7 @@ impl Ekf {
     }
 
     fn advance(&mut self, reading: Reading, duration_s: f64, yaw: Option<Yaw>) {
-        let steps = (reading.read_m.abs() / STEP_M)
-            .ceil()
-            .clamp(1.0, MOST_STEPS);
+        let steps = (reading.read_m.abs() / STEP_M).ceil().clamp(1.0, MAX_STEPS);
         let share = 1.0 / steps;
         let yaw = yaw.map(|yaw| Yaw {
             turn_rad: yaw.turn_rad * share,

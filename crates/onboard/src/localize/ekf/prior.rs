@@ -16,7 +16,7 @@ use crate::road::Road;
 
 /// Minimum variance of an exact start, of a micrometre and a microradian: with zero, rounding
 /// errors of either sign would remain.
-const LEAST_VARIANCE: f64 = 1e-12;
+const MIN_VARIANCE: f64 = 1e-12;
 
 impl Ekf {
     /// Returns the prior of the state.
@@ -79,7 +79,7 @@ impl Ekf {
             row[state] = 1.0;
             row[ALONG] = by_along;
             let expected = belief.mean[state] + by_along * (belief.mean[ALONG] - along_m);
-            belief.update(value - expected, &row, (std * std).max(LEAST_VARIANCE));
+            belief.update(value - expected, &row, (std * std).max(MIN_VARIANCE));
         }
         belief
     }

@@ -7,7 +7,7 @@ use super::state::{ACROSS, ALONG, ANGLE_TIME_OFFSET, HEADING, SCALE, STATES, YAW
 use super::white_noise_fraction::Residual;
 use crate::gaussian::{Innovation, with_outliers};
 use crate::geometry::wrap_angle;
-use crate::localize::bias::{self, JumpHypotheses, MOST_VARIANCE};
+use crate::localize::bias::{self, JumpHypotheses, MAX_VARIANCE};
 use crate::localize::output::{UpdateReason, UpdateResult};
 use crate::observation::{AngleMeasurement, MeasurementKind};
 use crate::radio_head::RadioHead;
@@ -138,7 +138,7 @@ impl Ekf {
         let hypotheses = if head.excluded {
             None
         } else {
-            (self.bias).weigh(index, travelled_m.abs(), &innovation, &row)
+            (self.bias).jump_hypotheses(index, travelled_m.abs(), &innovation, &row)
         };
         Ok(PredictedMeasurement {
             head: index,
@@ -270,7 +270,7 @@ impl Ekf {
     ) -> UpdateResult {
         // The gate includes the maximum variance of the bias.
         let mut seen = predicted.innovation;
-        seen.variance += MOST_VARIANCE;
+        seen.variance += MAX_VARIANCE;
         let mahalanobis2 = seen.mahalanobis2();
         let is_known = self.bias.is_large(predicted.head);
         let before = self.belief.mean;

@@ -9,7 +9,7 @@ const PRIOR_PAIRS: u32 = 16;
 /// estimate is common to all radio heads, because it is a property of the receiver; with the
 /// differences of one radio head only, its convergence would be slower in proportion to the number
 /// of radio heads.
-const LEAST_WEIGHT: f64 = 1.0 / 2048.0;
+const MIN_WEIGHT: f64 = 1.0 / 2048.0;
 
 /// Maximum squared deviation of a difference, and the mean square of a normal distribution
 /// truncated there, `1 − 2cφ(c)/erf(c/√2)`.
@@ -58,7 +58,7 @@ impl WhiteNoiseFraction {
             return;
         }
         self.pairs = self.pairs.saturating_add(1);
-        let weight = LEAST_WEIGHT.max(f64::from(PRIOR_PAIRS + self.pairs).recip());
+        let weight = MIN_WEIGHT.max(f64::from(PRIOR_PAIRS + self.pairs).recip());
         self.share += weight * (square / OF_MOST - self.share);
     }
 }

@@ -252,8 +252,8 @@ impl IntegrityMonitor {
     }
 
     fn restart(&mut self) {
-        let strayed_m = self.bank.nominal().driven_m() - self.trusted_m;
-        let position_std_m = self.settings.alert_limit_m + strayed_m;
+        let untrusted_m = self.bank.nominal().driven_m() - self.trusted_m;
+        let position_std_m = self.settings.alert_limit_m + untrusted_m;
         self.restarted = Some(Restarted {
             bank: self.bank.restarted(position_std_m, self.now_s),
             since_s: self.now_s,
@@ -297,7 +297,7 @@ impl IntegrityMonitor {
         };
         hypotheses.extend(others.filter_map(other));
         let levels = self.level.solve(&hypotheses);
-        let state = if self.bank.is_outvoted() {
+        let state = if self.bank.most_heads_are_suspect() {
             IntegrityState::Unavailable
         } else if self.has_departed
             || self.restarted.is_some()
@@ -353,7 +353,7 @@ mod tests {
     use crate::localize::modes::trip::{angle, trip_with_bias};
 
     /// Maximum change of the position at one angle, in standard deviations.
-    const MOST_DEVIATIONS: f64 = 5.0;
+    const MAX_DEVIATIONS: f64 = 5.0;
 
     #[test]
     fn the_new_solution_covers_the_previous_one() {
@@ -385,7 +385,7 @@ mod tests {
                 let moved_m = last.pose.point().distance_m(before.pose.point());
                 let [before_m2, now_m2] = [&before, &last].map(|it| it.principal_variances()[0]);
                 let std_m = before_m2.max(now_m2).sqrt();
-                assert!(moved_m < MOST_DEVIATIONS * std_m, "{moved_m} of {std_m} m");
+                assert!(moved_m < MAX_DEVIATIONS * std_m, "{moved_m} of {std_m} m");
                 farthest_m = farthest_m.max(moved_m);
             }
         }

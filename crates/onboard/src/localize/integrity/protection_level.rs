@@ -23,7 +23,7 @@ const NEGLIGIBLE: f64 = 1e-3;
 
 /// Minimum logarithm of probability over risk: below it, the logarithm is not linear in the squared
 /// level.
-const LEAST_EXCESS: f64 = -30.0;
+const MIN_EXCESS: f64 = -30.0;
 
 /// Position of the vehicle relative to the estimate under a fault: a Gaussian.
 #[derive(Clone, Copy, Debug)]
@@ -297,7 +297,7 @@ impl Bracket {
         if excess > 0.0 {
             (self.low, self.at_low, self.at_high) = (middle, excess, 0.5 * self.at_high);
         } else {
-            let excess = excess.max(LEAST_EXCESS);
+            let excess = excess.max(MIN_EXCESS);
             (self.high, self.at_high, self.at_low) = (middle, excess, 0.5 * self.at_low);
         }
     }

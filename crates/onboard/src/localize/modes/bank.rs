@@ -12,7 +12,7 @@
 //! After the exclusion of a radio head, filters without its angles replace the previous ones,
 //! including those without one further radio head.
 
-use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP, information_fraction};
+use super::likelihood::{LikelihoodRatio, MIN_ODDS, SPEED_JUMP, information_fraction};
 use super::noise_scale::NoiseScale;
 use super::subsets::{CLEARED, DETECTED, HeadTest, RECOVERY_S, Subsets, exclude};
 use super::table::{Carry, Mode, TABLE};
@@ -25,10 +25,10 @@ use crate::radio_head::RadioHead;
 use crate::settings::{FaultProbability, IntegritySettings};
 
 /// Maximum probability of the error exceeding the level under a fault, however rare the fault is.
-const MOST_UNDER_FAULT: f64 = 0.49;
+const MAX_PROBABILITY_UNDER_FAULT: f64 = 0.49;
 
 /// Minimum number of radio heads that separate the bias of one of them from the position.
-const LEAST_SEPARABLE: usize = 3;
+const MIN_SEPARABLE: usize = 3;
 
 clone_in_place! {
     /// Filter of a mode, weighted by its posterior probability.
@@ -162,7 +162,7 @@ impl Bank {
         let faults = &settings.fault_probability;
         let nominal = given.nominal();
         let count = heads.len();
-        let is_separable = nominal.is_with_bias() && count >= LEAST_SEPARABLE;
+        let is_separable = nominal.is_with_bias() && count >= MIN_SEPARABLE;
         Self {
             settings: *settings,
             subsets: Subsets::new(count),
@@ -240,7 +240,7 @@ impl Bank {
     /// other mode.
     pub(super) fn leading(&self) -> Option<&ModeFilter> {
         let most = (self.modes.iter()).max_by(|one, other| one.odds().total_cmp(&other.odds()));
-        most.filter(|it| it.odds() > LEAST_ODDS)
+        most.filter(|it| it.odds() > MIN_ODDS)
     }
 
     /// Returns the selected filter: the nominal one, unless another mode is selected.
@@ -267,8 +267,9 @@ impl Bank {
     }
 
     /// Whether the selected mode explains contradicting angles without a lost vehicle.
-    pub fn may_mislead(&self) -> bool {
-        self.leading().is_some_and(|it| it.mode.misleads)
+    pub fn may_explain_contradictions(&self) -> bool {
+        self.leading()
+            .is_some_and(|it| it.mode.explains_contradictions)
     }
 
     /// Returns the hypotheses of the protection level, each with its probability and the filter
@@ -421,11 +422,11 @@ impl Bank {
 
     /// Whether there is an unidentified fault, or too many radio heads are faulty.
     pub fn is_lost(&self) -> bool {
-        self.in_doubt(DETECTED) > 0 || self.is_outvoted()
+        self.in_doubt(DETECTED) > 0 || self.most_heads_are_suspect()
     }
 
     /// Whether at least half of several radio heads are faulty or suspected.
-    pub fn is_outvoted(&self) -> bool {
+    pub fn most_heads_are_suspect(&self) -> bool {
         let against = self.in_doubt(DETECTED) + self.faulty();
         against > 1 && 2 * against >= self.heads.len()
     }
@@ -452,7 +453,7 @@ impl Bank {
         // The exclusion of a fault-free radio head is itself a fault; its probability must not
         // exceed the risk under a fault.
         let head = self.settings.fault_probability.of_radio_head(false);
-        let risk = (self.settings.risk_per_epoch() / head).min(MOST_UNDER_FAULT);
+        let risk = (self.settings.risk_per_epoch() / head).min(MAX_PROBABILITY_UNDER_FAULT);
         let odds = -2.0 * risk.ln();
         if let Some(faulty_head) = self.faulty_head(odds) {
             self.exclude(faulty_head);
@@ -484,8 +485,8 @@ impl Bank {
             }
         }
         let (head, least) = best;
-        let sure = second * second - least * least > odds;
-        (sure && least < DETECTED && self.statistic(head) > DETECTED).then_some(head)
+        let precise = second * second - least * least > odds;
+        (precise && least < DETECTED && self.statistic(head) > DETECTED).then_some(head)
     }
 
     /// Returns the maximum statistic of the fault-free radio heads if `left_out` is excluded.

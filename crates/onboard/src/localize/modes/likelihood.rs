@@ -24,7 +24,7 @@ const OUTLIERS: f64 = 2e-3;
 /// Minimum odds to the nominal mode for the selection of a mode. The protection level covers every
 /// hypothesis, whether selected or not. With lower odds, the position alternates between filters,
 /// which reduces the availability (K = 5 dB: 91 % instead of 94 %).
-pub(super) const LEAST_ODDS: f64 = 100.0;
+pub(super) const MIN_ODDS: f64 = 100.0;
 
 /// Log-likelihood ratio at which a sequential test is decided, with an error probability of one in
 /// three million (e⁻¹⁵; Wald 1945), the prior probability of a radio head fault. The ratios of

@@ -7,7 +7,7 @@ use crate::localize::ekf::ExcludedInnovation;
 
 /// Minimum weight of the newest difference, and number of differences that the specified noise
 /// counts as.
-const LEAST_WEIGHT: f64 = 1.0 / 128.0;
+const MIN_WEIGHT: f64 = 1.0 / 128.0;
 const STATED: u32 = 16;
 
 /// Limit of a difference in standard deviations, and the mean square of a normal distribution with
@@ -58,7 +58,7 @@ impl Ratio {
     /// Adds a squared difference relative to its expected value.
     fn see(&mut self, square: f64) {
         self.differences = self.differences.saturating_add(1);
-        let weight = LEAST_WEIGHT.max(f64::from(STATED + self.differences).recip());
+        let weight = MIN_WEIGHT.max(f64::from(STATED + self.differences).recip());
         let mean = |value: &mut f64, most: f64, of_most: f64| {
             *value += weight * (square.min(most * most * *value) / of_most - *value);
         };

@@ -17,9 +17,9 @@ const FREE_M_PER_SQRT_M: f64 = 0.6;
 const EVIDENCE: f64 = 6.9;
 /// Minimum distance between the positions of both filters in metres. Angle errors that the filters
 /// do not model, such as strong multipath, cause smaller distances.
-const LEAST_M: f64 = 0.5;
+const MIN_M: f64 = 0.5;
 /// Maximum number of odometry samples that are stored until the next burst.
-const MOST_WAITING: usize = 256;
+const MAX_STORED_SAMPLES: usize = 256;
 
 /// Two filters with a common start: one is predicted by the odometry; the other one has process
 /// noise that permits any motion. Both model the correlated errors of the angles. A cumulative sum
@@ -42,13 +42,13 @@ impl OdometryTest {
             driven,
             free,
             ratio: LikelihoodRatio::NONE,
-            waiting: VecDeque::with_capacity(MOST_WAITING),
+            waiting: VecDeque::with_capacity(MAX_STORED_SAMPLES),
         }
     }
 
     /// Processes odometry. It is used with the next burst, which may be older.
     pub fn odometry(&mut self, sample: &OdometrySample) {
-        if self.waiting.len() == MOST_WAITING {
+        if self.waiting.len() == MAX_STORED_SAMPLES {
             self.advance_to(f64::INFINITY);
         }
         self.waiting.push_back(*sample);
@@ -80,7 +80,7 @@ impl OdometryTest {
     /// Whether the angles show another motion than the odometry.
     pub fn is_fault(&self) -> bool {
         let [driven, free] = [&self.driven, &self.free].map(|ekf| ekf.pose(ekf.time_s()).pose);
-        self.ratio.value() > EVIDENCE && driven.point().distance_m(free.point()) >= LEAST_M
+        self.ratio.value() > EVIDENCE && driven.point().distance_m(free.point()) >= MIN_M
     }
 
     /// Returns the filter that does not depend on the odometry.

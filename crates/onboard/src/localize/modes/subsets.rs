@@ -18,7 +18,7 @@ const WEIGHTS: [f64; 3] = [0.5, 0.125, 0.03125];
 
 /// Maximum deviation of an angle from an average, in standard deviations: two successive outliers
 /// are no fault.
-const MOST_LEAD: f64 = 3.0;
+const MAX_DEVIATION_SIGMAS: f64 = 3.0;
 
 /// Statistic, in standard deviations, above which a radio head is faulty, and below which it is
 /// consistent. Error probabilities of a single Gaussian test: 4e-8 and 5e-4.
@@ -47,7 +47,7 @@ impl HeadTest {
     /// Adds one innovation.
     pub fn push(&mut self, innovation: &Innovation) {
         let belief = (innovation.variance - innovation.measurement_variance).max(0.0);
-        let most = MOST_LEAD * innovation.variance.sqrt();
+        let most = MAX_DEVIATION_SIGMAS * innovation.variance.sqrt();
         for (average, weight) in self.averages.iter_mut().zip(WEIGHTS) {
             // The first angle initialises an average.
             let weight = if average.noise == 0.0 { 1.0 } else { weight };
@@ -75,11 +75,11 @@ const LATELY: u64 = 32;
 
 /// Number of radio heads whose filters are kept regardless of the time since reception, because
 /// their previous angles may still contribute to the position.
-const LEAST_WATCHED: usize = 4;
+const MIN_MONITORED: usize = 4;
 
 /// Minimum number of radio heads for filters without two of them: with two radio heads, the faulty one cannot be
 /// identified. Filters that estimate the bias of each radio head bound two faults by that bias.
-const LEAST_FOR_PAIRS: usize = 3;
+const MIN_FOR_PAIRS: usize = 3;
 
 clone_in_place! {
     /// Filter without one or two radio heads, and the test of each against it.
@@ -200,7 +200,7 @@ impl Subsets {
         }
         let ones = self.iter().filter(|it| it.is_of_one()).count();
         self.begin([head; 2], (head, heads.get(head)), nominal);
-        let pairs = if heads.len() < LEAST_FOR_PAIRS || nominal.is_with_bias() {
+        let pairs = if heads.len() < MIN_FOR_PAIRS || nominal.is_with_bias() {
             0
         } else {
             ones
@@ -246,7 +246,7 @@ impl Subsets {
     fn longest_without_reception(&self, keeps: impl Fn(usize, f64) -> bool) -> Option<usize> {
         let last = |head: &usize| self.last.get(*head).copied().unwrap_or_default();
         let ones = (self.iter().filter(|it| it.is_of_one())).map(|it| it.without[0]);
-        if ones.clone().count() < LEAST_WATCHED {
+        if ones.clone().count() < MIN_MONITORED {
             return None;
         }
         let statistic = |head| {

@@ -2,7 +2,7 @@
 //! filters from the nominal one, and the transitions of their hypotheses. A mode is a row; an
 //! additional mode needs a row and its test.
 
-use crate::localize::ekf::{Ekf, EkfConfig, MOST_SLIP};
+use crate::localize::ekf::{Ekf, EkfConfig, MAX_SLIP};
 use crate::localize::output::SelectedHypothesis;
 use crate::settings::{DriveKind, FaultProbability};
 
@@ -45,7 +45,7 @@ pub(in crate::localize) struct Mode {
     /// Odds above which the mode becomes the nominal mode.
     pub becomes_nominal_at: Option<f64>,
     /// Whether the mode explains contradicting angles, so that they do not imply a lost vehicle.
-    pub misleads: bool,
+    pub explains_contradictions: bool,
 }
 
 /// Default row.
@@ -60,15 +60,15 @@ const ROW: Mode = Mode {
     on_exclude: Carry::Nothing,
     on_rebase: Carry::All,
     becomes_nominal_at: None,
-    misleads: false,
+    explains_contradictions: false,
 };
 
 const SLIP: Mode = Mode {
     id: SelectedHypothesis::WheelSlip,
     prior: |_, faults| faults.odometer,
-    alter: |ekf| ekf.expect_slip(MOST_SLIP),
+    alter: |ekf| ekf.expect_slip(MAX_SLIP),
     is_fault: true,
-    onset: Some(|ekf, jump| ekf.expect_slip(if jump > 0.0 { jump } else { MOST_SLIP })),
+    onset: Some(|ekf, jump| ekf.expect_slip(if jump > 0.0 { jump } else { MAX_SLIP })),
     on_exclude: Carry::AllButHead,
     on_rebase: Carry::IfNotAgainst,
     ..ROW
@@ -126,7 +126,7 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
             ekf.set_noise_scale(Some(ratio.min(most)));
         },
         on_rebase: Carry::Nothing,
-        misleads: true,
+        explains_contradictions: true,
         ..ROW
     },
 ];

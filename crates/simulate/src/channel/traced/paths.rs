@@ -25,7 +25,7 @@ const LONGEST_M: f64 = 1e5;
 const DIRECT_M: f64 = 0.01;
 /// Minimum cosine between the geometric direction of the line of sight and its direction of arrival
 /// in the file.
-const LEAST_COSINE: f64 = 0.9;
+const MIN_COSINE: f64 = 0.9;
 
 /// Error of a file of paths.
 #[derive(Debug, Error)]
@@ -194,7 +194,7 @@ impl Paths {
                 + (head[1] - place[1]) * level * sin
                 + (head[2] - place[2]) * up;
             let is_sight = (length_m - straight_m).abs() < DIRECT_M && straight_m > REACH_M;
-            if is_sight && along_m < LEAST_COSINE * straight_m {
+            if is_sight && along_m < MIN_COSINE * straight_m {
                 return PathsError::that(format!(
                     "`azimuth_rad`, `elevation_rad` in row {row}: the line of sight does not come \
                      from the radio head; write directions of arrival in the map frame"

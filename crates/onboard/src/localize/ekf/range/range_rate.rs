@@ -11,7 +11,7 @@ use crate::radio_head::RadioHead;
 use crate::range::RangeMeasurement;
 
 /// Minimum duration between two odometry samples, and of the measurement of a rate (s).
-const LEAST_INTERVAL_S: f64 = 1e-4;
+const MIN_INTERVAL_S: f64 = 1e-4;
 
 impl Ekf {
     pub(super) fn predict_range_rate(
@@ -51,7 +51,7 @@ impl Ekf {
         let noise = &self.config.noise;
         let interval_s = (self.sample_interval.usual_s())
             .max(seen.lag_s)
-            .max(LEAST_INTERVAL_S);
+            .max(MIN_INTERVAL_S);
         let odometer_variance = noise.odometer_m_per_sqrt_m.powi(2) * speed_mps.abs()
             + noise.odometer_m_per_sqrt_s.powi(2);
         let speed_variance = self.config.speed_noise_mps.powi(2)
@@ -61,7 +61,7 @@ impl Ekf {
         // The random walk of both clocks within the interval is noise of the rate.
         let [_, head_wander] = seen.model.head_clock(&seen.head.clock);
         let wander = seen.model.clock_wander_m_per_sqrt_s.powi(2) + head_wander.powi(2);
-        let walked = wander / measured_s.max(LEAST_INTERVAL_S);
+        let walked = wander / measured_s.max(MIN_INTERVAL_S);
         // The radio heads of a burst have a common speed error.
         let shared = self.heads.len().max(1) as f64;
         let model_variance = (cos_elevation * along).powi(2) * shared * speed_variance
