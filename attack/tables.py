@@ -36,9 +36,6 @@ SPACE: dict[str, Any] = {
 }
 
 
-KINDS = {"operating_points": "paper", "designs": "design"}
-
-
 def held(name: str) -> dict[str, list[Any]]:
     """Returns a table of the results, by name."""
     text = {"energy_provenance": "fitted", "interpretation": "gate", "campaign": "adaptive"}
@@ -47,7 +44,7 @@ def held(name: str) -> dict[str, list[Any]]:
             {"text": text.get(column, "music"), "true or false": True}.get(unit, 1.0)
             for _ in range(8)
         ]
-        for column in TABLES["operating_points"].of(KINDS[name])
+        for column in TABLES["operating_points"].of(f"`{name}.parquet`")
         if (unit := GLOSSARY[column].unit)
     }
 

@@ -107,7 +107,9 @@ def test_old_columns() -> None:
             validation.check(pl.DataFrame({old: [1.0]}), "mine.csv", numbers=[new])
     rows = pl.DataFrame({"time_s": [0.0], "reading": ["gate"]})
     with pytest.raises(InputError, match="write `interpretation`"):
-        validation.check_types(rows, "mine.parquet", "operating_points", "paper")
+        validation.check_types(
+            rows, "mine.parquet", "operating_points", "`operating_points.parquet`"
+        )
 
 
 def test_new_columns_and_tables_exist() -> None:

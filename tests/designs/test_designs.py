@@ -403,7 +403,7 @@ def test_the_table_has_its_documented_columns() -> None:
     driven = cloud(4, PAIRS)
     driven.append(replace(driven[0], energy_j=np.full(4, np.inf), square_m2=np.full(4, np.inf)))
     rows = rows_of(driven)
-    assert rows.columns == list(columns.TABLES["operating_points"].of("design"))
+    assert rows.columns == list(columns.TABLES["operating_points"].of("`designs.parquet`"))
     assert rows["energy_j"].to_list()[-1] is rows["rms_error_m"].to_list()[-1] is None
     assert rows["on_front"].to_list()[-1] is False
 

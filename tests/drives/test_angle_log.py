@@ -71,7 +71,7 @@ def test_an_angle_log_gives_the_poses_of_its_samples(
     assert "receiver noise and the site's scatter (rician_k_db = " in comments[0]
     assert "phase_noise_sigma_rad: receiver noise only" in comments[1]
     rows = pl.read_parquet(out / "angles.parquet")
-    assert tuple(rows.columns) == TABLES["measurements"].of("log", "angle")
+    assert tuple(rows.columns) == TABLES["measurements"].of("`estimate_angles(…)`")
     assert (rows["phase_sigma_rad"] > rows["phase_noise_sigma_rad"]).all()
 
     def located(recording: Path, vehicle_file: Path) -> drives.Drive:

@@ -64,7 +64,7 @@ def test_the_first_mast_is_the_best_candidate() -> None:
     alone = {name: p90_m([name]) for name in MASTS["name"]}
     assert found.chosen == [min(alone, key=alone.__getitem__)]
     assert math.isclose(found.after_m, min(alone.values()), rel_tol=1e-9)
-    assert tuple(found.ranking.columns) == columns.TABLES["masts"].columns
+    assert tuple(found.ranking.columns) == columns.TABLES["radio_heads"].of("`masts.parquet`")
     two = plan(SHORT, MASTS, add=2)
     pairs = [(a, b) for a in MASTS["name"] for b in MASTS["name"] if a < b]
     assert two.after_m <= 1.05 * min(p90_m(list(pair)) for pair in pairs)

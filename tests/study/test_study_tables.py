@@ -237,19 +237,18 @@ def test_variants_are_compared(results: Path, page: str) -> None:
 @pytest.mark.parametrize(
     ("file", "table"),
     [
-        ("errors", "study_errors"),
+        ("errors", "position_errors"),
         ("drives", "runs"),
         ("targets", "study_targets"),
-        ("places", "places"),
-        ("points", "study_points"),
+        ("places", "positions"),
+        ("points", "operating_points"),
         ("compared", "compared"),
         ("trajectories", "trajectories"),
     ],
 )
 def test_columns_are_those_that_are_documented(results: Path, file: str, table: str) -> None:
-    assert tuple(pl.read_parquet(results / f"{file}.parquet").columns) == TABLES[table].of(
-        "simulated" if table == "trajectories" else "study"
-    )
+    found = pl.read_parquet(results / f"{file}.parquet").columns
+    assert tuple(found) == TABLES[table].of(f"`{file}.parquet`")
 
 
 def interval(within: Any, duration_s: float) -> tuple[float, float]:

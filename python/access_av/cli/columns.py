@@ -19,7 +19,8 @@ app = typer.Typer()
 )
 def columns(
     name: Annotated[
-        str | None, typer.Argument(metavar="TABLE", help="Name of a table.", show_default="all")
+        str | None,
+        typer.Argument(metavar="TABLE", help="Table or file.", show_default="all"),
     ] = None,
     as_json_: AsJson = False,
     as_markdown: Annotated[

@@ -189,7 +189,7 @@ def choose(
     if not file.is_file():
         raise InputError(f"{results}: no results of access-av design sweep ({TABLE} is missing)")
     rows = validation.read(file, "table of designs")
-    validation.check_types(rows, str(file), "operating_points", "design")
+    validation.check_types(rows, str(file), "operating_points", "`designs.parquet`")
     limits = Query(
         max_energy_j=max_energy_j,
         max_rms_m=max_rms_m,

@@ -29,18 +29,9 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "DATATYPES",
-    "FINDINGS",
-    "MOST_TRUTH_GAP_S",
-    "Drive",
-    "SynthesizedDrive",
-    "error_m",
-    "locate",
-    "log_angles",
-    "read_tum",
-    "summary",
-    "synthesize",
-]
+    "DATATYPES", "FINDINGS", "MOST_TRUTH_GAP_S", "Drive", "SynthesizedDrive", "error_m",
+    "locate", "log_angles", "read_tum", "summary", "synthesize",
+]  # fmt: skip
 
 if not TYPE_CHECKING:
     __getattr__, __dir__ = attach(__name__, {"access_av.drives.recorded": __all__})

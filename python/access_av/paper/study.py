@@ -22,6 +22,7 @@ from access_av.paper.outcome import rows
 from access_av.paper.sampled_interpretations import sample
 from access_av.paper.stages import Stages
 from access_av.paper.unknowns import Unknowns, sobol
+from access_av.tables.columns import TABLES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -120,7 +121,7 @@ class Study:
             "ablations": rows(self.ablations),
             "fixed_front": pl.DataFrame(front),
             "proposed_vs_paper": rows(self.proposed_vs_paper),
-            "equal_information": rows(self.equal_information),
+            "equal_information": TABLES["comparisons"].frame(rows(self.equal_information)),
             "evaluation_runs": run_tables.joined(self._runs()),
             "resamples": run_tables.joined(
                 table for each in self.evaluations for table in run_tables.resamples_of(each)

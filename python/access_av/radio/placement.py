@@ -47,7 +47,7 @@ class Plan(Result):
     chosen
         Names of the masts, the best one first.
     ranking
-        One row per mast, added alone; columns ``masts`` of :mod:`access_av.columns`.
+        One row per mast, added alone; columns ``radio_heads`` of :mod:`access_av.columns`.
     verdicts
         Service levels that the bound permits with the new radio heads.
     origin

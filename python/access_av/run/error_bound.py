@@ -41,11 +41,11 @@ class ErrorBound(Result):
     scenario
         The scenario.
     route
-        One row per SSB of the drive; columns ``bound_route`` of :mod:`access_av.columns`.
+        One row per SSB of the drive; columns ``positions`` of :mod:`access_av.columns`.
     heads
-        One row per radio head; columns ``bound_heads``.
+        One row per radio head; columns ``radio_heads``.
     site
-        The bound over the site, one row per square of ``map_step_m``; columns ``bound_route``. It
+        The bound over the site, one row per square of ``map_step_m``; columns ``positions``. It
         is valid for a vehicle that has measured ``map_num_angles`` independent angles, with a
         heading σ of ``map_heading_std_rad`` and an unknown position.
     """
@@ -153,7 +153,7 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
         scenario=scenario,
         route=route,
         heads=heads,
-        site=TABLES["bound_route"].frame({"x_m": x_m, "y_m": y_m, "bound_m": bound_m}),
+        site=TABLES["positions"].frame({"x_m": x_m, "y_m": y_m, "bound_m": bound_m}),
         map_step_m=step_m,
         map_num_angles=looks,
         map_heading_std_rad=heading_std_rad,
@@ -161,7 +161,7 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
 
 
 def along_route(scenario: _core.Scenario) -> pl.DataFrame:
-    """Returns the bound at every SSB of the drive; columns ``bound_route``."""
+    """Returns the bound at every SSB of the drive; columns ``positions``."""
     return pl.DataFrame(_core.Bound(scenario).along_route())
 
 

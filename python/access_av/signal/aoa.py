@@ -56,29 +56,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = [
-    "AngleEstimate",
-    "DirectionEstimate",
-    "ManifoldFit",
-    "MeasuredManifold",
-    "SwitchedEstimate",
-    "calibrate",
-    "covariance",
-    "crb_rad",
-    "direction",
-    "direction_crb_rad",
-    "direction_spectrum",
-    "esprit",
-    "estimate_sources",
-    "fit_manifold",
-    "forward_backward",
-    "maximum_likelihood",
-    "maximum_likelihood_pilots",
-    "music",
-    "root_music",
-    "spectrum",
-    "switched_direction",
-    "whiten",
-]
+    "AngleEstimate", "DirectionEstimate", "ManifoldFit", "MeasuredManifold", "SwitchedEstimate",
+    "calibrate", "covariance", "crb_rad", "direction", "direction_crb_rad",
+    "direction_spectrum", "esprit", "estimate_sources", "fit_manifold", "forward_backward",
+    "maximum_likelihood", "maximum_likelihood_pilots", "music", "root_music", "spectrum",
+    "switched_direction", "whiten",
+]  # fmt: skip
 
 # Eigenvalues below this fraction of the largest one are rounding errors.
 _LEAST_EIGENVALUE = 1e-4

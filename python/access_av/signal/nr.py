@@ -41,19 +41,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 __all__ = [
-    "Cell",
-    "Cells",
-    "Observables",
-    "Receiver",
-    "Recording",
-    "Scan",
-    "Searcher",
-    "build_burst",
-    "record",
-    "scan",
-    "scan_as_recorded",
-    "search",
-]
+    "Cell", "Cells", "Observables", "Receiver", "Recording", "Scan", "Searcher", "build_burst",
+    "record", "scan", "scan_as_recorded", "search",
+]  # fmt: skip
 
 
 class Cells(list[Cell]):

@@ -27,22 +27,8 @@ from access_av.statistics.percentiles import Percentile, percentiles
 from access_av.statistics.proportions import clopper_pearson, wilson
 
 __all__ = [
-    "Alarms",
-    "Consistency",
-    "Integrity",
-    "ObtainedRisk",
-    "Percentile",
-    "beta_quantile",
-    "bootstrap_interval",
-    "chi_squared_quantile",
-    "clopper_pearson",
-    "exceedance",
-    "horizontal_error_m",
-    "mean_nees",
-    "nees",
-    "nees_band",
-    "paired_difference",
-    "percentiles",
-    "stanford_counts",
-    "wilson",
-]
+    "Alarms", "Consistency", "Integrity", "ObtainedRisk", "Percentile", "beta_quantile",
+    "bootstrap_interval", "chi_squared_quantile", "clopper_pearson", "exceedance",
+    "horizontal_error_m", "mean_nees", "nees", "nees_band", "paired_difference", "percentiles",
+    "stanford_counts", "wilson",
+]  # fmt: skip

@@ -54,15 +54,7 @@ def wilson(successes: int, trials: int, *, probability: float = 0.95) -> tuple[f
 
     ``(p + z²/2n ± z·sqrt(p(1 − p)/n + z²/4n²)) / (1 + z²/n)`` with the normal quantile z of
     ``(1 + probability) / 2`` (Wilson, Journal of the American Statistical Association 22, 1927).
-
-    Parameters
-    ----------
-    successes
-        Number of successful trials.
-    trials
-        Number of independent trials.
-    probability
-        Coverage, above 0 and below 1.
+    The parameters are those of :func:`clopper_pearson`.
 
     Examples
     --------

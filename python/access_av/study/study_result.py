@@ -338,11 +338,11 @@ def _tables(study: Study) -> dict[str, pl.DataFrame]:
     rows = [
         {
             "variant": point.driven.name,
-            "runs": point.driven.runs,
-            "method": point.operation.method,
-            "wake_up": point.operation.wake_up,
             "mode": point.mode,
             "mode_name": point.mode_name,
+            "method": point.operation.method,
+            "wake_up": point.operation.wake_up,
+            "runs": point.driven.runs,
             "is_simulated": point.simulated,
             "target_error_m": point.error_m,
             "judgement": point.judgement.value,

@@ -181,7 +181,7 @@ class Driven(ErrorSamples):
         return found
 
     def table(self) -> pl.DataFrame:
-        """Returns one row per run and epoch: columns ``study_errors``."""
+        """Returns one row per run and epoch: columns ``position_errors``."""
         runs, epochs = self.errors_m.shape
         return pl.DataFrame(
             {

@@ -16,7 +16,7 @@ Examples
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -67,16 +67,17 @@ class Table:
     @classmethod
     def read(cls, name: str, entry: Mapping[str, Any]) -> Table:
         """Returns the table of an entry of the TOML file."""
-        null, absent = (_by_column(entry.get(kind, {})) for kind in ("null", "absent"))
-        conditions = {column: " or ".join(it) for column, it in null.items()}
-        return cls(name, entry["row"], entry["where"], tuple(entry["columns"]), conditions, absent)
+        conditions, absent = _by_column(entry.get("null", {})), _by_column(entry.get("absent", {}))
+        null = {column: " or ".join(it) for column, it in conditions.items()}
+        kinds = {column: ", ".join(it).split(", ") for column, it in absent.items()}
+        return cls(name, entry["row"], entry["where"], tuple(entry["columns"]), null, kinds)
 
     def of(self, *kinds: str) -> tuple[str, ...]:
         """Returns the columns of rows of these kinds.
 
         Examples
         --------
-        >>> TABLES["runs"].of("study")[:3]
+        >>> TABLES["runs"].of("`drives.parquet`")[:3]
         ('variant', 'run', 'seed')
         """
         return tuple(it for it in self.columns if not {*kinds} & {*self.absent.get(it, ())})
@@ -89,13 +90,13 @@ class Table:
         null, absent = self.null.get(name, "never"), self.absent.get(name, ())
         return f"{null}; absent: {', '.join(absent)}" if absent else null
 
-    def frame(self, columns: Mapping[str, Any]) -> pl.DataFrame:
-        """Returns columns of the core in the order of this table, with null for NaN."""
+    def frame(self, columns: Mapping[str, Any] | pl.DataFrame) -> pl.DataFrame:
+        """Returns columns in the order of this table, with null for NaN."""
         import polars as pl
 
-        texts = {name: pl.String for name in columns if GLOSSARY[name].unit == "text"}
-        rows = pl.DataFrame(columns, schema_overrides=texts).fill_nan(None)
-        return rows.select(name for name in self.columns if name in rows.columns)
+        names = [name for name in self.columns if name in columns]
+        texts = {name: pl.String for name in names if GLOSSARY[name].unit == "text"}
+        return pl.DataFrame(columns, schema_overrides=texts).fill_nan(None).select(names)
 
 
 def _by_column(columns_of: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
@@ -112,18 +113,28 @@ TABLES: Mapping[str, Table] = {
 
 
 def table(name: str) -> Table:
-    """Returns a table by its name.
+    """Returns a table by its name, or the table of a file with the columns of this file.
 
     Raises
     ------
     InputError
         Unknown name; the message lists the valid ones, and contains the new name of an old one.
+
+    Examples
+    --------
+    >>> table("masts.parquet").columns
+    ('name', 'x_m', 'y_m', 'z_m', 'p90_bound_m')
     """
-    if name not in TABLES:
-        renamed = shipped("tables", "renamed.toml")["tables"]
-        hint = f"the present name is {renamed[name]}; " if name in renamed else ""
-        raise InputError(f"unknown table {name}: {hint}allowed: {', '.join(TABLES)}")
-    return TABLES[name]
+    if name in TABLES:
+        return TABLES[name]
+    file = f"`{name}`"
+    found = [it for it in TABLES.values() if file in it.where]
+    if len(found) == 1:
+        return replace(found[0], name=name, columns=found[0].of(file), absent={})
+    renamed = shipped("tables", "renamed.toml")["tables"]
+    names = [it.name for it in found] or [renamed[it] for it in (name,) if it in renamed]
+    hint = f"see {' or '.join(names)}; " if names else ""
+    raise InputError(f"unknown table {name}: {hint}allowed: {', '.join(TABLES)}")
 
 
 def as_json(tables: list[Table]) -> dict[str, Any]:

@@ -140,5 +140,5 @@ def operating_points(
 def _points(file: Path) -> pl.DataFrame:
     """Reads a table of operating points, with all its columns."""
     points = validation.read(file, "table of operating points")
-    validation.check_types(points, str(file), "operating_points", "paper")
+    validation.check_types(points, str(file), "operating_points", f"`{POINTS_FILE}`")
     return points
