@@ -102,15 +102,14 @@ docs: .venv/installed-docs ## Build the documentation site target/docs/site/inde
 	$(BIN)/python docs/site/build.py
 
 CHROMIUM ?= chromium
-figures: .venv/installed ## Evaluate the paper with five seeds (10 minutes) and make the figures of README and docs/paper.md
+figures: .venv/installed ## Evaluate the paper with five seeds (10 minutes) and make the figures of docs/paper.md
 	$(BIN)/access-av paper evaluate --seeds 5 --sensitivity --out results/paper
 	for name in ablation front sobol; do cp results/paper/$$name.svg docs/paper-$$name.svg; done
-	$(MAKE) --no-print-directory picture REPORT=results/paper/report.html
 
 REPORT := results/latest/report.html
-picture: ## Make the README's picture from the last report (needs chromium)
+picture: ## Make the README's picture from the report of `access-av study bends` (needs chromium)
 	$(CHROMIUM) --headless --no-sandbox --hide-scrollbars --virtual-time-budget=20000 \
-	  --window-size=1300,1150 --screenshot=docs/report.png file://$(abspath $(REPORT))
+	  --window-size=1300,1400 --screenshot=docs/study.png file://$(abspath $(REPORT))
 
 bench: .venv/installed-bench ## Compare angle estimators and cell search with other libraries; time the evaluation
 	$(BIN)/python benches/aoa_peers.py

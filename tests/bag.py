@@ -19,7 +19,7 @@ ODOMETRY, IMU = "nav_msgs/msg/Odometry", "sensor_msgs/msg/Imu"
 
 
 def made(name: str, *values: Any) -> Any:
-    """Returns a message from its fields in order."""
+    """Returns a message with the given fields, in their order."""
     return STORE.types[name](*values)
 
 

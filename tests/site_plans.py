@@ -118,11 +118,11 @@ class Drawing:
         return self.document.modelspace()
 
     def world(self, points: Points) -> list[tuple[float, ...]]:
-        """Units of the drawing in world coordinates."""
+        """World coordinates in units of the drawing."""
         return [tuple(float(it) / self.unit_m for it in point) for point in points]
 
     def flat(self, points: Points) -> list[tuple[float, ...]]:
-        """Units of the drawing in object coordinates; seen from below, x points the other way."""
+        """Object coordinates in units of the drawing; x is mirrored if it is seen from below."""
         sign = -1.0 if self.down else 1.0
         return [(sign * x, *more) for x, *more in self.world(points)]
 

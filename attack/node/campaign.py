@@ -88,7 +88,7 @@ def _worst(values: list[float | None]) -> str:
 
 
 def table(verdicts: list[Verdict]) -> Table:
-    """Table with one line a fault: median and maximum of each figure."""
+    """Table with one line for each fault: median and maximum of each figure."""
     made = Table(title="Fault campaign of access-av-node: median / maximum, seconds")
     for column in ("fault", "runs", "reported", "ok beyond level", "recovery", "localized above"):
         made.add_column(column, justify="left" if column == "fault" else "right")

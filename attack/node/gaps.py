@@ -35,7 +35,7 @@ class Condition(NamedTuple):
     sleeps: bool
 
     def __str__(self) -> str:
-        """For the table."""
+        """Text for the table."""
         clock = "start-time-s" if self.counts_samples else "default"
         return f"clock {clock}, sleep {'on' if self.sleeps else 'off'}"
 

@@ -93,7 +93,7 @@ class Node:
         return Path(f"/proc/{self.pid}/root{self.disk}")
 
     def kill(self) -> None:
-        """Kills it with SIGKILL."""
+        """Kills the node with SIGKILL."""
         assert self.process is not None
         self.process.kill()
         self.process.wait()
@@ -119,7 +119,7 @@ class Node:
         return Resources(pages * os.sysconf("SC_PAGE_SIZE") / 2**20, files)
 
     def end(self) -> None:
-        """Ends it with SIGTERM; a node that does not end is killed and counts as hung."""
+        """Ends the node with SIGTERM; a node that does not end is killed and counts as hung."""
         self.watch()
         if self.process is None:
             return

@@ -77,7 +77,7 @@ def with_fault(lap: list[Message], fault: Fault) -> list[Message | str]:
 
 
 def line_of(message: Message | str, begins_s: float) -> str:
-    """Returns the line of a message of a drive that begins at a time (s)."""
+    """Returns a message as a line of JSON; ``begins_s`` is the start time of the drive (s)."""
     if isinstance(message, str):
         return message + "\n"
     return json.dumps({**message, "time_s": round(begins_s + message["time_s"], 9)}) + "\n"

@@ -49,7 +49,7 @@ def figures() -> dict[str, Any]:
     return copy.deepcopy(tomllib.loads(ROUND))
 
 
-def test_round_figures_by_hand() -> None:
+def test_the_balance_equals_a_calculation_by_hand() -> None:
     found = balance(figures())
     # Two masts of 100 W all year: 1752 kWh at 0.2, and 2 × 50 a year.
     assert found.before.capital.central == 2000.0

@@ -90,7 +90,7 @@ def test_make_commands_exist() -> None:
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE)
 
 
-@pytest.mark.parametrize("path", ["docs/report.png", "LICENSE-MIT", "LICENSE-APACHE"])
+@pytest.mark.parametrize("path", ["docs/study.png", "LICENSE-MIT", "LICENSE-APACHE"])
 def test_files_it_shows_exist(path: str) -> None:
     assert (ROOT / path).stat().st_size < 300_000
 

@@ -164,7 +164,7 @@ def test_t_max_follows_from_the_position_uncertainty_unless_it_is_stated() -> No
 
 @pytest.mark.parametrize("base_ms", [65.0, 80.0, 150.0])
 @pytest.mark.parametrize("serving", ["first-after", "last-before"])
-def test_algorithm_1_of_no_gain_is_the_fixed_interval(
+def test_algorithm_1_without_gains_is_the_fixed_interval(
     base_ms: float, serving: str, driver: Driver
 ) -> None:
     """Both use the same SSBs for every base wake-up time."""

@@ -97,7 +97,7 @@ def test_the_suggested_upgrades_reach_the_next_service_level() -> None:
     assert math.isclose(levels["6"].share, found.cheapest.share, rel_tol=1e-12)
     shares = {change.what: change.share for change in found.changes}
     assert all(found.share < share for share in shares.values())
-    # This is equal for the radio heads of the plan.
+    # The reached service levels are equal with the radio heads of the plan.
     shares_by_level = {it.level.name: it.share for it in bound(planned.scenario).verdicts}
     assert math.isclose(
         shares[f"a radio head at {planned.chosen[0]}"], shares_by_level["6"], rel_tol=1e-12

@@ -18,7 +18,7 @@ from access_av.verdicts import Effect, Judgement
 
 
 def errors_of(name: str, errors_m: np.ndarray) -> ErrorSamples:
-    """Ten drives of 100 s."""
+    """Returns the errors of ten drives of 100 s."""
     return ErrorSamples(name=name, errors_m=errors_m, duration_s=100.0)
 
 

@@ -29,7 +29,7 @@ _Values = float | NDArray[np.float64]
 
 @final
 class AngleEstimate:
-    """Angles of arrival, each with what is known about it.
+    """Angles of arrival with standard deviations, SNR and verdict.
 
     Every field is a number for a single estimate and an array for a batch or several sources.
     """
@@ -39,38 +39,38 @@ class AngleEstimate:
         """Angle from the array's axis, 0 to pi."""
     @property
     def sigma_rad(self) -> _Values:
-        """Standard deviation of `angle_rad`: of noise, and of the misfit where there is one."""
+        """Standard deviation of `angle_rad`: noise, and the misfit of the model if there is one."""
     @property
     def phase_rad(self) -> _Values:
-        """Electrical angle, the phase step from one antenna to the next: best for a filter."""
+        """Electrical angle: phase difference between neighbouring antennas, for use in filters."""
     @property
     def phase_sigma_rad(self) -> _Values:
         """Standard deviation of `phase_rad`."""
     @property
     def phase_noise_sigma_rad(self) -> _Values:
-        """Standard deviation of `phase_rad` that noise alone makes."""
+        """Standard deviation of `phase_rad` caused by noise."""
     @property
     def snr_db(self) -> _Values:
-        """SNR per antenna and snapshot, as estimated."""
+        """Estimated SNR per antenna and snapshot."""
     @property
     def p_value(self) -> _Values:
-        """Probability that plane waves in white noise fit as badly as this or worse."""
+        """Probability of an equal or larger misfit of plane waves in white noise."""
     @property
     def reliable(self) -> bool | NDArray[np.bool_]:
-        """Whether the estimate may be relied on: it is resolved, and the model fits."""
+        """Whether the estimate is reliable: it is resolved, and the model fits."""
     @property
     def doubt(self) -> str | NDArray[np.str_]:
-        """Why it may not be relied on; empty where it may."""
+        """Reason why the estimate is unreliable; empty if it is reliable."""
     @property
     def resolved(self) -> bool | NDArray[np.bool_]:
-        """Whether noise and geometry leave no doubt, if the model fits."""
+        """Whether noise and geometry permit no other angle, if the model fits."""
     @property
     def verdict(self) -> str | NDArray[np.str_]:
-        """`resolved`, or `unresolved: ` and the reason."""
+        """Verdict: `resolved`, or `unresolved: ` and the reason."""
 
 @final
 class DirectionEstimate:
-    """Azimuth and elevation, with what is known about each.
+    """Azimuth and elevation with covariance, SNR and verdict.
 
     Every field is a number for a single item and an array for a batch.
     """
@@ -86,31 +86,31 @@ class DirectionEstimate:
         """Standard deviation of `azimuth_rad`."""
     @property
     def elevation_sigma_rad(self) -> _Values:
-        """Standard deviation of `elevation_rad`; 0 where the elevation was given."""
+        """Standard deviation of `elevation_rad`; 0 if the elevation was given."""
     @property
     def noise_covariance(self) -> NDArray[np.float64]:
-        """Part of `covariance` that is noise."""
+        """Part of `covariance` caused by noise, in rad^2."""
     @property
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of azimuth and elevation in rad^2, `(2, 2)` or `(batch, 2, 2)`."""
     @property
     def snr_db(self) -> _Values:
-        """SNR per antenna and snapshot, as estimated."""
+        """Estimated SNR per antenna and snapshot."""
     @property
     def p_value(self) -> _Values:
-        """Probability that plane waves in white noise fit as badly as this or worse."""
+        """Probability of an equal or larger misfit of plane waves in white noise."""
     @property
     def reliable(self) -> bool | NDArray[np.bool_]:
-        """Whether the estimate may be relied on: it is resolved, and the model fits."""
+        """Whether the estimate is reliable: it is resolved, and the model fits."""
     @property
     def doubt(self) -> str | NDArray[np.str_]:
-        """Why it may not be relied on; empty where it may."""
+        """Reason why the estimate is unreliable; empty if it is reliable."""
     @property
     def resolved(self) -> bool | NDArray[np.bool_]:
-        """Whether noise and geometry leave no doubt, if the model fits."""
+        """Whether noise and geometry permit no other angle, if the model fits."""
     @property
     def verdict(self) -> str | NDArray[np.str_]:
-        """`resolved`, or `unresolved: ` and the reason."""
+        """Verdict: `resolved`, or `unresolved: ` and the reason."""
 
 @final
 class MeasuredManifold:
@@ -119,7 +119,7 @@ class MeasuredManifold:
     def __new__(
         cls, responses: ArrayLike, elevations_rad: ArrayLike | None = None
     ) -> MeasuredManifold:
-        """From responses of shape `(azimuths, antennas)` or `(elevations, azimuths, antennas)`."""
+        """From responses `(azimuths, antennas)` or `(elevations, azimuths, antennas)`."""
 
 def direction(
     snapshots: _Samples,
@@ -130,7 +130,7 @@ def direction(
     noise_variance: float | None = None,
     calibration: ArrayLike | None = None,
 ) -> DirectionEstimate:
-    """Azimuth and elevation by maximum likelihood, antennas in any places."""
+    """Estimates azimuth and elevation by maximum likelihood, for antennas at any positions."""
 
 def direction_spectrum(
     snapshots: _Samples,
@@ -142,7 +142,7 @@ def direction_spectrum(
     sources: int = 1,
     calibration: ArrayLike | None = None,
 ) -> NDArray[np.float64]:
-    """Spectrum `(elevations, azimuths)`, of a batch one for each, antennas in any places."""
+    """Returns the spectrum `(elevations, azimuths)` of each item, for antennas at any positions."""
 
 def direction_crb_rad(
     places_wavelengths: ArrayLike | MeasuredManifold,
@@ -152,7 +152,7 @@ def direction_crb_rad(
     *,
     snapshots: int = 20,
 ) -> tuple[float, float]:
-    """Cramér–Rao bounds of azimuth and elevation: the least standard deviations."""
+    """Returns the Cramér–Rao bounds of the standard deviations of azimuth and elevation, in rad."""
 
 def music(
     snapshots: _Samples,
@@ -164,7 +164,7 @@ def music(
     calibration: ArrayLike | None = None,
     threads: int = 1,
 ) -> AngleEstimate:
-    """Directions by MUSIC, of samples `(antennas, snapshots)` or `(batch, antennas, snapshots)`."""
+    """Estimates angles by MUSIC from `(antennas, snapshots)` or `(batch, antennas, snapshots)`."""
 
 def root_music(
     snapshots: _Samples,
@@ -176,7 +176,7 @@ def root_music(
     calibration: ArrayLike | None = None,
     threads: int = 1,
 ) -> AngleEstimate:
-    """Directions by Root-MUSIC; parameters as of `music`."""
+    """Estimates angles by Root-MUSIC; parameters as in `music`."""
 
 def esprit(
     snapshots: _Samples,
@@ -189,7 +189,7 @@ def esprit(
     calibration: ArrayLike | None = None,
     threads: int = 1,
 ) -> AngleEstimate:
-    """Directions by ESPRIT; parameters as of `music`."""
+    """Estimates angles by ESPRIT; parameters as in `music`."""
 
 def maximum_likelihood(
     snapshots: _Samples,
@@ -201,7 +201,7 @@ def maximum_likelihood(
     calibration: ArrayLike | None = None,
     threads: int = 1,
 ) -> AngleEstimate:
-    """Directions by maximum likelihood, coherent sources too; parameters as of `music`."""
+    """Estimates angles by maximum likelihood, also of coherent sources; parameters: see `music`."""
 
 def maximum_likelihood_pilots(
     blocks: _Samples,
@@ -210,18 +210,18 @@ def maximum_likelihood_pilots(
     spacing_wavelengths: float = 0.5,
     calibration: ArrayLike | None = None,
 ) -> AngleEstimate:
-    """Directions from despread pilots, `(antennas, blocks)` or `(batch, antennas, blocks)`."""
+    """Estimates angles from despread pilots `(antennas, blocks)` or `(batch, antennas, blocks)`."""
 
 def covariance(snapshots: _Samples) -> NDArray[np.complex128]:
-    """Sample covariance of the antennas, mean not removed: `(…, antennas, antennas)`."""
+    """Returns the sample covariance `(…, antennas, antennas)`; the mean is not removed."""
 
 def forward_backward(covariance: ArrayLike) -> NDArray[np.complex128]:
-    """Forward–backward average of a covariance: `(R + J conj(R) J) / 2`."""
+    """Returns the forward–backward average of a covariance: `(R + J conj(R) J) / 2`."""
 
 def estimate_sources(
     snapshots: _Samples, *, criterion: Literal["mdl", "aic"] = "mdl"
 ) -> int | NDArray[np.int64]:
-    """Number of sources, from the eigenvalues of the covariance."""
+    """Estimates the number of sources from the eigenvalues of the covariance."""
 
 def spectrum(
     snapshots: _Samples,
@@ -233,12 +233,12 @@ def spectrum(
     forward_backward: bool = False,
     calibration: ArrayLike | None = None,
 ) -> NDArray[np.float64]:
-    """Spectrum at the given angles, `(angles,)` or `(batch, angles)`."""
+    """Returns the spectrum at the given angles, `(angles,)` or `(batch, angles)`."""
 
 def calibrate(
     snapshots: _Samples, angle_rad: float, *, spacing_wavelengths: float = 0.5
 ) -> NDArray[np.complex128]:
-    """Complex gains of the channels, from a burst of one source in a known direction."""
+    """Estimates the complex gains of the channels from a burst of one source at a known angle."""
 
 def crb_rad(
     angle_rad: ArrayLike,
@@ -251,4 +251,4 @@ def crb_rad(
     quantity: Literal["angle", "phase"] = "angle",
     joint: bool = False,
 ) -> _Values:
-    """Cramér–Rao bound: the least standard deviation of an angle, or of a phase."""
+    """Returns the Cramér–Rao bound of the standard deviation of an angle or a phase, in rad."""

@@ -1,4 +1,4 @@
-"""Ctrl-C, without the interpreter."""
+"""Handling of Ctrl-C without the Python interpreter."""
 
 from os import PathLike
 from typing import NoReturn
@@ -6,10 +6,10 @@ from typing import NoReturn
 __all__ = ["INTERRUPTED", "came", "clean", "end", "watch", "writing"]
 
 INTERRUPTED: int
-"""Exit code of a program that Ctrl-C ended."""
+"""Exit code after Ctrl-C."""
 
 def watch() -> int:
-    """Start the thread that ends the program after Ctrl-C.
+    """Starts the thread that ends the program after Ctrl-C.
 
     Returns
     -------
@@ -18,13 +18,13 @@ def watch() -> int:
     """
 
 def came() -> bool:
-    """Whether Ctrl-C has come."""
+    """Whether Ctrl-C was pressed."""
 
 def writing(folder: str | PathLike[str]) -> None:
-    """Register a folder that contains temporary files of a write."""
+    """Registers a folder that contains temporary files of an unfinished write."""
 
 def clean() -> None:
-    """Leave no partial file behind, and no folder with nothing in it."""
+    """Removes partially written files and empty folders of registered writes."""
 
 def end() -> NoReturn:
-    """End the program now, with a message and the exit code."""
+    """Ends the program immediately with a message and its exit code."""

@@ -19,17 +19,17 @@ __all__ = [
 
 @final
 class Cell:
-    """One SSB of a cell, as it was received."""
+    """Received SSB of a cell."""
 
     @property
     def pci(self) -> int:
         """Physical cell identity, 0 to 1007."""
     @property
     def ssb_index(self) -> int:
-        """Index of the SSB in its burst, that is its beam."""
+        """Index of the SSB in its burst; it identifies the beam."""
     @property
     def ssb_index_is_guess(self) -> bool:
-        """Whether the PBCH was not decoded."""
+        """Whether no PBCH was decoded, so that `ssb_index` is not certain."""
     @property
     def lmax(self) -> int | None:
         """Number of SSB indices of the cell (4, 8 or 64), if frequency or PBCH determine it."""
@@ -38,28 +38,28 @@ class Cell:
         """1 in the second half of a frame, if DM-RS or PBCH determine it."""
     @property
     def sfn(self) -> int | None:
-        """System frame number, if the PBCH's checksum held."""
+        """System frame number; None if the CRC of the PBCH is wrong."""
     @property
     def mib_bits(self) -> str | None:
-        """The 24 bits of the master information block, the first sent first."""
+        """The 24 bits of the master information block, in the order of transmission."""
     @property
     def cfo_hz(self) -> float:
-        """Carrier frequency offset."""
+        """Carrier frequency offset in Hz."""
     @property
     def snr_db(self) -> float:
         """SNR of a resource element, mean over the antennas."""
     @property
     def sample_start(self) -> float:
-        """First sample of the SSB, its cyclic prefix included, at the recording's rate."""
+        """First sample of the SSB including its cyclic prefix, at the rate of the recording."""
     @property
     def sample_count(self) -> float:
-        """Its length at that rate."""
+        """Length of the SSB in samples, at the rate of the recording."""
     @property
     def ssb_freq_hz(self) -> float:
-        """Frequency of its centre."""
+        """Centre frequency of the SSB in Hz."""
     @property
     def scs_khz(self) -> int:
-        """Its subcarrier spacing."""
+        """Subcarrier spacing in kHz."""
     @property
     def rsrp_dbfs(self) -> list[float]:
         """SS-RSRP of each antenna (TS 38.215)."""
@@ -71,49 +71,49 @@ class Cell:
         """SS-SINR of each antenna."""
     @property
     def angle_rad(self) -> float | None:
-        """Angle of arrival from the array's axis; with 2 antennas and more."""
+        """Angle of arrival from the array's axis in rad; None with one antenna."""
     @property
     def sigma_rad(self) -> float | None:
-        """Its standard deviation, or that of `azimuth_rad` of antennas not in a row."""
+        """Standard deviation of `angle_rad`, or of `azimuth_rad` for antennas not in a row."""
     @property
     def phase_rad(self) -> float | None:
-        """The electrical angle behind it."""
+        """Electrical angle in rad: phase difference between neighbouring antennas."""
     @property
     def phase_sigma_rad(self) -> float | None:
-        """Its standard deviation."""
+        """Standard deviation of `phase_rad`."""
     @property
     def azimuth_rad(self) -> float | None:
-        """Counter-clockwise from broadside; of antennas not in a row from their x axis."""
+        """Azimuth, counter-clockwise from broadside; from the x axis for antennas not in a row."""
     @property
     def elevation_rad(self) -> float | None:
-        """From the horizontal upwards, of antennas that are not in a row."""
+        """Elevation from the horizontal upwards; None if the antennas are in a row."""
     @property
     def elevation_sigma_rad(self) -> float | None:
-        """Its standard deviation."""
+        """Standard deviation of `elevation_rad`."""
     @property
     def verdict(self) -> str | None:
-        """`resolved`, or why noise and geometry leave it in doubt."""
+        """Verdict: `resolved`, or the reason why noise or geometry permit another angle."""
     @property
     def doubt(self) -> str | None:
-        """Why the angle may not be relied on: of the verdict or of the fit; empty where it may."""
+        """Reason why the angle is unreliable (verdict or misfit); empty if it is reliable."""
     @property
     def p_value(self) -> float | None:
-        """Probability that a plane wave in white noise fits as badly as this or worse."""
+        """Probability of an equal or larger misfit of a plane wave in white noise."""
     @property
     def blocks(self) -> NDArray[np.complex128]:
-        """Responses by symbol, `(antennas, 4)`, in unit noise: what angles are estimated from."""
+        """Despread response of each symbol `(antennas, 4)`, in unit noise; input of `aoa`."""
     @property
     def channel(self) -> NDArray[np.complex64]:
-        """Channel on the subcarriers as received, complex64 `(antennas, 240)`."""
+        """Channel estimate of each subcarrier, complex64 `(antennas, 240)`."""
     @property
     def channel_covariance(self) -> NDArray[np.complex64]:
-        """Covariance of its noise over `noise_variance`, complex64 `(240, 240)`: `aoa.whiten`."""
+        """Noise covariance of `channel` divided by `noise_variance`, complex64 `(240, 240)`."""
     @property
     def noise_variance(self) -> list[float]:
-        """Noise variance of a resource element, each antenna's, in the channel's scale squared."""
+        """Noise variance of a resource element for each antenna, in the scale of `channel`."""
     @property
     def observables(self) -> Observables | None:
-        """Delay, carrier phase, range rate and power, from a `Receiver`; None from a search."""
+        """Delay, carrier phase, range rate and power; None unless from a `Receiver`."""
 
 @final
 class Observables:
@@ -207,17 +207,17 @@ class Scan:
     ) -> Scan: ...
     @property
     def cells(self) -> list[Cell]:
-        """The SSBs in order of time."""
+        """SSBs in the order of time."""
     @property
     def faults(self) -> list[str]:
-        """Faults of the channels, and removed tones."""
+        """Faults of the channels and removed tones, as text."""
     @property
     def looked(self) -> list[str]:
-        """Where was looked."""
+        """Searched frequencies and subcarrier spacings, as text."""
 
 @final
 class Receiver:
-    """Receive the SSBs of one frequency from a stream: cells are searched, then tracked."""
+    """Receiver of a sample stream that searches for and tracks the cells of one SSB frequency."""
 
     def __new__(
         cls,
@@ -235,18 +235,18 @@ class Receiver:
         calibration: Sequence[complex] | None = None,
     ) -> Receiver: ...
     def push(self, samples: ArrayLike) -> list[Cell]:
-        """SSBs completed by the next samples, `(samples,)` or `(antennas, samples)`."""
+        """Returns the SSBs that end in the next `(samples,)` or `(antennas, samples)`."""
 
     def finish(self) -> list[Cell]:
-        """SSBs held back; the stream ends."""
+        """Ends the stream; returns the remaining SSBs."""
 
     @property
     def tones(self) -> list[tuple[float, float]]:
-        """Tones that are removed now: frequency in Hz, power in dBFS."""
+        """Currently removed tones: frequency in Hz, power in dBFS."""
 
 @final
 class Searcher:
-    """Search for the SSBs of one frequency, plans and buffers kept from call to call."""
+    """Search for the SSBs of one frequency that reuses its buffers between calls."""
 
     def __new__(
         cls,
@@ -261,7 +261,7 @@ class Searcher:
         calibration: Sequence[complex] | None = None,
     ) -> Searcher: ...
     def search(self, samples: ArrayLike) -> list[Cell]:
-        """Every SSB in samples, `(samples,)` or `(antennas, samples)`, in order of time."""
+        """Returns every SSB in `(samples,)` or `(antennas, samples)`, in the order of time."""
 
     @property
     def tones(self) -> list[tuple[float, float]]:
@@ -278,7 +278,7 @@ def scan(
     places_wavelengths: Sequence[tuple[float, float]] | None = None,
     calibration: Sequence[complex] | None = None,
 ) -> Scan:
-    """Find every SSB of a recording."""
+    """Returns every SSB of a recording."""
 
 def search(
     samples: ArrayLike,
@@ -292,7 +292,7 @@ def search(
     places_wavelengths: Sequence[tuple[float, float]] | None = None,
     calibration: Sequence[complex] | None = None,
 ) -> Scan:
-    """Find every SSB in samples, `(samples,)` or `(antennas, samples)`, in order of time."""
+    """Returns every SSB in `(samples,)` or `(antennas, samples)`, in the order of time."""
 
 def build_burst(
     pci: int,
@@ -307,4 +307,4 @@ def build_burst(
     ssb_freq_hz: float | None = None,
     sample_rate_hz: float = 7.68e6,
 ) -> NDArray[np.complex64]:
-    """One burst set, complex64 of 5 ms, its centre at 0 Hz."""
+    """Returns the samples of one burst set: complex64, 5 ms, centre frequency 0 Hz."""

@@ -43,7 +43,7 @@ pub struct PoseFields {
     pub speed_mps: f64,
     /// Yaw rate in radians per second, counter-clockwise; null without a sensor for it.
     pub yaw_rate_radps: Option<f64>,
-    /// State of the pose. The documentation of the integrity monitor defines the states.
+    /// State of the pose, as defined in docs/live.md and docs/integrity.md.
     #[schemars(extend("enum" = state_names()))]
     pub state: &'static str,
     /// Reason for the state.
@@ -205,7 +205,7 @@ pub struct StatusMessage {
     #[serde(rename = "type")]
     #[schemars(extend("const" = "status"))]
     pub kind: &'static str,
-    /// Present time in seconds, by the clock of the odometry.
+    /// Current time in seconds, by the clock of the odometry.
     pub now_s: f64,
     /// Pose, state and reason.
     #[serde(flatten)]

@@ -85,7 +85,7 @@ pub struct PositionFields {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(extend("additionalProperties" = false))]
 pub struct MobileRobotPosition {
-    /// Whether the position can be trusted.
+    /// Whether the protection level was at most the alert limit for at least `localized_after_s`.
     pub localized: bool,
     /// The position.
     #[serde(flatten)]
@@ -97,7 +97,7 @@ pub struct MobileRobotPosition {
 #[serde(rename_all = "camelCase")]
 #[schemars(extend("additionalProperties" = false))]
 pub struct AgvPosition {
-    /// Whether the position can be trusted.
+    /// Whether the protection level was at most the alert limit for at least `localized_after_s`.
     pub position_initialized: bool,
     /// The position.
     #[serde(flatten)]

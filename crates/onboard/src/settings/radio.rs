@@ -65,7 +65,7 @@ pub struct HeadArraySettings {
     /// Direction of azimuth 0 of the array, counter-clockwise from +x of the map, in radians.
     #[schemars(range(min = -6.3, max = 6.3))]
     pub azimuth_rad: f64,
-    /// Standard deviation of that direction, in radians.
+    /// Standard deviation of `azimuth_rad`, in radians.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 3.2))]
     pub azimuth_std_rad: f64,

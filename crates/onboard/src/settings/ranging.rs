@@ -42,7 +42,7 @@ pub struct RangingSettings {
     /// per billion.
     #[schemars(range(min = 0.0, max = 1e5))]
     pub clock_drift_std_ppb: f64,
-    /// One-way delays: random walk of that frequency error, in ppb/√s.
+    /// One-way delays: random walk of the vehicle clock's frequency error, in ppb/√s.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub clock_drift_walk_ppb_per_sqrt_s: f64,
     /// One-way delays: whether the range rates of received SSBs are used. They measure the

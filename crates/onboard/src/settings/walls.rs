@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WallSettings {
-    /// Name for people: that of the hall.
+    /// Display name, for example of the hall.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub name: String,
     /// Corners in plan `[x, y]`, in metres. Straight walls connect consecutive corners, and are

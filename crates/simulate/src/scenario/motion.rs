@@ -31,7 +31,7 @@ pub struct MotionSettings {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StopSettings {
-    /// Name for people.
+    /// Display name.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub name: String,
     /// Position along the path in metres.

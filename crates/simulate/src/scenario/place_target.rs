@@ -10,7 +10,7 @@ use super::target::Target;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlaceTarget {
-    /// Name for people.
+    /// Display name.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub name: String,
     /// Position as distance along the road, in metres; the target applies from 5 m before to 5 m behind it.
