@@ -145,6 +145,11 @@ def as_json(tables: list[Table]) -> dict[str, Any]:
     }
 
 
+def _lower(text: str) -> str:
+    """Returns the text with a lower-case first letter, unless it begins with an abbreviation."""
+    return text if text[:2].isupper() else text[0].lower() + text[1:]
+
+
 def markdown() -> str:
     """Returns the text of ``docs/columns.md``."""
     parts = [
@@ -159,7 +164,7 @@ def markdown() -> str:
             for one in table.records()
         ]
         head = "| column | unit | meaning | null when |\n|---|---|---|---|"
-        row = f"Row: {table.row[0].lower()}{table.row[1:]}. {table.where}."
+        row = f"Row: {_lower(table.row)}. {table.where}."
         parts += [f"## {table.name}", row]
         parts.append("\n".join([head, *rows]))
     # Wrap paragraphs, but no table rows.
