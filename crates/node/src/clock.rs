@@ -77,7 +77,7 @@ struct Interruption {
 #[derive(Debug, Clone, Copy)]
 struct Window {
     began_s: f64,
-    least_delay_s: f64,
+    min_delay_s: f64,
 }
 
 impl ArrivalClock {
@@ -156,21 +156,21 @@ impl ArrivalClock {
     fn watch(&mut self, delay_s: f64, now_s: f64) -> Option<Finding> {
         let wrong_rate = self.rate.see(delay_s + self.offset_s, now_s);
         let window = self.window.get_or_insert(Window::new(delay_s, now_s));
-        let missing = (window.see(delay_s, now_s, WINDOW_S)).and_then(|(least_s, lasted_s)| {
+        let missing = (window.see(delay_s, now_s, WINDOW_S)).and_then(|(min_s, lasted_s)| {
             self.window = None;
-            self.correct(least_s, lasted_s)
+            self.correct(min_s, lasted_s)
         });
         wrong_rate.map(Finding::WrongRate).or(missing)
     }
 
-    fn correct(&mut self, least_s: f64, lasted_s: f64) -> Option<Finding> {
-        if least_s.abs() <= STEP_S {
-            let most_s = DRIFT * lasted_s;
-            self.offset_s += least_s.clamp(-most_s, most_s);
+    fn correct(&mut self, min_s: f64, lasted_s: f64) -> Option<Finding> {
+        if min_s.abs() <= STEP_S {
+            let max_s = DRIFT * lasted_s;
+            self.offset_s += min_s.clamp(-max_s, max_s);
             return None;
         }
-        self.offset_s += least_s;
-        (least_s >= INTERRUPTION_S).then_some(Finding::Missing(least_s))
+        self.offset_s += min_s;
+        (min_s >= INTERRUPTION_S).then_some(Finding::Missing(min_s))
     }
 }
 
@@ -178,15 +178,15 @@ impl Window {
     const fn new(delay_s: f64, now_s: f64) -> Self {
         Self {
             began_s: now_s,
-            least_delay_s: delay_s,
+            min_delay_s: delay_s,
         }
     }
 
     /// Adds a delay. Returns the minimum delay and the duration at the end of the window.
     fn see(&mut self, delay_s: f64, now_s: f64, length_s: f64) -> Option<(f64, f64)> {
-        self.least_delay_s = self.least_delay_s.min(delay_s);
+        self.min_delay_s = self.min_delay_s.min(delay_s);
         let lasted_s = now_s - self.began_s;
-        (lasted_s >= length_s).then_some((self.least_delay_s, lasted_s))
+        (lasted_s >= length_s).then_some((self.min_delay_s, lasted_s))
     }
 }
 
@@ -216,9 +216,9 @@ impl RateMonitor {
     /// configured one, minus one, if it is wrong.
     fn see(&mut self, delay_s: f64, now_s: f64) -> Option<f64> {
         let window = self.window.get_or_insert(Window::new(delay_s, now_s));
-        let (least_s, lasted_s) = window.see(delay_s, now_s, RATE_WINDOW_S)?;
+        let (min_s, lasted_s) = window.see(delay_s, now_s, RATE_WINDOW_S)?;
         self.window = None;
-        let growth_s = least_s - self.before_s.replace(least_s)?;
+        let growth_s = min_s - self.before_s.replace(min_s)?;
         if growth_s.abs() <= WRONG_RATE * lasted_s || growth_s * self.growth_s < 0.0 {
             (self.count, self.lasted_s, self.growth_s) = (0, 0.0, 0.0);
         }

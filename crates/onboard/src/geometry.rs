@@ -79,10 +79,10 @@ impl Area {
         }
     }
 
-    /// Returns the grid spacing for a maximum number of grid points, at least `least_m`.
-    pub fn spacing_m(&self, most_places: f64, least_m: f64) -> f64 {
+    /// Returns the grid spacing for a maximum number of grid points, at least `min_m`.
+    pub fn spacing_m(&self, max_places: f64, min_m: f64) -> f64 {
         let square_m2 = (self.to.x_m - self.from.x_m) * (self.to.y_m - self.from.y_m);
-        (square_m2 / most_places).sqrt().max(least_m)
+        (square_m2 / max_places).sqrt().max(min_m)
     }
 
     /// Returns the centres of the grid cells.

@@ -48,9 +48,9 @@ pub fn replace_jumps(times_s: &[f64], distances_m: &mut [f64]) -> Vec<Jump> {
         let Some(speed_mps) = neighbours_mps(&steps, k) else {
             continue;
         };
-        let most_change_mps = MAX_ACCELERATION_MPS2 * NEIGHBOURS as f64 * step_s;
-        let most_m = RESOLUTION_M + most_change_mps * step_s;
-        if (step_m - speed_mps * step_s).abs() > most_m && step_m.abs() > TIMES_USUAL * usual_m {
+        let max_change_mps = MAX_ACCELERATION_MPS2 * NEIGHBOURS as f64 * step_s;
+        let max_m = RESOLUTION_M + max_change_mps * step_s;
+        if (step_m - speed_mps * step_s).abs() > max_m && step_m.abs() > TIMES_USUAL * usual_m {
             jumps.push(Jump {
                 index: k + 1,
                 step_m,

@@ -22,11 +22,11 @@ pub fn open(path: &Path) -> io::Result<File> {
 ///
 /// # Errors
 /// Errors of [`open`]; an error for a longer file.
-pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+pub fn read(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    open(path)?.take(most_bytes + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most_bytes {
-        let message = format!("longer than the {most_bytes} bytes that are read of such a file");
+    open(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max_bytes {
+        let message = format!("longer than the {max_bytes} bytes that are read of such a file");
         return Err(io::Error::other(message));
     }
     Ok(bytes)

@@ -11,8 +11,8 @@ use crate::file;
 ///
 /// # Errors
 /// [`SettingsError::Read`].
-pub fn read_text(path: &Path, most_bytes: u64) -> Result<String, SettingsError> {
-    let text = file::read(path, most_bytes).and_then(|bytes| {
+pub fn read_text(path: &Path, max_bytes: u64) -> Result<String, SettingsError> {
+    let text = file::read(path, max_bytes).and_then(|bytes| {
         let not_utf8 = |_| io::Error::new(io::ErrorKind::InvalidData, "not UTF-8 text");
         String::from_utf8(bytes).map_err(not_utf8)
     });

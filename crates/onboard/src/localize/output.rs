@@ -165,11 +165,11 @@ impl Integrity {
         }
     }
 
-    /// Raises every level to a minimum of `least_m`.
-    pub const fn raise(&mut self, least_m: f64) {
-        self.protection_level_m = self.protection_level_m.max(least_m);
-        self.protection_level_along_m = self.protection_level_along_m.max(least_m);
-        self.protection_level_across_m = self.protection_level_across_m.max(least_m);
+    /// Raises every level to a minimum of `min_m`.
+    pub const fn raise(&mut self, min_m: f64) {
+        self.protection_level_m = self.protection_level_m.max(min_m);
+        self.protection_level_along_m = self.protection_level_along_m.max(min_m);
+        self.protection_level_across_m = self.protection_level_across_m.max(min_m);
     }
 }
 

@@ -45,10 +45,9 @@ impl Contradiction {
         let kept = (-duration_s / MEMORY_S).exp();
         let by_speed_m = 0.5 * (last.speed_mps + sample.speed_mps) * duration_s;
         let by_distance_m = sample.distance_m - last.distance_m;
-        let most_m = MAX_DIFFERENCE_PER_SAMPLE_M + 2.0 * by_speed_m.abs();
-        let difference_m = (by_distance_m - by_speed_m).clamp(-most_m, most_m);
-        self.driven_m =
-            kept * self.driven_m + by_speed_m.abs().max(by_distance_m.abs().min(most_m));
+        let max_m = MAX_DIFFERENCE_PER_SAMPLE_M + 2.0 * by_speed_m.abs();
+        let difference_m = (by_distance_m - by_speed_m).clamp(-max_m, max_m);
+        self.driven_m = kept * self.driven_m + by_speed_m.abs().max(by_distance_m.abs().min(max_m));
         let threshold_m = MIN_M + SHARE * self.driven_m;
         // The sum is limited, so that large and small faults end after the same time.
         let bound_m = BOUND * threshold_m;

@@ -206,10 +206,10 @@ mod tests {
 
     #[test]
     fn the_noise_is_continuous_between_short_and_long_steps() {
-        let most_m = SHORT * KEEPING.wavelength_m;
+        let max_m = SHORT * KEEPING.wavelength_m;
         let (short, long) = (
-            KEEPING.noise(most_m * (1.0 - 1e-12)),
-            KEEPING.noise(most_m * (1.0 + 1e-12)),
+            KEEPING.noise(max_m * (1.0 - 1e-12)),
+            KEEPING.noise(max_m * (1.0 + 1e-12)),
         );
         for (short, long) in short.iter().flatten().zip(long.iter().flatten()) {
             assert!((short / long - 1.0).abs() < 1e-5, "{short} {long}");

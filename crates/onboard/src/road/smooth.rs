@@ -403,12 +403,12 @@ mod tests {
 
     #[test]
     fn a_sampled_bend_is_the_bend_at_any_spacing() {
-        for (spacing_m, most_m) in [(0.5, 0.03), (1.0, 0.03), (2.0, 0.04), (5.0, 0.12)] {
+        for (spacing_m, max_m) in [(0.5, 0.03), (1.0, 0.03), (2.0, 0.04), (5.0, 0.12)] {
             let (exact, made) = bend(spacing_m);
             for step in 0..=180 {
                 let place = exact.pose(0.5 * f64::from(step)).point();
                 let off_m = made.project(place).lateral_m.abs();
-                assert!(off_m < most_m, "{spacing_m}: {off_m} at {step}");
+                assert!(off_m < max_m, "{spacing_m}: {off_m} at {step}");
             }
             assert!((made.length_m() - 90.0).abs() < 0.1, "{}", made.length_m());
         }

@@ -168,8 +168,8 @@ impl RoadSettings {
     /// points.
     pub fn survey_std_m(&self) -> f64 {
         let is_drawn = self.polyline_m.is_some() && self.corner_radius_m.is_none();
-        let least_m = if is_drawn { DRAWN_STD_M } else { 0.0 };
-        self.position_std_m.max(least_m)
+        let min_m = if is_drawn { DRAWN_STD_M } else { 0.0 };
+        self.position_std_m.max(min_m)
     }
 
     /// Builds the road. Errors name `key` as the path of the table.

@@ -104,7 +104,7 @@ impl UncertaintyDriven {
             self.quantile.radius(next.principal_variances(belief)) <= self.target_error_m
         };
         let before = spread(&belief);
-        let (mut taken, mut best, mut most_m2) = (0u64, 0u64, 0.0);
+        let (mut taken, mut best, mut max_m2) = (0u64, 0u64, 0.0);
         let (mut improving, mut kept) = (true, !demanded);
         for count in 1..=heads.len().min(MAX_HEADS) {
             let next = (heads.iter().enumerate().take(MAX_HEADS))
@@ -123,9 +123,9 @@ impl UncertaintyDriven {
             belief = after;
             let cost = (self.wake_up_cost + count as f64) / (self.wake_up_cost + 1.0);
             let gain_m2 = (before - left) / cost;
-            improving &= gain_m2 > most_m2;
+            improving &= gain_m2 > max_m2;
             if improving {
-                (best, most_m2) = (taken, gain_m2);
+                (best, max_m2) = (taken, gain_m2);
             }
             if !kept && keeps(&belief) {
                 // Both criteria add the angles in the same order.
@@ -136,7 +136,7 @@ impl UncertaintyDriven {
                 break;
             }
         }
-        if (demanded && kept) || most_m2 >= self.min_variance_reduction_m2 {
+        if (demanded && kept) || max_m2 >= self.min_variance_reduction_m2 {
             best
         } else {
             0

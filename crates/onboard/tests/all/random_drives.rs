@@ -125,10 +125,10 @@ fn drive(seed: u64) {
         if let Some((last, last_std_m)) = before {
             let moved_m = pose.point().distance_m(last.point());
             // Several angles a step, each within the gate; the odometer's step, or a gap's.
-            let most_m = 0.4 + 5.0 * last_std_m.max(std_m);
+            let max_m = 0.4 + 5.0 * last_std_m.max(std_m);
             assert!(
-                moved_m <= most_m,
-                "drive {seed}, step {step}: {moved_m} of {most_m}"
+                moved_m <= max_m,
+                "drive {seed}, step {step}: {moved_m} of {max_m}"
             );
         }
         let gap = (gap_from..=gap_to).contains(&step);

@@ -406,8 +406,8 @@ fn every_kind_reaches_the_bound() {
             );
             // Phases are used only after the number of their wavelengths is known; the bound uses
             // them from the start.
-            let [most_ratio, most_nees] = if phase { [1.5, 1.3] } else { [1.1, 1.15] };
-            if ratio > most_ratio || !(0.85..most_nees).contains(&nees) {
+            let [max_ratio, max_nees] = if phase { [1.5, 1.3] } else { [1.1, 1.15] };
+            if ratio > max_ratio || !(0.85..max_nees).contains(&nees) {
                 failed.push((heads, rate, phase, ratio, nees));
             }
         }

@@ -75,8 +75,8 @@ fn along_road(segments: &[(f64, f64)], rate_hz: f64, rng: &mut ChaCha8Rng) -> Ve
         } else {
             f64::INFINITY
         };
-        let most_mps = (2.0 * 0.8 * before_stop_m.max(0.0)).sqrt().min(cruise_mps);
-        speed_mps = (speed_mps + 0.8 / rate_hz).min(most_mps);
+        let max_mps = (2.0 * 0.8 * before_stop_m.max(0.0)).sqrt().min(cruise_mps);
+        speed_mps = (speed_mps + 0.8 / rate_hz).min(max_mps);
         if before_stop_m < 0.05 {
             speed_mps = 0.0;
             stands_s += 1.0 / rate_hz;

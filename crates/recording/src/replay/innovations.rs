@@ -114,7 +114,7 @@ pub fn replay_angles(
     let heads = RadioHead::received_by(site, vehicle);
     let mut odometry = odometry.samples.iter().peekable();
     let measurand = vehicle.array.measurand();
-    let most_lost = (MAX_LOST * angles.len() as f64) as usize;
+    let max_lost = (MAX_LOST * angles.len() as f64) as usize;
     let (mut lost, mut steps) = (0, Vec::with_capacity(angles.len()));
     for (index, logged) in angles.iter().enumerate() {
         let mut measured = with_phase(logged, &measurand).measured;
@@ -146,7 +146,7 @@ pub fn replay_angles(
         }
         steps.push(step);
         lost += usize::from(localizer.is_lost());
-        if lost > most_lost {
+        if lost > max_lost {
             break;
         }
     }

@@ -31,7 +31,7 @@ pub fn constant_radps(samples: &[OdometrySample]) -> Option<f64> {
 pub fn measured_per_true(poses: &[LocatedPose]) -> Option<f64> {
     let (mut cross_sum, mut true_square) = (0.0, 0.0);
     // Turn since the first pose, and its minimum and maximum.
-    let (mut heading_rad, mut least_rad, mut most_rad) = (0.0, 0.0_f64, 0.0_f64);
+    let (mut heading_rad, mut min_rad, mut max_rad) = (0.0, 0.0_f64, 0.0_f64);
     let mut measured_square = 0.0;
     let mut window = (poses.first()?, 0.0);
     for pair in poses.windows(2) {
@@ -51,12 +51,12 @@ pub fn measured_per_true(poses: &[LocatedPose]) -> Option<f64> {
         true_square += driven * driven;
         measured_square += measured * measured;
         heading_rad += driven;
-        (least_rad, most_rad) = (least_rad.min(heading_rad), most_rad.max(heading_rad));
+        (min_rad, max_rad) = (min_rad.min(heading_rad), max_rad.max(heading_rad));
         window = (to, 0.0);
     }
     let correlation2 = cross_sum * cross_sum / (measured_square * true_square);
     let is_determined =
-        most_rad - least_rad > MIN_TURNED_RAD && (measured_square == 0.0 || correlation2 > 0.5);
+        max_rad - min_rad > MIN_TURNED_RAD && (measured_square == 0.0 || correlation2 > 0.5);
     is_determined.then_some(cross_sum / true_square)
 }
 

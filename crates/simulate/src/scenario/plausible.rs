@@ -163,7 +163,7 @@ impl Scenario {
         let (curvature_per_m, along_m) = bends.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let across_mps2 = (speed_kmh / 3.6).powi(2) * curvature_per_m;
         (across_mps2 > MAX_LATERAL_ACCELERATION_MPS2).then(|| {
-            let most_kmh = 3.6 * (0.25 * MAX_LATERAL_ACCELERATION_MPS2 / curvature_per_m).sqrt();
+            let max_kmh = 3.6 * (0.25 * MAX_LATERAL_ACCELERATION_MPS2 / curvature_per_m).sqrt();
             Warning {
                 key: key.to_owned(),
                 value: speed_kmh.to_string(),
@@ -172,7 +172,7 @@ impl Scenario {
                      {across_mps2:.0} m/s², and tyres permit {MAX_LATERAL_ACCELERATION_MPS2}",
                     1.0 / curvature_per_m
                 ),
-                write: format!("write at most {most_kmh:.0} km/h, or a larger radius"),
+                write: format!("write at most {max_kmh:.0} km/h, or a larger radius"),
             }
         })
     }

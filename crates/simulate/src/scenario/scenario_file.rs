@@ -311,9 +311,9 @@ impl Scenario {
         // Limit: a quarter of the cyclic prefix (18 of 256 samples). A fraction e⁻⁴ of the scatter
         // exceeds the prefix.
         let prefix_ns = 18.0 / 256.0 * 1e6 / self.site.ssb.subcarrier_spacing_khz;
-        let most_ns = 0.25 * prefix_ns;
-        let allowed = format!("it must be between 0 and {most_ns}");
-        check.that(spread_ns <= most_ns, key, spread_ns, &allowed)?;
+        let max_ns = 0.25 * prefix_ns;
+        let allowed = format!("it must be between 0 and {max_ns}");
+        check.that(spread_ns <= max_ns, key, spread_ns, &allowed)?;
         check.that(
             spread_ns == 0.0 || self.fidelity == Fidelity::Iq,
             key,

@@ -81,13 +81,13 @@ impl DriveSize {
 
     /// Rejects a campaign whose runs do not fit into the usual memory.
     pub(super) fn check_runs(&self, runs: usize, check: Check<'_>) -> Result<(), SettingsError> {
-        let most_gb = MAX_BYTES * 1e-9;
+        let max_gb = MAX_BYTES * 1e-9;
         check.that(
             self.bytes(runs) <= MAX_BYTES,
             "runs",
             format!("{runs} in memory, {:.1} GB", self.bytes(runs) * 1e-9),
             &format!(
-                "at most {most_gb:.1} GB are allowed without allow_large = true (--allow-large); \
+                "at most {max_gb:.1} GB are allowed without allow_large = true (--allow-large); \
                  drive in several parts, or keep no trajectories"
             ),
         )

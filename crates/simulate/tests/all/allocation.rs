@@ -30,7 +30,7 @@ fn a_drive_allocates_nothing_after_initialisation() {
         min_variance_reduction_m2: 0.0,
         ..UncertaintySettings::default()
     }));
-    for (scenario, least_accepted) in [
+    for (scenario, min_accepted) in [
         (unguarded("paper-real-odometry-4"), 2000),
         (changed("paper-real-odometry-4", [guarded()]), 2000),
         (changed("paper-real-odometry-4", [guarded(), adapts]), 2000),
@@ -49,7 +49,7 @@ fn a_drive_allocates_nothing_after_initialisation() {
                 "{}, integrity {guarded}, map {map}: {accepted}",
                 scenario.name
             );
-            assert!(accepted > least_accepted, "{}: {accepted}", scenario.name);
+            assert!(accepted > min_accepted, "{}: {accepted}", scenario.name);
         }
     }
 }

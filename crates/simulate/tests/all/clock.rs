@@ -53,9 +53,9 @@ fn agreeing_clocks_are_not_corrected() {
         let (scenario, odometry, angles, start) = drive(seed);
         for until_s in [16.0, 40.0, 100.0] {
             let [found_s, std_s] = found_s(&scenario, (&odometry, &angles), start, until_s, 0.0);
-            let most_s = MIN_S.max(3.0 * std_s).min(DOUBTED_S);
+            let max_s = MIN_S.max(3.0 * std_s).min(DOUBTED_S);
             assert!(
-                found_s.abs() < most_s,
+                found_s.abs() < max_s,
                 "seed {seed}, {until_s} s: {found_s} s ± {std_s} s"
             );
         }

@@ -391,7 +391,7 @@ fn windows_without_an_ssb_open_the_receiver_and_windows_follow_missing_samples()
     // At 0.3 s, samples of 7.3 ms are missing. Windows placed relative to the last SSB miss all
     // following SSBs.
     let (from, lost) = ((0.3 * RATE_HZ) as usize, (7.3e-3 * RATE_HZ) as usize);
-    for (resumes, most_s) in [(false, 1.25), (true, 0.2)] {
+    for (resumes, max_s) in [(false, 1.25), (true, 0.2)] {
         let mut live = recorded.live();
         let received = drive_asleep(
             &mut live,
@@ -401,7 +401,7 @@ fn windows_without_an_ssb_open_the_receiver_and_windows_follow_missing_samples()
             resumes,
         );
         let after = received.iter().copied().find(|it| *it > 0.31).unwrap();
-        assert!(after < 0.3 + most_s, "{after}");
+        assert!(after < 0.3 + max_s, "{after}");
         // After re-acquisition, the receiver sleeps again and every window contains its SSBs: two
         // per 80 ms.
         let later = received.iter().filter(|it| **it > after + 0.1).count();

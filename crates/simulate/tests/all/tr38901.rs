@@ -26,7 +26,7 @@ fn environment(model: &str) -> Environment {
 
 /// Returns the horizontal distances of `benches/tr38901_oracle.py`.
 fn places(model: &str) -> Vec<LinkGeometry> {
-    let (head_m, array_m, least_m, most_m) = match model {
+    let (head_m, array_m, min_m, max_m) = match model {
         "umi" => (10.0, 1.5, 20.0, 120.0),
         "inf-sl" => (1.5, 1.5, 5.0, 60.0),
         "inf-dl" => (1.5, 1.5, 1.0, 10.0),
@@ -35,7 +35,7 @@ fn places(model: &str) -> Vec<LinkGeometry> {
     };
     let mut rng = Streams::new(3, 0).generator(Purpose::Start, 0);
     let place = |_| LinkGeometry {
-        level_m: least_m + (most_m - least_m) * rng.random::<f64>(),
+        level_m: min_m + (max_m - min_m) * rng.random::<f64>(),
         head_m,
         array_m,
     };

@@ -170,11 +170,8 @@ fn the_target_error_is_met_with_the_fewest_angles() {
         assert!(record.out_of_reach <= 3, "{}", record.out_of_reach);
         // The error grows by less than 3 % until the next SSB. An estimate at the last possible SSB
         // gives an error close to the target, and one missed angle exceeds it slightly.
-        let most_m = most_predicted_m(record);
-        assert!(
-            (0.97..1.03).contains(&(most_m / target_error_m)),
-            "{most_m}"
-        );
+        let max_m = most_predicted_m(record);
+        assert!((0.97..1.03).contains(&(max_m / target_error_m)), "{max_m}");
         assert!(record.bursts_received < record.steps.len());
     }
     let beyond = |record: &RunRecord| {
@@ -191,8 +188,8 @@ fn the_target_error_is_met_with_the_fewest_angles() {
 #[test]
 fn the_target_error_is_met_with_late_ssbs() {
     for record in on_demand(0.3, 100.0, 3) {
-        let most_m = most_predicted_m(&record);
-        assert!((0.97..1.03).contains(&(most_m / 0.3)), "{most_m}");
+        let max_m = most_predicted_m(&record);
+        assert!((0.97..1.03).contains(&(max_m / 0.3)), "{max_m}");
     }
 }
 

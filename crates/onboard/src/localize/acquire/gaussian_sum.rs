@@ -406,14 +406,14 @@ impl GaussianSum {
     /// within its confidence region.
     pub(super) fn is_at(&self, ekf: &Ekf) -> bool {
         self.hypotheses.iter().all(|it| {
-            let [most_m2, _] = Ekf::principal_variances(it.ekf.belief());
+            let [max_m2, _] = Ekf::principal_variances(it.ekf.belief());
             let (one, other) = (it.ekf.belief(), ekf.belief());
             let is_near = |state| {
                 let apart = it.apart_of(ekf, state);
                 let variance = one.covariance[state][state] + other.covariance[state][state];
                 apart * apart < CERTAIN_SIGMAS * CERTAIN_SIGMAS * variance
             };
-            most_m2 < FOUND_STD_M * FOUND_STD_M && [ALONG, ACROSS, HEADING].into_iter().all(is_near)
+            max_m2 < FOUND_STD_M * FOUND_STD_M && [ALONG, ACROSS, HEADING].into_iter().all(is_near)
         })
     }
 
@@ -487,8 +487,8 @@ impl GaussianSum {
     }
 
     /// Returns mean and covariance over hypotheses. In the covariance, the weight of a
-    /// hypothesis is at least `least_weight` times the weight of the best.
-    fn mixture(hypotheses: &[Hypothesis], time_s: f64, least_weight: f64) -> PoseEstimate {
+    /// hypothesis is at least `min_weight` times the weight of the best.
+    fn mixture(hypotheses: &[Hypothesis], time_s: f64, min_weight: f64) -> PoseEstimate {
         let best = hypotheses
             .iter()
             .map(|hypothesis| hypothesis.log_likelihood)
@@ -516,7 +516,7 @@ impl GaussianSum {
         let mut covariance = [[0.0; 3]; 3];
         let mut total = 0.0;
         for (weight, estimate) in weighed() {
-            let weight = weight.max(least_weight);
+            let weight = weight.max(min_weight);
             total += weight;
             estimate.add_about(mean, weight, &mut covariance);
         }

@@ -19,8 +19,8 @@ pub(super) struct SpeedJumps {
 }
 
 impl SpeedJumps {
-    /// Adds a change of the speed, which is a jump if it exceeds `least_mps` and is unusual.
-    pub fn step(&mut self, from_mps: f64, to_mps: f64, least_mps: f64) {
+    /// Adds a change of the speed, which is a jump if it exceeds `min_mps` and is unusual.
+    pub fn step(&mut self, from_mps: f64, to_mps: f64, min_mps: f64) {
         self.speed_jump = 0.0;
         let fastest_mps = from_mps.abs().max(to_mps.abs());
         if fastest_mps == 0.0 {
@@ -28,7 +28,7 @@ impl SpeedJumps {
         }
         let step_mps = (to_mps - from_mps).abs();
         let unusual_mps = UNUSUAL * self.mean_square.sqrt();
-        if step_mps > least_mps.max(unusual_mps) {
+        if step_mps > min_mps.max(unusual_mps) {
             self.speed_jump = step_mps / fastest_mps;
         }
         let square = step_mps * step_mps;

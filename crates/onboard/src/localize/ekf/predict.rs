@@ -52,9 +52,9 @@ impl Ekf {
         if !sample.is_finite() {
             return OdometryResult::NotFinite;
         }
-        let most_mps = WILD * self.config.top_speed_mps;
+        let max_mps = WILD * self.config.top_speed_mps;
         let sample = &OdometrySample {
-            speed_mps: sample.speed_mps.clamp(-most_mps, most_mps),
+            speed_mps: sample.speed_mps.clamp(-max_mps, max_mps),
             ..*sample
         };
         let Some(previous) = self.odometry else {
@@ -143,12 +143,11 @@ impl Ekf {
             return;
         }
         let usual_mps = SIGMAS_OF_SLIP * self.config.speed_noise_mps;
-        let mut least_mps =
-            usual_mps.max(self.config.slip_acceleration_mps2 * duration_s.max(0.02));
-        if (sample.speed_mps - previous.speed_mps).abs() > least_mps {
-            least_mps += self.bend_mps(sample.speed_mps, duration_s);
+        let mut min_mps = usual_mps.max(self.config.slip_acceleration_mps2 * duration_s.max(0.02));
+        if (sample.speed_mps - previous.speed_mps).abs() > min_mps {
+            min_mps += self.bend_mps(sample.speed_mps, duration_s);
         }
-        (self.speed_jumps).step(previous.speed_mps, sample.speed_mps, least_mps);
+        (self.speed_jumps).step(previous.speed_mps, sample.speed_mps, min_mps);
         let sets_off = previous.speed_mps == 0.0 && sample.speed_mps != 0.0;
         let unseen = self.config.may_slip && sets_off;
         self.slip(if unseen {
@@ -215,12 +214,12 @@ impl Ekf {
     fn guessed_yaw(&self, from_radps: f64, to_radps: f64, duration_s: f64) -> Yaw {
         let change_rad = (to_radps - from_radps) * duration_s;
         let wander = YAW_RATE_WALK * duration_s.powi(3);
-        let most_rad = self.config.top_yaw_rate_radps * duration_s;
+        let max_rad = self.config.top_yaw_rate_radps * duration_s;
         Yaw {
             turn_rad: 0.5 * (from_radps + to_radps) * duration_s,
             duration_s,
             is_measured: false,
-            variance: ((change_rad * change_rad).max(wander) / 12.0).min(most_rad * most_rad),
+            variance: ((change_rad * change_rad).max(wander) / 12.0).min(max_rad * max_rad),
         }
     }
 

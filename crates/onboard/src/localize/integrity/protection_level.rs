@@ -84,7 +84,7 @@ impl Hypothesis {
 
     /// Returns an upper bound of the probability that the error exceeds the radius,
     /// `exp(−((r − d)/σ)²/2)`: that of a circular distribution.
-    fn most_beyond_circle(&self, radius_m: f64) -> f64 {
+    fn max_beyond_circle(&self, radius_m: f64) -> f64 {
         let room_m = radius_m - self.distance_m();
         if room_m <= 0.0 {
             return 1.0;
@@ -104,7 +104,7 @@ impl Hypothesis {
         radius_m: f64,
         negligible: f64,
     ) -> f64 {
-        let most = self.most_beyond_circle(radius_m);
+        let most = self.max_beyond_circle(radius_m);
         if most < negligible {
             return most;
         }
