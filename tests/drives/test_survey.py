@@ -120,7 +120,7 @@ def test_parameters_that_cannot_be_surveyed_are_reported(logged: Path, tmp_path:
     elsewhere = Site.load("yard").with_overrides(
         {f"radio_heads[{index}].pci": 900 + index for index in range(4)}
     )
-    with pytest.raises(InputError, match="no angle is to a radio head of yard"):
+    with pytest.raises(InputError, match="no angle belongs to a radio head of yard"):
         survey(elsewhere, vehicle, [logged / "0"])
     lost = tmp_path / "lost"
     lost.mkdir()

@@ -97,7 +97,7 @@ def test_files_of_another_kind_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"text\.zip: not a result"):
         access_av.Simulation.load(text)
     file = access_av.bound(SHORT, map_step_m=60.0).save(tmp_path / "bound.zip")
-    with pytest.raises(InputError, match="holds a ErrorBound, not a Simulation"):
+    with pytest.raises(InputError, match="contains a ErrorBound, not a Simulation"):
         access_av.Simulation.load(file)
     for entry in (
         {"$": "object", "class": "os:system", "fields": {}},
