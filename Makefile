@@ -101,15 +101,13 @@ docs: .venv/installed-docs ## Build the documentation site target/docs/site/inde
 	$(BIN)/access-av file columns --markdown > docs/columns.md
 	$(BIN)/python docs/site/build.py
 
-CHROMIUM ?= chromium
 figures: .venv/installed ## Evaluate the paper with five seeds (10 minutes) and make the figures of docs/paper.md
 	$(BIN)/access-av paper evaluate --seeds 5 --sensitivity --out results/paper
 	for name in ablation front sobol; do cp results/paper/$$name.svg docs/paper-$$name.svg; done
 
 REPORT := results/latest/report.html
 picture: ## Make the README's picture from the report of `access-av study bends` (needs chromium)
-	$(CHROMIUM) --headless --no-sandbox --hide-scrollbars --virtual-time-budget=20000 \
-	  --window-size=1300,1400 --screenshot=docs/study.png file://$(abspath $(REPORT))
+	$(BIN)/python docs/site/picture.py $(REPORT)
 
 bench: .venv/installed-bench ## Compare angle estimators and cell search with other libraries; time the evaluation
 	$(BIN)/python benches/aoa_peers.py

@@ -32,7 +32,7 @@ def test_more_radio_heads_bound_the_error_more_tightly(four_heads: ErrorBound) -
     assert least[0] > least[1] > four_heads.route["bound_m"].median()
 
 
-def test_route_is_the_scenarios(four_heads: ErrorBound) -> None:
+def test_the_route_is_that_of_the_scenario(four_heads: ErrorBound) -> None:
     route = four_heads.route
     assert route["time_s"].diff().drop_nulls().is_between(0.02 - 1e-9, 0.02 + 1e-9).all()
     assert abs(route["along_m"][-1] - 300.0) < 1e-6

@@ -104,8 +104,11 @@ def test_run_prints_percentiles_and_integrity(
 ) -> None:
     done = access_av(
         "run", "paper-real-odometry-2", "--set", "vehicle.integrity={}", "--out", tmp_path,
+        columns=80,
     )  # fmt: skip
     assert done.code == 0, done.err
+    # A terminal has 24 lines; one of them is the prompt.
+    assert len(done.out.splitlines()) <= 23, done.out
     output = " ".join(done.out.split())
     for text in (
         "50th percentile of the error",

@@ -207,6 +207,10 @@ def show_points(points: pl.DataFrame, title: str = "") -> None:
     console.print(made)
 
 
+# Percentiles that only the report contains, so that the table fits a screen of 24 lines.
+REPORT_ONLY_PERCENTS = (95.0, 99.9)
+
+
 def show_simulation(result: Simulation, title: str, energy_boundary: str | None) -> None:
     """Prints errors, angle estimates and energy of a simulation as a table."""
     from access_av.run.service_levels import reached_in_words
@@ -215,9 +219,10 @@ def show_simulation(result: Simulation, title: str, energy_boundary: str | None)
     made = table(["", "value", "95 % interval"], title=title)
     rows: dict[str, tuple[Any, str]] = {
         "RMS error / m": (result.rms_error_m, ""),
-        "mean error / m": (result.mean_error_m, ""),
     }
     for each in result.percentiles or ():
+        if each.percent in REPORT_ONLY_PERCENTS:
+            continue
         rows[f"{each.percent:g}th percentile of the error / m"] = each.value, each.interval
     rows |= {
         "maximum mean error along the track, X / m": (steps["mean_abs_error_x_m"].max(), ""),

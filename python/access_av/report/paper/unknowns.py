@@ -60,8 +60,8 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
 def _width_text(found: Unknowns) -> str:
     widest = max((each.half_width for each in found.matter), default=0.0)
     return (
-        f"For claims that are neither arithmetic nor solved for, {len(found.matter)} total indices "
-        f"are {MATTERS:g} or more; their 95 % intervals are at most ± {widest:.3f} wide."
+        f"For claims that are neither by arithmetic nor by construction, {len(found.matter)} total "
+        f"indices are {MATTERS:g} or more; their 95 % intervals are at most ± {widest:.3f} wide."
     )
 
 
