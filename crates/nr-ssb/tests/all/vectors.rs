@@ -27,26 +27,26 @@ fn sequences() {
     let vectors = Vectors::open("sequences.npz");
     let as_i8 = |sequence: [f32; 127]| sequence.map(|x| x as i8);
     let as_i16 = |indices: &[usize]| indices.iter().map(|&i| i as i16).collect::<Vec<_>>();
-    for (n_id_2, expected) in (0..).zip(vectors.array::<i8>("pss").chunks(127)) {
+    for (n_id_2, expected) in (0..).zip(vectors.array::<i8, _>("pss").chunks(127)) {
         assert_eq!(as_i8(pss(n_id_2)), expected);
     }
     assert_eq!(
         as_i16(&pss_indices().collect::<Vec<_>>()),
-        vectors.array::<i16>("pss_index")
+        vectors.array::<i16, _>("pss_index")
     );
     assert_eq!(
         as_i16(&sss_indices().collect::<Vec<_>>()),
-        vectors.array::<i16>("sss_index")
+        vectors.array::<i16, _>("sss_index")
     );
 
-    let sss_all = vectors.array::<i8>("sss");
-    let dmrs_all = vectors.array::<Complex32>("dmrs");
-    let prbs_all = vectors.array::<u8>("pbch_prbs");
+    let sss_all = vectors.array::<i8, _>("sss");
+    let dmrs_all = vectors.array::<Complex32, _>("dmrs");
+    let prbs_all = vectors.array::<u8, _>("pbch_prbs");
     let (dmrs_index, pbch_index) = (
-        vectors.array::<i16>("dmrs_index"),
-        vectors.array::<i16>("pbch_index"),
+        vectors.array::<i16, _>("dmrs_index"),
+        vectors.array::<i16, _>("pbch_index"),
     );
-    for (i, pci) in vectors.array::<i16>("pcis").into_iter().enumerate() {
+    for (i, pci) in vectors.array::<i16, _>("pcis").into_iter().enumerate() {
         let pci = Pci::new(pci as u16).unwrap();
         assert_eq!(as_i8(sss(pci)), sss_all[127 * i..127 * (i + 1)]);
         assert_eq!(
@@ -78,7 +78,7 @@ fn every_stage_of_the_pbch() {
     let vectors = Vectors::open("pbch.npz");
     let stage = |key, width: usize| -> Vec<Vec<u8>> {
         vectors
-            .array::<u8>(key)
+            .array::<u8, _>(key)
             .chunks(width)
             .map(<[u8]>::to_vec)
             .collect()
@@ -89,7 +89,7 @@ fn every_stage_of_the_pbch() {
         stage("polar512", 512),
         stage("ratematched864", 864),
     );
-    let ibar = vectors.array::<i32>("ibar_ssb");
+    let ibar = vectors.array::<i32, _>("ibar_ssb");
     for (i, cell) in cells(&vectors).into_iter().enumerate() {
         let bits = cell.payload.bits(cell.lmax);
         assert_eq!(bits, pack(&payloads[i]), "case {i}: payload");
@@ -141,7 +141,7 @@ fn fields_of_the_mib() {
 fn grids() {
     for name in ["pbch.npz", "pbch_extra.npz"] {
         let vectors = Vectors::open(name);
-        let grids = vectors.array::<Complex32>("grid");
+        let grids = vectors.array::<Complex32, _>("grid");
         for (i, (cell, expected)) in cells(&vectors)
             .into_iter()
             .zip(grids.chunks(960))
@@ -161,7 +161,7 @@ fn grids() {
 #[ignore = "needs the reference vectors (ACCESS_AV_DATA)"]
 fn k_ssb_of_the_extra_cases() {
     let vectors = Vectors::open("pbch_extra.npz");
-    let expected = vectors.array::<i64>("k_ssb");
+    let expected = vectors.array::<i64, _>("k_ssb");
     for (cell, expected) in cells(&vectors).iter().zip(expected) {
         assert_eq!(i64::from(cell.payload.k_ssb()), expected);
     }
@@ -192,17 +192,17 @@ fn bursts_at_15_khz() {
     for (i, cell) in cells.iter().enumerate().take(6) {
         let key = format!("x{i}");
         let one = burst(cell, Case::A, [cell.payload.ssb_index]);
-        assert_close(&iq(&one), &vectors.array::<Complex32>(&key), &key);
+        assert_close(&iq(&one), &vectors.array::<Complex32, _>(&key), &key);
     }
     let all = burst(&cells[2], Case::A, 0..4);
-    let expected = vectors.array::<Complex32>("x_allbeams_L4_caseA");
+    let expected = vectors.array::<Complex32, _>("x_allbeams_L4_caseA");
     assert_close(&iq(&all), &expected, "all beams");
 
     let with_phase = Burst {
-        ssb_freq_hz: Some(vectors.array::<f64>("f0_phase54")[0]),
+        ssb_freq_hz: Some(vectors.array::<f64, _>("f0_phase54")[0]),
         ..burst(&cells[2], Case::A, [cells[2].payload.ssb_index])
     };
-    let expected = vectors.array::<Complex32>("x_case2_phase54");
+    let expected = vectors.array::<Complex32, _>("x_case2_phase54");
     assert_close(&iq(&with_phase), &expected, "symbol phase");
 }
 
@@ -211,7 +211,7 @@ fn bursts_at_15_khz() {
 fn bursts_at_30_khz() {
     let cases = Vectors::open("pbch.npz");
     let vectors = Vectors::open("burst30k_7p68Msps.npz");
-    let cell = &cells(&cases)[vectors.array::<i64>("base_case")[0] as usize];
+    let cell = &cells(&cases)[vectors.array::<i64, _>("base_case")[0] as usize];
     assert_eq!(cell.lmax, Lmax::L8);
     for (case, name) in [(Case::B, "B8"), (Case::C, "C8")] {
         let all = burst(cell, case, 0..8);
@@ -221,8 +221,8 @@ fn bursts_at_30_khz() {
             .iter()
             .map(|(symbol, _)| *symbol as i64)
             .collect();
-        assert_eq!(symbols, vectors.array::<i64>(&format!("sym_{name}")));
+        assert_eq!(symbols, vectors.array::<i64, _>(&format!("sym_{name}")));
         let key = format!("x_allbeams_{name}");
-        assert_close(&iq(&all), &vectors.array::<Complex32>(&key), &key);
+        assert_close(&iq(&all), &vectors.array::<Complex32, _>(&key), &key);
     }
 }

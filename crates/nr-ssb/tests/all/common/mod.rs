@@ -4,8 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::PathBuf;
 
-use npyz::{Deserialize, NpyFile};
-use nr_ssb::{BchPayload, Lmax, Mib, Pci};
+use nr_ssb::{BchPayload, Complex32, Lmax, Mib, Pci};
 
 /// Returns the directory of reference data: `ACCESS_AV_DATA`, or `../shared/data`.
 pub fn data_dir() -> PathBuf {
@@ -36,27 +35,71 @@ impl Vectors {
     }
 
     /// Returns an array, flattened in C order.
-    pub fn array<T: Deserialize>(&self, key: &str) -> Vec<T> {
+    pub fn array<T: Element<W>, const W: usize>(&self, key: &str) -> Vec<T> {
         let npy = self.npy(key);
-        let array = NpyFile::new(&*npy).unwrap();
-        assert_eq!(array.order(), npyz::Order::C, "{key}");
-        array.into_vec().unwrap()
+        let (header, bytes) = header_and_bytes(&npy);
+        let (kind, order) = (T::KIND, "'fortran_order': False");
+        assert!(
+            header.contains(&format!("'descr': '{kind}'")),
+            "{key}: {header}"
+        );
+        assert!(header.contains(order), "{key}: {header}");
+        let (elements, rest) = bytes.as_chunks();
+        assert!(rest.is_empty(), "{key}: {header}");
+        elements.iter().copied().map(T::of).collect()
     }
 
     /// Returns a zero-dimensional array of text (NumPy's UTF-32).
     pub fn text(&self, key: &str) -> String {
         let npy = self.npy(key);
-        let mut bytes = Vec::new();
-        NpyFile::new(&*npy)
-            .unwrap()
-            .into_inner()
-            .read_to_end(&mut bytes)
-            .unwrap();
+        let (_, bytes) = header_and_bytes(&npy);
         let codes = bytes.as_chunks().0.iter().copied().map(u32::from_le_bytes);
         codes
             .take_while(|&code| code != 0)
             .filter_map(char::from_u32)
             .collect()
+    }
+}
+
+/// Splits an npy file of version 1 (NumPy enhancement proposal 1).
+fn header_and_bytes(npy: &[u8]) -> (&str, &[u8]) {
+    let (length, rest) = npy
+        .strip_prefix(b"\x93NUMPY\x01\x00")
+        .and_then(<[u8]>::split_first_chunk)
+        .expect("a file of version 1");
+    let (header, bytes) = rest.split_at(u16::from_le_bytes(*length).into());
+    (std::str::from_utf8(header).unwrap(), bytes)
+}
+
+/// Element of `W` bytes of an array.
+pub trait Element<const W: usize> {
+    /// NumPy's name of the type.
+    const KIND: &'static str;
+
+    fn of(bytes: [u8; W]) -> Self;
+}
+
+macro_rules! elements {
+    ($($type:ident $width:literal $kind:literal)*) => {$(
+        impl Element<$width> for $type {
+            const KIND: &'static str = $kind;
+
+            fn of(bytes: [u8; $width]) -> Self {
+                Self::from_le_bytes(bytes)
+            }
+        }
+    )*};
+}
+elements!(i8 1 "|i1" u8 1 "|u1" i16 2 "<i2" i32 4 "<i4" i64 8 "<i8" f64 8 "<f8");
+
+impl Element<8> for Complex32 {
+    const KIND: &'static str = "<c8";
+
+    fn of([a, b, c, d, e, f, g, h]: [u8; 8]) -> Self {
+        Self::new(
+            f32::from_le_bytes([a, b, c, d]),
+            f32::from_le_bytes([e, f, g, h]),
+        )
     }
 }
 
@@ -69,10 +112,10 @@ pub struct Cell {
 
 /// Returns all cells of `pbch.npz` or `pbch_extra.npz`.
 pub fn cells(vectors: &Vectors) -> Vec<Cell> {
-    let column = |key| vectors.array::<i32>(key);
+    let column = |key| vectors.array::<i32, _>(key);
     let (pci, lmax, index) = (column("pci"), column("lmax"), column("ssb_idx"));
     let (hrf, sfn, kssb_msb) = (column("hrf"), column("sfn"), column("kssb_msb"));
-    let mib = vectors.array::<u8>("mib");
+    let mib = vectors.array::<u8, _>("mib");
     (0..pci.len())
         .map(|i| {
             let mib = Mib::from_bits(pack(&mib[24 * i..24 * (i + 1)])).unwrap();

@@ -1,5 +1,6 @@
 //! Ray-traced channels: file of paths, and propagation along the paths.
 
+mod npy;
 mod paths;
 mod propagation;
 mod read;

@@ -4,9 +4,10 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use npyz::{DType, NpyFile, Order};
 use num_complex::Complex32;
 use zip::ZipArchive;
+
+use super::npy::Npy;
 
 /// Arrays of an npz file.
 pub struct Arrays(ZipArchive<File>);
@@ -36,12 +37,11 @@ impl Arrays {
     /// Reads real or integer numbers with `width` values per row.
     pub fn numbers(&mut self, name: &str, width: u64) -> Result<Vec<f64>, Why> {
         let bytes = self.bytes(name)?;
-        let npy =
-            NpyFile::new(bytes.as_slice()).map_err(|error| format!("array `{name}`: {error}"))?;
-        let shape = npy.shape().to_vec();
+        let npy = Npy::new(&bytes).map_err(|error| format!("array `{name}`: {error}"))?;
+        let shape = &npy.shape;
         let fits = match *shape.as_slice() {
             [] | [_] => width == 1,
-            [_, columns] => columns == width,
+            [_, columns] => columns as u64 == width,
             _ => false,
         };
         if !fits {
@@ -49,21 +49,15 @@ impl Arrays {
                 "array `{name}` has the shape {shape:?}; each row must have {width} values"
             ));
         }
-        let by_column = npy.order() == Order::Fortran;
-        let kind = match npy.dtype() {
-            DType::Plain(kind) => kind.to_string(),
-            _ => String::new(),
-        };
-        let values = match kind.trim_start_matches(['<', '|', '=']) {
-            "f8" => npy.into_vec::<f64>(),
-            "f4" => npy.into_vec::<f32>().map(widened),
-            "i8" => npy
-                .into_vec::<i64>()
-                .map(|values| values.into_iter().map(|it| it as f64).collect()),
-            "i4" => npy.into_vec::<i32>().map(widened),
-            "u2" => npy.into_vec::<u16>().map(widened),
-            "u1" => npy.into_vec::<u8>().map(widened),
+        let values = match npy.kind.trim_start_matches(['<', '|', '=']) {
+            "f8" => converted(&npy, f64::from_le_bytes),
+            "f4" => converted(&npy, |it| f32::from_le_bytes(it).into()),
+            "i8" => converted(&npy, |it| i64::from_le_bytes(it) as f64),
+            "i4" => converted(&npy, |it| i32::from_le_bytes(it).into()),
+            "u2" => converted(&npy, |it| u16::from_le_bytes(it).into()),
+            "u1" => converted(&npy, |[it]| it.into()),
             _ => {
+                let kind = npy.kind;
                 return Err(format!(
                     "array `{name}` has the type {kind}; it must be f4, f8, i4 or i8"
                 ));
@@ -71,7 +65,7 @@ impl Arrays {
         };
         let values = values.map_err(|error| format!("array `{name}`: {error}"))?;
         let width = width as usize;
-        Ok(if by_column && width > 1 {
+        Ok(if npy.is_by_column && width > 1 {
             let rows = values.len() / width;
             let places = 0..rows * width;
             places
@@ -85,13 +79,29 @@ impl Arrays {
     /// Reads complex numbers.
     pub fn complex(&mut self, name: &str) -> Result<Vec<Complex32>, Why> {
         let bytes = self.bytes(name)?;
-        let npy =
-            NpyFile::new(bytes.as_slice()).map_err(|error| format!("array `{name}`: {error}"))?;
-        npy.into_vec::<Complex32>()
-            .map_err(|error| format!("array `{name}` must be complex64: {error}"))
+        let npy = Npy::new(&bytes).map_err(|error| format!("array `{name}`: {error}"))?;
+        if npy.kind != "<c8" {
+            let kind = npy.kind;
+            return Err(format!(
+                "array `{name}` must be complex64 (`<c8`), not `{kind}`"
+            ));
+        }
+        let elements = npy.elements();
+        let elements = elements.map_err(|error| format!("array `{name}`: {error}"))?;
+        let value = |[a, b, c, d, e, f, g, h]: [u8; 8]| {
+            Complex32::new(
+                f32::from_le_bytes([a, b, c, d]),
+                f32::from_le_bytes([e, f, g, h]),
+            )
+        };
+        Ok(elements.iter().copied().map(value).collect())
     }
 }
 
-fn widened<T: Into<f64>>(values: Vec<T>) -> Vec<f64> {
-    values.into_iter().map(Into::into).collect()
+/// Returns all elements of an array as real numbers.
+fn converted<const WIDTH: usize>(
+    npy: &Npy<'_>,
+    number: impl Fn([u8; WIDTH]) -> f64,
+) -> Result<Vec<f64>, Why> {
+    Ok(npy.elements()?.iter().copied().map(number).collect())
 }
