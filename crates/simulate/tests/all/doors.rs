@@ -393,7 +393,8 @@ fn a_custom_propagation_works_with_snapshots_and_samples() {
 fn arrays_of_any_size_are_consistent() {
     let runs = 24;
     let mut by_size = Vec::new();
-    for elements in [2, 3, 5, 8] {
+    // Fewest, odd and many antennas.
+    for elements in [2, 3, 8] {
         let array = ("vehicle.array.elements", Value::from(elements));
         let scenario = changed("paper-real-odometry-2", [array.clone()]);
         let found = common::campaign(&scenario, 8, runs).consistency(50);

@@ -87,7 +87,7 @@ fn error(pose: &LocatedPose, record: &RunRecord) -> (f64, f64) {
 
 #[test]
 fn errors_in_the_gap_and_after_it_are_consistent() {
-    let runs = 32;
+    let runs = 16;
     // The gap lasts from 24 to 46 s.
     let after_s = [47.0, 50.0, 55.0, 60.0, 65.0];
     let mut nees = [[0.0; 5]; 2];
