@@ -48,6 +48,7 @@ class Toolchain(NamedTuple):
             "RUSTC": self.rustc,
             "CARGO": self.cargo,
             "CARGO_PROFILE_RELEASE_STRIP": "symbols",
+            "CARGO_PROFILE_RELEASE_LTO": "fat",
         }
         if thin:
             changed |= {"CARGO_PROFILE_RELEASE_LTO": "thin"}
