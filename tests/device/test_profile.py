@@ -380,7 +380,7 @@ def test_profile_of_a_board_with_modes(jetson: Path, monkeypatch: pytest.MonkeyP
     found = device.profile(jetson, window_s=1.2)
     assert found.machine == "A Jetson"
     assert found.sensors == "psys (RAPL)"
-    assert found.warnings == ("mode 3 (NEEDS_REBOOT) needs a reboot: left out",)
+    assert found.warnings == ("mode 3 (NEEDS_REBOOT) needs a reboot: it is not measured",)
     assert Path(os.environ["STATE"]).read_text().strip() == "1"
     assert [(each.mode.number, each.workload) for each in found.measured] == [
         (mode, work) for mode in (0, 1) for work in works

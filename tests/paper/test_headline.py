@@ -73,7 +73,7 @@ def test_the_effect_of_a_fit_parameter_equals_an_evaluation_with_it(
     assert summary.headline(made) == (
         "The paper's accuracy and its saving hold together under none of 2 interpretations"
     )
-    assert "one more parameter of the energy fit: another ratio in modes 1 to 5" in summary.lead(
+    assert "one more parameter of the energy fit: another power ratio in modes 1 to 5" in summary.lead(
         made
     )
 

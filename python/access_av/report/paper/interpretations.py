@@ -108,7 +108,7 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
                  alt.Tooltip("saving:Q", format=".1f"), "keeps:N"],
     )  # fmt: skip
     dots = base.mark_circle(size=90, opacity=1.0).encode(
-        color=colours("keeps:N", kinds, title="keeps", orient="top")
+        color=colours("keeps:N", kinds, title="claims met", orient="top")
     )
     specs["overview"] = finish(
         promised + lines + dots + numbers,
