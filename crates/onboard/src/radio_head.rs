@@ -1,7 +1,7 @@
 //! Radio heads of the nominal model.
 
 use crate::geometry::Point;
-use crate::range::{HeadClock, METRES_PER_NS};
+use crate::range::{HeadClock, METRES_PER_NS, RangeOffset};
 use crate::settings::{HeadArraySettings, RadioHeadSettings, Site, Vehicle};
 
 /// Surveyed radio head and its SSB.
@@ -23,6 +23,8 @@ pub struct RadioHead {
     pub array: Option<HeadArraySettings>,
     /// Clock of the radio head, for one-way delays.
     pub clock: HeadClock,
+    /// Offset of its ranges: cables, hardware and multipath.
+    pub range_offset: RangeOffset,
 }
 
 impl RadioHead {
@@ -67,6 +69,10 @@ impl From<&RadioHeadSettings> for RadioHead {
                 // 1 ppb is 1 ns/s.
                 frequency_std_mps: (settings.clock_frequency_std_ppb)
                     .map(|ppb| METRES_PER_NS * ppb),
+            },
+            range_offset: RangeOffset {
+                mean_m: settings.range_offset_m.unwrap_or(0.0),
+                std_m: settings.range_offset_std_m,
             },
         }
     }

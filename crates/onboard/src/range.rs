@@ -73,6 +73,15 @@ impl RangeMeasurement {
     }
 }
 
+/// Offset of the ranges of a radio head, as surveyed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RangeOffset {
+    /// Mean (m).
+    pub mean_m: f64,
+    /// Standard deviation (m); `None` for that of the vehicle's ranging.
+    pub std_m: Option<f64>,
+}
+
 /// Clock of a radio head.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct HeadClock {

@@ -159,7 +159,7 @@ impl Localizer for DeadReckoning {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::range::HeadClock;
+    use crate::range::{HeadClock, RangeOffset};
     use crate::road::{Road, Segment};
 
     /// Duration of the paper's trip (s): 300 m with 0.5 m/s² up to 15 km/h and down again.
@@ -201,6 +201,7 @@ mod tests {
             eirp_dbm: 0.0,
             array: None,
             clock: HeadClock::default(),
+            range_offset: RangeOffset::default(),
         };
         let mut localizer = DeadReckoning::new(Pose::default(), between, mounting_rad);
         let mut worst_m = 0f64;
@@ -302,6 +303,7 @@ mod tests {
             eirp_dbm: 0.0,
             array: None,
             clock: HeadClock::default(),
+            range_offset: RangeOffset::default(),
         };
         let measured = AngleMeasurement {
             kind: MeasurementKind::Angle,

@@ -56,6 +56,15 @@ pub struct RadioHeadSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e4))]
     pub clock_frequency_std_ppb: Option<f64>,
+    /// Offset of the ranges of this radio head, in metres: cables, hardware and mean multipath. `record
+    /// survey` estimates it from ranges at known positions. Default: 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -1e6, max = 1e6))]
+    pub range_offset_m: Option<f64>,
+    /// Standard deviation of that offset, in metres. Default: `ranging.offset_std_m` of the vehicle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub range_offset_std_m: Option<f64>,
 }
 
 /// `[radio_heads.array]`

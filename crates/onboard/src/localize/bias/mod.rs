@@ -7,4 +7,6 @@ mod range_states;
 
 pub(in crate::localize) use jump_process::{JumpHypotheses, MAX_VARIANCE, independent, share};
 pub use multipath_bias::MultipathBias;
-pub(in crate::localize) use range_states::{CLOCK, DRIFT, HeadState, RANGE_SCALE, RangeTerms};
+pub(in crate::localize) use range_states::{
+    CLOCK, DRIFT, HeadState, RANGE_SCALE, RangeTerms, common_phase,
+};

@@ -1,6 +1,6 @@
 //! States of the ranges, estimated together with the vehicle's state: scale error, offset and drift
-//! of the vehicle's clock, and per radio head an offset, a rate offset and a phase offset. They
-//! follow the angles' biases in [`MultipathBias`], so that vehicle, biases and range states remain
+//! of the vehicle's clock, per radio head an offset, a rate offset and a phase offset, and the phase
+//! offset that all radio heads share. They follow the angles' biases in [`MultipathBias`], so that vehicle, biases and range states remain
 //! one Gaussian.
 
 use super::multipath_bias::{HeadBias, MultipathBias};
@@ -45,12 +45,25 @@ impl HeadState {
     }
 }
 
+/// Returns the number of radio-head states per radio head.
+const fn blocks(model: &RangeModel) -> usize {
+    1 + model.uses_range_rate as usize + model.uses_carrier_phase as usize
+}
+
+/// Returns the number of the phase offset that all radio heads share (m): unknown number of
+/// wavelengths by which the vehicle clock has changed.
+pub(in crate::localize) const fn common_phase(heads: usize, model: &RangeModel) -> usize {
+    FIRST_OFFSET + blocks(model) * heads
+}
+
 impl MultipathBias {
     /// Adds the states of the ranges of these radio heads.
     pub fn add_ranges(&mut self, model: &RangeModel, heads: &[RadioHead]) {
         let old = self.heads.len();
-        let blocks = 1 + usize::from(model.uses_range_rate) + usize::from(model.uses_carrier_phase);
-        let count = old + FIRST_OFFSET + blocks * heads.len();
+        let count = old
+            + FIRST_OFFSET
+            + blocks(model) * heads.len()
+            + usize::from(model.uses_carrier_phase);
         let mut among = vec![0.0; count * count];
         for (place, &covariance) in self.among.iter().enumerate() {
             if let Some(value) = among.get_mut((place / old) * count + place % old) {
@@ -64,10 +77,14 @@ impl MultipathBias {
         self.add_to(DRIFT, DRIFT, model.drift_std_mps.powi(2));
         let offset_variance = |head: &RadioHead| {
             // A surveyed position that is off shifts the ranges of the radio head.
-            model.offset_std_m.powi(2) + head.position_std_m.powi(2)
+            let std_m = head.range_offset.std_m.unwrap_or(model.offset_std_m);
+            std_m.powi(2) + head.position_std_m.powi(2)
         };
         for (number, head) in heads.iter().enumerate() {
             let state = FIRST_OFFSET + number;
+            if let Some(it) = self.heads.get_mut(self.biases + state) {
+                it.mean_rad = head.range_offset.mean_m;
+            }
             self.add_to(state, state, offset_variance(head));
         }
         let each = heads.iter().copied();

@@ -358,7 +358,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Point, wrap_angle};
     use crate::manifold::scatter_bound;
-    use crate::range::HeadClock;
+    use crate::range::{HeadClock, RangeOffset};
     use crate::settings::HeadArraySettings;
 
     fn head(x_m: f64, y_m: f64, height_m: f64) -> RadioHead {
@@ -371,6 +371,7 @@ mod tests {
             eirp_dbm: 0.0,
             array: None,
             clock: HeadClock::default(),
+            range_offset: RangeOffset::default(),
         }
     }
 

@@ -79,6 +79,8 @@ clone_in_place! {
         pub(super) white: WhiteNoiseFraction,
         /// Noise of the ranges relative to the specified one.
         pub(super) range_noise: RangeNoise,
+        /// Whether a carrier phase has determined the common phase offset since the newest odometry.
+        pub(super) knows_common_phase: bool,
     }
 }
 
@@ -117,6 +119,7 @@ impl Ekf {
             unread_m: 0.0,
             white: WhiteNoiseFraction::new(config.correlated_noise.share),
             range_noise: RangeNoise::STATED,
+            knows_common_phase: false,
         };
         ekf.update_off_map();
         ekf

@@ -3,7 +3,7 @@
 
 use crate::gaussian::Innovation;
 use crate::geometry::Pose;
-use crate::localize::bias::RangeTerms;
+use crate::localize::bias::{HeadState, RangeTerms};
 use crate::localize::ekf::angle_model::{ArrayModel, LineOfSight, RoadFrame, locate};
 use crate::localize::ekf::filter::Ekf;
 use crate::localize::ekf::motion::Step;
@@ -25,6 +25,8 @@ pub(in crate::localize) struct PredictedRange {
     pub(super) stated_variance: f64,
     /// Whether a carrier phase starts a new sequence, because its number of wavelengths is unknown.
     pub is_new_sequence: bool,
+    /// State that the carrier phase then determines: phase offset of the radio head or of all.
+    pub(super) phase_state: usize,
     /// Innovation in metres; of a range rate in m/s.
     pub innovation: Innovation,
 }
@@ -150,6 +152,7 @@ impl Ekf {
             terms,
             stated_variance,
             is_new_sequence: false,
+            phase_state: HeadState::PhaseOffset.number(seen.index, self.heads.len(), seen.model),
             innovation: Innovation {
                 residual,
                 variance: known.max(0.0) + measurement_variance,

@@ -54,34 +54,23 @@ impl Ekf {
             Err(reason) => return self.verdict(reason, None),
         };
         if predicted.is_new_sequence {
-            self.begin_sequence(&predicted);
+            self.begin_sequence(&predicted, predicted.phase_state);
             return self.verdict(UpdateReason::Consistent, None);
         }
         let seen = predicted.innovation;
         let mahalanobis2 = seen.mahalanobis2();
-        if predicted.quantity == RangeQuantity::Range {
-            let known = seen.variance - seen.measurement_variance;
-            let model =
-                seen.measurement_variance - self.range_noise.ratio() * predicted.stated_variance;
-            self.range_noise.see(
-                seen.residual,
-                (known + model).max(0.0),
-                predicted.stated_variance,
-            );
-        }
-        if mahalanobis2 > self.config.gate {
-            match predicted.quantity {
-                RangeQuantity::Range => self.reject_range(&predicted),
-                // A cycle slip: the phase continues with another number of wavelengths.
-                RangeQuantity::CarrierPhase => self.begin_sequence(&predicted),
-                RangeQuantity::RangeRate { .. } => {}
+        let is_outlier = mahalanobis2 > self.config.gate;
+        match predicted.quantity {
+            RangeQuantity::Range => self.monitor_range(&predicted, is_outlier),
+            // A cycle slip: the phase continues with another number of wavelengths.
+            RangeQuantity::CarrierPhase if is_outlier => {
+                self.begin_sequence(&predicted, predicted.phase_state);
             }
-            return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
+            RangeQuantity::CarrierPhase => self.knows_common_phase = true,
+            RangeQuantity::RangeRate { .. } => {}
         }
-        if predicted.quantity == RangeQuantity::Range
-            && let Some(head) = self.heads.get_mut(predicted.index)
-        {
-            head.rejected_ranges = 0;
+        if is_outlier {
+            return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
         }
         self.bias.update_with_range(
             &mut self.belief,
@@ -92,6 +81,24 @@ impl Ekf {
         );
         self.keep_bounds();
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// Estimates the noise of the ranges with an innovation, and counts successive outliers.
+    fn monitor_range(&mut self, predicted: &PredictedRange, is_outlier: bool) {
+        let seen = predicted.innovation;
+        let known = seen.variance - seen.measurement_variance;
+        let model =
+            seen.measurement_variance - self.range_noise.ratio() * predicted.stated_variance;
+        self.range_noise.see(
+            seen.residual,
+            (known + model).max(0.0),
+            predicted.stated_variance,
+        );
+        if is_outlier {
+            self.reject_range(predicted);
+        } else if let Some(head) = self.heads.get_mut(predicted.index) {
+            head.rejected_ranges = 0;
+        }
     }
 
     /// Counts a rejected range. After several successive ones, the offset of the radio head has
@@ -127,6 +134,7 @@ impl Ekf {
 
     /// Predicts the range states with an odometry sample.
     pub(in crate::localize::ekf) fn advance_ranges(&mut self, travelled_m: f64, duration_s: f64) {
+        self.knows_common_phase = false;
         if let Some(model) = &self.config.ranging {
             let heads = self.heads.iter().map(|head| head.known);
             self.bias
