@@ -32,6 +32,11 @@ fn cycle_log_odds(residual_m: f64, variance: f64, wavelength_m: f64) -> f64 {
 /// so that the first phase has no other effect.
 const UNKNOWN_OFFSET_M: f64 = 100.0;
 
+/// Number of successive phases that share the error of the linearised distance, because the direction
+/// to the radio head changes little between them. With 1, NEES/2 is 1.22 with one radio head; with
+/// 11, the RMS error with two radio heads is 14 % above the bound.
+const SHARED_CURVATURE: f64 = 5.0;
+
 impl Ekf {
     pub(super) fn predict_carrier_phase(
         &self,
@@ -71,6 +76,10 @@ impl Ekf {
         let seen = predicted.innovation;
         let is_slip = seen.mahalanobis2() > self.config.gate;
         let is_resolved = cycle_log_odds(seen.residual, seen.variance, wavelength_m) > RESOLVED;
+        // Successive phases share the error of the linearisation.
+        let shared = (SHARED_CURVATURE - 1.0) * distance.curvature_variance;
+        predicted.innovation.variance += shared;
+        predicted.innovation.measurement_variance += shared;
         let is_first = offset_variance == 0.0;
         predicted.is_new_sequence = is_first || !(is_resolved || is_slip);
         if predicted.is_new_sequence && !is_first && !self.knows_common_phase {

@@ -54,6 +54,8 @@ pub(super) struct Distance {
     pub row: [f64; STATES],
     /// Variance of the prediction in addition to that of the state (m²).
     pub variance: f64,
+    /// Its part due to the curvature of the distance.
+    pub curvature_variance: f64,
 }
 
 impl Ekf {
@@ -126,6 +128,7 @@ impl Ekf {
             range_m: scale * sight.range_m + 0.5 * aside,
             row,
             variance: coasted + strayed + 0.5 * aside * aside,
+            curvature_variance: 0.5 * aside * aside,
         }
     }
 
