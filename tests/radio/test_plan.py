@@ -14,7 +14,7 @@ from access_av import InputError, Scenario, bound, columns, plan, service_levels
 from access_av.radio.upgrades import next_level
 from access_av.run.campaign import Campaign
 from access_av.run.fault_injection import SIZES, hypotheses, mismatches
-from access_av.run.integrity_campaign import drive
+from access_av.run.integrity_campaign import Case, drive
 from access_av.run.result_cache import ResultCache
 from access_av.verdicts import LevelResult
 
@@ -175,6 +175,21 @@ def test_service_levels_need_time_as_well_as_accuracy() -> None:
     assert found[0].share == 1.0
     # Half a minute is too short for level 2: neither reached nor missed.
     assert [found[0].result, found[1].result] == [LevelResult.TOO_FEW_RUNS] * 2
+
+
+def test_errors_of_an_integrity_case_are_horizontal() -> None:
+    steps = pl.DataFrame(
+        {
+            "run": [0, 0],
+            "time_s": [0.0, 1.0],
+            "error_x_m": [3.0, -0.6],
+            "error_y_m": [-4.0, 0.8],
+            "protection_level_m": [6.0, 6.0],
+            "integrity": ["ok", "ok"],
+        }
+    )
+    case = Case("none", "as set", 2, 1e-3, SHORT, steps)
+    assert case.errors("it").errors_m.tolist() == [[5.0, 1.0]]
 
 
 def test_an_interrupted_integrity_campaign_is_continued(

@@ -14,8 +14,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use recording::replay::{self, ReplayError, StartChoice};
 use recording::{
-    Datatype, LoggedAngle, OdometryChoice, Recording, TimedPose, angle_log_of_columns,
-    is_range_log, read_angle_log, read_odometry, read_range_log, write_drive_mcap, write_tum,
+    Datatype, LoggedAngle, LoggedRange, OdometryChoice, RangeLog, Recording, TimedPose,
+    angle_log_of_columns, is_prs_log, is_range_log, read_angle_log, read_odometry, read_prs_log,
+    read_range_log, write_drive_mcap, write_tum,
 };
 use simulate::{SynthError, SynthSettings};
 
@@ -160,7 +161,8 @@ pub fn read_tum(py: Python<'_>, file: PathBuf) -> PyResult<Bound<'_, PyDict>> {
 ///     CSV file with the columns `time_s`, `distance_m`, `speed_mps` and, with a gyroscope,
 ///     `yaw_rate_radps`; or an MCAP file or a rosbag2 folder with `nav_msgs/msg/Odometry`.
 /// recording : path-like
-///     SigMF recording of the array's samples, or CSV log of angles or ranges.
+///     SigMF recording of the array's samples, CSV log of angles or ranges, or log of an
+///     OpenAirInterface UE (`.log`, `.txt`).
 /// angles : dict of ndarray, optional
 ///     Columns of a log of angles that was read from `recording`, float64, NaN for missing values.
 /// topic, imu_topic : str, optional
@@ -277,16 +279,18 @@ impl RecordedDrive<'_> {
         vehicle: &CoreVehicle,
         smooth: bool,
     ) -> Result<replay::LocatedDrive, ReplayError> {
-        let odometry = read_odometry(self.odometry, &self.choice)?;
-        if self.angles.is_none() && is(self.recording, "csv") && is_range_log(self.recording)? {
+        if self.angles.is_none()
+            && let Some(log) = ranges(site, self.recording)?
+        {
             if smooth {
                 return Err(ReplayError::Custom(
                     "smoothing needs angles; it does not support ranges".into(),
                 ));
             }
-            let log = read_range_log(self.recording)?;
+            let odometry = read_odometry(self.odometry, &self.choice)?;
             return replay::locate_ranges(site, vehicle, self.start, &odometry, &log);
         }
+        let odometry = read_odometry(self.odometry, &self.choice)?;
         let angles = match &self.angles {
             Some(columns) => Some(angle_log_of_columns(self.recording, columns)?),
             None if is(self.recording, "csv") => Some(read_angle_log(self.recording)?),
@@ -307,6 +311,64 @@ impl RecordedDrive<'_> {
             )
         }
     }
+}
+
+/// Returns the ranges of a file, if it contains ranges.
+fn ranges(site: &CoreSite, file: &Path) -> Result<Option<RangeLog>, recording::RecordingError> {
+    if is_prs_log(file) {
+        return read_prs_log(file, site.ssb.subcarrier_spacing_khz).map(Some);
+    }
+    if is(file, "csv") && is_range_log(file)? {
+        return read_range_log(file).map(Some);
+    }
+    Ok(None)
+}
+
+/// Read the ranges of a CSV file or of an OpenAirInterface log.
+///
+/// Parameters
+/// ----------
+/// site : Site
+///     Site with the subcarrier spacing of the positioning reference signals.
+/// file : path-like
+///     Range log, `.csv`, or log of an OpenAirInterface UE, `.log` or `.txt`.
+///
+/// Returns
+/// -------
+/// tuple
+///     Columns `time_s`, `pci`, `ssb_index` and `range_m`; whether the ranges are one-way delays; the
+///     length of a sample in metres, if the delays are in samples; and remarks on single lines.
+///
+/// Raises
+/// ------
+/// RecordingError
+///     An unusable file, or one without ranges.
+#[pyfunction]
+#[allow(clippy::needless_pass_by_value)] // what extraction yields
+#[allow(clippy::type_complexity)] // described above
+pub fn read_ranges<'py>(
+    py: Python<'py>,
+    site: &Site,
+    file: PathBuf,
+) -> PyResult<(Bound<'py, PyDict>, bool, Option<f64>, Vec<String>)> {
+    let log = ranges(&site.0, &file).map_err(recording_error)?;
+    let log = log.ok_or_else(|| {
+        RecordingError::new_err(format!(
+            "{}: contains no ranges; it must be a CSV file with range_m, delay_ns or delay_samples, or a \
+             log of an OpenAirInterface UE (.log, .txt)",
+            file.display()
+        ))
+    })?;
+    let columns = PyDict::new(py);
+    let all = || log.ranges.iter();
+    let column = |value: fn(&LoggedRange) -> f64| PyArray1::from_iter(py, all().map(value));
+    columns.set_item("time_s", column(|it| it.measured.time_s))?;
+    columns.set_item("pci", PyArray1::from_iter(py, all().map(|it| it.pci)))?;
+    let indices = all().map(|it| it.ssb_index);
+    columns.set_item("ssb_index", PyArray1::from_iter(py, indices))?;
+    columns.set_item("range_m", column(|it| it.measured.value))?;
+    let remarks = log.remarks.iter().map(|(_, text)| text.clone()).collect();
+    Ok((columns, log.has_delays, log.sample_m, remarks))
 }
 
 fn is(path: &Path, extension: &str) -> bool {

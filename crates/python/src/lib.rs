@@ -77,7 +77,9 @@ mod _core {
     #[pymodule_export]
     use crate::channel::{channel_drops, check_paths};
     #[pymodule_export]
-    use crate::drive::{LocatedDrive, estimate_angles, locate, log_angles, read_tum, synthesize};
+    use crate::drive::{
+        LocatedDrive, estimate_angles, locate, log_angles, read_ranges, read_tum, synthesize,
+    };
     #[pymodule_export]
     use crate::live::{Live, LiveEnergy, LiveHead, LiveOutcome, LiveStatus};
     #[pymodule_export]

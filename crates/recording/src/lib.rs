@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | IQ of one or more antennas | [SigMF](sigmf); one raw file per antenna | read, written; read |
 //! | angles of arrival | [CSV](read_angle_log); [verdicts](read_angles_mcap) | read, written |
-//! | ranges | [CSV](read_range_log) | read |
+//! | ranges | [CSV](read_range_log); [OpenAirInterface](read_prs_log) | read |
 //! | odometry, IMU | [CSV](read_odometry_csv); [MCAP, rosbag2](mcap) | read; odometry written |
 //! | trajectories | [TUM](write_tum) | read, written |
 //! | poses, verdicts, diagnoses | [MCAP](mcap) | written |
@@ -26,6 +26,7 @@ mod number;
 mod odometry;
 mod odometry_csv;
 mod odometry_file;
+mod prs_log;
 mod range_log;
 pub mod replay;
 mod road_file;
@@ -47,6 +48,7 @@ pub use mcap::{McapWriter, read_angles_mcap, read_odometry_mcap, write_drive_mca
 pub use odometry::{OdometryFields, OdometryIssue, OdometryLog, OdometryRemark};
 pub use odometry_csv::{read_odometry_csv, read_wheel_odometry_csv, write_odometry_csv};
 pub use odometry_file::{OdometryChoice, read_odometry};
+pub use prs_log::{is_prs_log, read_prs_log};
 pub use range_log::{LoggedRange, RangeLog, is_range_log, read_range_log};
 pub use sigmf::{
     Annotation, Capture, Datatype, Recording, RecordingWarning, RecordingWriter, Segment,

@@ -44,6 +44,7 @@ __all__ = [
     "locate",
     "log_angles",
     "nr",
+    "read_ranges",
     "read_tum",
     "simulate",
     "synthesize",
@@ -403,6 +404,9 @@ def log_angles(
     duration_s: float | None = None,
 ) -> int: ...
 def read_tum(file: str | PathLike[str]) -> dict[str, NDArray[np.float64]]: ...
+def read_ranges(
+    site: Site, file: str | PathLike[str]
+) -> tuple[dict[str, NDArray[Any]], bool, float | None, list[str]]: ...
 def estimate_angles(
     site: Site,
     vehicle: Vehicle,

@@ -112,12 +112,19 @@ def synth(
 def locate(
     recording: Annotated[
         Path,
-        typer.Option(help="SigMF recording of the array, angles (CSV, Parquet) or ranges (CSV)."),
-    ],
-    odometry: Annotated[
-        Path, typer.Option(help="Odometry: CSV, or MCAP or rosbag2 folder with nav_msgs/Odometry.")
+        typer.Option(
+            help="SigMF recording of the array, angles (CSV, Parquet) or ranges (CSV, or .log of "
+            "OpenAirInterface)."
+        ),
     ],
     site: Annotated[str, typer.Option(help="Site: shipped name, or path of a TOML file.")],
+    odometry: Annotated[
+        Path | None,
+        typer.Option(
+            help="Odometry: CSV, or MCAP or rosbag2 folder with nav_msgs/Odometry.",
+            show_default="stationary receiver; ranges only",
+        ),
+    ] = None,
     vehicle: Annotated[
         str, typer.Option(help="Vehicle: shipped name, or path of a TOML file.")
     ] = "default",
@@ -164,8 +171,11 @@ def locate(
     Angles, CSV or Parquet: time_s; pci; phase_rad (electrical) and phase_sigma_rad, or angle_rad
     (from the array axis) and angle_sigma_rad; optional ssb_index and snr_db.
 
-    Ranges, CSV: time_s; pci; range_m (two-way) or delay_ns (one-way); optional ssb_index, and
-    sigma_m or delay_sigma_ns, by default ranging.sigma_m of the vehicle. Ranges need a start pose.
+    Ranges, CSV: time_s; pci; range_m (two-way) or delay_ns (one-way) or delay_samples and
+    sample_rate_hz; optional ssb_index, and sigma_m or delay_sigma_ns, by default ranging.sigma_m of
+    the vehicle. Or the log (.log, .txt) of an OpenAirInterface UE with delays of PRS: the gNB is
+    the pci, the resource the ssb_index. Ranges need a start pose. Without --odometry, the receiver
+    is stationary: the command writes position.json and trajectory.tum, and needs no start.
 
     Truth, TUM: lines t x y z qx qy qz qw at most 1 s apart; # begins a comment. The truth must
     cover half of the drive. Its orientation is not used.
@@ -191,6 +201,13 @@ def locate(
     pose = None if start is None or start_unknown else _pose(start)
     plant, carrier = load_site_and_vehicle(site, vehicle, pose)
     others = {name: load_site_and_vehicle(site, name, pose) for name in compare or ()}
+    if odometry is None:
+        if smooth or vary or compare or start_unknown:
+            raise InputError(
+                "--odometry: missing; --smooth, --sweep, --against and --start unknown need a drive"
+            )
+        _locate_stationary(plant, carrier, recording, pose, truth, out, as_json=as_json)
+        return
     beliefs = variants((plant, carrier), vary, others, _changed)
     if len(beliefs) > 1 and truth is None:
         raise InputError("--sweep, --against: add --truth FILE, because the errors are compared")
@@ -260,6 +277,66 @@ def locate(
     if not drive.is_reliable:
         errors.print(_unreliable(drive), style="red", soft_wrap=True)
         raise typer.Exit(UNRELIABLE)
+
+
+def _locate_stationary(
+    site: Site,
+    vehicle: Vehicle,
+    recording: Path,
+    pose: tuple[float, float, float] | None,
+    truth: Path | None,
+    out: Path | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Locates a stationary receiver from ranges, and writes and prints its position."""
+    from access_av.drives.recorded import read_tum
+    from access_av.drives.stationary import locate_stationary
+    from access_av.tables.results_directory import ResultsDirectory, json_text
+
+    near_m = None if pose is None else pose[:2]
+    found = locate_stationary(site, vehicle, recording, near_m=near_m)
+    numbers: dict[str, Any] = {
+        "x_m": found.x_m,
+        "y_m": found.y_m,
+        "covariance_m2": found.covariance_m2.tolist(),
+        "std_m": found.std_m,
+        "ranges": found.ranges,
+        "radio_heads": found.radio_heads,
+        "alternatives_m": found.alternatives_m,
+        "remarks": found.remarks,
+    }
+    if truth is not None:
+        true = read_tum(truth)
+        error_m = (
+            found.x_m - float(true["x_m"].median()),  # type: ignore[arg-type]
+            found.y_m - float(true["y_m"].median()),  # type: ignore[arg-type]
+        )
+        numbers["error_m"] = math.hypot(*error_m)
+        numbers["nees_per_axis"] = found.nees_per_axis(error_m)
+    directory = ResultsDirectory.create("locate", out)
+    directory.write_json("position.json", numbers)
+    line = f"0 {found.x_m:.6f} {found.y_m:.6f} 0 0 0 0 1\n"
+    directory.write_text("trajectory.tum", line)
+    directory.write_text("site.toml", site.to_toml())
+    directory.write_text("vehicle.toml", vehicle.to_toml())
+    directory.write_manifest(
+        recording=str(recording), odometry=None, **numbers, warnings=site.warnings(vehicle)
+    )
+    directory.link_latest()
+    if as_json:
+        print(json_text({**numbers, "directory": str(directory.path)}))
+        return
+    for remark in found.remarks[:MOST_REMARKS]:
+        show_warning(remark)
+    console.print(
+        f"{found.ranges} ranges of {found.radio_heads} radio heads. "
+        f"Position: x {found.x_m:.2f} m, y {found.y_m:.2f} m, σ {found.std_m:.2f} m.",
+        soft_wrap=True,
+    )
+    if truth is not None:
+        console.print(f"Horizontal error: {numbers['error_m']:.3f} m.")
+    console.print(f"Files: {directory.path}", soft_wrap=True)
 
 
 def _changed(belief: tuple[Site, Vehicle], keys: dict[str, Any]) -> tuple[Site, Vehicle]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,7 +11,12 @@ from access_av.cli.options import AsJson, Out, Threads, load_site_and_vehicle
 from access_av.cli.terminal import console, progress, show_warning, table
 from access_av.errors import InputError
 
+if TYPE_CHECKING:
+    from access_av._core import Site, Vehicle
+
 app = typer.Typer()
+
+MOST_REMARKS = 10
 
 
 @app.command(
@@ -23,7 +28,8 @@ def survey(
     drives: Annotated[
         list[Path],
         typer.Argument(
-            help="Folders of drives: odometry.csv or odometry.mcap, angles.csv, vehicle.toml."
+            help="Folders of drives: odometry.csv or odometry.mcap, angles.csv, vehicle.toml; or "
+            "folders of ranges: ranges.csv, truth.tum."
         ),
     ],
     site: Annotated[str, typer.Option(help="Site: shipped name, or path of a TOML file.")],
@@ -54,21 +60,33 @@ def survey(
     out: Out = None,
     as_json: AsJson = False,
 ) -> None:
-    """Survey radio-head positions and array mounting from ordinary drives.
+    """Survey radio-head positions and array mounting, or range offsets, from drives.
 
     Estimates the positions, the mounting of the array and its phase per element jointly from the
     angles of all drives. The road and the start poses define the frame. Parameters that the drives
     do not determine are reported and stay unchanged. Writes site.toml and vehicle.toml with the
     estimates, their standard deviations, and the posterior probability of a displaced site plan,
     survey.parquet, covariance.json and manifest.json.
+
+    Range offsets: every folder contains ranges.csv (or ranges.log of an OpenAirInterface UE) and
+    truth.tum, the position of a stationary receiver (one line) or of a drive. Writes site.toml with
+    range_offset_m and range_offset_std_m of the radio heads, offsets.json and manifest.json. At
+    least two positions determine the standard deviation.
     """
     from access_av.drives import self_survey
+    from access_av.drives.range_survey import log_of
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
     for number, folder in enumerate(drives):
         if folder.resolve() in (earlier.resolve() for earlier in drives[:number]):
             raise InputError(f"{folder}: given twice; a drive counts once")
     plant, carrier = load_site_and_vehicle(site, vehicle)
+    with_ranges = [folder for folder in drives if log_of(folder) is not None]
+    if with_ranges:
+        if other := next((folder for folder in drives if folder not in with_ranges), None):
+            raise InputError(f"{other}: no range log; a survey is of ranges or of angles")
+        _survey_offsets(plant, carrier, drives, out, as_json=as_json)
+        return
     logged = [self_survey.read_drive(folder) for folder in drives]
     with progress("Replays") as tick:
         found = self_survey.survey(
@@ -133,3 +151,41 @@ def survey(
             soft_wrap=True,
         )
     console.print(f"{directory.path}/site.toml, vehicle.toml", soft_wrap=True)
+
+
+def _survey_offsets(
+    site: Site, vehicle: Vehicle, folders: list[Path], out: Path | None, *, as_json: bool
+) -> None:
+    """Estimates range offsets, writes the site, and prints the offsets."""
+    from access_av.drives.range_survey import survey_offsets
+    from access_av.tables.results_directory import ResultsDirectory, json_text
+
+    found = survey_offsets(site, vehicle, folders)
+    directory = ResultsDirectory.create("survey", out)
+    directory.write_text("site.toml", found.site.to_toml())
+    directory.write_json("offsets.json", found.offsets.to_dicts())
+    directory.write_manifest(
+        site=site.name, drives=[str(it) for it in folders], remarks=found.remarks
+    )
+    if as_json:
+        rows = found.offsets.to_dicts()
+        print(json_text({"offsets": rows, "directory": str(directory.path)}))
+        return
+    for remark in found.remarks[:MOST_REMARKS]:
+        show_warning(remark)
+    if len(found.remarks) > MOST_REMARKS:
+        show_warning(f"{len(found.remarks) - MOST_REMARKS} more in manifest.json")
+    made = table(
+        ["radio head", "positions", "ranges", "offset / m", "σ / m"], title="Ranges", text=1
+    )
+    for row in found.offsets.iter_rows(named=True):
+        offset_m, std_m = row["range_offset_m"], row["range_offset_std_m"]
+        made.add_row(
+            f"pci {row['pci']}, ssb_index {row['ssb_index']}",
+            f"{row['positions']}",
+            f"{row['ranges']}",
+            "–" if offset_m is None else f"{offset_m:+.2f}",
+            "unknown" if std_m is None else f"{std_m:.2f}",
+        )
+    console.print(made)
+    console.print(f"{directory.path}/site.toml", soft_wrap=True)

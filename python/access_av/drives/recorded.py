@@ -276,8 +276,9 @@ def locate(
         ``angle_rad`` (from the array axis) with ``angle_sigma_rad``; optionally ``ssb_index`` and
         ``snr_db``. The standard deviation covers the whole error: the site's ``rician_k_db`` adds
         nothing. Or a log of ranges, CSV, with the columns ``time_s``, ``pci`` and either
-        ``range_m`` or ``delay_ns``; optionally ``ssb_index`` and ``sigma_m`` or
-        ``delay_sigma_ns``. Ranges need a start pose.
+        ``range_m`` or ``delay_ns`` or ``delay_samples`` with ``sample_rate_hz``; optionally
+        ``ssb_index`` and ``sigma_m`` or ``delay_sigma_ns``. Or the log of an OpenAirInterface UE
+        with positioning reference signals, ``.log`` or ``.txt``. Ranges need a start pose.
     vehicle
         Vehicle, or the name or path of a vehicle file. Its wake-up policy is applied.
     topic

@@ -67,7 +67,7 @@ class Case:
         alarms = Alarms.of(self.trajectories, self.alert_limit_m)
         if found is None or alarms is None:
             raise InputError(f"{self.scenario.name}: no step has a protection level")
-        error_m = self.trajectories["error_x_m"].abs()
+        error_m = self.trajectories.select(horizontal_error_m()).to_series()
         risk = ObtainedRisk.of(self.trajectories, _settings(self.scenario)["error_correlation_s"])
         return {
             "variant": self.variant,
@@ -95,12 +95,12 @@ class Case:
     def errors(self, name: str) -> ErrorSamples:
         """Returns the errors of each run; infinite during the search for the first position."""
         by_run = [
-            part["error_x_m"].to_numpy()
+            part.select(horizontal_error_m()).to_series().to_numpy()
             for part in self.trajectories.partition_by("run", maintain_order=True)
         ]
         errors_m = np.full((len(by_run), max(map(len, by_run))), np.inf)
         for row, found_m in zip(errors_m, by_run, strict=True):
-            row[len(row) - len(found_m) :] = np.abs(found_m)
+            row[len(row) - len(found_m) :] = found_m
         duration_s = float(self.trajectories["time_s"].max())  # type: ignore[arg-type]
         return ErrorSamples(name=name, errors_m=errors_m, duration_s=duration_s)
 
@@ -257,7 +257,8 @@ def driven(scenario: str, first_run: int, runs: int, seed: int) -> dict[str, NDA
     return {
         "run": steps["run"].to_numpy().astype(np.int32),
         "time_s": steps["time_s"].to_numpy().astype(np.float32),
-        "error_m": steps.select(horizontal_error_m()).to_series().to_numpy().astype(np.float32),
+        "error_x_m": steps["error_x_m"].to_numpy().astype(np.float32),
+        "error_y_m": steps["error_y_m"].to_numpy().astype(np.float32),
         "level_m": steps["protection_level_m"].to_numpy().astype(np.float32),
         "state": state.to_numpy().astype(np.uint8),
     }
@@ -268,8 +269,8 @@ def _table(arrays: Mapping[str, NDArray[Any]]) -> pl.DataFrame:
         {
             "run": arrays["run"],
             "time_s": arrays["time_s"].astype(np.float64),
-            "error_x_m": arrays["error_m"].astype(np.float64),
-            "error_y_m": np.zeros(len(arrays["error_m"])),
+            "error_x_m": arrays["error_x_m"].astype(np.float64),
+            "error_y_m": arrays["error_y_m"].astype(np.float64),
             "protection_level_m": arrays["level_m"].astype(np.float64),
             "integrity": np.asarray(STATES)[arrays["state"]],
         }

@@ -14,6 +14,9 @@ use super::time_units::check_times;
 use crate::odometry::OdometryLog;
 use crate::range_log::RangeLog;
 
+/// Standard deviation of delays in samples, in samples: rounding (0.29) and equal receiver noise.
+const SAMPLE_SIGMA: f64 = 0.5;
+
 /// Minimum number of ranges of a radio head whose consistency is reported.
 const MIN_RANGES: usize = 20;
 
@@ -88,14 +91,18 @@ fn with_ranging(vehicle: &Vehicle, log: &RangeLog) -> Result<Vehicle, ReplayErro
         },
         ..RangingSettings::default()
     };
-    let ranging = *vehicle.ranging.get_or_insert(default);
+    let ranging = vehicle.ranging.get_or_insert(default);
+    if ranging.sigma_m.is_none() {
+        ranging.sigma_m = log.sample_m.map(|sample_m| SAMPLE_SIGMA * sample_m);
+    }
+    let ranging = *ranging;
     let file = vehicle.name.clone();
     let check = Check { file: &file };
     check.that(
         !(log.has_delays && ranging.kind == RangingKind::TwoWay),
         "ranging.kind",
         "two-way",
-        "the log has one-way delays (delay_ns), which contain clocks: write kind = \"one-way\"",
+        "the log has one-way delays, which contain clocks: write kind = \"one-way\"",
     )?;
     check.that(
         log.has_sigma || ranging.sigma_m.is_some(),
@@ -129,13 +136,16 @@ fn displaced(site: &Site, vehicle: &Vehicle, replay: &Replay<'_>) -> Vec<String>
             continue;
         };
         let [clock_m, _] = model.head_clock(&head.clock);
-        let stated_m = (model.offset_std_m)
-            .hypot(head.position_std_m)
-            .hypot(clock_m);
-        if offset.mean.abs() > CERTAIN_SIGMAS * (stated_m + offset.std) {
+        let stated_m = match head.range_offset.std_m {
+            Some(surveyed_m) => surveyed_m,
+            None => model.offset_std_m.hypot(clock_m),
+        };
+        let stated_m = stated_m.hypot(head.position_std_m);
+        let surveyed_m = head.range_offset.mean_m;
+        if (offset.mean - surveyed_m).abs() > CERTAIN_SIGMAS * (stated_m + offset.std) {
             texts.push(format!(
-                "the ranges of pci {} ssb_index {} have an offset of {:.2} ± {:.2} m, specified as 0 \
-                 ± {stated_m:.2} m; check position_m of the radio head, and ranging.offset_std_m \
+                "the ranges of pci {} ssb_index {} have an offset of {:.2} ± {:.2} m, specified as \
+                 {surveyed_m:.2} ± {stated_m:.2} m; check position_m of the radio head, and ranging.offset_std_m \
                  (and clock_offset_std_ns of the radio head)",
                 head.pci, head.ssb_index, offset.mean, offset.std
             ));

@@ -15,7 +15,7 @@
 
 mod archive;
 mod checksum;
-mod date;
+pub(crate) mod date;
 mod frequency;
 mod metadata;
 mod reader;

@@ -10,7 +10,9 @@ use onboard::localize::IntegrityState;
 use onboard::range::METRES_PER_NS;
 use onboard::settings::{Site, TomlFile, Vehicle};
 use recording::replay::{LocatedDrive, ReplayError, StartChoice, locate_ranges};
-use recording::{Files, OdometryLog, RangeLog, RecordingError, read_odometry_csv, read_range_log};
+use recording::{
+    Files, OdometryLog, RangeLog, RecordingError, read_odometry_csv, read_prs_log, read_range_log,
+};
 
 fn log_of(name: &str, text: &str) -> Result<RangeLog, RecordingError> {
     let file = common::scratch(name).join("ranges.csv");
@@ -252,6 +254,21 @@ impl Comparison {
     fn rms_m(&self) -> f64 {
         (self.error2 / self.count).sqrt()
     }
+
+    /// NEES per axis; the expected value is 1.
+    fn nees(&self) -> f64 {
+        0.5 * self.nees / self.count
+    }
+
+    fn print(&self, name: &str) {
+        println!(
+            "{name}: RMS {:.3} m, NEES/2 {:.2}, ok {:.3}, beyond {:.4}",
+            self.rms_m(),
+            self.nees(),
+            self.ok / self.count,
+            self.beyond / self.count,
+        );
+    }
 }
 
 #[test]
@@ -262,17 +279,10 @@ fn a_real_drive_is_located_from_ranges() {
     let plaza = Plaza::read(&folder, "plaza");
     let drive = plaza.locate(0.0);
     let it = plaza.compare(&drive, f64::NEG_INFINITY);
-    println!(
-        "RMS {:.3} m, NEES/2 {:.2}, ok {:.3}, beyond {:.4}, {} ranges",
-        it.rms_m(),
-        0.5 * it.nees / it.count,
-        it.ok / it.count,
-        it.beyond / it.count,
-        drive.ranges.len(),
-    );
+    it.print(&format!("{} ranges", drive.ranges.len()));
     // Required: 0.85 m; a hand-tuned filter without a scale error has 0.87 to 1.26 m.
     assert!(it.rms_m() < 0.5);
-    assert!((0.7..1.5).contains(&(0.5 * it.nees / it.count)));
+    assert!((0.7..1.5).contains(&it.nees()));
     assert!(it.ok > 0.8 * it.count && it.beyond < 1e-2 * it.count);
 }
 
@@ -287,15 +297,9 @@ fn wrong_noise_of_ranges_is_tolerated() {
         let sensors = DATA_SHEETS.replace("sigma_m = 1.0", &format!("sigma_m = {sigma_m}"));
         let drive = plaza.locate_with(0.0, &sensors);
         let it = plaza.compare(&drive, f64::NEG_INFINITY);
-        println!(
-            "sigma {sigma_m}: RMS {:.3} m, NEES/2 {:.2}, ok {:.3}, beyond {:.4}",
-            it.rms_m(),
-            0.5 * it.nees / it.count,
-            it.ok / it.count,
-            it.beyond / it.count,
-        );
+        it.print(&format!("sigma {sigma_m}"));
         assert!(it.rms_m() < 0.5);
-        assert!((0.3..1.5).contains(&(0.5 * it.nees / it.count)));
+        assert!((0.3..1.5).contains(&it.nees()));
         assert!(it.beyond < 1e-2 * it.count);
     }
 }
@@ -310,13 +314,8 @@ fn a_start_with_the_opposite_heading_is_found_again() {
     let half_s = 0.5 * plaza.truth.last().unwrap()[0];
     let late = plaza.compare(&drive, half_s);
     let all = plaza.compare(&drive, f64::NEG_INFINITY);
-    println!(
-        "second half: RMS {:.3} m, ok {:.3}; all: RMS {:.3}, beyond {:.4}",
-        late.rms_m(),
-        late.ok / late.count,
-        all.rms_m(),
-        all.beyond / all.count
-    );
+    late.print("second half");
+    all.print("all");
     assert!(late.rms_m() < 0.5, "{}", late.rms_m());
     assert!(all.beyond < 1e-2 * all.count);
 }
@@ -387,4 +386,49 @@ fn missing_common_time_is_an_error() {
         located.unwrap_err(),
         ReplayError::RangeClocks { .. }
     ));
+}
+
+#[test]
+fn delays_in_samples_are_read() {
+    let text = "time_s,pci,delay_samples,sample_rate_hz\n0,1,3,122.88e6\n1,1,-2,30.72e6\n2,1,1,0\n";
+    let log = log_of("samples", text).unwrap();
+    let sample_m = onboard::settings::SPEED_OF_LIGHT_MPS / 122.88e6;
+    let values: Vec<f64> = log.ranges.iter().map(|it| it.measured.value).collect();
+    assert!((values[0] - 3.0 * sample_m).abs() < 1e-9);
+    assert!((values[1] + 8.0 * sample_m).abs() < 1e-9);
+    assert!(log.has_delays && !log.has_sigma);
+    // The coarsest rate determines the noise.
+    assert!((log.sample_m.unwrap() - 4.0 * sample_m).abs() < 1e-9);
+    assert!(log.remarks[0].1.contains("line 4") && log.remarks[0].1.contains("sample_rate_hz"));
+    let without = log_of("samples-rate", "time_s,pci,delay_samples\n0,1,3\n").unwrap_err();
+    assert!(without.to_string().contains("sample_rate_hz"), "{without}");
+}
+
+#[test]
+fn delays_of_openairinterface_are_read() {
+    let file = common::scratch("prs").join("ue.log");
+    let line = |frame: u32, slot: u32, delay: f64, power: &str| {
+        format!(
+            "[PHY]   [gNB {}][rsc 0][Rx 0][sfn {frame}][slot {slot}] DL PRS ToA ==> {delay:.1} / 2048 \
+             samples, peak channel power {power} dBm, SNR +4.0 dB, rsrp -42.2 dBm\n",
+            slot - 2
+        )
+    };
+    let mut text = "[HW] started\n".to_owned();
+    text += &line(1023, 2, -3.0, "-16.4");
+    text += &line(1023, 3, 5.0, "-inf");
+    text += &line(1, 3, 5.0, "-17.0");
+    fs::write(&file, text).unwrap();
+    let log = read_prs_log(&file, 30.0).unwrap();
+    let sample_m = onboard::settings::SPEED_OF_LIGHT_MPS / (2048.0 * 30e3);
+    let [first, second] = log.ranges[..] else {
+        panic!("{log:?}")
+    };
+    assert_eq!((first.pci, second.pci), (0, 1));
+    assert!((first.measured.value + 3.0 * sample_m).abs() < 1e-9);
+    // Two frames and one slot of 0.5 ms later.
+    let step_s = second.measured.time_s - first.measured.time_s;
+    assert!((step_s - 0.0205).abs() < 1e-9, "{step_s}");
+    assert!(log.remarks[0].1.contains("line 3") && log.remarks[0].1.contains("power"));
+    assert!(log.has_delays && log.sample_m.is_some());
 }

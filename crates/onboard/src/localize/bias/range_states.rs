@@ -88,7 +88,11 @@ impl MultipathBias {
             self.add_to(state, state, offset_variance(head));
         }
         let each = heads.iter().copied();
-        let offset = |head: &RadioHead| model.head_clock(&head.clock)[0];
+        // A surveyed offset contains that of the clock.
+        let offset = |head: &RadioHead| match head.range_offset.std_m {
+            Some(_) => 0.0,
+            None => model.head_clock(&head.clock)[0],
+        };
         self.add_of_clocks(&each, offset, |one, other, covariance| {
             (FIRST_OFFSET + one, FIRST_OFFSET + other, covariance)
         });
