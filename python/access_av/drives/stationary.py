@@ -1,15 +1,15 @@
 """Position of a stationary receiver from a log of ranges.
 
-The medians of the ranges over the log are computed
-(:mod:`access_av.drives.range_survey`), which removes the receiver's clock from one-way delays.
-Weighted least squares then determine the position. The standard deviations of the range offsets are
-the errors of the medians.
+The medians of the ranges over the log are computed (:mod:`access_av.drives.range_survey`), which
+removes the receiver's clock from one-way delays. Weighted least squares with the weights of
+Student's t then determine the position. The standard deviations of the range offsets are the errors
+of the medians.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,6 +42,10 @@ ALTERNATIVE = 9.0
 APART_M, APART_SIGMAS = 0.5, 3.0
 # Squared error per degree of freedom that is reported as a contradiction.
 CONTRADICTION = 10.0
+# Degrees of freedom of Student's t as the distribution of the range offsets: a blocked first path
+# makes the ranges of single radio heads too long. An offset of 4 σ has a fifth of its weight.
+TAIL = 3.0
+REWEIGHTINGS = 10
 
 
 @dataclass(frozen=True)
@@ -176,6 +180,12 @@ class _Problem:
             rows = np.column_stack([rows, np.ones(len(rows))])
         return residual_m / self.std_m, rows / self.std_m[:, None]
 
+    def reweighted(self, place: Numbers) -> _Problem:
+        """Returns the problem with the weights of Student's t at a solution."""
+        residual, _ = self.linearized(place)
+        factor = np.sqrt(np.maximum(1.0, (TAIL + residual**2) / (TAIL + 1.0)))
+        return replace(self, std_m=self.std_m * factor)
+
     def solved(self, start: Numbers) -> tuple[float, Numbers]:
         """Returns squared error and solution from an initial position (Levenberg–Marquardt)."""
         place = start.astype(float)
@@ -240,6 +250,13 @@ def _best(
     place = distinct[0]
     residual, rows = problem.linearized(place)
     freedom = len(residual) - rows.shape[1]
+    robust = problem
+    for _ in range(REWEIGHTINGS if freedom > 0 else 0):
+        robust = problem.reweighted(place)
+        _, place = robust.solved(place[:2])
+    weighted, rows = robust.linearized(place)
+    # Offsets that scatter more than specified make the position uncertain.
+    scale = max(1.0, float(weighted @ weighted) / freedom) if freedom > 0 else 1.0
     if freedom > 0 and float(residual @ residual) > CONTRADICTION * freedom:
         remarks.append(
             "the ranges contradict each other: check position_m, range_offset_m and "
@@ -252,7 +269,7 @@ def _best(
     return StationaryPosition(
         x_m=float(place[0]),
         y_m=float(place[1]),
-        covariance_m2=np.asarray(np.linalg.inv(rows.T @ rows)[:2, :2], dtype=np.float64),
+        covariance_m2=np.asarray(scale * np.linalg.inv(rows.T @ rows)[:2, :2], dtype=np.float64),
         ranges=ranges,
         radio_heads=len(residual),
         alternatives_m=alternatives_m,
