@@ -320,9 +320,8 @@ fn a_start_with_the_opposite_heading_is_found_again() {
     assert!(all.beyond < 1e-2 * all.count);
 }
 
-/// Offsets declared as zero that are not: the drive is located, and the radio head is named.
-#[test]
-fn an_offset_beyond_its_specification_is_reported() {
+/// Locates a drive past three anchors, of which the second has a cable of 20 m and `settings`.
+fn drive_with_a_long_cable(name: &str, settings: &str) -> LocatedDrive {
     let heads = [[-20.0, 12.0], [20.0, -10.0], [60.0, 14.0]];
     let mut plant = "name = \"hall\"\n".to_owned();
     for (pci, [x_m, y_m]) in heads.iter().enumerate() {
@@ -331,6 +330,7 @@ fn an_offset_beyond_its_specification_is_reported() {
             "[[radio_heads]]\npci = {pci}\nposition_m = [{x_m:?}, {y_m:?}, 0.0]"
         )
         .unwrap();
+        plant += if pci == 1 { settings } else { "" };
     }
     let mut odometry = "time_s,distance_m,yaw_rate_radps\n".to_owned();
     let mut ranges = "time_s,pci,range_m\n".to_owned();
@@ -344,7 +344,7 @@ fn an_offset_beyond_its_specification_is_reported() {
         let range_m = (x_m - head_x_m).hypot(head_y_m) + cable_m;
         writeln!(ranges, "{time_s:.3},{pci},{range_m:.4}").unwrap();
     }
-    let file = common::scratch("offset").join("odometry.csv");
+    let file = common::scratch(name).join("odometry.csv");
     fs::write(&file, odometry).unwrap();
     let carrier = vehicle(&format!(
         "{VEHICLE}[odometer]\nscale_std = 0.02\nnoise_m_per_sqrt_m = 0.05\n\
@@ -355,18 +355,32 @@ fn an_offset_beyond_its_specification_is_reported() {
         &carrier,
         StartChoice::AsSet,
         &read_odometry_csv(&file).unwrap(),
-        &log_of("offset-log", &ranges).unwrap(),
+        &log_of(&format!("{name}-log"), &ranges).unwrap(),
     )
     .unwrap();
     let last = located.poses.last().unwrap().estimate.pose;
     assert!(last.x_m > 44.0 && last.x_m < 45.7, "{last:?}");
-    let texts: Vec<&str> = (located.diagnoses.iter().map(|it| it.text.as_str())).collect();
-    assert!(
-        texts
-            .iter()
-            .any(|it| it.contains("pci 1 ") && it.contains("offset")),
-        "{texts:?}"
-    );
+    located
+}
+
+fn reports_offset(located: &LocatedDrive) -> bool {
+    let mut texts = located.diagnoses.iter().map(|it| it.text.as_str());
+    texts.any(|it| it.contains("pci 1 ") && it.contains("offset"))
+}
+
+/// Offsets declared as zero that are not: the drive is located, and the radio head is named.
+#[test]
+fn an_offset_beyond_its_specification_is_reported() {
+    assert!(reports_offset(&drive_with_a_long_cable("offset", "")));
+}
+
+#[test]
+fn a_surveyed_offset_is_subtracted() {
+    let surveyed = "range_offset_m = 20.0\nrange_offset_std_m = 0.1\n";
+    let located = drive_with_a_long_cable("surveyed", surveyed);
+    assert!(!reports_offset(&located), "{:?}", located.diagnoses);
+    let accepted = located.ranges.iter().filter(|it| it.verdict.accepted);
+    assert_eq!(accepted.count(), located.ranges.len());
 }
 
 #[test]
