@@ -1,5 +1,7 @@
 //! Campaigns of simulated runs and their statistics.
 
+use std::sync::{Mutex, PoisonError};
+
 use onboard::Custom;
 use onboard::energy::{Energy, EnergyModel, EstimateCost};
 use onboard::geometry::wrap_angle;
@@ -161,16 +163,17 @@ impl Simulation {
     /// caller stopped the campaign.
     pub fn campaign(&self, options: &CampaignOptions<'_>) -> Result<Campaign, SimulationError> {
         let (seed, first, custom) = (options.seed, options.first_run, options.custom);
-        let drive = |number| self.run(seed, first + number as u64, custom);
+        let drive = |number, used| self.run_in(used, seed, first + number as u64, custom);
         self.campaign_of(options, options.runs, drive)
     }
 
-    /// Accumulates a campaign of `count` records, which `drive` computes by index.
+    /// Accumulates a campaign of `count` records, which `drive` computes by index in the memory of a
+    /// record that is not used any more.
     pub(crate) fn campaign_of(
         &self,
         options: &CampaignOptions<'_>,
         count: usize,
-        drive: impl Fn(usize) -> Result<RunRecord, SimulationError> + Sync,
+        drive: impl Fn(usize, RunRecord) -> Result<RunRecord, SimulationError> + Sync,
     ) -> Result<Campaign, SimulationError> {
         let pool = thread_pool(options.threads)?;
         let wave = 8 * pool.current_num_threads();
@@ -189,6 +192,14 @@ impl Simulation {
         let (mut errors_m, mut levels_m) = (Vec::new(), Vec::new());
         let integrity_settings = self.scenario().vehicle.integrity_monitor();
         let alert_limit_m = integrity_settings.map_or(f64::INFINITY, |it| it.alert_limit_m);
+        // The system clears new memory, which takes as long as a run from a trace.
+        let spare = Mutex::new(Vec::new());
+        let spares = || spare.lock().unwrap_or_else(PoisonError::into_inner);
+        let drive = |number| {
+            // Release the lock before the run.
+            let used = spares().pop();
+            drive(number, used.unwrap_or_default())
+        };
         while runs.len() < count {
             let first = runs.len();
             let finished: Vec<_> = pool.install(|| {
@@ -207,6 +218,8 @@ impl Simulation {
                 }
                 if options.keep_records {
                     records.push(record);
+                } else {
+                    spares().push(record);
                 }
             }
             if !(options.progress)(runs.len()) {

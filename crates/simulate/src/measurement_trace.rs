@@ -105,10 +105,10 @@ impl MeasurementTraces {
     ) -> Result<Campaign, SimulationError> {
         let wanted = simulation.scenario().vehicle.estimator.method;
         let method = self.methods.iter().position(|&method| method == wanted);
-        simulation.campaign_of(options, self.runs.len(), |number| {
+        simulation.campaign_of(options, self.runs.len(), |number, used| {
             let trace = self.runs.get(number).zip(method);
             let (trace, method) = trace.ok_or(SimulationError::NotTraced)?;
-            trace.drive(simulation, method)
+            trace.drive(simulation, method, used)
         })
     }
 }
@@ -198,13 +198,19 @@ impl MeasurementTrace {
         Ok(trace)
     }
 
-    fn drive(&self, simulation: &Simulation, method: usize) -> Result<RunRecord, SimulationError> {
+    /// Processes the run in the memory of a record that is not used any more.
+    fn drive(
+        &self,
+        simulation: &Simulation,
+        method: usize,
+        used: RunRecord,
+    ) -> Result<RunRecord, SimulationError> {
         let scenario = simulation.scenario();
         let (site, vehicle) = (&scenario.site, &scenario.vehicle);
         let platform = simulation.platform();
         let custom = Custom::default();
         let mut onboard = Pipeline::new(site, vehicle, platform, self.given_start, custom)?;
-        let mut record = RunRecord::new(self.run, self.bursts.len());
+        let mut record = used.restarted(self.run, self.bursts.len());
         let mut silence = SsbObservation::new(vehicle.array.elements.into());
         let mut odometry = self.odometry.iter().peekable();
         let angles = self.angles.get(method).map_or(&[][..], Vec::as_slice);

@@ -73,7 +73,7 @@ impl Step {
 }
 
 /// Record of one run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct RunRecord {
     /// Number of the run.
     pub run: u64,
@@ -105,17 +105,17 @@ pub struct Found {
 }
 
 impl RunRecord {
-    /// Creates an empty record.
-    pub(crate) fn new(run: u64, steps: usize) -> Self {
+    /// Returns an empty record of run `run` in the memory of this record.
+    pub(crate) fn restarted(mut self, run: u64, steps: usize) -> Self {
+        self.steps.clear();
+        self.steps.reserve(steps);
+        self.aoa_estimates.clear();
+        self.aoa_estimates.reserve(steps);
         Self {
             run,
-            steps: Vec::with_capacity(steps),
-            aoa_estimates: Vec::with_capacity(steps),
-            bursts_received: 0,
-            ranges: 0,
-            accepted_ranges: 0,
-            constants: None,
-            out_of_reach: 0,
+            steps: self.steps,
+            aoa_estimates: self.aoa_estimates,
+            ..Self::default()
         }
     }
 

@@ -98,8 +98,19 @@ impl Simulation {
         run: u64,
         custom: &MakeCustom<'_>,
     ) -> Result<RunRecord, SimulationError> {
+        self.run_in(RunRecord::default(), seed, run, custom)
+    }
+
+    /// Simulates one run in the memory of a record that is not used any more.
+    pub(crate) fn run_in(
+        &self,
+        used: RunRecord,
+        seed: u64,
+        run: u64,
+        custom: &MakeCustom<'_>,
+    ) -> Result<RunRecord, SimulationError> {
         let mut drive = Drive::new(self, Streams::new(seed, run), custom)?;
-        let mut record = RunRecord::new(run, self.steps);
+        let mut record = used.restarted(run, self.steps);
         for number in 0..self.steps {
             let time_s = self.time_s(number);
             let truth = drive.path.at(time_s);

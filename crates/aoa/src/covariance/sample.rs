@@ -37,11 +37,27 @@ impl<const N: usize> Covariance<N> {
     /// # Errors
     /// [`Error::NoSnapshots`], [`Error::NotFinite`], [`Error::Zero`].
     pub fn from_snapshots(snapshots: &[[Complex64; N]]) -> Result<Self, Error> {
-        let mut covariance = Self::new();
+        let mut sum = zeros::<N>();
         for snapshot in snapshots {
-            covariance.accumulate(snapshot, 1.0);
+            for i in 0..N {
+                for j in 0..=i {
+                    let product = snapshot[i] * snapshot[j].conj();
+                    sum[i][j].re += product.re;
+                    sum[i][j].im += product.im;
+                }
+            }
         }
-        covariance.validated()
+        for i in 0..N {
+            for j in 0..i {
+                sum[j][i] = sum[i][j].conj();
+            }
+        }
+        Self {
+            sum,
+            weight: snapshots.len() as f64,
+            snapshots: snapshots.len(),
+        }
+        .validated()
     }
 
     /// Computes the sample covariance of channels: `channels[n]` contains the samples of antenna

@@ -48,6 +48,27 @@ fn fixed(method: &str, interval_ms: f64) -> Vec<(&'static str, Value)> {
 }
 
 #[test]
+fn statistics_do_not_depend_on_kept_records() {
+    // More runs than are computed together, so that runs reuse the memory of earlier ones.
+    let runs = 20;
+    let simulation = simulation(&[("motion.start_at_m", 280.0.into())]);
+    let [kept, dropped] = [true, false].map(|keep_records| {
+        let options = CampaignOptions {
+            seed: 7,
+            runs,
+            threads: Some(1),
+            keep_records,
+            errors_every: Some(3),
+            ..CampaignOptions::default()
+        };
+        simulation.campaign(&options).unwrap()
+    });
+    assert_eq!(kept.records.len(), runs);
+    let records = Vec::new();
+    assert_eq!(Campaign { records, ..kept }, dropped);
+}
+
+#[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let simulation = simulation(&[
         ("vehicle.lane_keeping.rms_m", 0.1.into()),

@@ -139,10 +139,7 @@ mod tests {
             let part = Npy::new(&whole[..length]);
             let complete = length >= whole.len() - 12;
             assert_eq!(part.is_ok(), complete, "{length}");
-            assert!(
-                part.map_or(true, |it| it.elements::<4>().is_err()),
-                "{length}"
-            );
+            assert!(!part.is_ok_and(|it| it.elements::<4>().is_ok()), "{length}");
         }
         for (old, new) in [
             ("descr", "type"),
