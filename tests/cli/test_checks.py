@@ -417,7 +417,7 @@ def test_a_run_prints_warnings_first(
     tmp_path: Path, access_av: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Checks the terminal output, the manifest and the report."""
-    monkeypatch.setattr("access_av.report.page.bundle", lambda: "")
+    monkeypatch.setattr("access_av.report.page.chart_code", lambda: "")
     deep = PLANT.replace("25.0, 8.0]", "25.0, -8.0]").replace("324.0", "4.0")
     (tmp_path / "deep.toml").write_text(deep.replace("250.0 }", "30.0 }"))
     (tmp_path / "cart.toml").write_text(VEHICLE)

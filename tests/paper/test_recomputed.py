@@ -591,7 +591,7 @@ def test_the_page_shows_the_tables(tables: Tables) -> None:
 
 def test_claim_groups_follow_from_the_verdicts(tables: Tables) -> None:
     for cells, name in zip(
-        rows_of(tables.page, "Accuracy half"), tables.manifest["interpretations"], strict=True
+        rows_of(tables.page, "Accuracy claims"), tables.manifest["interpretations"], strict=True
     ):
         met = {
             it["id"]
@@ -600,7 +600,7 @@ def test_claim_groups_follow_from_the_verdicts(tables: Tables) -> None:
         }
         accuracy = met >= {"a1_adaptive_worst_m", "a2_adaptive_beats_fixed"}
         energy = met >= {"e3_mode67_saving_percent", "e4_average_saving_percent"}
-        assert [cells[1] == "holds", cells[2] == "holds"] == [accuracy, energy]
+        assert [cells[1] == "hold", cells[2] == "hold"] == [accuracy, energy]
         adaptive = tables.runs.filter(interpretation=name, campaign="R")
         assert cells[3].endswith(f"{adaptive['longest_gap_s'].max():.2f} s")
 

@@ -330,6 +330,12 @@ def test_reliability_is_counted_from_the_drives(
         levels = pl.read_parquet(results / "errors.parquet").filter(variant=variant)
         ok_share = 1.0 - levels["protection_level_m"].null_count() / levels.height
         assert ok_share == pytest.approx(figures["ok_share"], abs=0.02)
+    points = pl.read_parquet(results / "points.parquet")
+    chosen = points.row(by_predicate=pl.col("recommended"), named=True)
+    sums = drives.filter(variant=chosen["variant"]).select(pl.sum(*steps)).row(0, named=True)
+    of_chosen = sums["ok_steps"] / sum(sums.values())
+    assert f"State ok: {of_chosen:.1%} of the time" in page
+    assert f"with the operation of the vehicle file {said['nominal']['ok_share']:.1%};" in page
     assert said["alert_limit_m"] == pytest.approx(0.4)
     assert "alert limit 0.4 m (twice the target’s 0.2 m)" in page
 

@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
-from access_av.cli.options import AsJson
+from access_av.cli import options as opt
 from access_av.cli.terminal import console, table
 from access_av.economics.carbon import Range
+from access_av.report.study_parts import low_to_high
 
 app = typer.Typer()
 
@@ -24,17 +26,15 @@ UNITS = {
 }
 
 
-@app.command(
-    rich_help_panel="Integrity and cost",
-    epilog="Example: [bold]access-av design balance --example > mine.toml; "
-    "access-av design balance mine.toml[/]",
+@opt.command(
+    app,
+    "Integrity and cost",
+    "design balance --example > mine.toml; access-av design balance mine.toml",
 )
 def balance(
-    figures: Annotated[
-        Path | None, typer.Argument(help="TOML file.", show_default="the example")
-    ] = None,
-    example: Annotated[bool, typer.Option("--example", help="Print the example file.")] = False,
-    as_json: AsJson = False,
+    figures: Annotated[Path | None, Argument(help="TOML file.", show_default="the example")] = None,
+    example: Annotated[bool, Option("--example", help="Print the example file.")] = False,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Compute cost, energy and carbon of a fleet's localization, before and after a change.
 
@@ -69,6 +69,5 @@ def balance(
 
 
 def _shown(values: Range) -> str:
-    """Returns the three values as text, or one value if all are equal."""
-    ends = dict.fromkeys((values.low, values.central, values.high))
-    return " … ".join(f"{end:,.0f}" if abs(end) >= 1000.0 else f"{end:.3g}" for end in ends)
+    ends = (values.low, values.central, values.high)
+    return low_to_high(f"{end:,.0f}" if abs(end) >= 1000.0 else f"{end:.3g}" for end in ends)

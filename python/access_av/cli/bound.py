@@ -5,33 +5,30 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
+from typer import Option
 
-from access_av.cli.options import AllowLarge, AsJson, Out, ScenarioArgument, load_scenario
-from access_av.cli.terminal import console, progress, show_bound, show_kinds
+from access_av.cli import options as opt
+from access_av.cli.terminal import console, progress, say, show_bound, show_kinds
 
 app = typer.Typer()
 
 
-@app.command(
-    rich_help_panel="Radio heads",
-    epilog="Example: [bold]access-av design bound yard --map-step-m 10 --out results/yard-bound[/]",
-)
+@opt.command(app, "Radio heads", "design bound yard --map-step-m 10 --out results/yard-bound")
 def bound(
-    scenario: ScenarioArgument,
-    out: Out = None,
-    allow_large: AllowLarge = False,
+    scenario: opt.ScenarioArgument,
+    out: opt.Out = None,
+    allow_large: opt.AllowLarge = False,
     map_step_m: Annotated[
-        float | None,
-        typer.Option(help="Side length of the map's squares.", show_default="by the size"),
+        float | None, Option(help="Side length of the map's squares.", show_default="by the size")
     ] = None,
     kinds: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--kinds",
             help="Also list the bound with delays, carrier phases and power, for several clocks.",
         ),
     ] = False,
-    as_json: AsJson = False,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Compute the smallest possible localization error of a site.
 
@@ -49,7 +46,7 @@ def bound(
     from access_av.run.error_bound import bound as error_bound
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
-    chosen = load_scenario(scenario, allow_large=allow_large)
+    chosen = opt.load_scenario(scenario, allow_large=allow_large)
     directory = ResultsDirectory.create(f"bound-{chosen.name}", out)
     with progress("Bounding"):
         found = error_bound(chosen, map_step_m=map_step_m)
@@ -76,5 +73,5 @@ def bound(
         show_kinds(by_kind)
     if missed is not None:
         console.print(missed.in_words())
-        console.print(f"Further radio heads: access-av design plan {scenario}", soft_wrap=True)
-    console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
+        say(f"Further radio heads: access-av design plan {scenario}")
+    say(f"Report: {directory.path / 'report.html'}")

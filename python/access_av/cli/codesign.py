@@ -6,25 +6,21 @@ from dataclasses import asdict
 from typing import Annotated
 
 import typer
+from typer import Option
 
-from access_av.cli.options import AsJson, Runs, Seed, Threads
+from access_av.cli import options as opt
 from access_av.cli.terminal import console, progress, table
 
 app = typer.Typer()
 
 
-@app.command(
-    rich_help_panel="Energy",
-    epilog="Example: [bold]access-av paper codesign --runs 20[/]",
-)
+@opt.command(app, "Energy", "paper codesign --runs 20")
 def codesign(
-    interpretation: Annotated[
-        str, typer.Option(help="Name of an interpretation of the paper.")
-    ] = "gate",
-    runs: Runs = 100,
-    seed: Seed = 1,
-    threads: Threads = None,
-    as_json: AsJson = False,
+    interpretation: Annotated[str, Option(help="Name of an interpretation of the paper.")] = "gate",
+    runs: opt.Runs = 100,
+    seed: opt.Seed = 1,
+    threads: opt.Threads = None,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Compare tracker, policy and engine with the paper's adaptive point in each power mode.
 

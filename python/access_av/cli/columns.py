@@ -6,25 +6,23 @@ import json
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
-from access_av.cli.options import AsJson
+from access_av.cli import options as opt
 from access_av.cli.terminal import show_columns
 
 app = typer.Typer()
 
 
-@app.command(
-    rich_help_panel="Results",
-    epilog="Example: [bold]access-av file columns trajectories[/]",
-)
+@opt.command(app, "Results", "file columns trajectories")
 def columns(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="TABLE", help="Table or file.", show_default="all"),
+        Argument(metavar="TABLE", help="Table or file.", show_default="all"),
     ] = None,
-    as_json_: AsJson = False,
+    as_json_: opt.AsJson = False,
     as_markdown: Annotated[
-        bool, typer.Option("--markdown", help="Print all tables as Markdown (docs/columns.md).")
+        bool, Option("--markdown", help="Print all tables as Markdown (docs/columns.md).")
     ] = False,
 ) -> None:
     """Print name, unit and meaning of each column, and the condition of a null value."""

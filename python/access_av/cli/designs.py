@@ -6,23 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Argument, Option
 
-from access_av.cli.options import (
-    MISSED,
-    AsJson,
-    ExecutorOption,
-    MaxError,
-    MaxRms,
-    Out,
-    PercentileOption,
-    Runs,
-    ScenarioArgument,
-    Seed,
-    Threads,
-    announce,
-    load_scenario,
-)
-from access_av.cli.terminal import console, progress, table, width
+from access_av.cli import options as opt
+from access_av.cli.terminal import console, progress, say, show_rows
 from access_av.tables.numbers import value_text
 
 if TYPE_CHECKING:
@@ -41,23 +28,17 @@ SHOWN = 20
 LEAST_COLUMNS = 5
 
 
-def _bound(text: str) -> Any:
-    return typer.Option(min=0.0, help=text)
-
-
-@app.command(
-    "sweep",
-    rich_help_panel="Operating points",
-    epilog="Example: [bold]access-av design sweep paper --space space.toml --halving[/]",
+@opt.command(
+    app, "Operating points", "design sweep paper --space space.toml --halving", name="sweep"
 )
 def designs(
-    scenario: ScenarioArgument,
+    scenario: opt.ScenarioArgument,
     space: Annotated[
-        Path, typer.Option(help="TOML file with the varied keys of the scenario and their values.")
+        Path, Option(help="TOML file with the varied keys of the scenario and their values.")
     ],
     sobol: Annotated[
         int | None,
-        typer.Option(
+        Option(
             min=1,
             max=100_000,
             help="Number of designs of a Sobol sequence.",
@@ -65,17 +46,17 @@ def designs(
         ),
     ] = None,
     halving: Annotated[
-        bool, typer.Option("--halving", help="Drop inferior designs early (successive halving).")
+        bool, Option("--halving", help="Drop inferior designs early (successive halving).")
     ] = False,
     optuna: Annotated[
-        int | None, typer.Option(min=1, max=100_000, help="Number of designs suggested by Optuna.")
+        int | None, Option(min=1, max=100_000, help="Number of designs suggested by Optuna.")
     ] = None,
-    runs: Runs = 20,
-    seed: Seed = 1,
-    executor: ExecutorOption = None,
-    threads: Threads = None,
-    out: Out = None,
-    as_json: AsJson = False,
+    runs: opt.Runs = 20,
+    seed: opt.Seed = 1,
+    executor: opt.ExecutorOption = None,
+    threads: opt.Threads = None,
+    out: opt.Out = None,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Simulate all designs of a space, and find the Pareto front of energy and error.
 
@@ -93,7 +74,7 @@ def designs(
     from access_av.run.campaign import campaign
     from access_av.tables.results_directory import RESULTS, ResultsDirectory, json_text
 
-    chosen = load_scenario(scenario)
+    chosen = opt.load_scenario(scenario)
     read = Space.read(space)
     if optuna is not None and (sobol is not None or halving):
         raise InputError("--optuna selects the designs itself: omit --sobol and --halving")
@@ -105,7 +86,7 @@ def designs(
         for worlds in every[:MOST_CHECKED]:
             new = [it for it in worlds[0].scenario.warnings() if str(it) not in said]
             said |= {str(it) for it in new}
-            announce(f"{space}: {worlds[0].label}", new)
+            opt.announce(f"{space}: {worlds[0].label}", new)
     with progress("Driving") as tick, campaign(RESULTS / "parts", executor, threads) as kept:
         found = (
             search(kept, every, runs=runs, seed=seed, halving=halving, progress=tick)
@@ -150,29 +131,26 @@ def designs(
             f"Results are those of the worst of {len(read.worlds)} environments: "
             f"{', '.join(read.worlds)}. worlds.parquet contains all of them."
         )
-    console.print(f"{found.drives} runs. Report: {directory.path / 'report.html'}", soft_wrap=True)
-    console.print(
-        f"Next: access-av design select {directory.path} --max-error-m 0.3 --percentile 99",
-        soft_wrap=True,
-    )
+    say(f"{found.drives} runs. Report: {directory.path / 'report.html'}")
+    say(f"Next: access-av design select {directory.path} --max-error-m 0.3 --percentile 99")
 
 
-@app.command(
-    "select",
-    rich_help_panel="Operating points",
-    epilog="Example: [bold]access-av design select results/mine --max-energy-j 1 "
-    "--max-error-m 0.3[/]",
+@opt.command(
+    app,
+    "Operating points",
+    "design select results/mine --max-energy-j 1 --max-error-m 0.3",
+    name="select",
 )
 def choose(
-    results: Annotated[Path, typer.Argument(help="Results folder of access-av design sweep.")],
-    max_error_m: MaxError = None,
-    percentile: PercentileOption = None,
-    max_rms_m: MaxRms = None,
+    results: Annotated[Path, Argument(help="Results folder of access-av design sweep.")],
+    max_error_m: opt.MaxError = None,
+    percentile: opt.PercentileOption = None,
+    max_rms_m: opt.MaxRms = None,
     max_worst_m: Annotated[
-        float | None, _bound("Maximum error of a run, in 90 % of the runs, in m.")
+        float | None, opt.limit("Maximum error of a run, in 90 % of the runs, in m.")
     ] = None,
-    max_energy_j: Annotated[float | None, _bound("Maximum mean energy of a trip, in J.")] = None,
-    as_json: AsJson = False,
+    max_energy_j: Annotated[float | None, opt.limit("Maximum mean energy of a trip, in J.")] = None,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Choose the design with the least energy that meets all limits.
 
@@ -204,14 +182,14 @@ def choose(
     elif advice:
         console.print("No design meets all limits. Limits that a design would meet:")
         for line in advice:
-            console.print(f"  {line}", soft_wrap=True)
+            say(f"  {line}")
     else:
         title = f"{kept.height} of {rows.height} designs meet the limits, the least energy first"
         _show(kept, title, limits.percent)
         for line in limits.in_words(kept.row(0, named=True)):
-            console.print(f"First design: {line}.", soft_wrap=True)
+            say(f"First design: {line}.")
     if advice:
-        raise typer.Exit(MISSED)
+        raise typer.Exit(opt.MISSED)
 
 
 def _show(rows: pl.DataFrame, title: str, percent: float = 99.0) -> None:
@@ -231,14 +209,7 @@ def _show(rows: pl.DataFrame, title: str, percent: float = 99.0) -> None:
         ("angle estimates", lambda row: _known(row["aoa_estimates"])),
         ("received", lambda row: _known(row["bursts_received"])),
     ]
-    while True:
-        made = table([head for head, _ in columns], title=title)
-        for row in rows.head(SHOWN).iter_rows(named=True):
-            made.add_row(*(cell(row) for _, cell in columns))
-        if width(made) <= console.width or len(columns) <= LEAST_COLUMNS:
-            break
-        columns.pop()
-    console.print(made)
+    show_rows(columns, rows.head(SHOWN).iter_rows(named=True), title=title, least=LEAST_COLUMNS)
     if rows.height > SHOWN:
         console.print(f"{rows.height - SHOWN} more in {TABLE}.")
     if rows["energy_j"].null_count() == rows.height and rows.height:

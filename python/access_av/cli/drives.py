@@ -7,22 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Option
 
-from access_av.cli.options import (
-    AllowLarge,
-    AsJson,
-    Compare,
-    Out,
-    Overrides,
-    Percents,
-    ScenarioArgument,
-    Vary,
-    load_scenario,
-    load_site_and_vehicle,
-    overridden,
-)
+from access_av.cli import options as opt
 from access_av.cli.side_by_side import PERCENTS, records, show_compared, variants, write_compared
-from access_av.cli.terminal import console, errors, progress, show_warning
+from access_av.cli.terminal import console, errors, progress, say, show_warning
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
@@ -40,33 +29,26 @@ MOST_REMARKS = 10
 UNRELIABLE = 3
 
 
-@app.command(
-    rich_help_panel="Drives",
-    epilog="Example: [bold]access-av record synth paper-real-odometry-2 --out drive "
-    "--duration-s 20[/]",
-)
+@opt.command(app, "Drives", "record synth paper-real-odometry-2 --out drive --duration-s 20")
 def synth(
-    scenario: ScenarioArgument,
-    out: Annotated[Path, typer.Option(help="Output folder.")],
+    scenario: opt.ScenarioArgument,
+    out: Annotated[Path, Option(help="Output folder.")],
     duration_s: Annotated[
         float | None,
-        typer.Option(min=0.02, help="Duration from the start of the drive.", show_default="all"),
+        Option(min=0.02, help="Duration from the start of the drive.", show_default="all"),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")] = 1,
-    run: Annotated[int, typer.Option(min=0, help="Number of the recorded run, from 0.")] = 0,
+    seed: Annotated[int, Option(min=0, help="Seed of the random numbers.")] = 1,
+    run: Annotated[int, Option(min=0, help="Number of the recorded run, from 0.")] = 0,
     continuous: Annotated[
         bool,
-        typer.Option(
-            "--continuous", help="Also write the samples between the bursts (large files)."
-        ),
+        Option("--continuous", help="Also write the samples between the bursts (large files)."),
     ] = False,
-    datatype: Annotated[str, typer.Option(help="Sample format: ci16_le or cf32_le.")] = "ci16_le",
+    datatype: Annotated[str, Option(help="Sample format: ci16_le or cf32_le.")] = "ci16_le",
     angles: Annotated[
-        bool,
-        typer.Option("--angles", help="Write angles.csv instead of samples (small file)."),
+        bool, Option("--angles", help="Write angles.csv instead of samples (small file).")
     ] = False,
-    allow_large: AllowLarge = False,
-    overrides: Overrides = None,
+    allow_large: opt.AllowLarge = False,
+    overrides: opt.Overrides = None,
 ) -> None:
     """Synthesize a recorded drive: antenna samples, odometry, site, vehicle, truth.
 
@@ -77,13 +59,13 @@ def synth(
     from access_av.drives import recorded as drives
     from access_av.tables.results_directory import ResultsDirectory
 
-    given = overridden(overrides)
-    chosen = load_scenario(scenario, allow_large=allow_large, overrides=given)
+    given = opt.overridden(overrides)
+    chosen = opt.load_scenario(scenario, allow_large=allow_large, overrides=given)
     directory = ResultsDirectory.create("synth", out)
     if angles:
         count = drives.log_angles(chosen, directory.path, seed=seed, run=run, duration_s=duration_s)
         directory.write_manifest(scenario=chosen.name, seed=seed, run=run)
-        console.print(f"{count} angles: {directory.path / 'angles.csv'}", soft_wrap=True)
+        say(f"{count} angles: {directory.path / 'angles.csv'}")
         return
     with progress("Recording") as tick:
         made = drives.synthesize(
@@ -97,62 +79,53 @@ def synth(
             progress=lambda share: tick(round(100 * share), 100),
         )
     directory.write_manifest(scenario=chosen.name, seed=seed, run=run)
-    console.print(
-        f"{made.bursts} bursts, {made.samples} samples per antenna: {made.recording}",
-        soft_wrap=True,
-    )
+    say(f"{made.bursts} bursts, {made.samples} samples per antenna: {made.recording}")
 
 
-@app.command(
-    rich_help_panel="Drives",
-    epilog="Example: [bold]access-av record locate --recording drive/iq.sigmf-meta "
-    "--odometry drive/odometry.csv --site drive/site.toml --vehicle drive/vehicle.toml "
-    "--truth drive/truth.tum[/]",
+@opt.command(
+    app,
+    "Drives",
+    "record locate --recording drive/iq.sigmf-meta --odometry drive/odometry.csv "
+    "--site drive/site.toml --vehicle drive/vehicle.toml --truth drive/truth.tum",
 )
 def locate(
     recording: Annotated[
         Path,
-        typer.Option(
+        Option(
             help="SigMF recording of the array, angles (CSV, Parquet) or ranges (CSV, or .log of "
             "OpenAirInterface)."
         ),
     ],
-    site: Annotated[str, typer.Option(help="Site: shipped name, or path of a TOML file.")],
+    site: opt.SiteOption,
     odometry: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="Odometry: CSV, or MCAP or rosbag2 folder with nav_msgs/Odometry.",
             show_default="stationary receiver; ranges only",
         ),
     ] = None,
-    vehicle: Annotated[
-        str, typer.Option(help="Vehicle: shipped name, or path of a TOML file.")
-    ] = "default",
-    out: Out = None,
-    truth: Annotated[Path | None, typer.Option(help="True trajectory as a TUM file.")] = None,
-    topic: Annotated[str | None, typer.Option(help="Odometry topic of the bag.")] = None,
+    vehicle: opt.VehicleOption = "default",
+    out: opt.Out = None,
+    truth: Annotated[Path | None, Option(help="True trajectory as a TUM file.")] = None,
+    topic: Annotated[str | None, Option(help="Odometry topic of the bag.")] = None,
     imu_topic: Annotated[
         str | None,
-        typer.Option(help="IMU topic for the yaw rate.", show_default="yaw rate of the odometry"),
+        Option(help="IMU topic for the yaw rate.", show_default="yaw rate of the odometry"),
     ] = None,
-    start_time_s: Annotated[
-        float, typer.Option(help="Time of the first sample by the odometry's clock, in s.")
-    ] = 0.0,
+    start_time_s: opt.StartTime = 0.0,
     start: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="X,Y,HEADING",
             help="Start pose in m, m, rad, or the word unknown.",
             show_default="of the vehicle file",
         ),
     ] = None,
-    smooth: Annotated[
-        bool, typer.Option("--smooth", help="Also write the smoothed trajectory.")
-    ] = False,
-    vary: Vary = None,
-    compare: Compare = None,
-    percentile: Percents = None,
-    as_json: AsJson = False,
+    smooth: Annotated[bool, Option("--smooth", help="Also write the smoothed trajectory.")] = False,
+    vary: opt.Vary = None,
+    compare: opt.Compare = None,
+    percentile: opt.Percents = None,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Locate a recorded drive.
 
@@ -199,8 +172,8 @@ def locate(
 
     start_unknown = start is not None and start.strip() == "unknown"
     pose = None if start is None or start_unknown else _pose(start)
-    plant, carrier = load_site_and_vehicle(site, vehicle, pose)
-    others = {name: load_site_and_vehicle(site, name, pose) for name in compare or ()}
+    plant, carrier = opt.load_site_and_vehicle(site, vehicle, pose)
+    others = {name: opt.load_site_and_vehicle(site, name, pose) for name in compare or ()}
     if odometry is None:
         if smooth or vary or compare or start_unknown:
             raise InputError(
@@ -273,7 +246,7 @@ def locate(
         show_compared(beside)
         if (operation := Operation.under(carrier, drive.poses)) is not None:
             console.print(f"{operation.in_words()} {operation.what_helps()}".strip())
-        console.print(f"Files: {directory.path}", soft_wrap=True)
+        say(f"Files: {directory.path}")
     if not drive.is_reliable:
         errors.print(_unreliable(drive), style="red", soft_wrap=True)
         raise typer.Exit(UNRELIABLE)
@@ -329,14 +302,13 @@ def _locate_stationary(
         return
     for remark in found.remarks[:MOST_REMARKS]:
         show_warning(remark)
-    console.print(
+    say(
         f"{found.ranges} ranges of {found.radio_heads} radio heads. "
-        f"Position: x {found.x_m:.2f} m, y {found.y_m:.2f} m, σ {found.std_m:.2f} m.",
-        soft_wrap=True,
+        f"Position: x {found.x_m:.2f} m, y {found.y_m:.2f} m, σ {found.std_m:.2f} m."
     )
     if truth is not None:
         console.print(f"Horizontal error: {numbers['error_m']:.3f} m.")
-    console.print(f"Files: {directory.path}", soft_wrap=True)
+    say(f"Files: {directory.path}")
 
 
 def _changed(belief: tuple[Site, Vehicle], keys: dict[str, Any]) -> tuple[Site, Vehicle]:

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer import Argument, Option
 
 from access_av._core import Plant, Platform, Scenario, SettingsError, Site, Vehicle
-from access_av.cli.options import AllowLarge, announce, read_scenario
-from access_av.cli.terminal import console, show_error
+from access_av.cli import options as opt
+from access_av.cli.terminal import say, show_error
 from access_av.errors import InputError
 from access_av.tables import toml
 
@@ -38,11 +39,11 @@ CLASSES: dict[Kind, Any] = {
 # Keys that only files of access-av-node have at the top.
 NODE_KEYS = {"samples", "messages", "inputs", "output", "page"}
 
-KindArgument = Annotated[Kind, typer.Argument(help="Kind of file.")]
+KindArgument = Annotated[Kind, Argument(help="Kind of file.")]
 KindOption = Annotated[
-    Kind | None, typer.Option(help="Kind of file.", show_default="recognized from the keys")
+    Kind | None, Option(help="Kind of file.", show_default="recognized from the keys")
 ]
-Names = Annotated[list[str], typer.Argument(help="Files: shipped names, or paths.")]
+Names = Annotated[list[str], Argument(help="Files: shipped names, or paths.")]
 PANEL = "Settings files"
 
 
@@ -86,33 +87,27 @@ def _kinds_of_file(path: Path) -> list[Kind]:
     return [kind for kind, score in scores.items() if score == best]
 
 
-@app.command("list", rich_help_panel=PANEL, epilog="Example: [bold]access-av file list site[/]")
+@opt.command(app, PANEL, "file list site", name="list")
 def list_names(
-    kind: Annotated[
-        Kind | None, typer.Argument(help="Kind of file.", show_default="all kinds")
-    ] = None,
+    kind: Annotated[Kind | None, Argument(help="Kind of file.", show_default="all kinds")] = None,
 ) -> None:
     """List the names of the shipped files."""
     for each in Kind if kind is None else [kind]:
         names = CLASSES[each].names()
         text = "\n".join(names) if kind else f"{each.value}: {', '.join(names)}"
-        console.print(text, soft_wrap=True)
+        say(text)
 
 
-@app.command(
-    rich_help_panel=PANEL,
-    epilog="Example: [bold]access-av file show --kind site yard > mine.toml[/]",
-)
+@opt.command(app, PANEL, "file show --kind site yard > mine.toml")
 def show(
-    name: Annotated[str, typer.Argument(help="File: shipped name, or path.")],
-    kind: KindOption = None,
+    name: Annotated[str, Argument(help="File: shipped name, or path.")], kind: KindOption = None
 ) -> None:
     """Print a settings file with all default values."""
     print(CLASSES[kind or kind_of(name)].load(name).to_toml(), end="")
 
 
-@app.command(rich_help_panel=PANEL, epilog="Example: [bold]access-av file check mine.toml[/]")
-def check(names: Names, kind: KindOption = None, allow_large: AllowLarge = False) -> None:
+@opt.command(app, PANEL, "file check mine.toml")
+def check(names: Names, kind: KindOption = None, allow_large: opt.AllowLarge = False) -> None:
     """Check settings files: exit code 2 for invalid ones, warnings for implausible values."""
     wrong = 0
     for name in names:
@@ -129,7 +124,7 @@ def _check(name: str, kind: Kind, allow_large: bool) -> None:
     """Prints the result of the check of one file."""
     size = ""
     if kind is Kind.SCENARIO:
-        read = read_scenario(name, allow_large=allow_large)
+        read = opt.read_scenario(name, allow_large=allow_large)
         run = read.size
         size = (
             f"; a run of {run['duration_s']:.0f} s, {run['ssbs']:.0f} SSBs, "
@@ -139,14 +134,11 @@ def _check(name: str, kind: Kind, allow_large: bool) -> None:
         read = CLASSES[kind].load(name)
     warnings = read.warnings()
     count = f", {len(warnings)} warning{'s' * (len(warnings) > 1)}" if warnings else ""
-    console.print(f"{name}: valid{count}{size}", soft_wrap=True)
-    announce(name, warnings)
+    say(f"{name}: valid{count}{size}")
+    opt.announce(name, warnings)
 
 
-@app.command(
-    rich_help_panel=PANEL,
-    epilog="Example: [bold]access-av file schema site > site.schema.json[/]",
-)
+@opt.command(app, PANEL, "file schema site > site.schema.json")
 def schema(kind: KindArgument) -> None:
     """Print the JSON Schema of one kind of settings file, for editors."""
     print(CLASSES[kind].schema_json())

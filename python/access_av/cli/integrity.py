@@ -8,23 +8,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Option
 
-from access_av.cli.options import (
-    AsJson,
-    Compare,
-    ExecutorOption,
-    Out,
-    Percents,
-    Runs,
-    ScenarioArgument,
-    Seed,
-    Threads,
-    Vary,
-    load_scenario,
-)
+from access_av.cli import options as opt
 from access_av.cli.side_by_side import PERCENTS, of_scenario, show_compared, write_compared
 from access_av.cli.side_by_side import records as as_records
-from access_av.cli.terminal import console, progress, table, width
+from access_av.cli.terminal import progress, say, show_rows
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
@@ -54,26 +43,27 @@ def _scales(text: str) -> list[float]:
     return scales
 
 
-@app.command(
-    rich_help_panel="Integrity and cost",
-    epilog="Example: [bold]access-av design integrity yard --channel 'as set' --channel inf-sh "
-    "--num-heads 2 --num-heads 4 --out results/yard-integrity[/]",
+@opt.command(
+    app,
+    "Integrity and cost",
+    "design integrity yard --channel 'as set' --channel inf-sh "
+    "--num-heads 2 --num-heads 4 --out results/yard-integrity",
 )
 def integrity(
-    scenario: ScenarioArgument,
-    runs: Runs = 20,
-    seed: Seed = 1,
-    threads: Threads = None,
+    scenario: opt.ScenarioArgument,
+    runs: opt.Runs = 20,
+    seed: opt.Seed = 1,
+    threads: opt.Threads = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             help="Fault: difference between truth and nominal model; repeatable.",
             show_default="all",
         ),
     ] = None,
     fault_scale: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="N,N,…",
             help="Also simulate the site's fault hypotheses at these multiples of their "
             "standard deviations, for example 1,3,10.",
@@ -81,26 +71,22 @@ def integrity(
     ] = None,
     channel: Annotated[
         list[str] | None,
-        typer.Option(
-            help="True channel: 'as set', K=5 (Rician K of 5 dB), umi, inf-sl, …; repeatable."
-        ),
+        Option(help="True channel: 'as set', K=5 (Rician K of 5 dB), umi, inf-sl, …; repeatable."),
     ] = None,
     heads: Annotated[
         list[int] | None,
-        typer.Option("--num-heads", min=1, help="Number of received radio heads; repeatable."),
+        Option("--num-heads", min=1, help="Number of received radio heads; repeatable."),
     ] = None,
     risk: Annotated[
         list[float] | None,
-        typer.Option(
-            help="Target integrity risk per hour; repeatable.", show_default="the vehicle's"
-        ),
+        Option(help="Target integrity risk per hour; repeatable.", show_default="the vehicle's"),
     ] = None,
-    vary: Vary = None,
-    compare: Compare = None,
-    percentile: Percents = None,
-    executor: ExecutorOption = None,
-    out: Out = None,
-    as_json: AsJson = False,
+    vary: opt.Vary = None,
+    compare: opt.Compare = None,
+    percentile: opt.Percents = None,
+    executor: opt.ExecutorOption = None,
+    out: opt.Out = None,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Inject faults and wrong settings, and evaluate the protection level.
 
@@ -124,8 +110,8 @@ def integrity(
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
     scales = [] if fault_scale is None else _scales(fault_scale)
-    chosen = load_scenario(scenario)
-    others = {name: load_scenario(name) for name in compare or ()}
+    chosen = opt.load_scenario(scenario)
+    others = {name: opt.load_scenario(name) for name in compare or ()}
     variants = of_scenario(chosen, vary, others)
     directory = ResultsDirectory.create("integrity", out)
     if scales:
@@ -166,7 +152,7 @@ def integrity(
         return
     _show(records)
     show_compared(beside)
-    console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
+    say(f"Report: {directory.path / 'report.html'}")
 
 
 def _beside(cases: Sequence[Case], percents: list[float]) -> list[Compared]:
@@ -227,12 +213,5 @@ def _show(records: Sequence[dict[str, Any]]) -> None:
         *((name, cell) for name, cell in _SETTINGS if len({cell(one) for one in records}) > 1),
         *_FOUND,
     ]
-    console.print(", ".join([f"{records[0]['runs']} runs each", *common]), soft_wrap=True)
-    while True:
-        made = table([name for name, _ in columns])
-        for one in records:
-            made.add_row(*(cell(one) for _, cell in columns))
-        if width(made) <= console.width or len(columns) == 2:
-            break
-        columns.pop()
-    console.print(made)
+    say(", ".join([f"{records[0]['runs']} runs each", *common]))
+    show_rows(columns, records, least=2)

@@ -8,40 +8,39 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Argument, Option
 
+from access_av.cli import options as opt
 from access_av.cli.files import CLASSES, PANEL, Kind, kind_of
-from access_av.cli.terminal import console
+from access_av.cli.terminal import say
 from access_av.errors import InputError
 from access_av.site_files.drawn import Drawn
 
 if TYPE_CHECKING:
     from access_av.site_files.picture import Placed
 
-Target = Annotated[Path, typer.Argument(help="File to write, for example mine.toml.")]
-Force = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
+Target = Annotated[Path, Argument(help="File to write, for example mine.toml.")]
+Force = Annotated[bool, Option("--force", help="Overwrite an existing file.")]
 Road = Annotated[
     Path | None,
-    typer.Option(
-        help="Road: CSV (x_m, y_m), GeoJSON (LineString) or DXF (joining curves of a layer)."
-    ),
+    Option(help="Road: CSV (x_m, y_m), GeoJSON (LineString) or DXF (joining curves of a layer)."),
 ]
 Heads = Annotated[
     Path | None,
-    typer.Option(
+    Option(
         "--heads-file",
         help="Radio heads: CSV (x_m, y_m, z_m, name, pci), GeoJSON or DXF (points, blocks).",
     ),
 ]
 Walls = Annotated[
-    Path | None,
-    typer.Option(help="Walls: GeoJSON (LineStrings, Polygons) or DXF (curves and faces)."),
+    Path | None, Option(help="Walls: GeoJSON (LineStrings, Polygons) or DXF (curves and faces).")
 ]
 Picture = Annotated[
-    Path | None, typer.Option("--underlay", help="PNG or JPEG as background of the site's maps.")
+    Path | None, Option("--underlay", help="PNG or JPEG as background of the site's maps.")
 ]
 PicturePoints = Annotated[
     str | None,
-    typer.Option(
+    Option(
         "--underlay-points",
         metavar="X1,Y1,X2,Y2",
         help="Two pixels X1,Y1,X2,Y2 of the background, counted from its upper left corner.",
@@ -49,17 +48,17 @@ PicturePoints = Annotated[
 ]
 PictureLength = Annotated[
     float | None,
-    typer.Option("--underlay-length-m", min=0.0, help="Distance between the two pixels, in m."),
+    Option("--underlay-length-m", min=0.0, help="Distance between the two pixels, in m."),
 ]
 PictureScale = Annotated[
     float | None,
-    typer.Option(
+    Option(
         "--underlay-metres-per-pixel", min=0.0, help="Scale of the background, in metres per pixel."
     ),
 ]
 PictureZero = Annotated[
     str | None,
-    typer.Option(
+    Option(
         "--underlay-zero",
         metavar="X,Y",
         help="Pixel X,Y of the map origin.",
@@ -68,27 +67,27 @@ PictureZero = Annotated[
 ]
 OriginText = Annotated[
     str | None,
-    typer.Option(
+    Option(
         "--origin",
         metavar="LAT,LON",
         help="Map origin of a GeoJSON file: latitude,longitude in degrees.",
         show_default="first point",
     ),
 ]
-RoadLayer = Annotated[str, typer.Option(help="DXF layer of the road.")]
-HeadsLayer = Annotated[str, typer.Option(help="DXF layer of the radio heads.")]
-WallsLayer = Annotated[str, typer.Option(help="DXF layer of the walls.")]
+RoadLayer = Annotated[str, Option(help="DXF layer of the road.")]
+HeadsLayer = Annotated[str, Option(help="DXF layer of the radio heads.")]
+WallsLayer = Annotated[str, Option(help="DXF layer of the walls.")]
 TwoPoints = Annotated[
     str | None,
-    typer.Option(
+    Option(
         metavar="X1,Y1,X2,Y2", help="Two points X1,Y1,X2,Y2 of a DXF drawing, --length-m apart."
     ),
 ]
 Length = Annotated[
-    float | None, typer.Option("--length-m", min=0.0, help="Distance between --two-points, in m.")
+    float | None, Option("--length-m", min=0.0, help="Distance between --two-points, in m.")
 ]
 MetresPerUnit = Annotated[
-    float | None, typer.Option(min=0.0, help="Unit of a DXF drawing, for example 0.001 for mm.")
+    float | None, Option(min=0.0, help="Unit of a DXF drawing, for example 0.001 for mm.")
 ]
 
 app = typer.Typer()
@@ -173,11 +172,7 @@ def _placed(
 
 
 def _write(
-    kind: str,
-    file: Path,
-    force: bool,
-    drawn: Drawn | None = None,
-    placed: Placed | None = None,
+    kind: str, file: Path, force: bool, drawn: Drawn | None = None, placed: Placed | None = None
 ) -> None:
     from access_av._core import SettingsWarning
     from access_av.cli.options import announce
@@ -203,11 +198,7 @@ def _write(
         _report(drawn)
     if to_fill:
         after = f"fill in {', '.join(to_fill)} (examples are in its comments), then "
-    console.print(
-        f"Written: {file}. Next: {after if to_fill else ''}{_next(kind, file)}",
-        soft_wrap=True,
-        markup=False,
-    )
+    say(f"Written: {file}. Next: {after if to_fill else ''}{_next(kind, file)}")
     announce(str(file), warnings)
 
 
@@ -228,11 +219,11 @@ def _report(drawn: Drawn) -> None:
     if drawn.walls_m:
         walls += f" of {walls_m:.2f} m in total"
     heads = _count(len(drawn.heads), "radio head")
-    console.print(f"Imported: {road}; {heads}; {walls}.", soft_wrap=True)
+    say(f"Imported: {road}; {heads}; {walls}.")
     for what, count in drawn.skipped.items():
-        console.print(f"Not imported: {plain(what)}: {count}", soft_wrap=True)
+        say(f"Not imported: {plain(what)}: {count}")
     if not drawn.skipped:
-        console.print("Not imported: nothing.", soft_wrap=True)
+        say("Not imported: nothing.")
     for note in drawn.notes:
         show_warning(note)
 
@@ -250,13 +241,10 @@ def _next(kind: str, file: Path) -> str:
     return commands.get(kind, f"access-av file check {file}")
 
 
-@app.command(
-    rich_help_panel=PANEL,
-    epilog="Example: [bold]access-av file new plant mine.toml --road road.geojson[/]",
-)
+@opt.command(app, PANEL, "file new plant mine.toml --road road.geojson")
 def new(
     context: typer.Context,
-    kind: Annotated[New, typer.Argument(help="Kind of file.")],
+    kind: Annotated[New, Argument(help="Kind of file.")],
     file: Target,
     force: Force = False,
     road: Road = None,
@@ -297,12 +285,7 @@ def new(
     )
     drawn = read(road, heads, options, walls) if road or heads or walls else None
     placed = _placed(
-        file,
-        underlay,
-        underlay_points,
-        underlay_length_m,
-        underlay_metres_per_pixel,
-        underlay_zero,
+        file, underlay, underlay_points, underlay_length_m, underlay_metres_per_pixel, underlay_zero
     )
     _write(kind.value, file, force, drawn, placed)
 
@@ -319,17 +302,13 @@ def _without_site(context: typer.Context, kind: New) -> None:
         )
 
 
-@app.command(
-    rich_help_panel=PANEL, epilog="Example: [bold]access-av file export yard yard.geojson[/]"
-)
+@opt.command(app, PANEL, "file export yard yard.geojson")
 def export(
-    site: Annotated[
-        str, typer.Argument(help="Site or plant: shipped name, or path of a TOML file.")
-    ],
-    file: Annotated[Path, typer.Argument(help="File to write: .geojson or .csv.")],
+    site: Annotated[str, Argument(help="Site or plant: shipped name, or path of a TOML file.")],
+    file: Annotated[Path, Argument(help="File to write: .geojson or .csv.")],
     origin: OriginText = None,
     decimal_comma: Annotated[
-        bool, typer.Option("--decimal-comma", help="Write CSV with semicolons and decimal commas.")
+        bool, Option("--decimal-comma", help="Write CSV with semicolons and decimal commas.")
     ] = False,
 ) -> None:
     """Export a site's road, radio heads and walls.
@@ -348,11 +327,11 @@ def export(
     drawn = of_site(of)
     if file.suffix.lower() in (".geojson", ".json"):
         write_whole(file, geojson.text(drawn, _origin(origin)))
-        console.print(f"Written: {file}", soft_wrap=True)
+        say(f"Written: {file}")
     elif file.suffix.lower() == ".csv":
         beside = file.with_name(f"{file.stem}-heads.csv")
         write_whole(file, csv_file.road_text(drawn.road_m, decimal_comma=decimal_comma))
         write_whole(beside, csv_file.heads_text(drawn.heads, decimal_comma=decimal_comma))
-        console.print(f"Written: {file}, {beside}", soft_wrap=True)
+        say(f"Written: {file}, {beside}")
     else:
         raise InputError(f"{file}: its name must end in .geojson, .json or .csv")

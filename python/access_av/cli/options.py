@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
+from typer import Argument, Option
 
 from access_av._core import Scenario, Site, Vehicle
 from access_av.cli.terminal import show_warning
@@ -14,30 +16,29 @@ from access_av.errors import InputError
 from access_av.tables.toml import tomllib
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from access_av._core import SettingsWarning
 
-ScenarioArgument = Annotated[
-    str, typer.Argument(help="Scenario: shipped name, or path of a TOML file.")
+ScenarioArgument = Annotated[str, Argument(help="Scenario: shipped name, or path of a TOML file.")]
+PlatformOption = Annotated[str, Option(help="Platform: shipped name, or path of a TOML file.")]
+SiteOption = Annotated[str, Option("--site", help="Site: shipped name, or path of a TOML file.")]
+VehicleOption = Annotated[
+    str, Option("--vehicle", help="Vehicle: shipped name, or path of a TOML file.")
 ]
-PlatformOption = Annotated[
-    str, typer.Option(help="Platform: shipped name, or path of a TOML file.")
-]
-Runs = Annotated[int, typer.Option(min=1, max=1_000_000, help="Simulated runs per configuration.")]
-Seed = Annotated[int, typer.Option(min=0, max=2**64 - 1, help="Seed of the random numbers.")]
+StartTime = Annotated[float, Option(help="Time of the first sample by the odometry's clock, in s.")]
+Runs = Annotated[int, Option(min=1, max=1_000_000, help="Simulated runs per configuration.")]
+Seed = Annotated[int, Option(min=0, max=2**64 - 1, help="Seed of the random numbers.")]
 Threads = Annotated[
-    int | None, typer.Option(min=1, max=1024, help="Worker threads.", show_default="all cores")
+    int | None, Option(min=1, max=1024, help="Worker threads.", show_default="all cores")
 ]
-Out = Annotated[
-    Path | None, typer.Option(help="Output folder.", show_default="a new one in results/")
-]
+Out = Annotated[Path | None, Option(help="Output folder.", show_default="a new one in results/")]
 AllowLarge = Annotated[
-    bool, typer.Option("--allow-large", help="Permit simulations that need hours or gigabytes.")
+    bool, Option("--allow-large", help="Permit simulations that need hours or gigabytes.")
 ]
 Overrides = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         "--set",
         metavar="KEY=VALUE",
         help="Value for one key of the file, as KEY=VALUE; repeatable.",
@@ -45,38 +46,47 @@ Overrides = Annotated[
 ]
 ExecutorOption = Annotated[
     str | None,
-    typer.Option(
+    Option(
         metavar="FILE.py:NAME",
         help="Function that returns a concurrent.futures.Executor, for example of a cluster.",
         show_default="threads",
     ),
 ]
-MaxRms = Annotated[
-    float | None, typer.Option(min=0.0, help="Maximum RMS error over all runs, in m.")
-]
+
+
+def _finite(value: float | None) -> float | None:
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter(f"{value} is not a finite number")
+    return value
+
+
+def limit(text: str) -> Any:
+    """Returns the option of a limit: a finite number of at least 0."""
+    return Option(min=0.0, callback=_finite, help=text)
+
+
+MaxRms = Annotated[float | None, limit("Maximum RMS error over all runs, in m.")]
 MaxError = Annotated[
-    float | None,
-    typer.Option(min=0.0, help="Maximum of the error percentile (see --percentile), in m."),
+    float | None, limit("Maximum of the error percentile (see --percentile), in m.")
 ]
 PercentileOption = Annotated[
     float | None,
-    typer.Option(
+    Option(
         help="Error percentile limited by --max-error-m: 50, 90, 95, 99 or 99.9.", show_default="99"
     ),
 ]
 Vary = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         "--sweep", metavar="KEY=a,b,c", help="Compare values of a key, as KEY=a,b,c; repeatable."
     ),
 ]
 Compare = Annotated[
-    list[str] | None,
-    typer.Option("--against", help="File to compare with the baseline; repeatable."),
+    list[str] | None, Option("--against", help="File to compare with the baseline; repeatable.")
 ]
 Percents = Annotated[
     list[float] | None,
-    typer.Option(
+    Option(
         "--percentile",
         min=1.0,
         max=100.0,
@@ -84,7 +94,19 @@ Percents = Annotated[
         show_default="50, 90, 99",
     ),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+AsJson = Annotated[bool, Option("--json", help="Print JSON.")]
+
+F = TypeVar("F", bound="Callable[..., Any]")
+
+
+def command(
+    app: typer.Typer, panel: str, *examples: str, name: str | None = None
+) -> Callable[[F], F]:
+    """Returns the decorator of a command, with its help panel and its examples."""
+    shown = ", ".join(f"[bold]access-av {it}[/]" for it in examples)
+    plural = "s" * (len(examples) > 1)
+    return app.command(name, rich_help_panel=panel, epilog=f"Example{plural}: {shown}")
+
 
 # Exit code if no result meets the requirement.
 MISSED = 3

@@ -2,63 +2,45 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer import Argument, Option
 
-from access_av.cli.options import (
-    MISSED,
-    AsJson,
-    ExecutorOption,
-    MaxError,
-    Out,
-    PercentileOption,
-    PlatformOption,
-    Runs,
-    Seed,
-    Threads,
-)
-from access_av.cli.terminal import console, progress, show_points, table
+from access_av.cli import options as opt
+from access_av.cli.terminal import console, progress, say, show_points, table
 
 app = typer.Typer()
 
 InterpretationOption = Annotated[
-    str, typer.Option(help="Interpretation: name, or path of a scenario file.")
+    str, Option(help="Interpretation: name, or path of a scenario file.")
 ]
 
 
-@app.command(
-    rich_help_panel="Claims",
-    epilog="Example: [bold]access-av paper evaluate --runs 20 --out results/quick[/]",
-)
+@opt.command(app, "Claims", "paper evaluate --runs 20 --out results/quick")
 def evaluate(
     interpretation: Annotated[
         list[str] | None,
-        typer.Option(help="Interpretation: name, or path of a scenario file; repeatable."),
+        Option(help="Interpretation: name, or path of a scenario file; repeatable."),
     ] = None,
     scenario: Annotated[
-        str | None, typer.Option(help="Scenario of the paper's trip, in place of interpretations.")
+        str | None, Option(help="Scenario of the paper's trip, in place of interpretations.")
     ] = None,
-    platform: PlatformOption = "jetson-agx-xavier",
-    runs: Runs = 100,
-    seed: Seed = 1,
+    platform: opt.PlatformOption = "jetson-agx-xavier",
+    runs: opt.Runs = 100,
+    seed: opt.Seed = 1,
     seeds: Annotated[
-        int, typer.Option(min=1, help="Number of seeds for the claims, starting at --seed.")
+        int, Option(min=1, help="Number of seeds for the claims, starting at --seed.")
     ] = 1,
     sensitivity: Annotated[
         bool,
-        typer.Option(
-            "--sensitivity", help="Also analyse the sensitivity of the claims (takes minutes)."
-        ),
+        Option("--sensitivity", help="Also analyse the sensitivity of the claims (takes minutes)."),
     ] = False,
-    claims: Annotated[
-        Path | None, typer.Option(help="Claims file, in the format of paper.toml.")
-    ] = None,
-    threads: Threads = None,
-    executor: ExecutorOption = None,
-    out: Out = None,
+    claims: Annotated[Path | None, Option(help="Claims file, in the format of paper.toml.")] = None,
+    threads: opt.Threads = None,
+    executor: opt.ExecutorOption = None,
+    out: opt.Out = None,
 ) -> None:
     """Evaluate the paper's claims under its interpretations, and write the report.
 
@@ -87,10 +69,9 @@ def evaluate(
             progress=tick,
         )
     show_study(made)
-    console.print(
+    say(
         f"{runs} runs per setting in {made.duration_s:.1f} s. "
-        f"Report: {directory.path / 'report.html'}",
-        soft_wrap=True,
+        f"Report: {directory.path / 'report.html'}"
     )
 
 
@@ -112,14 +93,9 @@ def _claims(path: Path) -> dict[str, Any]:
     return dict(found)
 
 
-@app.command(
-    rich_help_panel="Claims",
-    epilog="Example: [bold]access-av paper interpretations gate-t-max[/]",
-)
+@opt.command(app, "Claims", "paper interpretations gate-t-max")
 def interpretations(
-    name: Annotated[
-        str | None, typer.Argument(help="Interpretation to print as a scenario.")
-    ] = None,
+    name: Annotated[str | None, Argument(help="Interpretation to print as a scenario.")] = None,
 ) -> None:
     """List the interpretations of the paper, or print one with all default values."""
     from access_av.paper import interpretations as known
@@ -133,17 +109,13 @@ def interpretations(
     console.print(made)
 
 
-@app.command(
-    "assumptions",
-    rich_help_panel="Claims",
-    epilog="Example: [bold]access-av paper assumptions --runs 100[/]",
-)
+@opt.command(app, "Claims", "paper assumptions --runs 100", name="assumptions")
 def chosen(
-    platform: PlatformOption = "jetson-agx-xavier",
-    runs: Runs = 30,
-    seed: Seed = 1,
-    threads: Threads = None,
-    as_json: AsJson = False,
+    platform: opt.PlatformOption = "jetson-agx-xavier",
+    runs: opt.Runs = 30,
+    seed: opt.Seed = 1,
+    threads: opt.Threads = None,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Print the open choices of the paper: chosen value, reason, and effect of alternatives.
 
@@ -167,32 +139,28 @@ def chosen(
     show_chosen(found, runs)
     for each in found:
         if each.is_shipped:
-            console.print(f"{each.what}: {each.why}", markup=False)
+            console.print(f"{each.what}: {each.why}")
 
 
-@app.command(
-    "search-controllers",
-    rich_help_panel="Claims",
-    epilog="Example: [bold]access-av paper search-controllers --worlds 64 --controllers 32[/]",
+@opt.command(
+    app,
+    "Claims",
+    "paper search-controllers --worlds 64 --controllers 32",
+    name="search-controllers",
 )
 def search(
-    platform: PlatformOption = "jetson-agx-xavier",
-    worlds: Annotated[int, typer.Option(min=1, help="Number of environments.")] = 64,
-    controllers: Annotated[
-        int, typer.Option(min=1, help="Number of controllers per environment.")
-    ] = 32,
-    runs: Runs = 20,
+    platform: opt.PlatformOption = "jetson-agx-xavier",
+    worlds: Annotated[int, Option(min=1, help="Number of environments.")] = 64,
+    controllers: Annotated[int, Option(min=1, help="Number of controllers per environment.")] = 32,
+    runs: opt.Runs = 20,
     confirm: Annotated[
-        int,
-        typer.Option(
-            min=0, help="Runs per setting for the best interpretation and its neighbours."
-        ),
+        int, Option(min=0, help="Runs per setting for the best interpretation and its neighbours.")
     ] = 200,
-    seed: Seed = 1,
-    threads: Threads = None,
-    executor: ExecutorOption = None,
+    seed: opt.Seed = 1,
+    threads: opt.Threads = None,
+    executor: opt.ExecutorOption = None,
     out: Annotated[
-        Path | None, typer.Option(help="Scenario file to write for the best interpretation.")
+        Path | None, Option(help="Scenario file to write for the best interpretation.")
     ] = None,
 ) -> None:
     """Search for the interpretation of Algorithm 1 without a gate that meets most claims.
@@ -211,59 +179,36 @@ def search(
     parts = RESULTS / "parts"
     with progress("Worlds") as tick, campaign(parts, executor, threads) as kept:
         found = sample(
-            kept,
-            board,
-            worlds=worlds,
-            controllers=controllers,
-            runs=runs,
-            seed=seed,
-            progress=tick,
+            kept, board, worlds=worlds, controllers=controllers, runs=runs, seed=seed, progress=tick
         )
         checked = confirmed(kept, board, found, runs=confirm, seed=seed + 1) if confirm else []
     show_search(found, checked)
     if out is not None:
         best = checked[0].values if checked else found.values(found.best()[0])
         write_whole(out, as_scenario(best).to_toml())
-        console.print(f"Interpretation: {out}", soft_wrap=True)
+        say(f"Interpretation: {out}")
 
 
-def _finite(value: float | None) -> float | None:
-    if value is not None and not math.isfinite(value):
-        raise typer.BadParameter(f"{value} is not a finite number")
-    return value
-
-
-def _bound(text: str) -> Any:
-    return typer.Option(min=0.0, callback=_finite, help=text)
-
-
-@app.command(
-    rich_help_panel="Energy",
-    epilog="Example: [bold]access-av paper explore --max-energy-j 260 --max-rms-m 0.15[/]",
-)
+@opt.command(app, "Energy", "paper explore --max-energy-j 260 --max-rms-m 0.15")
 def explore(
-    max_energy_j: Annotated[float | None, _bound("Maximum energy of a trip, in J.")] = None,
-    max_error_m: MaxError = None,
-    percentile: PercentileOption = None,
+    max_energy_j: Annotated[float | None, opt.limit("Maximum energy of a trip, in J.")] = None,
+    max_error_m: opt.MaxError = None,
+    percentile: opt.PercentileOption = None,
     max_rms_m: Annotated[
-        float | None, _bound("Maximum RMS error over track and runs, in m.")
+        float | None, opt.limit("Maximum RMS error over track and runs, in m.")
     ] = None,
-    max_worst_m: Annotated[float | None, _bound("Maximum mean error in X and Y, in m.")] = None,
+    max_worst_m: Annotated[float | None, opt.limit("Maximum mean error in X and Y, in m.")] = None,
     max_aoa_estimates: Annotated[
-        float | None, _bound("Maximum number of angle estimates per trip.")
+        float | None, opt.limit("Maximum number of angle estimates per trip.")
     ] = None,
-    mode: Annotated[list[int] | None, typer.Option(help="Power mode; repeatable.")] = None,
-    fixed: Annotated[
-        bool, typer.Option("--fixed", help="Also consider fixed wake-up times.")
-    ] = False,
+    mode: Annotated[list[int] | None, Option(help="Power mode; repeatable.")] = None,
+    fixed: Annotated[bool, Option("--fixed", help="Also consider fixed wake-up times.")] = False,
     interpretation: InterpretationOption = "gate",
     results: Annotated[
         Path | None,
-        typer.Option(
-            help="Results folder of access-av paper evaluate.", show_default="results/latest"
-        ),
+        Option(help="Results folder of access-av paper evaluate.", show_default="results/latest"),
     ] = None,
-    as_json: AsJson = False,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Find operating points of the paper's trip within an energy budget and an error bound.
 
@@ -291,7 +236,7 @@ def explore(
         nearest = points.sort("energy_j").head(1)
         show_points(nearest, title="Operating point with the minimum energy")
     if found.is_empty():
-        raise typer.Exit(MISSED)
+        raise typer.Exit(opt.MISSED)
     if as_json:
         return
     show_points(found, title=f"Operating points with {query}")
@@ -305,18 +250,15 @@ def explore(
     )
 
 
-@app.command(
-    rich_help_panel="Energy",
-    epilog="Example: [bold]access-av paper fit --runs 100 --out fitted.toml[/]",
-)
+@opt.command(app, "Energy", "paper fit --runs 100 --out fitted.toml")
 def fit(
     interpretation: InterpretationOption = "gate",
-    platform: PlatformOption = "jetson-agx-xavier",
-    runs: Runs = 100,
-    seed: Seed = 1,
-    threads: Threads = None,
+    platform: opt.PlatformOption = "jetson-agx-xavier",
+    runs: opt.Runs = 100,
+    seed: opt.Seed = 1,
+    threads: opt.Threads = None,
     out: Annotated[
-        Path | None, typer.Option(help="Platform file to write with the fitted values.")
+        Path | None, Option(help="Platform file to write with the fitted values.")
     ] = None,
 ) -> None:
     """Fit the energy per estimate of each mode and method to the paper's figures.
@@ -343,4 +285,4 @@ def fit(
     console.print(f"{free} free parameters, {solved} of them solved from figures of the paper.")
     if out is not None:
         write_whole(out, fitted.to_toml())
-        console.print(f"Platform file: {out}", soft_wrap=True)
+        say(f"Platform file: {out}")

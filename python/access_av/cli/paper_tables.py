@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from access_av.cli.terminal import console, table
+from access_av.cli.terminal import console, show_rows, table
 from access_av.paper import summary
 from access_av.tables.numbers import value_text
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from access_av.paper.chosen import Effect
     from access_av.paper.sampled_interpretations import Confirmed, Sample
@@ -30,35 +30,22 @@ def show_study(study: Study) -> None:
     if seeds := summary.seeds_text(study):
         console.print(seeds)
     for name, why in study.unusable.items():
-        console.print(f"Not evaluated: {name}: {why}", markup=False)
+        console.print(f"Not evaluated: {name}: {why}")
 
 
 def show_chosen(effects: Sequence[Effect], runs: int) -> None:
     """Prints the open choices of the paper, the chosen values, and the effect of alternatives."""
-    made = table(
-        [
-            "choice",
-            "value",
-            "angle estimates",
-            "maximum m",
-            "RMS m",
-            "80 ms: RMS",
-            "every SSB: RMS",
-        ],
-        title=f"Single changes, mode 0 of the shipped interpretation, {runs} runs",
-        text=2,
-    )
-    for each in effects:
-        made.add_row(
-            each.what if each.is_shipped else "",
-            each.value if each.is_shipped else f"instead {each.value}",
-            f"{each.aoa_estimates:.0f}",
-            f"{each.worst_error_m:.2f}",
-            f"{each.rms_error_m:.3f} ± {each.rms_std_m:.3f}",
-            f"{each.fixed_rms_m:.3f}",
-            f"{each.every_ssb_rms_m:.3f}",
-        )
-    console.print(made)
+    columns: list[tuple[str, Callable[[Effect], str]]] = [
+        ("choice", lambda it: it.what if it.is_shipped else ""),
+        ("value", lambda it: it.value if it.is_shipped else f"instead {it.value}"),
+        ("angle estimates", lambda it: f"{it.aoa_estimates:.0f}"),
+        ("maximum m", lambda it: f"{it.worst_error_m:.2f}"),
+        ("RMS m", lambda it: f"{it.rms_error_m:.3f} ± {it.rms_std_m:.3f}"),
+        ("80 ms: RMS", lambda it: f"{it.fixed_rms_m:.3f}"),
+        ("every SSB: RMS", lambda it: f"{it.every_ssb_rms_m:.3f}"),
+    ]
+    title = f"Single changes, mode 0 of the shipped interpretation, {runs} runs"
+    show_rows(columns, effects, title=title, text=2)
 
 
 def show_search(found: Sample, checked: Sequence[Confirmed]) -> None:

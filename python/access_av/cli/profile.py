@@ -6,41 +6,37 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
 from access_av._core import Platform
-from access_av.cli.options import AsJson
-from access_av.cli.terminal import console, progress, show_warning, table
+from access_av.cli import options as opt
+from access_av.cli.terminal import console, progress, say, show_warning, table
 from access_av.settings import as_dict
 
 app = typer.Typer()
 
 
-@app.command(
-    rich_help_panel="Onboard computer",
-    epilog="Example: [bold]access-av design profile --name my-board --out my-board.toml[/]",
-)
+@opt.command(app, "Onboard computer", "design profile --name my-board --out my-board.toml")
 def profile(
-    out: Annotated[Path | None, typer.Option(help="Platform file to write.")] = None,
-    name: Annotated[str, typer.Option(help="Name of the platform.")] = "this-machine",
+    out: Annotated[Path | None, Option(help="Platform file to write.")] = None,
+    name: Annotated[str, Option(help="Name of the platform.")] = "this-machine",
     mode: Annotated[
-        list[int] | None, typer.Option(help="Power mode; repeatable.", show_default="all")
+        list[int] | None, Option(help="Power mode; repeatable.", show_default="all")
     ] = None,
     window_s: Annotated[
         float,
-        typer.Option(
+        Option(
             min=0.05, max=3600.0, help="Duration of each workload, and of the idle phase before it."
         ),
     ] = 5.0,
     cpu_mhz: Annotated[
         float | None,
-        typer.Option(
-            min=1.0, max=1e5, help="CPU clock in MHz, if the computer does not report it."
-        ),
+        Option(min=1.0, max=1e5, help="CPU clock in MHz, if the computer does not report it."),
     ] = None,
     sysfs_root: Annotated[
-        Path, typer.Option(help="Folder that contains sys/ with sensors and modes.")
+        Path, Option(help="Folder that contains sys/ with sensors and modes.")
     ] = Path("/"),
-    as_json: AsJson = False,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Measure time and energy of angle estimation on this computer, and write a platform file.
 
@@ -77,17 +73,12 @@ def profile(
         )
     console.print(made)
     if out is not None:
-        console.print(f"Platform file: {out}", soft_wrap=True)
+        say(f"Platform file: {out}")
 
 
-@app.command(
-    rich_help_panel="Onboard computer",
-    epilog="Example: [bold]access-av design power jetson-agx-xavier-engine[/]",
-)
+@opt.command(app, "Onboard computer", "design power jetson-agx-xavier-engine")
 def power(
-    platform: Annotated[
-        str, typer.Argument(help="Platform: shipped name, or path of a TOML file.")
-    ],
+    platform: Annotated[str, Argument(help="Platform: shipped name, or path of a TOML file.")],
 ) -> None:
     """Compare the modelled and the measured power of a board with all cores busy.
 

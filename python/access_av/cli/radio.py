@@ -6,37 +6,27 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
-from access_av.cli.options import (
-    AsJson,
-    Out,
-    ScenarioArgument,
-    load_scenario,
-    load_site,
-)
-from access_av.cli.terminal import console, progress, show_next_level, show_plan
+from access_av.cli import options as opt
+from access_av.cli.terminal import progress, say, show_next_level, show_plan
 
 app = typer.Typer()
 
 
-@app.command(
-    "import-paths",
-    rich_help_panel="Radio heads",
-    epilog="Example: [bold]access-av design import-paths paths.parquet --site street.toml "
-    "--carrier-mhz 3750 --out street.npz[/]",
+@opt.command(
+    app,
+    "Radio heads",
+    "design import-paths paths.parquet --site street.toml --carrier-mhz 3750 --out street.npz",
+    name="import-paths",
 )
 def import_paths(
-    table: Annotated[
-        Path,
-        typer.Argument(help="Ray-traced paths: Parquet or CSV, one row per path."),
-    ],
-    site: Annotated[str, typer.Option(help="Site: shipped name, or path of a TOML file.")],
+    table: Annotated[Path, Argument(help="Ray-traced paths: Parquet or CSV, one row per path.")],
+    site: opt.SiteOption,
     carrier_mhz: Annotated[
-        float, typer.Option(min=100.0, help="Carrier frequency of the traced paths, in MHz.")
+        float, Option(min=100.0, help="Carrier frequency of the traced paths, in MHz.")
     ],
-    out: Annotated[
-        Path, typer.Option(help="File to write (.npz), for channel.paths of a scenario.")
-    ],
+    out: Annotated[Path, Option(help="File to write (.npz), for channel.paths of a scenario.")],
 ) -> None:
     """Convert ray-traced paths into a channel for scenarios.
 
@@ -50,37 +40,32 @@ def import_paths(
     """
     from access_av.radio import ray_paths
 
-    found = ray_paths.import_paths(table, load_site(site), out, carrier_mhz=carrier_mhz)
-    console.print(
+    found = ray_paths.import_paths(table, opt.load_site(site), out, carrier_mhz=carrier_mhz)
+    say(
         f"{out}: {found['paths']} paths between {found['heads']} radio heads and "
-        f"{found['places']} positions",
-        soft_wrap=True,
+        f"{found['places']} positions"
     )
 
 
-@app.command(
-    rich_help_panel="Radio heads",
-    epilog="Examples: [bold]access-av design plan yard[/], "
-    "[bold]access-av design plan yard --masts masts.csv --add 2[/]",
-)
+@opt.command(app, "Radio heads", "design plan yard", "design plan yard --masts masts.csv --add 2")
 def plan(
-    scenario: ScenarioArgument,
+    scenario: opt.ScenarioArgument,
     masts: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="CSV of candidate masts: name, x_m, y_m, z_m.",
             show_default="positions around the weakest point of the route",
         ),
     ] = None,
-    add: Annotated[int, typer.Option(min=1, help="Number of radio heads to add.")] = 1,
+    add: Annotated[int, Option(min=1, help="Number of radio heads to add.")] = 1,
     eirp_dbm: Annotated[
         float | None,
-        typer.Option(
+        Option(
             help="EIRP of the added radio heads, in dBm.", show_default="EIRP of the site's first"
         ),
     ] = None,
-    out: Out = None,
-    as_json: AsJson = False,
+    out: opt.Out = None,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Plan radio heads, and report the changes that reach the next 3GPP service level.
 
@@ -93,7 +78,7 @@ def plan(
     from access_av.radio.upgrades import next_level
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
-    chosen = load_scenario(scenario)
+    chosen = opt.load_scenario(scenario)
     with progress("Masts") as tick:
         found = plan_heads(chosen, masts, add=add, eirp_dbm=eirp_dbm, progress=tick)
     missed = next_level(chosen, found)
@@ -121,4 +106,4 @@ def plan(
     show_plan(found)
     if missed is not None:
         show_next_level(missed)
-    console.print(f"Site: {directory.path / 'scenario.toml'}", soft_wrap=True)
+    say(f"Site: {directory.path / 'scenario.toml'}")

@@ -6,11 +6,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
-from access_av.cli.options import AsJson, Out, load_site_and_vehicle
+from access_av.cli import options as opt
 from access_av.cli.terminal import (
     console,
     progress,
+    say,
     show_angles,
     show_bursts,
     show_cells,
@@ -27,44 +29,39 @@ Possible remedies:
   a recording of at least 160 ms, the maximum SSB period of a cell"""
 
 
-@app.command(
-    rich_help_panel="Samples",
-    epilog="Example: [bold]access-av record scan captures/*.sigmf-meta --json[/]",
-)
+@opt.command(app, "Samples", "record scan captures/*.sigmf-meta --json")
 def scan(
     recordings: Annotated[
         list[Path],
-        typer.Argument(
-            help="SigMF recordings; with --sample-rate-hz raw cf32 files, one per channel."
-        ),
+        Argument(help="SigMF recordings; with --sample-rate-hz raw cf32 files, one per channel."),
     ],
     ssb_freq_hz: Annotated[
         float | None,
-        typer.Option(
+        Option(
             min=0.0, help="Centre frequency of the SSB, in Hz.", show_default="all of the raster"
         ),
     ] = None,
     scs_khz: Annotated[
-        int | None, typer.Option(help="Subcarrier spacing in kHz: 15 or 30.", show_default="both")
+        int | None, Option(help="Subcarrier spacing in kHz: 15 or 30.", show_default="both")
     ] = None,
     cfo_ppm: Annotated[
         float | None,
-        typer.Option(
+        Option(
             min=0.0, help="Maximum frequency offset of the oscillator, in ppm; needs --ssb-freq-hz."
         ),
     ] = None,
     centre_hz: Annotated[
         float | None,
-        typer.Option(
+        Option(
             min=0.0, help="Centre frequency of the recording, in Hz.", show_default="as recorded"
         ),
     ] = None,
     sample_rate_hz: Annotated[
-        float | None, typer.Option(help="Sample rate of raw cf32 files, in Hz.")
+        float | None, Option(help="Sample rate of raw cf32 files, in Hz.")
     ] = None,
     spacing_wavelengths: Annotated[
         float | None,
-        typer.Option(
+        Option(
             min=0.01,
             max=10.0,
             help="Antenna spacing, in wavelengths.",
@@ -73,16 +70,14 @@ def scan(
     ] = None,
     calibration: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="GAINS",
             help="Complex gain of each channel, for example 1,0.9+0.2j,1j,-1.",
             show_default="as recorded",
         ),
     ] = None,
-    unconfirmed: Annotated[
-        bool, typer.Option(help="Also list SSBs without a decoded message.")
-    ] = False,
-    as_json: AsJson = False,
+    unconfirmed: Annotated[bool, Option(help="Also list SSBs without a decoded message.")] = False,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Find every SSB in recordings of unknown cells.
 
@@ -124,32 +119,29 @@ def scan(
         if cells:
             show_cells(path.name, cells)
         else:
-            console.print(f"{path}: no SSB found. Searched:", soft_wrap=True)
+            say(f"{path}: no SSB found. Searched:")
             for where in result.looked:
-                console.print(f"  {where}", soft_wrap=True)
-            console.print(NOT_FOUND, soft_wrap=True)
+                say(f"  {where}")
+            say(NOT_FOUND)
         if weak:
             console.print(f"{len(weak)} SSBs without a decoded message: --unconfirmed lists them.")
     if as_json:
         print(json_text(found))
 
 
-@app.command(
-    rich_help_panel="Samples",
-    epilog="Example: [bold]access-av record aoa captures/array1.sigmf-meta --json[/]",
-)
+@opt.command(app, "Samples", "record aoa captures/array1.sigmf-meta --json")
 def aoa(
-    recording: Annotated[Path, typer.Argument(help="SigMF recording of an array.")],
+    recording: Annotated[Path, Argument(help="SigMF recording of an array.")],
     spacing: Annotated[
         float | None,
-        typer.Option(
+        Option(
             min=0.01,
             max=10.0,
             help="Spacing of a linear array, in wavelengths.",
             show_default="as recorded",
         ),
     ] = None,
-    as_json: AsJson = False,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Estimate angles of arrival from a multi-antenna recording.
 
@@ -168,22 +160,19 @@ def aoa(
         show_bursts(bursts)
 
 
-@app.command(
-    rich_help_panel="Samples",
-    epilog="Example: [bold]access-av record angles drive/iq.sigmf-meta --site drive/site.toml "
-    "--vehicle drive/vehicle.toml --out angles[/]",
+@opt.command(
+    app,
+    "Samples",
+    "record angles drive/iq.sigmf-meta --site drive/site.toml "
+    "--vehicle drive/vehicle.toml --out angles",
 )
 def angles(
-    recording: Annotated[Path, typer.Argument(help="SigMF recording of the array.")],
-    site: Annotated[str, typer.Option(help="Site: shipped name, or path of a TOML file.")],
-    vehicle: Annotated[
-        str, typer.Option(help="Vehicle: shipped name, or path of a TOML file.")
-    ] = "default",
-    start_time_s: Annotated[
-        float, typer.Option(help="Time of the first sample by the odometry's clock, in s.")
-    ] = 0.0,
-    out: Out = None,
-    as_json: AsJson = False,
+    recording: Annotated[Path, Argument(help="SigMF recording of the array.")],
+    site: opt.SiteOption,
+    vehicle: opt.VehicleOption = "default",
+    start_time_s: opt.StartTime = 0.0,
+    out: opt.Out = None,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Estimate the angles of a recording's SSBs, as input of record locate.
 
@@ -198,7 +187,7 @@ def angles(
     from access_av.drives.angle_log import estimate_angles
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
-    plant, carrier = load_site_and_vehicle(site, vehicle)
+    plant, carrier = opt.load_site_and_vehicle(site, vehicle)
     with progress("Estimating"):
         found = estimate_angles(plant, recording, vehicle=carrier, start_time_s=start_time_s)
     directory = ResultsDirectory.create("angles", out)
@@ -206,10 +195,7 @@ def angles(
     directory.write_table("angles.parquet", found.angles)
     directory.write_text("site.toml", found.site.to_toml())
     directory.write_text("vehicle.toml", found.vehicle.to_toml())
-    counts = {
-        "angles": found.angles.height,
-        "resolved": int(found.angles["resolved"].sum()),
-    }
+    counts = {"angles": found.angles.height, "resolved": int(found.angles["resolved"].sum())}
     directory.write_manifest(
         recording=str(recording),
         start_time_s=start_time_s,
@@ -224,7 +210,7 @@ def angles(
     for warning in found.warnings:
         show_warning(warning)
     show_angles(found)
-    console.print(f"Files: {directory.path}", soft_wrap=True)
+    say(f"Files: {directory.path}")
 
 
 def _gains(text: str) -> list[complex]:

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Argument, Option
 
-from access_av.cli.options import MISSED, AsJson
-from access_av.cli.terminal import console, show_warning
+from access_av.cli import options as opt
+from access_av.cli.terminal import console, say, show_warning
 from access_av.errors import InputError
 from access_av.tables import renamed
 
@@ -40,8 +41,6 @@ class Difference:
 
     Attributes
     ----------
-    file
-        Path in the results directory.
     what
         ``missing``, ``additional``, or how the content differs.
     """
@@ -50,20 +49,19 @@ class Difference:
     what: str
 
 
-@app.command(
-    rich_help_panel="Plants and scenarios",
-    epilog="Example: [bold]access-av run paper --out results/mine; access-av rerun results/mine[/]",
+@opt.command(
+    app, "Plants and scenarios", "run paper --out results/mine; access-av rerun results/mine"
 )
 def rerun(
-    results: Annotated[Path, typer.Argument(help="Results directory of the command to repeat.")],
+    results: Annotated[Path, Argument(help="Results directory of the command to repeat.")],
     directory: Annotated[
         Path | None,
-        typer.Option(help="Working directory with the inputs [default: that of the first run]."),
+        Option(help="Working directory with the inputs [default: that of the first run]."),
     ] = None,
     keep: Annotated[
-        Path | None, typer.Option(help="Directory for the new results [default: they are removed].")
+        Path | None, Option(help="Directory for the new results [default: they are removed].")
     ] = None,
-    as_json: AsJson = False,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Compute the results of a command again, and compare them byte by byte.
 
@@ -108,18 +106,18 @@ def rerun(
     else:
         _show(record)
     if differences:
-        raise typer.Exit(MISSED)
+        raise typer.Exit(opt.MISSED)
 
 
 def _show(record: Mapping[str, Any]) -> None:
     for each in record["differences"]:
-        console.print(f"{each['file']}: {each['what']}", markup=False, soft_wrap=True)
+        say(f"{each['file']}: {each['what']}")
     if record["written_by"] != record["repeated_by"]:
         was, now = (
             f"{it['version']} ({it['commit'] or 'no commit'})"
             for it in (record["written_by"], record["repeated_by"])
         )
-        console.print(f"Written by version {was}, repeated by {now}.", markup=False)
+        console.print(f"Written by version {was}, repeated by {now}.")
     count = len(record["differences"])
     console.print(
         f"All {record['files']} files are identical."
@@ -190,7 +188,7 @@ def _run(arguments: Sequence[str], where: Path, scratch: Path, keep: Path | None
         text=True,
     )
     # A command with a missed target (exit code 3) has written its results, too.
-    if done.returncode not in (0, MISSED) or not (out / MANIFEST).is_file():
+    if done.returncode not in (0, opt.MISSED) or not (out / MANIFEST).is_file():
         raise InputError(
             f"the command failed again (exit code {done.returncode}): "
             f"access-av {' '.join(arguments)}\n{done.stderr.strip()}"

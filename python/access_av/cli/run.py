@@ -4,20 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from access_av.cli.options import (
-    AllowLarge,
-    Compare,
-    Out,
-    Overrides,
-    Percents,
-    Runs,
-    ScenarioArgument,
-    Seed,
-    Threads,
-    Vary,
-    load_scenario,
-    overridden,
-)
+from access_av.cli import options as opt
 from access_av.cli.side_by_side import (
     PERCENTS,
     of_scenario,
@@ -26,26 +13,23 @@ from access_av.cli.side_by_side import (
     side_by_side,
     write_compared,
 )
-from access_av.cli.terminal import console, progress, show_simulation
+from access_av.cli.terminal import progress, say, show_simulation
 
 app = typer.Typer()
 
 
-@app.command(
-    rich_help_panel="Plants and scenarios",
-    epilog="Example: [bold]access-av run paper --runs 10 --set site.rician_k_db=10[/]",
-)
+@opt.command(app, "Plants and scenarios", "run paper --runs 10 --set site.rician_k_db=10")
 def run(
-    scenario: ScenarioArgument,
-    runs: Runs = 1,
-    seed: Seed = 1,
-    threads: Threads = None,
-    out: Out = None,
-    allow_large: AllowLarge = False,
-    vary: Vary = None,
-    compare: Compare = None,
-    percentile: Percents = None,
-    overrides: Overrides = None,
+    scenario: opt.ScenarioArgument,
+    runs: opt.Runs = 1,
+    seed: opt.Seed = 1,
+    threads: opt.Threads = None,
+    out: opt.Out = None,
+    allow_large: opt.AllowLarge = False,
+    vary: opt.Vary = None,
+    compare: opt.Compare = None,
+    percentile: opt.Percents = None,
+    overrides: opt.Overrides = None,
 ) -> None:
     """Simulate one scenario and write its trajectories.
 
@@ -62,11 +46,11 @@ def run(
     from access_av.run.simulation import simulate
     from access_av.tables.results_directory import ResultsDirectory, tum_trajectory
 
-    given = overridden(overrides)
-    chosen = load_scenario(scenario, allow_large=allow_large, overrides=given)
+    given = opt.overridden(overrides)
+    chosen = opt.load_scenario(scenario, allow_large=allow_large, overrides=given)
     plug_ins = plug_ins_of(compare)
     others = {
-        name: chosen if name in plug_ins else load_scenario(name, allow_large=allow_large)
+        name: chosen if name in plug_ins else opt.load_scenario(name, allow_large=allow_large)
         for name in compare or ()
     }
     scenarios = of_scenario(chosen, vary, others)
@@ -105,7 +89,7 @@ def run(
     title = f"{chosen.name}: {runs} run{'s' * (runs > 1)}, seed {seed}"
     show_simulation(result, title, energy_boundary(chosen))
     if assumed:
-        console.print(in_words(assumed), soft_wrap=True)
+        say(in_words(assumed))
     if (levels := result.service_levels) and not all(verdict.reached for verdict in levels):
-        console.print(f"Possible improvements: access-av design plan {scenario}", soft_wrap=True)
-    console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
+        say(f"Possible improvements: access-av design plan {scenario}")
+    say(f"Report: {directory.path / 'report.html'}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar
 
-from access_av.cli.options import announce
+from access_av.cli import options as opt
 from access_av.cli.terminal import progress, show
 from access_av.report.shown import compared
 
@@ -36,9 +36,7 @@ def variants(
 
 
 def of_scenario(
-    scenario: _core.Scenario,
-    vary: Sequence[str] | None,
-    others: Mapping[str, _core.Scenario],
+    scenario: _core.Scenario, vary: Sequence[str] | None, others: Mapping[str, _core.Scenario]
 ) -> dict[str, _core.Scenario]:
     """Returns the variants of a scenario."""
 
@@ -53,7 +51,7 @@ def of_scenario(
 def announce_new(name: str, changed: _core.Scenario, baseline: _core.Scenario) -> None:
     """Shows the warnings of a changed scenario that its baseline does not have."""
     known = {str(warning) for warning in baseline.warnings()}
-    announce(name, [it for it in changed.warnings() if str(it) not in known])
+    opt.announce(name, [it for it in changed.warnings() if str(it) not in known])
 
 
 def plug_ins_of(compare: Sequence[str] | None) -> dict[str, dict[str, Any]]:

@@ -5,19 +5,10 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
 from access_av._core import Plant
-from access_av.cli.options import (
-    AsJson,
-    Compare,
-    Out,
-    Percents,
-    Seed,
-    Threads,
-    Vary,
-    announce,
-    look_for_underlay,
-)
+from access_av.cli import options as opt
 from access_av.cli.side_by_side import (
     of_scenario,
     records,
@@ -25,36 +16,33 @@ from access_av.cli.side_by_side import (
     side_by_side,
     write_compared,
 )
-from access_av.cli.terminal import console, progress, table
+from access_av.cli.terminal import console, progress, say, table
 
 app = typer.Typer()
 
 
-@app.command(
-    rich_help_panel="Plants and scenarios",
-    epilog="Example: [bold]access-av file new plant mine.toml; access-av study mine.toml[/]",
-)
+@opt.command(app, "Plants and scenarios", "file new plant mine.toml; access-av study mine.toml")
 def study(
-    plant: Annotated[str, typer.Argument(help="Plant: shipped name, or path of a TOML file.")],
+    plant: Annotated[str, Argument(help="Plant: shipped name, or path of a TOML file.")],
     runs: Annotated[
         int | None,
-        typer.Option(
+        Option(
             min=2,
             max=100_000,
             help="Runs with the nominal channel.",
             show_default="about one minute",
         ),
     ] = None,
-    seed: Seed = 1,
-    threads: Threads = None,
-    out: Out = None,
+    seed: opt.Seed = 1,
+    threads: opt.Threads = None,
+    out: opt.Out = None,
     force_remedies: Annotated[
-        bool, typer.Option("--force-remedies", help="Simulate remedies even if the target is met.")
+        bool, Option("--force-remedies", help="Simulate remedies even if the target is met.")
     ] = False,
-    vary: Vary = None,
-    compare: Compare = None,
-    percentile: Percents = None,
-    as_json: AsJson = False,
+    vary: opt.Vary = None,
+    compare: opt.Compare = None,
+    percentile: opt.Percents = None,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Evaluate the localization of a plant: accuracy, weak positions, remedies and cost.
 
@@ -71,11 +59,11 @@ def study(
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
     chosen = Plant.load(plant)
-    look_for_underlay(chosen.scenario().site)
-    announce(plant, chosen.warnings())
+    opt.look_for_underlay(chosen.scenario().site)
+    opt.announce(plant, chosen.warnings())
     others = {name: Plant.load(name) for name in compare or ()}
     for name, other in others.items():
-        announce(name, other.warnings())
+        opt.announce(name, other.warnings())
     scenarios = of_scenario(
         chosen.scenario(), vary, {name: it.scenario() for name, it in others.items()}
     )
@@ -145,7 +133,5 @@ def study(
     if found.point is not None:
         agreement = found.recommendation.agreement.value
         console.print(f"Recommended: {found.point.name}; two seeds: {agreement}.")
-        console.print(
-            f"Simulate it: access-av run {directory.path / 'recommended.toml'}", soft_wrap=True
-        )
-    console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
+        say(f"Simulate it: access-av run {directory.path / 'recommended.toml'}")
+    say(f"Report: {directory.path / 'report.html'}")

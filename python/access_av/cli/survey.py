@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Argument, Option
 
-from access_av.cli.options import AsJson, Out, Threads, load_site_and_vehicle
-from access_av.cli.terminal import console, progress, show_warning, table
+from access_av.cli import options as opt
+from access_av.cli.terminal import console, progress, say, show_warning, table
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,24 +20,25 @@ app = typer.Typer()
 MOST_REMARKS = 10
 
 
-@app.command(
-    rich_help_panel="Drives",
-    epilog="Example: [bold]access-av record synth yard --angles --out drives/1; "
-    "access-av record survey drives/* --site yard --vehicle drives/1/vehicle.toml[/]",
+@opt.command(
+    app,
+    "Drives",
+    "record synth yard --angles --out drives/1; "
+    "access-av record survey drives/* --site yard --vehicle drives/1/vehicle.toml",
 )
 def survey(
     drives: Annotated[
         list[Path],
-        typer.Argument(
+        Argument(
             help="Folders of drives: odometry.csv or odometry.mcap, angles.csv, vehicle.toml; or "
             "folders of ranges: ranges.csv, truth.tum."
         ),
     ],
-    site: Annotated[str, typer.Option(help="Site: shipped name, or path of a TOML file.")],
-    vehicle: Annotated[str, typer.Option(help="Vehicle: shipped name, or path of a TOML file.")],
+    site: opt.SiteOption,
+    vehicle: opt.VehicleOption,
     position_std_m: Annotated[
         float,
-        typer.Option(
+        Option(
             min=1e-3,
             max=100.0,
             help="Prior σ of radio-head x and y, in m, if the site file has none.",
@@ -44,21 +46,21 @@ def survey(
     ] = 2.0,
     mounting_std_rad: Annotated[
         float,
-        typer.Option(
+        Option(
             min=1e-6, max=3.2, help="Prior σ of the mounting, in rad, if the vehicle file has none."
         ),
     ] = 0.05,
     phase_std_rad: Annotated[
         float,
-        typer.Option(
+        Option(
             min=1e-6,
             max=3.2,
             help="Prior σ of the phase per element, in rad, if the vehicle file has none.",
         ),
     ] = 0.1,
-    threads: Threads = None,
-    out: Out = None,
-    as_json: AsJson = False,
+    threads: opt.Threads = None,
+    out: opt.Out = None,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Survey radio-head positions and array mounting, or range offsets, from drives.
 
@@ -80,7 +82,7 @@ def survey(
     for number, folder in enumerate(drives):
         if folder.resolve() in (earlier.resolve() for earlier in drives[:number]):
             raise InputError(f"{folder}: given twice; a drive counts once")
-    plant, carrier = load_site_and_vehicle(site, vehicle)
+    plant, carrier = opt.load_site_and_vehicle(site, vehicle)
     with_ranges = [folder for folder in drives if log_of(folder) is not None]
     if with_ranges:
         if other := next((folder for folder in drives if folder not in with_ranges), None):
@@ -134,23 +136,20 @@ def survey(
         )
     for it in found.parameters:
         if not it.is_as_believed:
-            console.print(
+            say(
                 f"{it.key} deviates by {it.found - it.before:+.3f} {it.unit} from the given value "
-                f"with standard deviation {it.std_before:g}: measure it again",
-                soft_wrap=True,
+                f"with standard deviation {it.std_before:g}: measure it again"
             )
-    console.print(
+    say(
         f"{found.used} of {found.angles} angles used; mean normalized innovation squared "
-        f"{found.nis:.2f} (expected: 1)",
-        soft_wrap=True,
+        f"{found.nis:.2f} (expected: 1)"
     )
     if found.site_frame_offset is not None:
-        console.print(
+        say(
             f"posterior probability of a displaced site plan: {found.site_frame_offset:.1g} "
-            f"(vehicle.toml, {self_survey.OFFSET_KEY})",
-            soft_wrap=True,
+            f"(vehicle.toml, {self_survey.OFFSET_KEY})"
         )
-    console.print(f"{directory.path}/site.toml, vehicle.toml", soft_wrap=True)
+    say(f"{directory.path}/site.toml, vehicle.toml")
 
 
 def _survey_offsets(
@@ -188,4 +187,4 @@ def _survey_offsets(
             "unknown" if std_m is None else f"{std_m:.2f}",
         )
     console.print(made)
-    console.print(f"{directory.path}/site.toml", soft_wrap=True)
+    say(f"{directory.path}/site.toml")

@@ -7,18 +7,13 @@ import os
 import sys
 import time
 from contextlib import contextmanager
+from operator import itemgetter
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table as RichTable
 
 from access_av._core import brief
@@ -29,7 +24,7 @@ from access_av.signal.recorded_angles import mean_absolute_error_deg
 from access_av.tables.numbers import unsigned_zero, value_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     import polars as pl
 
@@ -155,6 +150,34 @@ def width(made: RichTable) -> int:
     """Returns the width of a table without wrapped cells, in characters."""
     unbounded = console.options.update(max_width=10_000)
     return console.measure(made, options=unbounded).maximum
+
+
+def show_rows(
+    columns: Sequence[tuple[str, Callable[[Any], str]]],
+    rows: Iterable[Any],
+    *,
+    title: str = "",
+    text: int = 1,
+    least: int | None = None,
+) -> None:
+    """Prints one row per item; a column has a name and the function of its cells.
+
+    With ``least`` columns or more, the last ones are omitted until the table fits the terminal.
+    """
+    every, shown_columns = list(rows), list(columns)
+    while True:
+        made = table([name for name, _ in shown_columns], title=title, text=text)
+        for row in every:
+            made.add_row(*(cell(row) for _, cell in shown_columns))
+        if least is None or width(made) <= console.width or len(shown_columns) <= least:
+            break
+        shown_columns.pop()
+    console.print(made)
+
+
+def say(text: str) -> None:
+    """Prints a text without line breaks of its own, so that paths can be copied."""
+    console.print(text, soft_wrap=True)
 
 
 def show_error(error: Exception) -> None:
@@ -290,17 +313,14 @@ def show_bound(summary: dict[str, Any], verdicts: Sequence[Verdict]) -> None:
 
 def show_kinds(bounds: pl.DataFrame) -> None:
     """Prints the bound by radio heads, kind of measurement and clocks."""
-    header = ["radio heads", "measurements", "clocks", "without road m", "with road m"]
-    made = table(header, title="Lower bound by measurement", text=3)
-    for row in bounds.to_dicts():
-        made.add_row(
-            str(row["num_heads"]),
-            row["kinds"],
-            row["clocks"],
-            f"{row['bound_without_road_m']:.3f}",
-            f"{row['bound_with_road_m']:.3f}",
-        )
-    console.print(made)
+    columns: list[tuple[str, Callable[[Any], str]]] = [
+        ("radio heads", lambda row: str(row["num_heads"])),
+        ("measurements", lambda row: row["kinds"]),
+        ("clocks", lambda row: row["clocks"]),
+        ("without road m", lambda row: f"{row['bound_without_road_m']:.3f}"),
+        ("with road m", lambda row: f"{row['bound_with_road_m']:.3f}"),
+    ]
+    show_rows(columns, bounds.to_dicts(), title="Lower bound by measurement", text=3)
 
 
 def show_columns(columns: Table) -> None:
@@ -308,10 +328,9 @@ def show_columns(columns: Table) -> None:
     where = columns.where.replace("`", "")
     console.print(columns.name, style="bold", end="")
     console.print(f"  {columns.row}. {where}.")
-    made = table(["column", "unit", "meaning", "null when"], text=4)
-    for one in columns.records():
-        made.add_row(one["name"], one["unit"], one["meaning"], one["null"])
-    console.print(made)
+    keys = {"column": "name", "unit": "unit", "meaning": "meaning", "null when": "null"}
+    cells = [(head, itemgetter(key)) for head, key in keys.items()]
+    show_rows(cells, columns.records(), text=4)
 
 
 def show_angles(log: AngleLog) -> None:

@@ -5,22 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Option
 
-from access_av.cli.options import (
-    MISSED,
-    AsJson,
-    ExecutorOption,
-    MaxError,
-    MaxRms,
-    Out,
-    PercentileOption,
-    Runs,
-    ScenarioArgument,
-    Seed,
-    Threads,
-    load_scenario,
-)
-from access_av.cli.terminal import console, errors, progress, table
+from access_av.cli import options as opt
+from access_av.cli.terminal import console, errors, progress, say, table
 
 if TYPE_CHECKING:
     from access_av.designs.space import Space
@@ -32,36 +20,29 @@ app = typer.Typer()
 SHOWN_PERCENTS = (50.0, 90.0, 99.0)
 
 
-@app.command(
-    rich_help_panel="Operating points",
-    epilog="Example: [bold]access-av design tune yard --max-error-m 0.5 --percentile 99[/]",
-)
+@opt.command(app, "Operating points", "design tune yard --max-error-m 0.5 --percentile 99")
 def tune(
-    scenario: ScenarioArgument,
-    max_error_m: MaxError = None,
-    percentile: PercentileOption = None,
-    max_rms_m: MaxRms = None,
+    scenario: opt.ScenarioArgument,
+    max_error_m: opt.MaxError = None,
+    percentile: opt.PercentileOption = None,
+    max_rms_m: opt.MaxRms = None,
     max_worst_m: Annotated[
-        float | None,
-        typer.Option(min=0.0, help="Maximum error of a drive, kept in 90 % of the runs, in m."),
+        float | None, opt.limit("Maximum error of a drive, kept in 90 % of the runs, in m.")
     ] = None,
     max_energy_j: Annotated[
-        float | None,
-        typer.Option(min=0.0, help="Maximum energy of a trip, in J; the error is minimized."),
+        float | None, opt.limit("Maximum energy of a trip, in J; the error is minimized.")
     ] = None,
-    platform: Annotated[
-        str, typer.Option(help="Platform: shipped name, or path of a TOML file.")
-    ] = "jetson-agx-xavier-engine",
-    mode: Annotated[int, typer.Option(min=0, max=255, help="Power mode of the platform.")] = 0,
+    platform: opt.PlatformOption = "jetson-agx-xavier-engine",
+    mode: Annotated[int, Option(min=0, max=255, help="Power mode of the platform.")] = 0,
     designs: Annotated[
-        int, typer.Option(min=2, max=10_000, help="Number of points that Optuna suggests.")
+        int, Option(min=2, max=10_000, help="Number of points that Optuna suggests.")
     ] = 192,
-    runs: Runs = 20,
-    seed: Seed = 1,
-    executor: ExecutorOption = None,
-    threads: Threads = None,
-    out: Out = None,
-    as_json: AsJson = False,
+    runs: opt.Runs = 20,
+    seed: opt.Seed = 1,
+    executor: opt.ExecutorOption = None,
+    threads: opt.Threads = None,
+    out: opt.Out = None,
+    as_json: opt.AsJson = False,
 ) -> None:
     """Tune gains, weights and set points of a scenario's wake-up policy.
 
@@ -80,7 +61,7 @@ def tune(
     from access_av.run.campaign import campaign
     from access_av.tables.results_directory import RESULTS, ResultsDirectory, json_text
 
-    chosen = load_scenario(
+    chosen = opt.load_scenario(
         scenario, overrides={"vehicle.platform": {"name": platform, "mode": mode}}
     )
     limits = Query(
@@ -91,15 +72,7 @@ def tune(
         percentile=percentile,
     )
     with progress("Tuning") as tick, campaign(RESULTS / "parts", executor, threads) as kept:
-        found = search(
-            kept,
-            chosen,
-            limits,
-            designs=designs,
-            runs=runs,
-            seed=seed,
-            progress=tick,
-        )
+        found = search(kept, chosen, limits, designs=designs, runs=runs, seed=seed, progress=tick)
     row = row_of(found.after)
     is_kept, verdicts = limits.keeps(row), limits.in_words(row)
     directory = ResultsDirectory.create(f"tune-{chosen.name}", out)
@@ -144,17 +117,16 @@ def tune(
     else:
         _show(found, space_of(chosen))
         for verdict in verdicts:
-            console.print(f"{verdict}.", soft_wrap=True)
-        console.print(f"{directory.path / 'vehicle.toml'}", soft_wrap=True)
+            say(f"{verdict}.")
+        say(f"{directory.path / 'vehicle.toml'}")
     if not is_kept:
         errors.print(
-            "Limits not met: no parameters of this policy meet the limits. More radio heads, "
-            "a better "
-            f"odometer or a surveyed road can help: access-av design plan {scenario}",
+            "Limits not met: no parameters of this policy meet the limits. More radio heads, a "
+            f"better odometer or a surveyed road can help: access-av design plan {scenario}",
             style="red",
             soft_wrap=True,
         )
-        raise typer.Exit(MISSED)
+        raise typer.Exit(opt.MISSED)
 
 
 def _show(found: Tuned, space: Space) -> None:

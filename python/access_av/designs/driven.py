@@ -43,8 +43,6 @@ class Design:
 
     Attributes
     ----------
-    values
-        Values by key.
     label
         Display name: values that differ between designs.
     world
@@ -81,10 +79,6 @@ class Driven:
     square_m2, energy_j
         Mean squared horizontal error and energy of each run, shape (runs,); infinite if the
         vehicle was never found, or the platform has no energy.
-    worst_m
-        Maximum error of each run.
-    errors
-        Horizontal errors of each run.
     track_s, track_m2
         Times, and mean squared error over the runs at these times.
     worlds

@@ -42,8 +42,6 @@ class Found:
 
     Attributes
     ----------
-    driven
-        Designs with all runs.
     drives
         Total number of runs, counted per design.
     """
@@ -141,8 +139,6 @@ def suggested(
 
     Parameters
     ----------
-    count
-        Number of suggestions.
     goal
         Returns objective and constraints by name of a design; a constraint is met up to 0. The
         tree-structured Parzen estimator minimizes the objective; the space must consist of ranges.

@@ -62,13 +62,9 @@ class Tuned:
 
     Attributes
     ----------
-    before, after
-        Policy before and after; equal without an improvement.
     less
         Paired differences before − after of energy (J) and squared error (m²): mean and the ends
         of the 95 % interval, shape (2, 3).
-    drives
-        Total number of runs.
     """
 
     before: Driven

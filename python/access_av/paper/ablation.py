@@ -34,12 +34,6 @@ class Ablation:
 
     Attributes
     ----------
-    constant_ms
-        The constant wake-up time.
-    aoa_estimates, constant_aoa_estimates
-        With the controller and with the constant.
-    rms_error_m, constant_rms_m
-        RMS errors with the controller and with the constant.
     gain_m
         RMS error with the constant minus that with the controller.
     gain_low_m, gain_high_m
@@ -47,8 +41,6 @@ class Ablation:
     matters
         1: the controller helps, -1: it harms, 0: no relevant difference. A difference is relevant
         if the whole interval exceeds :data:`LEAST_SHARE` of the error.
-    constant
-        Runs with the constant.
     """
 
     interpretation: str

@@ -36,8 +36,6 @@ class Point:
     ----------
     energy_j
         Energy of a trip by the end of the parameter ranges: low, value, high.
-    boundary
-        Components that the energy includes.
     """
 
     aoa_estimates: float

@@ -54,8 +54,6 @@ class Freedom:
 
     Attributes
     ----------
-    says
-        Description.
     free, solved
         Number of additional parameters, and number of these that are solved from stated figures.
     """
@@ -72,7 +70,9 @@ FREEDOMS = {
     "ratio": Freedom("one power ratio per method, equal in all modes", 2, 2),
     "mode": Freedom("a separate power in each mode, within the published budgets", 7, 1),
     "factor": Freedom(
-        "another power ratio in modes 1 to 5, with one factor that is solved from a claim", 1, 1
+        "one factor of the power ratios in modes 1 to 5, solved from the mean saving (claim e4)",
+        1,
+        1,
     ),
 }
 SHIPPED = ("ratio", "mode")

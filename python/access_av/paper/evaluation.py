@@ -372,13 +372,10 @@ def _demands(
 
 
 def _point(case: Case, outcome: Outcome, refitted: bool) -> dict[str, Any]:
-    method, mode = case.setting.method, case.mode
+    method, mode, adaptive = case.setting.method, case.mode, case.setting.adaptive
+    drives = outcome.drives(mode.number if mode else None, method, adaptive=adaptive)
     per_execution_j = total_j = provenance = None
-    if mode is None:
-        drives = outcome.every_ssb[method]
-    else:
-        adaptive = case.setting.adaptive
-        drives = outcome.adaptive[mode.number] if adaptive else outcome.fixed[mode.number, method]
+    if mode is not None:
         try:
             total_j = float(energy_j(outcome, mode.number, method, adaptive=adaptive)[0])
             per_execution_j = float(
@@ -393,12 +390,9 @@ def _point(case: Case, outcome: Outcome, refitted: bool) -> dict[str, Any]:
         "mode": mode.number if mode else None,
         "mode_name": mode.name if mode else None,
         "method": method,
-        "adaptive": case.setting.adaptive,
+        "adaptive": adaptive,
         "base_wake_up_ms": case.setting.base_wake_up_ms,
-        "aoa_estimates": float(drives.aoa_estimates[0]),
-        "worst_error_x_m": float(drives.worst_x_m[0]),
-        "worst_error_y_m": float(drives.worst_y_m[0]),
-        "rms_error_m": float(drives.rms_error_m[0]),
+        **drives.figures,
         "energy_per_execution_j": per_execution_j,
         "energy_j": total_j,
         "energy_provenance": provenance,

@@ -34,8 +34,6 @@ class Finding:
     ----------
     value
         The obtained value: an array over variants, or several by name.
-    note
-        Remark.
     conflict
         Remark if the claim is not met.
     spread
@@ -152,10 +150,8 @@ def energy_j(outcome: Outcome, mode: int, method: str, *, adaptive: bool = False
     MissingFigureError
         If the platform has no such mode, or no energy per execution of the method.
     """
-    drives = _adaptive(outcome, mode) if adaptive else None
-    if drives is None:
-        _adaptive(outcome, mode)
-        drives = outcome.fixed[mode, method]
+    _adaptive(outcome, mode)
+    drives = outcome.drives(mode, method, adaptive=adaptive)
     per_execution_j = outcome.energy_per_execution_j[mode].get(method)
     if per_execution_j is None:
         raise MissingFigureError(

@@ -29,10 +29,6 @@ class FitOption:
 
     Attributes
     ----------
-    freedoms
-        Degrees of freedom of the fit.
-    says
-        Description of the degree of freedom that this set adds.
     free, solved
         Number of fit parameters, and number of solved ones.
     reproduced, by_construction, by_arithmetic
@@ -91,8 +87,6 @@ def ladder(
 
     Parameters
     ----------
-    evaluations
-        One evaluation per interpretation.
     claims
         Claims of all interpretations under the shipped fit.
     shown

@@ -58,6 +58,16 @@ class Drives:
     runs: pl.DataFrame | None = None
 
     @property
+    def figures(self) -> dict[str, float]:
+        """Mean numbers of the sample, by their columns in the tables."""
+        return {
+            "aoa_estimates": float(self.aoa_estimates[0]),
+            "worst_error_x_m": float(self.worst_x_m[0]),
+            "worst_error_y_m": float(self.worst_y_m[0]),
+            "rms_error_m": float(self.rms_error_m[0]),
+        }
+
+    @property
     def worst_m(self) -> Numbers:
         """Maximum of X and Y."""
         return np.maximum(self.worst_x_m, self.worst_y_m)
@@ -88,8 +98,6 @@ class Drives:
 
         Parameters
         ----------
-        aoa_estimates
-            Values of each run.
         errors_m
             Estimate minus truth in x and y at every SSB, of shape (runs, SSBs, 2).
         weights
@@ -132,16 +140,10 @@ class Outcome:
         Campaign R by power mode.
     energy_per_execution_j
         Energy by power mode and method; values that the platform lacks are absent.
-    trip_s
-        Duration of a trip.
-    cpu_mhz
-        Clock by power mode.
     base_wake_up_ms
         Wake-up time by power mode and method.
     settings
         Other settings that the paper specifies, by name.
-    duty
-        Share of the day that is driven.
     """
 
     every_ssb: Mapping[str, Drives]
@@ -154,6 +156,12 @@ class Outcome:
     cpu_mhz: Mapping[int, float] = field(default_factory=dict)
     base_wake_up_ms: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
     settings: Mapping[str, float] = field(default_factory=dict)
+
+    def drives(self, mode: int | None, method: str, *, adaptive: bool) -> Drives:
+        """Returns the drives of an operating point; at every SSB without a mode."""
+        if mode is None:
+            return self.every_ssb[method]
+        return self.adaptive[mode] if adaptive else self.fixed[mode, method]
 
 
 def resamples(runs: int, count: int, seed: int = 0) -> Numbers:

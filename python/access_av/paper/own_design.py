@@ -205,11 +205,9 @@ class Fair:
     ----------
     real_odometer
         Whether odometer and start have errors, as :data:`REAL` has them.
-    map
-        Whether the method has a map of the road.
     who
-        ``paper``, ``ours``, ``one angle``, or ``bound``: the lower bound of any localizer with an
-        angle at every SSB.
+        ``paper``, ``ours``, ``one angle``, or ``bound``: the posterior Cramér–Rao bound of the
+        tracker's model with an angle at every SSB, a mean over the roads of its curvature prior.
     rms_low_m, rms_high_m
         95 % interval of ``rms_error_m`` over the runs.
     drives
@@ -260,18 +258,9 @@ def fair(driver: Driver, evaluation: Evaluation) -> list[Fair]:
 
 
 def _fair(real: bool, knows_road: bool, who: str, drives: Drives) -> Fair:
-    low_m, high_m = interval(drives.rms_error_m)
-    return Fair(
-        real_odometer=real,
-        map=knows_road,
-        who=who,
-        aoa_estimates=float(drives.aoa_estimates[0]),
-        rms_error_m=float(drives.rms_error_m[0]),
-        rms_low_m=low_m,
-        rms_high_m=high_m,
-        worst_error_m=float(drives.worst_m[0]),
-        drives=drives,
-    )
+    rms_m, ends_m = drives.rms_error_m, interval(drives.rms_error_m)
+    estimates, worst_m = float(drives.aoa_estimates[0]), float(drives.worst_m[0])
+    return Fair(real, knows_road, who, estimates, float(rms_m[0]), *ends_m, worst_m, drives)
 
 
 def _bound(real: bool, knows_road: bool, scenario: Scenario) -> Fair:

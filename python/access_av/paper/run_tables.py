@@ -76,13 +76,7 @@ def _points(evaluation: Evaluation) -> Iterator[tuple[dict[str, Any], Drives, fl
     """Yields key, drives and energy per estimate of every operating point."""
     outcome = evaluation.outcome
     for point in evaluation.points.iter_rows(named=True):
-        mode, method = point["mode"], point["method"]
-        if mode is None:
-            drives = outcome.every_ssb[method]
-        elif point["adaptive"]:
-            drives = outcome.adaptive[mode]
-        else:
-            drives = outcome.fixed[mode, method]
+        drives = outcome.drives(point["mode"], point["method"], adaptive=point["adaptive"])
         names = ("campaign", "mode", "method", "adaptive", "base_wake_up_ms")
         key = {
             "interpretation": evaluation.interpretation.name,

@@ -47,8 +47,6 @@ class Sample:
 
     Attributes
     ----------
-    dimensions
-        Sampled values.
     coordinates
         One row per interpretation, from 0 to 1.
     world
@@ -103,10 +101,6 @@ def sample(
     ----------
     campaign
         Workers, and storage of each environment with its controllers.
-    worlds, controllers
-        Number of environments, and number of controllers in each.
-    runs
-        Runs per setting.
     everything
         Whether all unspecified parameters are drawn, including an SNR gate and the power of a real
         radio head. Otherwise Algorithm 1 without a gate is simulated in environments similar to the
@@ -252,8 +246,6 @@ class Confirmed:
     ----------
     label
         Rank in the search, or the parameter that differs from the best one.
-    held
-        Number of met claims.
     missed
         Ids of the claims that are not met.
     """

@@ -50,24 +50,16 @@ class Study:
     ----------
     evaluations
         One evaluation per interpretation, in their order.
-    claims
-        Verdicts of all interpretations.
     ablations
         Each interpretation with a constant in place of the controller, by power mode.
     front
         MUSIC at fixed intervals, in ms.
     proposed_vs_paper
         Proposed method compared with the shipped interpretation, by power mode.
-    sensitivity
-        Sensitivity of the claims, if requested.
     unusable
         Interpretations that could not be evaluated, with the reason.
     fit_options
         Claims met with each degree of freedom of the energy fit.
-    equal_information
-        Both methods with equal information, in mode 0.
-    effects
-        Effects of alternative assumptions.
     """
 
     evaluations: list[Evaluation]
@@ -104,16 +96,7 @@ class Study:
             )
             for name in ("points", "errors")
         }
-        front = [
-            {
-                "base_wake_up_ms": interval_ms,
-                "aoa_estimates": float(drives.aoa_estimates[0]),
-                "worst_error_x_m": float(drives.worst_x_m[0]),
-                "worst_error_y_m": float(drives.worst_y_m[0]),
-                "rms_error_m": float(drives.rms_error_m[0]),
-            }
-            for interval_ms, drives in self.front
-        ]
+        front = [{"base_wake_up_ms": ms, **drives.figures} for ms, drives in self.front]
         tables = {
             "operating_points": named["points"],
             "errors": named["errors"],
@@ -141,41 +124,30 @@ class Study:
         """Yields the runs of every setting: operating points and their references."""
         for each in self.evaluations:
             yield from run_tables.runs_of(each)
-        shown = self.shown.interpretation.name
-        for one in self.ablations:
-            yield run_tables.of_drives(
-                one.constant,
-                interpretation=one.interpretation,
-                campaign=run_tables.CONSTANT,
-                mode=one.mode,
-                base_wake_up_ms=one.constant_ms,
-            )
+        shown = self.shown
+        energies_j = shown.outcome.energy_per_execution_j
+
+        def runs(campaign: str, drives: Drives | None, **key: Any) -> pl.DataFrame:
+            key = {"interpretation": shown.interpretation.name, **key}
+            return run_tables.of_drives(drives, campaign=campaign, **key)
+
+        for it in self.ablations:
+            where = {"interpretation": it.interpretation, "mode": it.mode}
+            yield runs(run_tables.CONSTANT, it.constant, **where, base_wake_up_ms=it.constant_ms)
         for interval_ms, drives in self.front:
-            yield run_tables.of_drives(
-                drives,
-                interpretation=shown,
-                campaign=run_tables.FRONT,
-                base_wake_up_ms=interval_ms,
-            )
+            yield runs(run_tables.FRONT, drives, base_wake_up_ms=interval_ms)
         for mine in self.proposed_vs_paper:
-            per_execution_j = self.shown.outcome.energy_per_execution_j[mine.mode].get("music")
-            yield run_tables.of_drives(
+            each_j = energies_j[mine.mode].get("music")
+            yield runs(
+                run_tables.TRACKER,
                 mine.ours,
-                None if per_execution_j is None else float(per_execution_j.flat[0]),
-                interpretation=shown,
-                campaign=run_tables.TRACKER,
+                energy_per_execution_j=None if each_j is None else float(each_j.flat[0]),
                 mode=mine.mode,
                 adaptive=True,
                 variant="road map" if mine.map else "no road map",
             )
         for equal in self.equal_information:
-            yield run_tables.of_drives(
-                equal.drives,
-                interpretation=shown,
-                campaign=run_tables.EQUAL,
-                adaptive=True,
-                variant=equal.variant,
-            )
+            yield runs(run_tables.EQUAL, equal.drives, adaptive=True, variant=equal.variant)
 
 
 def study(

@@ -117,10 +117,6 @@ class MainFigure:
 
     Attributes
     ----------
-    name
-        Name with unit.
-    stated, obtained
-        Figure of the paper, and that of the simulation.
     verdict
         Verdict on the claim; empty for a count of claims.
     """
@@ -320,16 +316,11 @@ def ours_text(study: Study) -> str:
 
 def fair_text(study: Study) -> str:
     """Returns a text that compares both methods with equal information."""
-    rms_m = {
-        (each.real_odometer, each.map, each.who): each.rms_error_m
-        for each in study.equal_information
-    }
-    count = {
-        (each.real_odometer, each.map, each.who): each.aoa_estimates
-        for each in study.equal_information
-    }
-    if not rms_m:
+    if not study.equal_information:
         return ""
+    found = {(it.real_odometer, it.map, it.who): it for it in study.equal_information}
+    rms_m = {key: each.rms_error_m for key, each in found.items()}
+    count = {key: each.aoa_estimates for key, each in found.items()}
     sentences = []
     for real, where in (
         (False, "With the paper's exact odometer and start"),

@@ -232,12 +232,6 @@ class Fit:
 
     Attributes
     ----------
-    terms
-        Dimensions of each polynomial.
-    columns
-        Index of each polynomial in the basis.
-    dimensions
-        Number of dimensions.
     explained
         Explained share of the margin's variance.
     """

@@ -99,7 +99,8 @@ def _headline(study: Study) -> str:
     stretches = len(study.targets.each) - 1
     more = f", and {count(stretches, 'target')} of stretches" if stretches else ""
     return (
-        f"{judged[0].upper()}{judged[1:]} for {study.error_m:g} m, {study.percent:g} % of the "
+        f"{judged[0].upper()}{judged[1:]} for {study.error_m:g}\N{NO-BREAK SPACE}m, "
+        f"{study.percent:g}\N{NO-BREAK SPACE}% of the "
         f"time{more}"
     )
 
@@ -145,14 +146,10 @@ def _verdict(study: Study) -> str:
                     badge(it.judgement.words, it.judgement.badge),
                 )
             )
-        judged = study.judged(driven)
-        rows.append(
-            (
-                small("all targets", name),
-                *(["–"] * 6),
-                badge(judged.words, judged.badge),
-            )
-        )
+        if len(study.targets.each) > 1:
+            judged = study.judged(driven)
+            verdict = badge(judged.words, judged.badge)
+            rows.append((small("all targets", name), *(["–"] * 6), verdict))
     head = (
         "Target", "Lost drives", "Required", "Percentile", "95 % interval", "Share within",
         "95 % interval", "Verdict",
@@ -183,7 +180,7 @@ def _integrity(study: Study, written: Mapping[str, Any]) -> str:
         settings.append(f"integrity risk {risk:g} per hour")
     if correlation_s is not None:
         settings.append(f"error correlation {correlation_s:g} s")
-    drives = [study.nominal, study.poor_los, *(it.driven for it in study.remedies)]
+    drives = [study.nominal.named("nominal"), study.poor_los, *(it.driven for it in study.remedies)]
     of_points = {it.driven.name: it.driven for it in study.points}
     drives += [it for name, it in of_points.items() if name != study.nominal.name]
     rows = reliability_rows(drives)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING
 
@@ -21,6 +20,7 @@ from access_av.run.assumptions import energy_boundary
 from access_av.settings import as_dict
 from access_av.study import economy
 from access_av.study.operate import MATTERS_SHARE
+from access_av.study.study_result import as_toml
 from access_av.verdicts import Agreement
 
 if TYPE_CHECKING:
@@ -39,9 +39,12 @@ def operation_section(study: Study) -> str:
         f"Recommended: {point.name}. {study.percent:g} % of the errors are within "
         f"{found.value:.3f} m ({found.interval} m, {point.driven.runs} drives with two seeds); a "
         f"trip takes {joules_range(economy.trip_j(point))}, the fleet’s day "
-        f"{ends(day.trips_wh)} Wh. Boundary: {boundary}; low to high. {_agreement(study)}"
+        f"{ends(day.trips_wh)} Wh. Boundary: {boundary}; low to high.{_availability(study, point)} "
+        f"{_agreement(study)}"
     )
-    keys = [{"Key": code(key), "Value": json.dumps(value)} for key, value in point.settings.items()]
+    keys = [
+        {"Key": code(key), "Value": code(as_toml(value))} for key, value in point.settings.items()
+    ]
     return section(
         "How to operate it",
         text,
@@ -60,6 +63,16 @@ def operation_section(study: Study) -> str:
     )
 
 
+def _availability(study: Study, point: Point) -> str:
+    """Returns the share of the time in state ``ok``, compared with the vehicle's own operation."""
+    if point.driven.ok_share is None or study.nominal.ok_share is None:
+        return ""
+    return (
+        f" State ok: {point.driven.ok_share:.1%} of the time, with the operation of the vehicle "
+        f"file {study.nominal.ok_share:.1%}; the recommendation does not consider this share."
+    )
+
+
 def _agreement(study: Study) -> str:
     """Returns whether the seeds agree, as text."""
     named = " and ".join(f"“{it}”" for it in dict.fromkeys(study.recommendation.by_seed))
@@ -68,9 +81,9 @@ def _agreement(study: Study) -> str:
             return "Two seeds recommend the same point."
         case Agreement.EQUIVALENT:
             return (
-                f"Two seeds recommend {named}. These points are equivalent: the 95 % interval of "
-                "the error difference contains 0, and the energy of the fleet’s day differs by "
-                f"less than {MATTERS_SHARE:.0%}."
+                f"Single seeds recommend {named}, the drives of both seeds the point above. These "
+                "points are equivalent: the 95 % interval of the error difference contains "
+                f"0, and the energy of the fleet’s day differs by less than {MATTERS_SHARE:.0%}."
             )
         case Agreement.UNDECIDED:
             return (
@@ -95,6 +108,7 @@ def _rivals(study: Study) -> str:
                 "of the fleet’s day": "–"
                 if it.day_share is None
                 else f"{100.0 * it.day_share:+.2g} %",
+                "state ok": ok(it.point.driven),
                 "": badge("equivalent", "fit")
                 if it.is_equivalent
                 else badge(judged.words, judged.badge),
@@ -106,7 +120,7 @@ def _rivals(study: Study) -> str:
         "<h3>Rivals of the recommended point</h3><p>Differences: rival − recommended, in pairs of "
         "drives. Equivalent: the interval of the error difference contains 0, and the energy of "
         f"the fleet’s day, idle included, differs by less than {MATTERS_SHARE:.0%}.</p>"
-        + records(rows, numbers=range(2, 7))
+        + records(rows, numbers=range(2, 8))
     )
 
 

@@ -70,8 +70,19 @@ def digits(value: float) -> str:
 
 def ends(values: Range) -> str:
     """Returns a range as text, low to high."""
-    texts = dict.fromkeys(map(digits, (values.low, values.central, values.high)))
-    return " … ".join(texts)
+    return low_to_high(map(digits, (values.low, values.central, values.high)))
+
+
+def low_to_high(texts: Iterable[str]) -> str:
+    """Returns low, central and high value as text, or one value if all are equal.
+
+    Examples
+    --------
+    >>> low_to_high(["307", "307", "3,000"]), low_to_high(["20", "20", "20"])
+    ('307 … 307 … 3,000', '20')
+    """
+    every = list(texts)
+    return every[0] if len({*every}) == 1 else " … ".join(every)
 
 
 def joules(value: float) -> str:
@@ -86,8 +97,7 @@ def joules_range(values: Range) -> str:
 
 def watts(power_w: Mapping[str, float]) -> str:
     """Returns a range of a power as text."""
-    texts = dict.fromkeys(f"{power_w[extent]:.3g}" for extent in ("low", "value", "high"))
-    return " … ".join(texts)
+    return low_to_high(f"{power_w[extent]:.3g}" for extent in ("low", "value", "high"))
 
 
 def numbered(study: Study) -> list[tuple[int, Point]]:

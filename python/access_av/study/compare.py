@@ -29,10 +29,6 @@ class Compared:
 
     Attributes
     ----------
-    driven
-        Runs of the variant.
-    percents
-        Compared percentiles of the error.
     delta_m
         Paired difference of each percentile, variant minus baseline, and the ends of its 95 %
         interval; ``None`` for the baseline.
@@ -165,10 +161,6 @@ def compare(
 
     Parameters
     ----------
-    scenarios
-        Variants by label.
-    percents
-        Compared percentiles of the error.
     baseline
         Runs of the first variant, if it was simulated before with equal runs and seed.
     """

@@ -36,8 +36,6 @@ class Prices:
 
     Attributes
     ----------
-    currency
-        Currency.
     ranges, sources
         Values by the keys of ``[prices]`` and ``economics/prices.toml``; money in ``currency``.
     published

@@ -37,10 +37,6 @@ class Measure:
 
     Attributes
     ----------
-    remedies
-        The changes.
-    driven
-        Its drives.
     error
         Error at the percentile of the target of the whole trip.
     delta_m
@@ -126,18 +122,8 @@ def measures(
 
     Parameters
     ----------
-    scenario
-        A trip of the plant.
-    changes
-        The remedies.
     before
         Runs without any measure; each measure gets an equal number.
-    targets, prices
-        Targets and prices of the plant.
-    seed
-        Seed of ``before``.
-    simulate
-        Simulates a scenario.
     plan
         Called with the number of remaining runs.
     """

@@ -160,16 +160,8 @@ def operate(
 
     Parameters
     ----------
-    plant, targets
-        The plant and its targets.
-    nominal
-        Runs of the nominal plant.
     runs
         Runs of each operation, power mode and block.
-    seed
-        Seed of the runs.
-    simulate
-        Simulates a scenario.
     plan
         Called with the number of remaining runs.
     """

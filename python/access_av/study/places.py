@@ -37,17 +37,7 @@ WEAK_SNR_DB = 5.0
 
 @dataclass(frozen=True)
 class WorstPlace:
-    """A position with a large error, and its cause.
-
-    Attributes
-    ----------
-    along_m, x_m, y_m
-        Position along the road, and its coordinates.
-    error_m
-        Error at the target's percentile.
-    why
-        Cause as text.
-    """
+    """A position with a large error, and its cause."""
 
     along_m: float
     x_m: float
@@ -58,13 +48,6 @@ class WorstPlace:
 
 def by_place(driven: Driven, percent: float, error_m: float) -> pl.DataFrame:
     """Returns error, bound, geometry and signal at every metre of the road.
-
-    Parameters
-    ----------
-    driven
-        Runs along the road.
-    percent, error_m
-        The target.
 
     Returns
     -------
@@ -187,7 +170,7 @@ def _why(row: Mapping[str, Any], places: pl.DataFrame, plant: Mapping[str, Any])
     here, usual = _carried(places, along_m), _usual(places)
     if here > MORE_THAN_USUAL * usual:
         return (
-            f"on the last {CARRIED_M:g} m, radio heads lie ahead, behind or far away"
+            f"on the {CARRIED_M:g} m before, radio heads lie ahead, behind or far away"
             f"{hiding(row, plant)}: an angle error of one degree is {here:.1f} m along the road, "
             f"{usual:.1f} m at the median of the road"
         )
@@ -203,7 +186,8 @@ def _why(row: Mapping[str, Any], places: pl.DataFrame, plant: Mapping[str, Any])
     if isinstance(bound, float) and row["bound_m"] <= bound:
         return "by chance in these drives: the Cramér–Rao bound is not larger than elsewhere"
     return (
-        "no particular geometry: the specified errors of odometer, array and radio-head positions"
+        "not the geometry: the specified errors of odometer, array and radio-head positions "
+        "determine the error here"
     )
 
 

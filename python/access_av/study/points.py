@@ -34,10 +34,6 @@ class Operation:
 
     Attributes
     ----------
-    name
-        Name in tables; ``unchanged`` for the vehicle's own.
-    method, wake_up
-        Descriptions of estimator and wake-up.
     settings
         Keys of the scenario that differ from the vehicle's own, and their values.
     """
@@ -56,10 +52,6 @@ class Point:
     ----------
     driven
         Runs in this mode if ``simulated``, otherwise in the vehicle's mode.
-    operation
-        Estimator and wake-up.
-    mode, mode_name
-        The power mode.
     simulated
         Whether the runs use this mode.
     energy

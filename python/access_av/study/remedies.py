@@ -29,16 +29,8 @@ class Remedy:
 
     Attributes
     ----------
-    name
-        Name in tables.
-    what
-        Description with numbers.
     settings
         Changed keys of the scenario, and their values.
-    price
-        Key of the plant's price of one unit.
-    units
-        Number of units.
     """
 
     name: str
@@ -53,15 +45,7 @@ class Remedy:
 
 
 def remedies(scenario: _core.Scenario, vehicles: int) -> list[Remedy]:
-    """Returns the remedies that change a scenario, ordered from settings to purchases.
-
-    Parameters
-    ----------
-    scenario
-        A trip of the plant.
-    vehicles
-        Number of vehicles.
-    """
+    """Returns the remedies that change a scenario, ordered from settings to purchases."""
     site, vehicle = (as_dict(part) for part in (scenario.site, scenario.vehicle))
     planned = plan(scenario)
     found = [

@@ -34,8 +34,6 @@ class Study(Result):
 
     Attributes
     ----------
-    plant, seed
-        The plant, and the seed of the runs.
     targets
         The targets; that of the whole trip is the first one.
     nominal, poor_los
@@ -171,11 +169,83 @@ class Study(Result):
 
     def summary(self) -> dict[str, Any]:
         """Every figure of the page, as plain values for JSON."""
-        return _summary(self)
+        written = as_dict(self.plant)
+        fleet = written["fleet"]
+        cheapest = None if self.measured is None else self.measured.cheapest
+        return {
+            "plant": self.plant.name,
+            "seed": self.seed,
+            "target": {"error_m": self.error_m, "percent": self.percent},
+            "targets": [vars(it) for it in self.targets.each],
+            "alert_limit_m": self.alert_limit_m,
+            "verdict": self.verdict,
+            "nominal": _figures(self, self.nominal),
+            "poor_los": _figures(self, self.poor_los),
+            "worst": [vars(place) for place in self.worst],
+            "radio_heads": self.heads.to_dicts(),
+            "before_measures": None
+            if self.measured is None
+            else _figures(self, self.measured.before),
+            "remedies": [_measure(self, it) for it in self.remedies],
+            "cheapest_measure": cheapest and cheapest.name,
+            **_recommendation(self),
+            "currency": self.prices.currency,
+            "years": fleet["years"],
+            "ways": {
+                name: {key: vars(value) for key, value in vars(way).items()}
+                for name, way in self.ways.items()
+            },
+            "prices": {
+                key: {
+                    **vars(value),
+                    "source": self.prices.sources[key],
+                    "is_published": key in self.prices.published,
+                }
+                for key, value in self.prices.ranges.items()
+            },
+            "unverified": [vars(it) for it in self.unverified],
+        }
 
     def tables(self) -> dict[str, pl.DataFrame]:
         """Everything the figures are computed from, by the file's name."""
-        return _tables(self)
+        drives = [self.nominal, self.poor_los, *(it.driven for it in self.remedies)]
+        of_points = {point.driven.name: point.driven for point in self.points}
+        drives += [it for name, it in of_points.items() if name != self.nominal.name]
+        rows = [
+            {
+                "variant": point.driven.name,
+                "mode": point.mode,
+                "mode_name": point.mode_name,
+                "method": point.operation.method,
+                "wake_up": point.operation.wake_up,
+                "runs": point.driven.runs,
+                "is_simulated": point.simulated,
+                "target_error_m": point.error_m,
+                "judgement": point.judgement.value,
+                **{
+                    f"{part}_{extent}_j": getattr(point.energy[extent], f"{part}_j")
+                    for part in ("estimates", "listening", "idle")
+                    for extent in ("low", "value", "high")
+                },
+                **{
+                    f"idle_{extent}_w": None if point.idle_w is None else point.idle_w[extent]
+                    for extent in ("low", "value", "high")
+                },
+                "on_front": index in self.front,
+                "recommended": index == self.recommended,
+            }
+            for index, point in enumerate(self.points)
+        ]
+        return {
+            "errors": pl.concat(driven.table() for driven in drives),
+            "drives": pl.concat(driven.drives() for driven in drives),
+            "targets": targets_table(
+                {it.name: self.results(it) for it in (self.nominal, self.poor_los)}
+            ),
+            "places": self.places,
+            "points": pl.DataFrame(rows, infer_schema_length=None),
+            "trajectories": self.trajectory,
+        }
 
 
 def recommended_toml(study: Study) -> str | None:
@@ -188,7 +258,7 @@ def recommended_toml(study: Study) -> str | None:
     if point is None:
         return None
     scenario = study.plant.scenario().with_overrides(point.settings)
-    keys = "".join(f"#   {key} = {_as_toml(value)}\n" for key, value in point.settings.items())
+    keys = "".join(f"#   {key} = {as_toml(value)}\n" for key, value in point.settings.items())
     return (
         f"# Recommended operating point of plant {study.plant.name}: {point.name}.\n"
         f"# Keys that select it:\n{keys}"
@@ -196,50 +266,11 @@ def recommended_toml(study: Study) -> str | None:
     )
 
 
-def _as_toml(value: object) -> str:
+def as_toml(value: object) -> str:
+    """Returns a value of a key in TOML."""
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_as_toml(it)}" for key, it in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {as_toml(it)}" for key, it in value.items()) + " }"
     return json.dumps(value)
-
-
-def _summary(study: Study) -> dict[str, Any]:
-    """Every figure of the page, as plain values for JSON."""
-    written = as_dict(study.plant)
-    fleet = written["fleet"]
-    cheapest = None if study.measured is None else study.measured.cheapest
-    return {
-        "plant": study.plant.name,
-        "seed": study.seed,
-        "target": {"error_m": study.error_m, "percent": study.percent},
-        "targets": [vars(it) for it in study.targets.each],
-        "alert_limit_m": study.alert_limit_m,
-        "verdict": study.verdict,
-        "nominal": _figures(study, study.nominal),
-        "poor_los": _figures(study, study.poor_los),
-        "worst": [vars(place) for place in study.worst],
-        "radio_heads": study.heads.to_dicts(),
-        "before_measures": None
-        if study.measured is None
-        else _figures(study, study.measured.before),
-        "remedies": [_measure(study, it) for it in study.remedies],
-        "cheapest_measure": cheapest and cheapest.name,
-        **_recommendation(study),
-        "currency": study.prices.currency,
-        "years": fleet["years"],
-        "ways": {
-            name: {key: vars(value) for key, value in vars(way).items()}
-            for name, way in study.ways.items()
-        },
-        "prices": {
-            key: {
-                **vars(value),
-                "source": study.prices.sources[key],
-                "is_published": key in study.prices.published,
-            }
-            for key, value in study.prices.ranges.items()
-        },
-        "unverified": [vars(it) for it in study.unverified],
-    }
 
 
 def _measure(study: Study, it: Measure) -> dict[str, Any]:
@@ -327,46 +358,4 @@ def _percentile(found: Percentile) -> dict[str, Any]:
         "target_error_m": found.value,
         "target_error_low_m": found.low,
         "target_error_high_m": found.high,
-    }
-
-
-def _tables(study: Study) -> dict[str, pl.DataFrame]:
-    """Everything the figures are computed from, by the file's name."""
-    drives = [study.nominal, study.poor_los, *(it.driven for it in study.remedies)]
-    of_points = {point.driven.name: point.driven for point in study.points}
-    drives += [it for name, it in of_points.items() if name != study.nominal.name]
-    rows = [
-        {
-            "variant": point.driven.name,
-            "mode": point.mode,
-            "mode_name": point.mode_name,
-            "method": point.operation.method,
-            "wake_up": point.operation.wake_up,
-            "runs": point.driven.runs,
-            "is_simulated": point.simulated,
-            "target_error_m": point.error_m,
-            "judgement": point.judgement.value,
-            **{
-                f"{part}_{extent}_j": getattr(point.energy[extent], f"{part}_j")
-                for part in ("estimates", "listening", "idle")
-                for extent in ("low", "value", "high")
-            },
-            **{
-                f"idle_{extent}_w": None if point.idle_w is None else point.idle_w[extent]
-                for extent in ("low", "value", "high")
-            },
-            "on_front": index in study.front,
-            "recommended": index == study.recommended,
-        }
-        for index, point in enumerate(study.points)
-    ]
-    return {
-        "errors": pl.concat(driven.table() for driven in drives),
-        "drives": pl.concat(driven.drives() for driven in drives),
-        "targets": targets_table(
-            {it.name: study.results(it) for it in (study.nominal, study.poor_los)}
-        ),
-        "places": study.places,
-        "points": pl.DataFrame(rows, infer_schema_length=None),
-        "trajectories": study.trajectory,
     }

@@ -28,8 +28,6 @@ class StretchTarget:
 
     Attributes
     ----------
-    name
-        Name for people.
     from_m, to_m
         Ends of the stretch as distances along the road, in metres.
     error_m, percent
@@ -54,8 +52,6 @@ class TargetResult:
 
     Attributes
     ----------
-    target
-        The target.
     error
         Error at the target's percentile on its section of the road.
     share

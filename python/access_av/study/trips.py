@@ -56,18 +56,10 @@ class Driven(ErrorSamples):
 
     Attributes
     ----------
-    scenario
-        Simulated scenario.
     levels_m
         Protection levels, shape (runs, epochs); NaN unless the state is ``ok``.
-    time_s
-        Times of the epochs.
-    aoa_estimates, bursts_received
-        Numbers of angle estimates and of received bursts of each run.
     integrity
         Counts of states and of errors above the protection level; ``None`` without a monitor.
-    seeds
-        Seed of each run.
     """
 
     scenario: _core.Scenario

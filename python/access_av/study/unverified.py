@@ -35,10 +35,6 @@ class Unverified:
 
     Attributes
     ----------
-    key
-        Key in the plant's file.
-    what
-        Description of the value.
     otherwise
         Description of a plausible alternative; empty without an effect on the error.
     effect
@@ -71,7 +67,9 @@ def unverified(plant: _core.Plant) -> list[Unverified]:
     for key, unit in OTHERS.items():
         if _is_shared(mine, template, key):
             value = _at(mine, key)
-            what = "as in the template" if isinstance(value, list) else f"{value} {unit}".strip()
+            what = "as in the template"
+            if not isinstance(value, list):
+                what = f"{value:g} {unit}".strip()
             found.append(Unverified(key, what, "", None))
     return found
 

@@ -76,7 +76,7 @@ def freedoms(study: Study) -> str:
     titles = {each.interpretation.name: each.interpretation.title for each in study.evaluations}
 
     def named(interpretations: tuple[str, ...]) -> str:
-        return ", ".join(titles[name] for name in interpretations) or "none"
+        return "; ".join(titles[name] for name in interpretations) or "none"
 
     title = study.shown.interpretation.title
     counted = f"“{title}”: reproduced / agree by construction / by arithmetic"
@@ -85,7 +85,7 @@ def freedoms(study: Study) -> str:
             "Degree of freedom": Html(
                 ("" if index == 0 else "and ")
                 + escape(each.says)
-                + (" <b>(judged by)</b>" if each.is_shipped else "")
+                + (" <b>(used for the verdicts)</b>" if each.is_shipped else "")
             ),
             "Parameters: free / solved": f"{each.free} / {each.solved}",
             counted: f"{each.reproduced} / {each.by_construction} / {each.by_arithmetic}",

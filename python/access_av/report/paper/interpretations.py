@@ -47,8 +47,8 @@ def interpretations(study: Study) -> str:
                     f"<b>{index} {escape(shown.title)}</b>"
                     f"<small>{escape(shown.scenario.description)} · {code(shown.name)}</small>"
                 ),
-                "Accuracy half": _met(half.accuracy),
-                "Energy half": _met(half.energy),
+                "Accuracy claims": _met(half.accuracy),
+                "Energy claims": _met(half.energy),
                 "t_max": f"{t_max}, {half.longest_gap_s:.2f} s",
                 "Algorithm 1": summary.controller_text(half.controller),
                 "Claims": summary.counts_text(claims),
@@ -63,7 +63,7 @@ def interpretations(study: Study) -> str:
 
 def overview(study: Study, specs: dict[str, Spec]) -> str:
     """Returns the chart of maximum error and average saving of each interpretation."""
-    kinds = {"neither": GREY, "accuracy": BLUE, "saving": ORANGE, "both": GREEN}
+    kinds = {"neither": GREY, "accuracy": BLUE, "energy": ORANGE, "both": GREEN}
     rows = []
     for index, half in enumerate(summary.halves(study), start=1):
         by_id = {it.id: it.obtained for it in study.of(half.interpretation.name)}
@@ -75,7 +75,7 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
                     "interpretation": half.interpretation.title,
                     "worst": worst_m,
                     "saving": saving,
-                    "keeps": list(kinds)[half.accuracy + 2 * half.energy],
+                    "claims": list(kinds)[half.accuracy + 2 * half.energy],
                 }
             )
     if not rows:
@@ -87,11 +87,11 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
     least_m = min(0.1, *table["worst"])
     x = Axis(
         "worst",
-        "worst error of adaptive MUSIC, any mode / m",
+        "maximum error of adaptive MUSIC over all modes / m",
         [least_m, bound_m, *table["worst"]],
         log=True,
     )
-    y = Axis("saving", "energy saved, average / %", [low, high, *table["saving"]])
+    y = Axis("saving", "mean energy saving / %", [low, high, *table["saving"]])
     field = {"worst": x.place[1][0], "right": bound_m, "saving": low, "high": high}
     promised = (
         alt.Chart(pl.DataFrame([field]))
@@ -105,22 +105,21 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
         y,
         OVERVIEW_PX,
         tooltip=["interpretation:N", alt.Tooltip("worst:Q", format=".3f"),
-                 alt.Tooltip("saving:Q", format=".1f"), "keeps:N"],
+                 alt.Tooltip("saving:Q", format=".1f"), "claims:N"],
     )  # fmt: skip
     dots = base.mark_circle(size=90, opacity=1.0).encode(
-        color=colours("keeps:N", kinds, title="claims met", orient="top")
+        color=colours("claims:N", kinds, title="claims met", orient="top")
     )
     specs["overview"] = finish(
         promised + lines + dots + numbers,
         height=OVERVIEW_PX,
-        description="Worst error and average saving of each interpretation, and the values that "
-        "the paper claims",
+        description="Maximum error and mean saving of each interpretation and of the paper",
     )
     return figure(
         "overview",
-        "Each dot is an interpretation, with its number in the table below. In the green area, "
-        "the worst error (a1) and the mean saving (e4) are as claimed. Accuracy and saving each "
-        "require one further claim (a2, e3).",
+        "Each point is an interpretation, with its number in the table below. In the green field, "
+        "maximum error (a1) and mean saving (e4) agree with the paper. The colour also considers "
+        "the other claim of each group (a2, e3).",
     )
 
 
@@ -249,14 +248,14 @@ def _verdict(claim: Claim) -> Html:
 
 def _deviation_text(deviation: float, tolerance: float) -> str:
     return (
-        f"deviation {deviation:.1%}, tolerance {tolerance:.3g}"
+        f"deviation {deviation:.1%}, no tolerance"
         if tolerance < 0.01
         else (f"deviation {deviation:.0%}, tolerance {tolerance:.0%}")
     )
 
 
 def _met(held: bool) -> Html:
-    return badge("holds", "yes") if held else badge("does not", "no")
+    return badge("hold", "yes") if held else badge("do not hold", "no")
 
 
 def _cell(claim: Claim) -> Html:
