@@ -162,7 +162,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
             !self.is_level(),
         )
         .map(|row| row.map(|it| it * tests.variance_factor(snr, needed)));
-        let alike = other
+        let is_ambiguous = other
             .filter(|other| best.is_far_from(&other.direction))
             .is_some_and(|other| {
                 let per_snapshot = match noise {
@@ -176,7 +176,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         let tested = tests.of(&left, noise_power, trace);
         let misfit = tests.misfit(tested.ratios());
         let weak = threshold_doubt(snr, needed).or(tests.noise_doubt());
-        let geometric = if alike {
+        let geometric = if is_ambiguous {
             Some(Reason::Ambiguous)
         } else {
             at_edge.then_some(Reason::EdgeOfElevations)

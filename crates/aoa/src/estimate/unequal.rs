@@ -17,7 +17,7 @@ use crate::spectrum::polynomial::Spectrum;
 /// Number of directions at which the pattern of the weighted array is evaluated.
 const DIRECTIONS: usize = 64;
 /// Maximum relative side lobe power. Above it, a direction is ambiguous.
-const ALIKE: f64 = 0.98;
+const MAX_SIDE_LOBE: f64 = 0.98;
 
 /// Estimates the angle like [`maximum_likelihood_pilots`](crate::maximum_likelihood_pilots), but
 /// for different noise variances of the antennas: `noise_variances[n]` per block and antenna `n`,
@@ -74,11 +74,11 @@ pub fn maximum_likelihood_pilots_unequal<const N: usize>(
     let snrs = weights.map(|weight| snr * (N * count) as f64 * weight / total);
     let lost = 1.0 + 1.0 / (N as f64 * snr);
     let sigma = bound::known_signal_unequal(&snrs) * lost.sqrt();
-    let alike = strongest_side_lobe(&weights);
-    let doubt = if alike > ALIKE {
+    let side_lobe = strongest_side_lobe(&weights);
+    let doubt = if side_lobe > MAX_SIDE_LOBE {
         Some(Reason::Ambiguous)
     } else {
-        threshold_doubt(snr, bound::resolvable_snr::<N>(count) / (1.0 - alike))
+        threshold_doubt(snr, bound::resolvable_snr::<N>(count) / (1.0 - side_lobe))
     };
     // Whiten to unit noise variance in the channels with a finite noise variance.
     let whitening = weights.map(f64::sqrt);
@@ -150,7 +150,7 @@ mod tests {
         // missing, the side lobe equals the main lobe.
         let uniform = strongest_side_lobe(&[1.0; 4]);
         assert!((10.0 * uniform.log10() + 11.3).abs() < 0.2, "{uniform}");
-        assert!(strongest_side_lobe(&[1.0, 0.0, 1.0, 0.0]) > ALIKE);
+        assert!(strongest_side_lobe(&[1.0, 0.0, 1.0, 0.0]) > MAX_SIDE_LOBE);
         assert!(strongest_side_lobe(&[1.0, 1.0, 0.0, 1.0]) < 0.7);
     }
 }

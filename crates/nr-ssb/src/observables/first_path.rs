@@ -41,7 +41,7 @@ const STEP_K_DB: f64 = 2.5;
 const PRIOR_K_DB: [f64; 2] = [7.0, 8.0];
 /// Mean and standard deviation of the decimal logarithm of the delay spread in seconds.
 const PRIOR_LG_SPREAD: [f64; 2] = [-7.4, 0.4];
-/// Probability of a single path before the first SSB.
+/// Prior probability that the channel consists of a single path, at the first SSB.
 const FIRST_SINGLE: f64 = 0.5;
 /// Probability that multipath appears or disappears between two successive SSBs.
 const CHANGE: f64 = 0.01;

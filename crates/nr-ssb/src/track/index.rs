@@ -2,8 +2,8 @@
 
 use crate::standard::numerology::{Case, Lmax, Numerology, SubcarrierSpacing};
 
-/// Number of SSBs with equal DM-RS in a burst set of 64.
-const ALIKE: u8 = 8;
+/// Number of different DM-RS in a burst set of 64; eight SSBs share each of them.
+const DMRS_INDICES: u8 = 8;
 
 /// SSB indices of one cell.
 #[derive(Debug, Clone)]
@@ -37,15 +37,17 @@ impl SsbIndex {
         let (Some(last), Some(half_frame)) = (self.place(self.last), self.half_frame()) else {
             return ibar_ssb;
         };
-        let off = |index: &u8| {
+        let offset_in_periods = |index: &u8| {
             let expected = self
                 .place(*index)
                 .map_or(f64::INFINITY, |place| place - last);
             let periods = (samples - expected) / half_frame;
             (periods - periods.round()).abs()
         };
-        let alike = (0..Lmax::L64.count() / ALIKE).map(|high| high * ALIKE + ibar_ssb % ALIKE);
-        let nearest = alike.min_by(|a, b| off(a).total_cmp(&off(b)));
+        let candidates = (0..Lmax::L64.count() / DMRS_INDICES)
+            .map(|high| high * DMRS_INDICES + ibar_ssb % DMRS_INDICES);
+        let nearest =
+            candidates.min_by(|a, b| offset_in_periods(a).total_cmp(&offset_in_periods(b)));
         nearest.unwrap_or(ibar_ssb)
     }
 
@@ -92,8 +94,8 @@ mod tests {
             for index in 0..64 {
                 // Three periods of 20 ms later, a tenth of a millisecond off.
                 let later = 12.0 * numerology.half_frame_len() as f64;
-                let off = 1e-4 * numerology.sample_rate_hz();
-                let samples = start(index) - start(21) + later + off;
+                let error_samples = 1e-4 * numerology.sample_rate_hz();
+                let samples = start(index) - start(21) + later + error_samples;
                 assert_eq!(known.of(index % 8, samples), index);
             }
         }

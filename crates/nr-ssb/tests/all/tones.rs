@@ -19,7 +19,8 @@ const ABOVE_SSB_DB: [f64; 5] = [-10.0, 0.0, 10.0, 15.0, 20.0];
 /// Power of an SSB: 240 subcarriers of unit power, divided by the squared length of the transform.
 const SSB_POWER: f64 = 240.0 / 65536.0;
 
-/// Adds a tone `above_ssb_db` above an SSB of unit resource elements, with a gain of its own per antenna.
+/// Adds a tone with a power of `above_ssb_db` relative to an SSB of unit resource elements, and
+/// with a random gain for each antenna.
 fn add_tone(samples: &mut [Vec<Complex32>], cycles: f64, above_ssb_db: f64, rng: &mut ChaCha8Rng) {
     let amplitude = (10f64.powf(0.1 * above_ssb_db) * SSB_POWER).sqrt();
     for antenna in samples {

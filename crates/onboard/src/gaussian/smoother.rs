@@ -210,19 +210,19 @@ impl Rest {
 
     fn before_measurement<const N: usize>(&mut self, seen: &Measurement<N>) {
         let (row, gain, size) = (seen.whole_row(), &seen.gain, seen.gain.len());
-        let (mut predicted_levels, mut spread) = (0.0, 0.0);
+        let (mut gain_projection, mut gain_variance) = (0.0, 0.0);
         let mut cross = vec![0.0; size]; // Λ k
         for i in 0..size {
-            predicted_levels += gain[i] * self.vector[i];
+            gain_projection += gain[i] * self.vector[i];
             for j in 0..size {
                 cross[i] += self.matrix[i][j] * gain[j];
             }
-            spread += gain[i] * cross[i];
+            gain_variance += gain[i] * cross[i];
         }
-        let pull = predicted_levels + seen.residual / seen.variance;
-        let weight = spread + 1.0 / seen.variance;
+        let vector_weight = gain_projection + seen.residual / seen.variance;
+        let weight = gain_variance + 1.0 / seen.variance;
         for i in 0..size {
-            self.vector[i] -= row[i] * pull;
+            self.vector[i] -= row[i] * vector_weight;
             for j in 0..size {
                 self.matrix[i][j] +=
                     weight * row[i] * row[j] - row[i] * cross[j] - cross[i] * row[j];

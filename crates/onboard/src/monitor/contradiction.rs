@@ -41,7 +41,7 @@ impl Contradiction {
         if duration_s > MAX_S {
             return self.is_faulty;
         }
-        // Forget, then add the newest interval.
+        // Reduce the old sums by exponential forgetting, then add the newest interval.
         let kept = (-duration_s / MEMORY_S).exp();
         let by_speed_m = 0.5 * (last.speed_mps + sample.speed_mps) * duration_s;
         let by_distance_m = sample.distance_m - last.distance_m;

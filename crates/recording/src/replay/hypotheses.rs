@@ -141,8 +141,8 @@ impl Hypothesis {
 
 /// Returns the name of a radio head: its PCI, and its SSB index if the PCI is ambiguous.
 pub fn name_of(site: &Site, head: &RadioHeadSettings) -> String {
-    let alike = site.radio_heads.iter().filter(|it| it.pci == head.pci);
-    if alike.count() > 1 {
+    let with_same_pci = site.radio_heads.iter().filter(|it| it.pci == head.pci);
+    if with_same_pci.count() > 1 {
         format!("pci {} (ssb_index {})", head.pci, head.ssb_index)
     } else {
         format!("pci {}", head.pci)

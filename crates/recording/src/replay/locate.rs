@@ -286,12 +286,12 @@ fn smoothed_poses(
             excluded_until_s.insert((ssb.pci, ssb.ssb_index), ssb.time_s);
         }
     }
-    let trusted = |angle_result: &&AngleResult| {
+    let was_not_excluded = |angle_result: &&AngleResult| {
         let ssb = angle_result.ssb;
         let until_s = excluded_until_s.get(&(ssb.pci, ssb.ssb_index));
         until_s.is_none_or(|until_s| ssb.time_s > *until_s)
     };
-    let aoa_estimates = aoa_estimates.iter().filter(trusted);
+    let aoa_estimates = aoa_estimates.iter().filter(was_not_excluded);
     let mut angles: Vec<LoggedAngle> = aoa_estimates.filter_map(as_logged).collect();
     // All data are available, so that no angle is late.
     angles.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));

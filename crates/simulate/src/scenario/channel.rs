@@ -167,9 +167,9 @@ impl ChannelSettings {
         if let Some(hall) = self.hall {
             let key = "channel.hall";
             check.that(factory, key, "given", "allowed with an InF `model` only")?;
-            let roomy = (hall.size_m.iter()).all(|side_m| (1.0..=1e4).contains(side_m));
+            let is_plausible = (hall.size_m.iter()).all(|side_m| (1.0..=1e4).contains(side_m));
             check.that(
-                roomy,
+                is_plausible,
                 "channel.hall.size_m",
                 format!("{:?}", hall.size_m),
                 "each side must be between 1 and 10000",

@@ -165,24 +165,24 @@ impl LineOfSight {
         array: &ArrayModel,
     ) -> Option<Self> {
         let [forward_m, left_m, up_m] = array.position_m;
-        let eye = pose.point_at(forward_m, left_m);
+        let array_point = pose.point_at(forward_m, left_m);
         let place = head.position.moved(DATUM.map(|state| mean[state]));
-        let ground_m = eye.distance_m(place);
+        let ground_m = array_point.distance_m(place);
         let range_m = ground_m.hypot(head.height_m - up_m);
         if range_m < NEAREST_M || ground_m < NEAREST_M {
             return None;
         }
-        let bearing_rad = eye.bearing_rad(place);
+        let bearing_rad = array_point.bearing_rad(place);
         let (left, ahead) = (bearing_rad - frame.direction_rad).sin_cos();
         // The array is not at the odometer's reference point, so that a heading change moves it.
-        let (aside, along) = (bearing_rad - pose.heading_rad).sin_cos();
+        let (sine, cosine) = (bearing_rad - pose.heading_rad).sin_cos();
         let mut position_rows = [[0.0; STATES]; 2];
         position_rows[0][ALONG] = ahead * frame.stretch;
         position_rows[0][ACROSS] = left;
-        position_rows[0][HEADING] = aside * forward_m - along * left_m;
+        position_rows[0][HEADING] = sine * forward_m - cosine * left_m;
         position_rows[1][ALONG] = -left * frame.stretch;
         position_rows[1][ACROSS] = ahead;
-        position_rows[1][HEADING] = along * forward_m + aside * left_m;
+        position_rows[1][HEADING] = cosine * forward_m + sine * left_m;
         for entry in &mut position_rows {
             // In a bend, the heading changes with the distance along the road.
             entry[ALONG] += frame.curvature_per_m * entry[HEADING];
@@ -196,7 +196,7 @@ impl LineOfSight {
             bearing_rad,
             ground_m,
             range_m,
-            along,
+            along: cosine,
             position_rows,
             bearing_row,
         })

@@ -643,8 +643,8 @@ mod tests {
         assert_eq!(bank.nominal().belief(), without.belief());
         assert_eq!(bank.faulty(), 1);
         let (_, without_both) = after(0.3, &[1, 2]);
-        let witness = bank.subsets.get(1, 1).unwrap().ekf.belief();
-        assert_eq!(witness, without_both.belief());
+        let subset_belief = bank.subsets.get(1, 1).unwrap().ekf.belief();
+        assert_eq!(subset_belief, without_both.belief());
         // The test of the excluded radio head continues, so that it can be readmitted.
         assert!(bank.statistic(2) > 5.5 && !bank.is_lost());
         bank.readmit(2);

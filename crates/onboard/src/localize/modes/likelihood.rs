@@ -118,10 +118,11 @@ impl LikelihoodRatio {
 /// Returns the log-likelihood of an angle relative to an exactly predicted angle with its own noise
 /// only, so that positions can be compared.
 ///
-/// The variance of dependent angles includes their dependence: it does not reduce the likelihood,
-/// although it differs between positions. With an estimated time-correlated bias, an angle is
-/// weighted by its independent fraction. Angles outside the gate, or of an excluded radio head, are
-/// outliers.
+/// The measurement variance of dependent angles is increased by an amount that differs between
+/// positions. The result is relative to a density with the same measurement variance, so that the
+/// increase does not change it. With an estimated time-correlated bias, an angle is weighted by its
+/// independent fraction. Angles outside the gate, and angles of an excluded radio head, are treated
+/// as outliers.
 pub(in crate::localize) fn log_likelihood(
     ekf: &Ekf,
     predicted: &Result<PredictedMeasurement, UpdateReason>,
@@ -145,7 +146,7 @@ pub(in crate::localize) fn log_likelihood(
 
 /// Returns the log-likelihood in which the uncertainty of a hypothesis reduces it: second-order
 /// terms and odometry are part of the prediction, not of the angle's noise. In contrast,
-/// [`Self::relative_log_likelihood`] does not penalise a hypothesis that is so uncertain that it
+/// [`log_likelihood`] does not penalise a hypothesis that is so uncertain that it
 /// agrees with any angle.
 pub(in crate::localize) fn log_likelihood_as_stated(
     ekf: &Ekf,

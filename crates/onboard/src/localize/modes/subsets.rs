@@ -357,18 +357,18 @@ mod tests {
 
     #[test]
     fn a_large_bias_is_detected_immediately_and_a_small_one_later() {
-        let mut leap = HeadTest::default();
+        let mut large_bias = HeadTest::default();
         for _ in 0..100 {
-            leap.push(&innovation(0.0));
+            large_bias.push(&innovation(0.0));
         }
-        let mut small = leap;
+        let mut small_bias = large_bias;
         for _ in 0..3 {
-            leap.push(&innovation(1.0));
+            large_bias.push(&innovation(1.0));
         }
-        assert!(leap.statistic() > 5.5);
+        assert!(large_bias.statistic() > 5.5);
         let found = (0..200).position(|_| {
-            small.push(&innovation(0.2));
-            small.statistic() > 3.0
+            small_bias.push(&innovation(0.2));
+            small_bias.statistic() > 3.0
         });
         assert!(
             found.is_some_and(|count| (5..60).contains(&count)),

@@ -121,14 +121,15 @@ impl Ekf {
         let (north, east) = sight.bearing_rad.sin_cos();
         (row[DATUM[0]], row[DATUM[1]]) = (cos_elevation * east, cos_elevation * north);
         // Second-order term: a lateral deviation increases the distance.
-        let aside = scale * self.belief.variance_along(&sight.position_rows[1]) / sight.range_m;
+        let second_order_m =
+            scale * self.belief.variance_along(&sight.position_rows[1]) / sight.range_m;
         let coasted = row[ALONG].powi(2) * seen.ahead_variance;
-        let (row, strayed) = seen.to_newest(row);
+        let (row, odometry_variance) = seen.to_newest(row);
         Distance {
-            range_m: scale * sight.range_m + 0.5 * aside,
+            range_m: scale * sight.range_m + 0.5 * second_order_m,
             row,
-            variance: coasted + strayed + 0.5 * aside * aside,
-            curvature_variance: 0.5 * aside * aside,
+            variance: coasted + odometry_variance + 0.5 * second_order_m * second_order_m,
+            curvature_variance: 0.5 * second_order_m * second_order_m,
         }
     }
 

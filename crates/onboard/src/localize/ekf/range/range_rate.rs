@@ -27,26 +27,26 @@ impl Ekf {
             return Err(UpdateReason::Unusable);
         }
         let (sight, speed_mps) = (&seen.sight, self.speed_mps());
-        let (aside, along) = (sight.bearing_rad - seen.pose.heading_rad).sin_cos();
+        let (sine, cosine) = (sight.bearing_rad - seen.pose.heading_rad).sin_cos();
         let cos_elevation = sight.cos_elevation();
         let yaw_rate_radps = odometry.yaw_rate_radps.unwrap_or(0.0) - seen.mean[YAW_RATE_BIAS];
         // Velocity towards the radio head in the plane: sum of the vehicle's velocity and of the
         // rotation of the antenna about the reference point.
-        let swing_m = sight.position_rows[0][HEADING];
+        let lever_arm_m = sight.position_rows[0][HEADING];
         // Derivatives: the bearing and the elevation depend on the state.
         let mut row = sight.bearing_row;
         row[HEADING] -= 1.0;
         row[ALONG] -= seen.frame.curvature_per_m;
         // Second-order term: uncertainty of the bearing reduces the mean of its cosine.
-        let bend = 0.5 * self.belief.variance_along(&row) * speed_mps * along;
-        let closing_mps = speed_mps * along - bend + yaw_rate_radps * swing_m;
+        let cosine_correction = 0.5 * self.belief.variance_along(&row) * speed_mps * cosine;
+        let closing_mps = speed_mps * cosine - cosine_correction + yaw_rate_radps * lever_arm_m;
         for (value, entry) in row.iter_mut().zip(sight.position_rows[0]) {
             let elevation_rate = (1.0 - cos_elevation * cos_elevation) / sight.range_m * entry;
-            *value = cos_elevation * speed_mps * aside * *value + elevation_rate * closing_mps;
+            *value = cos_elevation * speed_mps * sine * *value + elevation_rate * closing_mps;
         }
-        row[SCALE] += cos_elevation * along * speed_mps / (1.0 + seen.mean[SCALE]);
-        row[YAW_RATE_BIAS] += cos_elevation * swing_m;
-        let (row, strayed) = seen.to_newest(row);
+        row[SCALE] += cos_elevation * cosine * speed_mps / (1.0 + seen.mean[SCALE]);
+        row[YAW_RATE_BIAS] += cos_elevation * lever_arm_m;
+        let (row, odometry_variance) = seen.to_newest(row);
         // The odometer measures the mean speed between two samples.
         let noise = &self.config.noise;
         let interval_s = (self.sample_interval.usual_s())
@@ -64,11 +64,11 @@ impl Ekf {
         let walked = wander / measured_s.max(MIN_INTERVAL_S);
         // The radio heads of a burst have a common speed error.
         let shared = self.heads.len().max(1) as f64;
-        let model_variance = (cos_elevation * along).powi(2) * shared * speed_variance
+        let model_variance = (cos_elevation * cosine).powi(2) * shared * speed_variance
             + drift
-            + strayed
+            + odometry_variance
             + walked
-            + 2.0 * (cos_elevation * bend).powi(2);
+            + 2.0 * (cos_elevation * cosine_correction).powi(2);
         let rate = HeadState::RateOffset.number(seen.index, self.heads.len(), seen.model);
         let terms = [
             (DRIFT, 1.0),
