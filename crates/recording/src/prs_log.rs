@@ -21,7 +21,7 @@ use crate::range_log::{LoggedRange, RangeLog};
 use crate::sigmf::date::{Date, parse};
 
 /// Maximum size of a log in bytes: a day of four radio heads at 100 Hz.
-const MOST_BYTES: u64 = 8 << 30;
+const MAX_BYTES: u64 = 8 << 30;
 
 /// Text before the delay.
 const DELAY: &str = "DL PRS ToA ==>";
@@ -61,7 +61,7 @@ pub fn is_prs_log(file: &Path) -> bool {
 /// [`RecordingError`] if the file cannot be read, has no line with a delay, or contradicts the
 /// subcarrier spacing. Invalid single lines are reported as remarks only.
 pub fn read_prs_log(file: &Path, spacing_khz: f64) -> Result<RangeLog, RecordingError> {
-    let bytes = files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
+    let bytes = files::read(file, MAX_BYTES).map_err(|source| RecordingError::io(file, source))?;
     let text = String::from_utf8_lossy(&bytes);
     let slots = (10.0 * spacing_khz / 15.0).round();
     let mut log = RangeLog {
