@@ -69,7 +69,7 @@ def unverified(plant: _core.Plant) -> list[Unverified]:
             value = _at(mine, key)
             what = "as in the template"
             if not isinstance(value, list):
-                what = f"{value:g} {unit}".strip()
+                what = f"{format(value, 'g') if isinstance(value, float) else value} {unit}".strip()
             found.append(Unverified(key, what, "", None))
     return found
 
