@@ -3,7 +3,7 @@
 
 use onboard::radio_head::RadioHead;
 use onboard::range::RangeModel;
-use onboard::settings::SPEED_OF_LIGHT_MPS;
+use onboard::settings::{RadioHeadSettings, SPEED_OF_LIGHT_MPS};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -49,6 +49,14 @@ pub(super) struct Clocks {
     number: u64,
 }
 
+/// Returns the index of the first radio head with the oscillator of radio head `index`: its own
+/// index, or the first one of its clock group.
+pub(super) fn oscillator_of(heads: &[RadioHeadSettings], index: usize) -> usize {
+    let group = heads.get(index).and_then(|head| head.clock_group);
+    let first = group.and_then(|_| heads.iter().position(|head| head.clock_group == group));
+    first.unwrap_or(index)
+}
+
 impl Clocks {
     pub fn new(scenario: &Scenario, streams: Streams) -> Self {
         let (site, vehicle) = (&scenario.site, &scenario.vehicle);
@@ -68,15 +76,12 @@ impl Clocks {
         // vehicle's clock has no effect.
         let vehicle_m = [0.0, model.clock_wander_m_per_sqrt_s];
         made.vehicle = Some(Clock::new(streams, VEHICLE, vehicle_m, scale));
-        let heads: Vec<_> = site.radio_heads.iter().map(RadioHead::from).collect();
-        for (index, head) in heads.iter().enumerate() {
-            let group = head.clock.group;
-            let shares = |other: &&RadioHead| group.is_some() && other.clock.group == group;
-            let first = heads.iter().take(index).position(|other| shares(&other));
-            let own = first.and_then(|first| made.of_heads.get(first).copied());
-            made.of_heads.push(own.unwrap_or(made.oscillators.len()));
-            if own.is_none() {
-                let clock_m = model.head_clock(&head.clock);
+        for (index, head) in site.radio_heads.iter().enumerate() {
+            let shared = made.of_heads.get(oscillator_of(&site.radio_heads, index));
+            let shared = shared.copied();
+            made.of_heads.push(shared.unwrap_or(made.oscillators.len()));
+            if shared.is_none() {
+                let clock_m = model.head_clock(&RadioHead::from(head).clock);
                 let clock = Clock::new(streams, index, clock_m, scale);
                 made.oscillators.push(clock);
             }
@@ -101,5 +106,25 @@ impl Clocks {
         let head = oscillator.and_then(|&at| self.oscillators.get(at));
         let error_s = |clock: &Clock| clock.error_s;
         head.map_or(0.0, error_s) + self.vehicle.as_ref().map_or(0.0, error_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use onboard::settings::{Shipped, Site, TomlFile};
+
+    use super::*;
+
+    #[test]
+    fn radio_heads_of_a_clock_group_share_the_first_oscillator() {
+        let mut text = "name = \"hall\"\n".to_owned();
+        let groups = [None, Some(4), Some(7), Some(4), None, Some(7)];
+        for (pci, group) in groups.into_iter().enumerate() {
+            text += &format!("[[radio_heads]]\npci = {pci}\nposition_m = [1{pci}.0, 5.0, 3.0]\n");
+            text += &group.map_or(String::new(), |it| format!("clock_group = {it}\n"));
+        }
+        let site = Site::from_toml(&text, "site", &Shipped).unwrap();
+        let first = |index| oscillator_of(&site.radio_heads, index);
+        assert_eq!([0, 1, 2, 3, 4, 5].map(first), [0, 1, 2, 1, 4, 2]);
     }
 }

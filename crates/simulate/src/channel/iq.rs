@@ -17,7 +17,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::clocks::Clocks;
+use super::clocks::{Clocks, oscillator_of};
 use super::head_channel::HeadChannel;
 use crate::random::{Purpose, Streams};
 use crate::scenario::{IqSettings, Scenario};
@@ -101,7 +101,8 @@ impl IqAir {
         let channel_gains = channel_gains.collect();
         let head_oscillators = (0..site.radio_heads.len())
             .map(|index| {
-                let mut rng = streams.generator(Purpose::HeadOscillator, index);
+                let first = oscillator_of(&site.radio_heads, index);
+                let mut rng = streams.generator(Purpose::HeadOscillator, first);
                 1e-6 * settings.head_oscillator_ppm * rng.sample::<f64, _>(StandardNormal)
             })
             .collect();
