@@ -338,11 +338,16 @@ impl Pipeline {
         let estimate = localizer.pose(newest.time_s)?;
         let (localizer, first) = match change {
             Change::Begin => {
-                let pose = monitors.take_free_pose().unwrap_or(estimate.pose);
-                let localizer = monitors.fallback.begin(pose)?;
+                let along_m = localizer.ekf().and_then(Ekf::along_m);
+                let (pose, along_m) =
+                    (monitors.take_free_pose()).unwrap_or((estimate.pose, along_m));
+                let localizer = monitors.fallback.begin(pose, along_m)?;
                 (localizer, monitors.fallback.odometry(&newest))
             }
-            Change::End => (monitors.fallback.end(&estimate)?, newest),
+            Change::End => match monitors.fallback.end(localizer) {
+                Some(localizer) => (localizer, newest),
+                None => return Ok(()),
+            },
         };
         self.localizer = OutOfSequenceBuffer::new(localizer);
         self.localizer.odometry(&first)?;
@@ -485,6 +490,9 @@ impl Pipeline {
         let estimate = localizer.pose(newest_s.max(time_s))?;
         let is_known = localizer.hypotheses().is_none();
         let (pose, ekf) = (is_known.then_some(estimate.pose), localizer.ekf());
+        if is_known && !localizer.is_lost() {
+            monitors.retain(time_s, localizer);
+        }
         monitors.angles(time_s, &self.burst, pose, ekf);
         if monitors.is_without_odometry() {
             monitors.fallback.received(&estimate);

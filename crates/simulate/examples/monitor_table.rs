@@ -13,11 +13,13 @@
 use onboard::Custom;
 use onboard::localize::IntegrityState;
 use onboard::settings::{Shipped, TomlFile};
-use simulate::Simulation;
 use simulate::scenario::{FaultKind, FaultSettings, Scenario};
+use simulate::{Simulation, Step};
 
+/// Begin of the fault in the first run, difference from one run to the next, and duration, in seconds.
 const FROM_S: f64 = 60.0;
-const UNTIL_S: f64 = 75.0;
+const STEP_S: f64 = 11.0;
+const LASTS_S: f64 = 15.0;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
@@ -30,49 +32,49 @@ fn main() {
         FaultKind::OdometerStopped,
         FaultKind::OdometerFrozen,
         FaultKind::OdometerReversed,
+        FaultKind::OdometerHeld,
         FaultKind::DeadAntenna { antenna: 2 },
         FaultKind::InvertedAntenna { antenna: 1 },
         FaultKind::ExchangedAntennas { antennas: [1, 3] },
     ];
+    println!(
+        "scenario, fault, run: reported, fault ended, ok (s after begin, end, end); ok beyond the level (s)"
+    );
     for what in kinds {
-        let (from_s, until_s) = (FROM_S, UNTIL_S);
-        let fault = FaultSettings {
-            from_s,
-            until_s,
-            what,
-        };
-        let mut scenario = Scenario::from_library(name, &Shipped).unwrap();
-        scenario.faults = vec![fault];
-        let simulation = Simulation::on_its_platform(&scenario).unwrap();
         for run in 0..runs {
+            // Each run has its fault elsewhere.
+            let from_s = FROM_S + STEP_S * run as f64;
+            let until_s = from_s + LASTS_S;
+            let mut scenario = Scenario::from_library(name, &Shipped).unwrap();
+            scenario.faults = vec![FaultSettings {
+                from_s,
+                until_s,
+                what,
+            }];
+            let simulation = Simulation::on_its_platform(&scenario).unwrap();
             let record = simulation.run(5, run, &|_| Ok(Custom::default())).unwrap();
-            let mut before = String::new();
-            let (mut beyond, mut period_s) = (0, 0.0);
-            for pair in record.steps.windows(2) {
-                let [last, step] = pair else { continue };
-                period_s = step.time_s - last.time_s;
-                let Some(integrity) = step.integrity else {
-                    continue;
-                };
-                let is_beyond = integrity.state == IntegrityState::Ok
-                    && step.error_m() > integrity.protection_level_m;
-                beyond += usize::from(is_beyond);
-                let faults: Vec<_> = step.faults.iter().map(|it| it.fault.name()).collect();
-                let now = format!("{} {faults:?}", integrity.state.name());
-                let is_near = (FROM_S - 1.0..UNTIL_S + 20.0).contains(&step.time_s);
-                let is_time = (step.time_s % 2.0).abs() < 0.5 * period_s && step.time_s > UNTIL_S;
-                if (now != before || is_time) && (is_near || !faults.is_empty()) {
-                    println!(
-                        "  {:.2} s: {now}, error {:.2} m, level {:.2} m",
-                        step.time_s,
-                        step.error_m(),
-                        integrity.protection_level_m
-                    );
-                }
-                before = now;
-            }
-            let beyond_s = period_s * beyond as f64;
-            println!("{name} {what:?} run {run}: ok beyond the level {beyond_s:.2} s");
+            let is_ok = |step: &Step| {
+                step.integrity
+                    .is_some_and(|it| it.state == IntegrityState::Ok)
+            };
+            let first_s = |after_s: f64, is: &dyn Fn(&Step) -> bool| {
+                let mut steps = record.steps.iter().filter(|it| it.time_s > after_s);
+                let found = steps.find(|it| is(it)).map(|it| it.time_s - after_s);
+                found.map_or("none".to_owned(), |it| format!("{it:.2}"))
+            };
+            let reported_s = first_s(from_s, &|it| !it.faults.is_empty());
+            let ended_s = first_s(until_s, &|it| it.faults.is_empty());
+            let ok_s = first_s(until_s, &is_ok);
+            let beyond = record.steps.iter().filter(|it| {
+                let level_m = it.integrity.map(|it| it.protection_level_m);
+                is_ok(it) && level_m.is_some_and(|level_m| it.error_m() > level_m)
+            });
+            let period_s = record
+                .steps
+                .get(1)
+                .map_or(0.0, |it| it.time_s - record.steps[0].time_s);
+            let beyond_s = period_s * beyond.count() as f64;
+            println!("{name} {what:?} {run}: {reported_s}, {ended_s}, {ok_s}; {beyond_s:.2}");
         }
     }
 }

@@ -24,7 +24,7 @@ pub use motion::MotionMonitor;
 use crate::expected_angle::ExpectedAngle;
 use crate::geometry::Pose;
 use crate::localize::modes::OdometryTest;
-use crate::localize::{AngleUpdate, Ekf, UpdateReason};
+use crate::localize::{AngleUpdate, Ekf, Localizer, UpdateReason};
 use crate::observation::{OdometrySample, SsbObservation};
 use crate::settings::{Site, Vehicle};
 
@@ -94,6 +94,7 @@ impl Monitors {
         self.test = None;
         self.motion.restart();
         self.confirmation.restart();
+        self.fallback.forget();
     }
 
     /// Receives every burst until angles have confirmed the pose again.
@@ -200,6 +201,14 @@ impl Monitors {
         }
     }
 
+    /// Retains a copy of the localizer at a time (s) for the case of a fault, unless the odometry is suspicious.
+    pub fn retain(&mut self, time_s: f64, localizer: &dyn Localizer) {
+        let is_quiet = self.faults.is_empty() && !self.constancy.is_suspicious();
+        if is_quiet && self.confirmation.is_confirmed() {
+            self.fallback.retain(time_s, localizer);
+        }
+    }
+
     /// Tests a suspicious odometry with the angles of a burst. Returns the detected fault.
     fn test(&mut self, updates: &[AngleUpdate], ekf: Option<&Ekf>) -> Option<Fault> {
         if self.is_without_odometry || !self.constancy.is_suspicious() {
@@ -214,12 +223,12 @@ impl Monitors {
         is_fault.then_some(Fault::OdometryFrozen)
     }
 
-    /// Ends the test of the odometry, if it is active. Returns the pose of its filter without
+    /// Ends the test of the odometry, if it is active. Returns pose and distance along the road of its filter without
     /// odometry.
-    pub fn take_free_pose(&mut self) -> Option<Pose> {
+    pub fn take_free_pose(&mut self) -> Option<(Pose, Option<f64>)> {
         let test = self.test.take()?;
         let free = test.free();
-        Some(free.pose(free.time_s()).pose)
+        Some((free.pose(free.time_s()).pose, free.along_m()))
     }
 
     /// Returns the pending change of the localizer.

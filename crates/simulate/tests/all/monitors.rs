@@ -82,6 +82,31 @@ fn faults_of_the_odometry_are_detected_within_two_seconds_and_end() {
     }
 }
 
+/// The localizer retains the constants of the array and the evidence about the site plan. When it started with those of
+/// the files, it was not `ok` within 20 s after the faults.
+#[test]
+fn the_state_is_ok_again_within_ten_seconds_after_a_fault_of_the_odometry() {
+    const FROM_S: f64 = 60.0;
+    const UNTIL_S: f64 = 75.0;
+    for what in [FaultKind::OdometerStopped, FaultKind::OdometerFrozen] {
+        let fault = FaultSettings {
+            from_s: FROM_S,
+            until_s: UNTIL_S,
+            what,
+        };
+        let scenario = Scenario {
+            faults: vec![fault],
+            ..shipped("yard")
+        };
+        for run in drives(&scenario, 5, 1) {
+            let after = run.steps.iter().filter(|it| it.time_s > UNTIL_S);
+            let ok_s = after.clone().find(|it| is_ok(it)).unwrap().time_s - UNTIL_S;
+            assert!(ok_s < 10.0, "{what:?}: {ok_s}");
+            assert!(after.filter(|it| is_beyond(it)).count() == 0, "{what:?}");
+        }
+    }
+}
+
 /// The vehicle departs while the odometry reports standstill, so that odometry alone does not
 /// reveal the fault.
 #[test]

@@ -26,7 +26,8 @@ use crate::BoxError;
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::RadialQuantile;
 use crate::geometry::{Area, Pose};
-use crate::localize::ekf::Ekf;
+use crate::localize::ekf::state::Belief;
+use crate::localize::ekf::{Ekf, EkfConfig, FreeMotion};
 use crate::localize::integrity::IntegrityMonitor;
 use crate::localize::localizer::{Localizer, Recovered, copy_into};
 use crate::localize::output::{Integrity, IntegrityState, PoseEstimate};
@@ -200,6 +201,8 @@ clone_in_place! {
         rests_until_s: f64,
         recovered: Option<Recovered>,
         keeps_journal: bool,
+        /// Whether the odometry is at fault, so that no search is possible.
+        is_without_odometry: bool,
     }
 }
 
@@ -250,6 +253,7 @@ impl Relocalizer {
             rests_until_s: f64::NEG_INFINITY,
             recovered: None,
             keeps_journal: false,
+            is_without_odometry: false,
             drive_config: Arc::new(DriveConfig {
                 road,
                 heads: heads.to_vec(),
@@ -257,6 +261,33 @@ impl Relocalizer {
                 quantile: RadialQuantile::new(integrity.unwrap_or_default().risk_per_epoch()),
             }),
         }
+    }
+
+    /// Continues without odometry from a start on: every filter of the bank follows the angles.
+    pub(crate) fn begin_free_motion(&mut self, motion: &FreeMotion) {
+        self.change_motion(|ekf| ekf.begin_free_motion(motion));
+        self.is_without_odometry = true;
+    }
+
+    /// Continues with odometry that was at fault, with the specified noise, and with the constants of the odometry from
+    /// the filter `before`.
+    pub(crate) fn end_free_motion(&mut self, specified: &EkfConfig, before: &Belief) {
+        self.change_motion(|ekf| ekf.end_free_motion(specified, before));
+        self.is_without_odometry = false;
+        if self.drive_config.road.is_none() {
+            self.phase = Phase::Given;
+        }
+    }
+
+    fn change_motion(&mut self, change: impl Fn(&mut Ekf)) {
+        match &mut self.solution {
+            Some(Solution::Bare(ekf)) => change(ekf),
+            Some(Solution::Monitored(monitor)) => monitor.change_motion(change),
+            None => {}
+        }
+        self.end_search();
+        self.heading = None;
+        self.consistency.reset();
     }
 
     /// Tracks with the result of a search at time `now_s`.
@@ -476,6 +507,9 @@ impl Localizer for Relocalizer {
                 self.track(found, now_s);
             }
             return Ok(verdict);
+        }
+        if let (true, Some(solution)) = (self.is_without_odometry, &mut self.solution) {
+            return Ok(solution.update(head, measured));
         }
         // The hypotheses of a search predict angles with the states of the filter that they are
         // compared with.

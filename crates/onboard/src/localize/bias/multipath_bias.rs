@@ -166,6 +166,17 @@ impl MultipathBias {
         }
     }
 
+    /// Removes the covariances with some states, which were replaced.
+    pub fn decorrelate_states(&mut self, states: &[usize]) {
+        for head in &mut self.heads {
+            for (state, covariance) in head.state_covariance.iter_mut().enumerate() {
+                if states.contains(&state) {
+                    *covariance = 0.0;
+                }
+            }
+        }
+    }
+
     /// Whether the bias of a radio head is probably so large that its angles contain almost no
     /// information.
     pub fn is_large(&self, head: usize) -> bool {

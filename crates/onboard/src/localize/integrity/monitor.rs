@@ -160,6 +160,13 @@ impl IntegrityMonitor {
         &self.bank
     }
 
+    /// Changes the motion model of every filter, because the odometry is at fault or is right again.
+    pub fn change_motion(&mut self, change: impl Fn(&mut Ekf)) {
+        self.bank.change_motion(change);
+        (self.restarted, self.handover, self.has_departed) = (None, None, false);
+        self.trusted_m = self.bank.nominal().driven_m();
+    }
+
     /// Predicts every filter.
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryResult {
         if let Some(restarted) = &mut self.restarted {

@@ -194,6 +194,23 @@ impl Bank {
         }
     }
 
+    /// Changes the motion model of every filter, because the odometry is at fault or is right again. The hypotheses of the
+    /// odometry restart.
+    pub fn change_motion(&mut self, change: impl Fn(&mut Ekf)) {
+        change(&mut self.nominal);
+        for subset in self.subsets.iter_mut() {
+            change(&mut subset.ekf);
+        }
+        for it in &mut self.modes {
+            if it.mode.is_of_odometry {
+                let faults = &self.settings.fault_probability;
+                *it = ModeFilter::new(it.mode, &self.nominal, faults);
+            } else {
+                change(&mut it.ekf);
+            }
+        }
+    }
+
     /// Returns the bank with the selected mode as the nominal one, once it is certain and no radio
     /// head contradicts it. The common part of the likelihood ratios is subtracted from those of
     /// the other modes.

@@ -35,6 +35,8 @@ pub(in crate::localize) struct Mode {
     /// Whether the mode is a fault; radio heads are then monitored for a second fault with the
     /// probability that no fault mode holds.
     pub is_fault: bool,
+    /// Whether the mode is one of the odometry: it restarts when the odometry was at fault.
+    pub is_of_odometry: bool,
     /// Restarts the filter at a possible onset of the fault: when the vehicle starts to move, or
     /// when its speed jumps by the given fraction.
     pub onset: Option<fn(&mut Ekf, f64)>,
@@ -56,6 +58,7 @@ const ROW: Mode = Mode {
     alter: |_| (),
     adapt: |_, _| (),
     is_fault: false,
+    is_of_odometry: false,
     onset: None,
     on_exclude: Carry::Nothing,
     on_rebase: Carry::All,
@@ -68,6 +71,7 @@ const SLIP: Mode = Mode {
     prior: |_, faults| faults.odometer,
     alter: |ekf| ekf.expect_slip(MAX_SLIP),
     is_fault: true,
+    is_of_odometry: true,
     onset: Some(|ekf, jump| ekf.expect_slip(if jump > 0.0 { jump } else { MAX_SLIP })),
     on_exclude: Carry::AllButHead,
     on_rebase: Carry::IfNotAgainst,
@@ -100,6 +104,7 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
         // 90 times the probability of slip, at most 0.5.
         prior: |_, faults| (90.0 * faults.odometer).min(0.5),
         alter: |ekf| ekf.scale_odometer_noise(3.0),
+        is_of_odometry: true,
         on_rebase: Carry::Nothing,
         ..ROW
     },
