@@ -8,10 +8,14 @@ import signal
 import socket
 from typing import TYPE_CHECKING
 
+from attack.node.environment import HEADS
+
 if TYPE_CHECKING:
     from attack.node.fault import Action
     from attack.node.run import Run
 
+# Displacement of a radio head in the site file (m).
+MOVED_M = 30.0
 FILLING = "filling"
 BROKEN_SITE = 'name = "campaign"\nssb.period_ms = 41\n'
 
@@ -71,6 +75,24 @@ def break_site(run: Run) -> None:
 def restore_site(run: Run) -> None:
     """Restores the site file."""
     (run.folder / "site.good").rename(run.folder / "site.toml")
+
+
+def move_head(run: Run) -> None:
+    """Moves the third radio head of the site file, and asks the node to read it (SIGHUP)."""
+    site = run.folder / "site.toml"
+    text = site.read_text(encoding="utf-8")
+    site.rename(run.folder / "site.good")
+    _, x_m, y_m, z_m = HEADS[2]
+    moved = text.replace(f"[{x_m}, {y_m}, {z_m}]", f"[{x_m + MOVED_M}, {y_m}, {z_m}]")
+    assert moved != text
+    site.write_text(moved, encoding="utf-8")
+    run.node.signal(signal.SIGHUP)
+
+
+def move_head_back(run: Run) -> None:
+    """Restores the site file, and asks the node to read it (SIGHUP)."""
+    restore_site(run)
+    run.node.signal(signal.SIGHUP)
 
 
 def reconnect(run: Run) -> None:

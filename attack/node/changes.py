@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,11 @@ STRANGER = (99, 10.0, -40.0, 6.0)
 DUPLICATE = (HEADS[1][0], 75.0, -35.0, 6.0)
 # Error of the angles of a disturbed head (rad).
 ANGLE_ERROR_RAD = 0.5
+# Interval of the difference quotient of the heading (s).
+YAW_STEP_S = 0.02
+# Delay of a second odometry source, and difference of its distance counter (s, m).
+SECOND_SOURCE_S = 0.01
+SECOND_COUNTER_M = 1000.0
 # Bytes of an oversize message.
 OVERSIZE = 1 << 20
 
@@ -188,6 +194,89 @@ def biased_head(messages: list[Message], context: Context) -> list[Message]:
         else it
         for it in messages
     ]
+
+
+def yaw_rate(change: Callable[[float], float]) -> Change:
+    """Adds the true yaw rate to all odometry messages, and changes it within the window (rad/s)."""
+
+    def apply(messages: list[Message], context: Context) -> list[Message]:
+        changed = []
+        for it in messages:
+            if it.is_of("odometry"):
+                time_s = _value(it, "time_s")
+                before, after = (
+                    context.motion.pose(time_s + step_s).heading_rad
+                    for step_s in (-0.5 * YAW_STEP_S, 0.5 * YAW_STEP_S)
+                )
+                rate_radps = math.remainder(after - before, math.tau) / YAW_STEP_S
+                if it.send_s in context.window:
+                    rate_radps = change(rate_radps)
+                it = it.with_values(yaw_rate_radps=rate_radps)
+            changed.append(it)
+        return changed
+
+    return apply
+
+
+def second_source(messages: list[Message], context: Context) -> list[Message]:
+    """Adds a second odometry source with another distance counter, between the current messages."""
+    return [
+        *messages,
+        *(
+            Message(
+                it.send_s + SECOND_SOURCE_S,
+                {
+                    **it.content,
+                    "time_s": it.content["time_s"] + SECOND_SOURCE_S,
+                    "distance_m": it.content["distance_m"] + SECOND_COUNTER_M,
+                },
+            )
+            for it in messages
+            if isinstance(it.content, dict) and it.is_of("odometry") and it.send_s in context.window
+        ),
+    ]
+
+
+def stuck_angles(messages: list[Message], context: Context) -> list[Message]:
+    """Repeats the first angle of each head in the window, with current time stamps."""
+    held: dict[int, float] = {}
+    changed = []
+    for it in messages:
+        if it.is_of("angle") and it.send_s in context.window:
+            phase_rad = held.setdefault(_value(it, "pci"), _value(it, "phase_rad"))
+            it = it.with_values(phase_rad=phase_rad)
+        changed.append(it)
+    return changed
+
+
+def angle_values(change: Callable[[dict[str, Any]], dict[str, Any]], every: int = 1) -> Change:
+    """Changes the fields of every `every`-th angle message of the window."""
+
+    def apply(messages: list[Message], context: Context) -> list[Message]:
+        changed, number = [], 0
+        for it in messages:
+            if isinstance(it.content, dict) and it.is_of("angle") and it.send_s in context.window:
+                number += 1
+                if number % every == 0:
+                    it = Message(it.send_s, change(dict(it.content)))
+            changed.append(it)
+        return changed
+
+    return apply
+
+
+def heads_off(count: int) -> Change:
+    """Removes the angles of the first `count` radio heads."""
+    pcis = {head[0] for head in HEADS[:count]}
+
+    def apply(messages: list[Message], context: Context) -> list[Message]:
+        return [
+            it
+            for it in messages
+            if not (it.is_of("angle") and it.send_s in context.window and _value(it, "pci") in pcis)
+        ]
+
+    return apply
 
 
 def garbage(messages: list[Message], context: Context) -> list[Message]:

@@ -55,6 +55,8 @@ class Fault:
     end: Action | None = None
     # Whether the vehicle stands during the fault.
     stands: bool = False
+    # Distance along the road at drive time 0 (m); drawn if `None`.
+    starts_at_m: float | None = None
     # Whether only an event counts as a report: the pose is not affected.
     by_event: bool = False
     # Outputs other than JSON over TCP, MQTT and the page: `mcap`, `tum`, `fifo`, `disk`.
@@ -78,6 +80,9 @@ class Fault:
     samples: SampleChange | None = None
     # Pattern of withheld samples: whether they are, by the time since the begin of the fault (s).
     withheld: Callable[[float], bool] | None = None
+
+    # Bound that the node is known to violate; the short campaign leaves such a fault out.
+    shortfall: str = ""
 
     # Maximum time to the first SSB after withheld samples are back (s).
     reception_s: float | None = None

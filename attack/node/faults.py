@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 
 from attack.node import actions, changes, resume, samples
@@ -51,7 +52,68 @@ FAULTS = (
     Fault(
         "NaN, null and infinite speeds", "odomet|messages", lasts_s=4.0, change=changes.nan_fields
     ),
+    # A tyre was changed, or another wheel radius was configured; the filter estimates the scale.
+    Fault(
+        "odometry 10 % too long",
+        ODOMETRY,
+        lasts_s=6.0,
+        change=changes.odometry_steps(1.1, 1.1),
+        reported=False,
+        shortfall="recovery: the scale is estimated again only slowly after the fault",
+    ),
+    # The fault begins at most 4 m before or after the begin of a bend.
+    Fault(
+        "yaw rate with the wrong sign in a bend",
+        "",
+        lasts_s=6.0,
+        change=changes.yaw_rate(lambda it: -it),
+        reported=False,
+        starts_at_m=92.0,
+        shortfall="recovery: the heading is wrong until a search ends",
+    ),
+    Fault(
+        "yaw rate stuck at 0.3 rad/s",
+        "",
+        lasts_s=6.0,
+        change=changes.yaw_rate(lambda _: 0.3),
+        reported=False,
+    ),
+    Fault(
+        "two odometry sources with different counters",
+        ODOMETRY,
+        lasts_s=6.0,
+        change=changes.second_source,
+    ),
+    # Angle values.
+    Fault(
+        "angles stuck at their values, vehicle drives",
+        "angle|odomet",
+        lasts_s=6.0,
+        change=changes.stuck_angles,
+        shortfall="report after 2.5 to 2.8 s instead of 2 s; never `ok` beyond the level",
+    ),
+    Fault(
+        "NaN as the sigma of every second angle",
+        "angle|messages|sigma",
+        lasts_s=4.0,
+        change=changes.angle_values(lambda it: {**it, "phase_sigma_rad": math.nan}, every=2),
+        by_event=True,
+        harmless=True,
+    ),
+    Fault(
+        "SSB index of another beam in all angles",
+        "head|cell|PCI|angle",
+        lasts_s=6.0,
+        change=changes.angle_values(lambda it: {**it, "ssb_index": it["ssb_index"] + 8}),
+    ),
     # Time stamps.
+    Fault(
+        "clock of the angles behind by 0.2 s",
+        TIME + "|angle",
+        lasts_s=6.0,
+        change=changes.angle_values(lambda it: {**it, "time_s": it["time_s"] - 0.2}),
+        reported=False,
+    ),
     Fault(
         "one odometry message repeated 5 times a second",
         TIME,
@@ -97,6 +159,22 @@ FAULTS = (
     Fault("angles absent for 6 s", "angle", lasts_s=6.0, change=changes.absent("angle")),
     Fault("all messages absent for 8 s", "nothing|no ", lasts_s=8.0, change=changes.absent(None)),
     # Radio heads.
+    Fault(
+        "three of six radio heads off",
+        "",
+        lasts_s=6.0,
+        change=changes.heads_off(3),
+        reported=False,
+        harmless=True,
+    ),
+    Fault(
+        "SIGHUP with a radio head 30 m off its position",
+        "again|reload",
+        lasts_s=6.0,
+        begin=actions.move_head,
+        end=actions.move_head_back,
+        reported=False,
+    ),
     Fault(
         "radio head off the site",
         "99|cell|head",

@@ -6,7 +6,7 @@ import json
 import os
 import time
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -73,6 +73,8 @@ class Run:
         self.duration_s = self.window.end_s + AFTER_S
         stop_s = (begin_s, self.window.end_s) if fault.stands else None
         self.motion = environment.Motion.draw(self.random, stop_s)
+        if fault.starts_at_m is not None:
+            self.motion = replace(self.motion, start_m=fault.starts_at_m)
         self.messages = self._messages()
         self.ports = {name: free_port() for name in ("messages", "json", "page")}
         fifo = folder / "json.fifo" if "fifo" in fault.outputs else None

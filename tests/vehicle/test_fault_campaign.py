@@ -28,11 +28,11 @@ pytestmark = pytest.mark.skipif(
 def test_every_fault_is_reported_and_recovered_from_within_its_bounds(tmp_path: Path) -> None:
     small_disk = has_small_disk()
     # Faults of recordings are part of the full campaign only, because synthesis takes longer than
-    # all runs.
+    # all runs. So are faults with a known shortfall (docs/node.md).
     chosen = [
         replace(it, repetitions=1)
         for it in FAULTS
-        if not it.uses_samples and (small_disk or "disk" not in it.outputs)
+        if not (it.uses_samples or it.shortfall) and (small_disk or "disk" not in it.outputs)
     ]
     verdicts = campaign.run_all(chosen, SEED, 1, AT_ONCE, tmp_path / "first")
     # The computer may pause the node and not the test: a violation counts if it occurs again
