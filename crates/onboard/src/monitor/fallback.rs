@@ -33,7 +33,7 @@ const SPEED_S: f64 = 0.5;
 const LEVEL_SIGMAS: f64 = 5.0;
 /// Time between two copies of the localizer in seconds. The older one is at least of this age; a fault is detected
 /// earlier.
-const RETAINED_S: f64 = 5.0;
+const RETAINED_S: f64 = 2.5;
 
 /// Starts localizers without odometry, and those after the fault.
 #[derive(Debug)]
