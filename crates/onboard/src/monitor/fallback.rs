@@ -21,7 +21,7 @@ use crate::settings::{SettingsError, Site, Vehicle};
 const UNDETECTED_S: f64 = 1.0;
 /// Standard deviation of the heading when the fault is detected, in radians.
 const HEADING_STD_RAD: f64 = 0.2;
-/// Noise of the distance in m/√m and m/√s. Half of it shortens the recovery in the yard by 0.1 s at most.
+/// Noise of the distance in m/√m and m/√s. Half of it does not shorten the recovery in the yard.
 const DISTANCE_NOISE: f64 = 1.5;
 /// Noise of the heading in rad/√s: the yaw rate may be at fault, too.
 const YAW_NOISE_RAD_PER_SQRT_S: f64 = 0.3;
