@@ -28,7 +28,7 @@ pytestmark = pytest.mark.skipif(
 def test_every_fault_is_reported_and_recovered_from_within_its_bounds(tmp_path: Path) -> None:
     small_disk = has_small_disk()
     # Faults of recordings are part of the full campaign only, because synthesis takes longer than
-    # all runs. So are faults with a known shortfall (docs/node.md).
+    # all runs. Faults with a known shortfall (docs/node.md) are left out, too.
     chosen = [
         replace(it, repetitions=1)
         for it in FAULTS
