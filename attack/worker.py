@@ -18,7 +18,7 @@ from typing import Any
 
 from access_av import InputError, RecordingError, SettingsError
 from access_av.cli.terminal import plain
-from access_av.report import page
+from access_av.report.chart_code import chart_code
 from attack import files, kinds
 from attack.verdict import judge
 
@@ -87,7 +87,7 @@ def main() -> None:
     seed, place = int(sys.argv[1]), Path(sys.argv[2])
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     # Tables and charts are loaded before the limit is set, so that it applies to a case only.
-    page.bundle()
+    chart_code()
     files.recorded()
     limit_memory()
     print("ready", file=answers, flush=True)

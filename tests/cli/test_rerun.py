@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -22,6 +23,7 @@ start_at_m = 285.0
 """
 SPACE = "[vehicle.platform]\nmode = [0, 2]\n"
 DRIVE = ("--site", "drive/site.toml", "--vehicle", "drive/vehicle.toml")
+RANGES = ("--site", "hall.toml", "--vehicle", "receiver.toml")
 RECORDED = ("--recording", "drive/iq.sigmf-meta", "--odometry", "drive/odometry.csv")
 COMMANDS = {
     "run": (
@@ -32,6 +34,8 @@ COMMANDS = {
     "angles": ("record", "angles", "drive/iq.sigmf-meta", *DRIVE),
     "locate": ("record", "locate", *RECORDED, *DRIVE, "--truth", "drive/truth.tum", "--smooth"),
     "survey": ("record", "survey", "log1", "log2", *DRIVE),
+    "position": ("record", "locate", "--recording", "stop1/ranges.csv", *RANGES),
+    "offsets": ("record", "survey", "stop1", "stop2", "stop3", *RANGES),
     "bound": ("design", "bound", "short.toml", "--map-step-m", "60"),
     "plan": ("design", "plan", "short.toml"),
     "designs": ("design", "sweep", "short.toml", "--space", "space.toml", "--runs", "2"),
@@ -40,6 +44,33 @@ COMMANDS = {
     "evaluate": ("paper", "evaluate", "--interpretation", "gate", "--runs", "1"),
     "study": ("study", "plant.toml", "--runs", "2"),
 }
+
+
+RANGING = """
+name = "receiver"
+drive = "differential"
+ranging = { kind = "two-way", sigma_m = 0.1, offset_std_m = 0.5 }
+"""
+
+
+def write_ranges(where: Path) -> None:
+    """Writes the ranges of a receiver that stands at three positions, with its site and vehicle."""
+    heads = {1: (0.0, 0.0), 2: (20.0, 0.0), 3: (20.0, 30.0), 4: (0.0, 30.0)}
+    site = 'name = "hall"\n'
+    for pci, (x_m, y_m) in heads.items():
+        site += f"[[radio_heads]]\npci = {pci}\nposition_m = [{x_m}, {y_m}, 0.0]\n"
+    (where / "hall.toml").write_text(site)
+    (where / "receiver.toml").write_text(RANGING)
+    for number, (x_m, y_m) in enumerate(((4.0, 6.0), (15.0, 8.0), (6.0, 22.0)), start=1):
+        folder = where / f"stop{number}"
+        folder.mkdir()
+        (folder / "truth.tum").write_text(f"0 {x_m} {y_m} 0 0 0 0 1\n")
+        rows = [
+            f"{0.1 * epoch},{pci},{math.dist(place_m, (x_m, y_m)) + 0.05 * (-1) ** epoch}"
+            for epoch in range(20)
+            for pci, place_m in heads.items()
+        ]
+        (folder / "ranges.csv").write_text("\n".join(["time_s,pci,range_m", *rows]) + "\n")
 
 
 def access_av(where: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -59,6 +90,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (where / "short.toml").write_text(SCENARIO)
     (where / "space.toml").write_text(SPACE)
     (where / "plant.toml").write_text(LAST_METRES)
+    write_ranges(where)
     drives = (
         ("drive", ()),
         ("log1", ("--angles",)),

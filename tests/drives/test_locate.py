@@ -375,7 +375,13 @@ def test_the_report_shows_what_was_found(access_av: Cli, tmp_path: Path) -> None
 
 def test_the_files_of_the_docs_can_be_used(access_av: Cli, tmp_path: Path) -> None:
     page = (ROOT / "docs/locate.md").read_text(encoding="utf-8")
-    head, ranging, hall, road, vehicle = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    files = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    head, ranging, two_heads, delays, hall, road, vehicle = files
+    (tmp_path / "two-heads.toml").write_text(two_heads)
+    carrier = (ROOT / "vehicles/paper-carrier.toml").read_text(encoding="utf-8")
+    (tmp_path / "vehicle.toml").write_text(carrier + ranging)
+    (tmp_path / "delays.toml").write_text(delays.replace("site.toml", "two-heads.toml"))
+    assert access_av("file", "check", "--kind", "scenario", tmp_path / "delays.toml").code == 0
     assert Site.from_toml('name = "hall"\n' + head).to_json()
     assert Site.from_toml(hall).to_json()
     assert Vehicle.from_toml('name = "robot"\n' + ranging).to_json()

@@ -156,7 +156,7 @@ def test_a_drawing_gives_the_same_road(
         "file", "new", "site", site, "--walls", drawn, "--walls-layer", "X", *scale, "--force"
     )
     assert missing.code == 2
-    assert "'X' holds no lines" in missing.err
+    assert "layer 'X' contains no lines" in missing.err
 
 
 @pytest.mark.parametrize(

@@ -379,7 +379,7 @@ def error_m(poses: pl.DataFrame, truth: str | Path | pl.DataFrame) -> pl.DataFra
     true = true.select("time_s", "x_m", "y_m").sort("time_s")
     which = "the truth" if isinstance(truth, pl.DataFrame) else str(truth)
     if true.is_empty():
-        raise InputError(f"{which}: the file the file contains no pose")
+        raise InputError(f"{which}: contains no pose")
     both = _between(known, true)
     if both.height < MIN_COMPARED * known.height:
         covered = both.height / max(known.height, 1)
