@@ -117,12 +117,18 @@ mod tests {
 
     #[test]
     fn radio_heads_of_a_clock_group_share_the_first_oscillator() {
-        let mut text = "name = \"hall\"\n".to_owned();
-        let groups = [None, Some(4), Some(7), Some(4), None, Some(7)];
-        for (pci, group) in groups.into_iter().enumerate() {
-            text += &format!("[[radio_heads]]\npci = {pci}\nposition_m = [1{pci}.0, 5.0, 3.0]\n");
-            text += &group.map_or(String::new(), |it| format!("clock_group = {it}\n"));
-        }
+        let groups = [
+            "",
+            "clock_group = 4",
+            "clock_group = 7",
+            "clock_group = 4",
+            "",
+            "clock_group = 7",
+        ];
+        let heads = (0..).zip(groups).map(|(pci, group)| {
+            format!("[[radio_heads]]\npci = {pci}\nposition_m = [1{pci}.0, 5.0, 3.0]\n{group}\n")
+        });
+        let text = format!("name = 'hall'\n{}", heads.collect::<String>());
         let site = Site::from_toml(&text, "site", &Shipped).unwrap();
         let first = |index| oscillator_of(&site.radio_heads, index);
         assert_eq!([0, 1, 2, 3, 4, 5].map(first), [0, 1, 2, 1, 4, 2]);
