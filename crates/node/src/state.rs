@@ -266,9 +266,14 @@ mod tests {
                 now_s,
                 "version is 9",
             ),
-            (&text.replace("0.3", "-0.3"), "a", now_s, "negative"),
             (
-                &text.replace("0.3", "null"),
+                &text.replace("_m\":0.3", "_m\":-0.3"),
+                "a",
+                now_s,
+                "negative",
+            ),
+            (
+                &text.replace("_m\":0.3", "_m\":null"),
                 "a",
                 now_s,
                 "is not a state file",
