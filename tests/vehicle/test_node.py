@@ -289,7 +289,10 @@ def test_every_radio_head_is_received_through_sockets(live: Live) -> None:
     # The samples between the bursts were not processed.
     assert live.state["duty"] < 0.5
     poses = [it for it in live.records if it["type"] == "pose" and it["by"] == "odometry"]
-    assert len(poses) == round(DURATION_S / 0.02) + 1
+    # Without gap; on a busy computer, samples may be processed before the first odometry message.
+    numbers = [round(it["time_s"] / 0.02) for it in poses]
+    assert numbers[0] in (0, 1)
+    assert numbers == list(range(numbers[0], round(DURATION_S / 0.02) + 1))
     truth = [
         [float(value) for value in line.split()]
         for line in (live.drive / "truth.tum").read_text().splitlines()
