@@ -11,7 +11,7 @@ from typer import Option
 
 from access_av.cli import options as opt
 from access_av.cli.side_by_side import PERCENTS, records, show_compared, variants, write_compared
-from access_av.cli.terminal import console, errors, progress, say, show_warning
+from access_av.cli.terminal import console, errors, progress, say, show_remarks, show_warning
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from access_av.study.compare import Compared
 
 app = typer.Typer()
-
-MOST_REMARKS = 10
 
 # Exit code of a drive whose located poses are not reliable.
 UNRELIABLE = 3
@@ -300,8 +298,7 @@ def _locate_stationary(
     if as_json:
         print(json_text({**numbers, "directory": str(directory.path)}))
         return
-    for remark in found.remarks[:MOST_REMARKS]:
-        show_warning(remark)
+    show_remarks(found.remarks, "manifest.json")
     say(
         f"{found.ranges} ranges of {found.radio_heads} radio heads. "
         f"Position: x {found.x_m:.2f} m, y {found.y_m:.2f} m, σ {found.std_m:.2f} m."
@@ -340,10 +337,7 @@ def _beside(
 def _show(drive: Drive, numbers: dict[str, float]) -> None:
     # Suspicions are part of the verdict.
     remarks = [remark for remark in drive.remarks if remark not in drive.suspicions]
-    for remark in remarks[:MOST_REMARKS]:
-        show_warning(remark)
-    if len(remarks) > MOST_REMARKS:
-        show_warning(f"{len(remarks) - MOST_REMARKS} more in report.html")
+    show_remarks(remarks, "report.html")
     kind, accepted = (
         ("ranges", "accepted_ranges") if "ranges" in numbers else ("angles", "accepted")
     )

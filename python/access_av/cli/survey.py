@@ -9,15 +9,13 @@ import typer
 from typer import Argument, Option
 
 from access_av.cli import options as opt
-from access_av.cli.terminal import console, progress, say, show_warning, table
+from access_av.cli.terminal import console, progress, say, show_remarks, show_warning, table
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
     from access_av._core import Site, Vehicle
 
 app = typer.Typer()
-
-MOST_REMARKS = 10
 
 
 @opt.command(
@@ -170,10 +168,7 @@ def _survey_offsets(
         rows = found.offsets.to_dicts()
         print(json_text({"offsets": rows, "directory": str(directory.path)}))
         return
-    for remark in found.remarks[:MOST_REMARKS]:
-        show_warning(remark)
-    if len(found.remarks) > MOST_REMARKS:
-        show_warning(f"{len(found.remarks) - MOST_REMARKS} more in manifest.json")
+    show_remarks(found.remarks, "manifest.json")
     made = table(
         ["radio head", "positions", "ranges", "offset / m", "σ / m"], title="Ranges", text=1
     )

@@ -44,6 +44,8 @@ errors = Console(stderr=True, highlight=False, markup=False)
 NARROW = 80
 # Without a terminal: time to the first progress line, and maximum time between lines, in s.
 FIRST_LINE_S, MOST_SILENT_S = 2.0, 60.0
+# Maximum number of printed remarks of a result.
+MAX_REMARKS = 10
 
 
 def is_narrow() -> bool:
@@ -194,6 +196,14 @@ def show_warning(message: str) -> None:
     """Prints one warning."""
     errors.print("warning:", style="yellow", end=" ")
     errors.print(brief(plain(message)), soft_wrap=True)
+
+
+def show_remarks(remarks: Sequence[str], file: str) -> None:
+    """Prints the first remarks of a result, and the number of others, which ``file`` contains."""
+    for remark in remarks[:MAX_REMARKS]:
+        show_warning(remark)
+    if len(remarks) > MAX_REMARKS:
+        show_warning(f"{len(remarks) - MAX_REMARKS} more in {file}")
 
 
 def plain(text: str) -> str:

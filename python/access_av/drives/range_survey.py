@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
 # Names of a range log in the folder of a survey.
 LOGS = ("ranges.csv", "ranges.log", "ranges.txt")
-# σ of a range offset if the vehicle has no [ranging] (m): default of ranging.offset_std_m.
-DEFAULT_OFFSET_STD_M = 3.0
 # Maximum time between successive ranges of an epoch, during which the clock is constant (s).
 EPOCH_GAP_S = 0.005
 # Maximum movement of a stationary receiver (m): its truth needs no common time with the ranges.
@@ -78,11 +76,34 @@ class RangingHead:
     offset_m: float
     surveyed_std_m: float | None
 
-    def offset_std_m(self, ranging: dict[str, Any]) -> float:
-        """Returns the σ of the range offset in m, given ``[ranging]`` of the vehicle."""
-        if self.surveyed_std_m is not None:
-            return self.surveyed_std_m
-        return float(ranging.get("offset_std_m", DEFAULT_OFFSET_STD_M))
+
+@dataclass(frozen=True)
+class Ranging:
+    """``[ranging]`` of a vehicle.
+
+    Attributes
+    ----------
+    offset_std_m
+        σ of the range offset of a radio head that was not surveyed, in m.
+    sigma_m
+        σ of a range in m; ``None`` if not specified.
+    antenna_m
+        Position of the ranging antenna in the vehicle: forward, left and up, in m.
+    """
+
+    offset_std_m: float
+    sigma_m: float | None
+    antenna_m: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, vehicle: _core.Vehicle) -> Ranging:
+        """Returns the settings of a vehicle; default values if it has no ``[ranging]``."""
+        settings = as_dict(vehicle)
+        if "ranging" not in settings:
+            settings = as_dict(vehicle.with_overrides({"ranging.kind": "one-way"}))
+        ranging = settings["ranging"]
+        antenna_m = ranging.get("position_m") or settings["array"]["position_m"]
+        return cls(ranging["offset_std_m"], ranging.get("sigma_m"), tuple(antenna_m))
 
 
 def heads_of(site: _core.Site) -> list[RangingHead]:
@@ -143,6 +164,7 @@ def survey_offsets(
     site = _core.Site.load(site) if isinstance(site, str) else site
     vehicle = _core.Vehicle.load(vehicle) if isinstance(vehicle, str) else vehicle
     heads = heads_of(site)
+    ranging = Ranging.of(vehicle)
     positions_m = np.array([head.position_m for head in heads])
     found = np.full((len(folders), len(heads)), np.nan)
     ranges = np.zeros(len(heads), int)
@@ -156,7 +178,7 @@ def survey_offsets(
         remarks += [f"{log}: {it}" for it in said]
         index = places_of(columns, heads)
         time_s = columns["time_s"]
-        antenna_m = _antenna_m(Path(folder) / "truth.tum", vehicle, time_s)
+        antenna_m = _antenna_m(Path(folder) / "truth.tum", ranging.antenna_m, time_s)
         known = (index >= 0) & np.isfinite(antenna_m[:, 0])
         if not known.any():
             raise InputError(
@@ -171,9 +193,7 @@ def survey_offsets(
         ranges += np.bincount(index, minlength=len(heads))
     if one_way and np.isfinite(found).any(axis=0).sum() < 2:
         raise InputError("one-way delays of one radio head contain its offset and the clock")
-    ranging = as_dict(vehicle).get("ranging", {})
-    prior_m = float(ranging.get("offset_std_m", DEFAULT_OFFSET_STD_M))
-    mean_m, std_m = _over_positions(found, prior_m, common=one_way)
+    mean_m, std_m = _over_positions(found, ranging.offset_std_m, common=one_way)
     changed: dict[str, Any] = {}
     for at in np.flatnonzero(np.isfinite(mean_m)).tolist():
         changed[f"radio_heads[{at}].range_offset_m"] = float(mean_m[at])
@@ -193,7 +213,7 @@ def survey_offsets(
     return OffsetSurvey(site.with_overrides(changed), offsets, remarks)
 
 
-def _antenna_m(truth: Path, vehicle: _core.Vehicle, time_s: Numbers) -> Numbers:
+def _antenna_m(truth: Path, lever_m: tuple[float, float, float], time_s: Numbers) -> Numbers:
     """Returns x, y and z of the ranging antenna at the times, in m; NaN without truth."""
     true = _core.read_tum(truth)
     x_m, y_m, heading = true["x_m"], true["y_m"], np.unwrap(true["heading_rad"])
@@ -205,9 +225,7 @@ def _antenna_m(truth: Path, vehicle: _core.Vehicle, time_s: Numbers) -> Numbers:
             np.interp(time_s, true["time_s"][order], it[order], np.nan, np.nan)
             for it in (x_m, y_m, heading)
         ]
-    settings = as_dict(vehicle)
-    lever = settings.get("ranging", {}).get("position_m") or settings["array"]["position_m"]
-    forward_m, left_m, up_m = lever
+    forward_m, left_m, up_m = lever_m
     sin, cos = np.sin(here[2]), np.cos(here[2])
     return np.column_stack(
         [

@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from access_av import _core
-from access_av.drives.range_survey import epochs, heads_of, median_ranges, places_of
+from access_av.drives.range_survey import Ranging, epochs, heads_of, median_ranges, places_of
 from access_av.errors import InputError
-from access_av.settings import as_dict
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -137,22 +136,19 @@ def locate_stationary(
             f"{recording}: ranges of {len(received)} radio heads of the site; the position of a "
             f"stationary receiver needs {kind} of at least {needed}"
         )
-    settings = as_dict(vehicle)
-    ranging = settings.get("ranging", {})
-    lever_m = ranging.get("position_m") or settings["array"]["position_m"]
+    ranging = Ranging.of(vehicle)
     duration_s = float(np.ptp(time_s))
-    sigma_m = ranging.get("sigma_m") or SAMPLE_SIGMA * (sample_m or 0.0)
+    sigma_m = ranging.sigma_m or SAMPLE_SIGMA * (sample_m or 0.0)
     noise_m = sigma_m / math.sqrt(1.0 + duration_s / INDEPENDENT_S)
-    std_m = np.array(
-        [
-            math.hypot(heads[at].offset_std_m(ranging), heads[at].position_std_m, noise_m)
-            for at in received
-        ]
-    )
+    measured = [heads[at] for at in received]
+    surveyed_m = [head.surveyed_std_m for head in measured]
+    offset_std_m = [ranging.offset_std_m if std is None else std for std in surveyed_m]
+    position_std_m = [head.position_std_m for head in measured]
+    std_m = np.sqrt(np.square(offset_std_m) + np.square(position_std_m) + noise_m**2)
     problem = _Problem(
-        positions_m=np.array([heads[at].position_m for at in received]),
-        height_m=float(lever_m[2]),
-        pseudorange_m=median_m[received] - np.array([heads[at].offset_m for at in received]),
+        positions_m=np.array([head.position_m for head in measured]),
+        height_m=ranging.antenna_m[2],
+        pseudorange_m=median_m[received] - np.array([head.offset_m for head in measured]),
         std_m=np.maximum(std_m, 1e-3),
         has_clock=one_way,
     )
