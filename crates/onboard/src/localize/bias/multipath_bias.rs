@@ -169,10 +169,8 @@ impl MultipathBias {
     /// Removes the covariances with some states, which were replaced.
     pub fn decorrelate_states(&mut self, states: &[usize]) {
         for head in &mut self.heads {
-            for (state, covariance) in head.state_covariance.iter_mut().enumerate() {
-                if states.contains(&state) {
-                    *covariance = 0.0;
-                }
+            for &state in states {
+                head.state_covariance[state] = 0.0;
             }
         }
     }
@@ -517,27 +515,27 @@ mod tests {
                 redrawn.covariance[STATES + head][i] = 0.0;
             }
             redrawn.covariance[STATES + head][STATES + head] = value;
-            for (probable, mut decorrelate) in [(stays, *before), (1.0 - stays, redrawn)] {
-                let residual = rad - decorrelate.mean[0] - decorrelate.mean[STATES + head];
-                let once = decorrelate.innovation(residual, &whole_row, OWN_VARIANCE + value);
+            for (probable, mut component) in [(stays, *before), (1.0 - stays, redrawn)] {
+                let residual = rad - component.mean[0] - component.mean[STATES + head];
+                let once = component.innovation(residual, &whole_row, OWN_VARIANCE + value);
                 let repeated = OWN_VARIANCE + value / share(travelled_m);
-                decorrelate.update(residual, &whole_row, repeated);
-                parts.push((probable * probability * once.density(), decorrelate));
+                component.update(residual, &whole_row, repeated);
+                parts.push((probable * probability * once.density(), component));
             }
         }
         let total: f64 = parts.iter().map(|(weight, _)| weight).sum();
         let mut mixed = Gaussian::<ALL>::independent([0.0; ALL], [0.0; ALL]);
-        for (weight, decorrelate) in &parts {
+        for (weight, component) in &parts {
             for i in 0..ALL {
-                mixed.mean[i] += weight / total * decorrelate.mean[i];
+                mixed.mean[i] += weight / total * component.mean[i];
             }
         }
-        for (weight, decorrelate) in &parts {
+        for (weight, component) in &parts {
             for i in 0..ALL {
                 for j in 0..ALL {
-                    let apart = [i, j].map(|at| decorrelate.mean[at] - mixed.mean[at]);
+                    let apart = [i, j].map(|at| component.mean[at] - mixed.mean[at]);
                     mixed.covariance[i][j] +=
-                        weight / total * (decorrelate.covariance[i][j] + apart[0] * apart[1]);
+                        weight / total * (component.covariance[i][j] + apart[0] * apart[1]);
                 }
             }
         }
