@@ -107,8 +107,8 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, appendix: st
         headline=f"90 % of the errors are below {result.error_quantiles_m[0.9]:.2f} m",
         lead=f"{scenario.description} {in_words(optimistic_assumptions(scenario))}".strip(),
         tiles=tiles,
-        meta=f"Scenario “{scenario.name}”, {runs} runs of {duration_s:.1f} s, seed {seed}, "
-        f"{VERSION}.",
+        meta=f"Scenario “{scenario.name}”, {runs} run{'s' * (runs > 1)} of {duration_s:.1f} s, "
+        f"seed {seed}, {VERSION}.",
         sections=[warnings(scenario.warnings()), *sections],
     )
 
