@@ -232,7 +232,7 @@ def test_invalid_values_are_rejected_with_a_valid_example(what: str) -> None:
     assert any(key in one.split(" is ")[0] and write in one for one in warnings), warnings
 
 
-def test_the_plant_causes_no_warning() -> None:
+def test_the_unchanged_test_scenario_causes_no_warning() -> None:
     assert scenario().warnings() == []
 
 
@@ -246,7 +246,7 @@ FILES = {
 
 
 @pytest.mark.parametrize("line", FILES)
-def test_decimal_commas_are_reported(line: str) -> None:
+def test_decimal_commas_in_toml_are_rejected_with_a_correction(line: str) -> None:
     place = "" if "position_m" in line else "position_m = [0.0, 20.0, 8.0]\n"
     with pytest.raises(SettingsError, match=re.escape(FILES[line])):
         Site.from_toml(f'name = "mine"\n[[radio_heads]]\n{place}{line}\n')
@@ -475,14 +475,14 @@ def test_every_command_prints_warnings_first(
     assert "asked first: 0 doubtful" in done.err
 
 
-def test_commands_load_settings_in_one_place() -> None:
+def test_only_the_options_module_loads_settings_files() -> None:
     """`options` reads the inputs of every command and warns of doubtful settings."""
-    for file in (ROOT / "python" / "access_av" / "commands").glob("*.py"):
+    for file in (ROOT / "python" / "access_av" / "cli").glob("*.py"):
         loads = re.findall(r"\b(?:Scenario|Site|Vehicle)\.load\(", file.read_text(encoding="utf-8"))
         assert not loads or file.name == "options.py", file.name
 
 
-def test_german_tables_are_read(tmp_path: Path) -> None:
+def test_csv_with_semicolons_and_decimal_commas_is_read(tmp_path: Path) -> None:
     file = tmp_path / "masts.csv"
     file.write_text("name;x_m;y_m\nTor, Süd;1,5;-2\nHalle;3;4,25\n", encoding="utf-8")
     rows = validation.read(file, "table of masts", {"name": pl.String})

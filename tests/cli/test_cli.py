@@ -83,7 +83,7 @@ def test_run_writes_the_files_that_its_help_lists(access_av: Cli, tmp_path: Path
         assert len(lines) == table.filter(run=0).height
 
 
-def test_run_is_the_same_for_one_and_two_threads(access_av: Cli, tmp_path: Path) -> None:
+def test_run_results_are_equal_for_one_and_two_threads(access_av: Cli, tmp_path: Path) -> None:
     for threads in ("1", "2"):
         access_av("run", "paper", "--runs", "3", "--threads", threads, "--out", tmp_path / threads)
     for name in ("trajectories.parquet", "aoa_estimates.parquet", "trajectory.tum"):
@@ -176,7 +176,7 @@ def test_shipped_files_are_listed_shown_and_valid(
     assert json.loads(access_av("file", "schema", kind).out)["$schema"]
 
 
-def test_kinds_of_files(access_av: Cli, tmp_path: Path) -> None:
+def test_the_kind_of_a_settings_file_is_recognised(access_av: Cli, tmp_path: Path) -> None:
     listed = access_av("file", "list").out.splitlines()
     assert {line.split(":")[0] for line in listed} == {*KINDS}
     assert "radio_heads" in access_av("file", "show", "trip-1", "--kind", "site").out
@@ -288,7 +288,7 @@ def test_bad_arguments_end_with_2(access_av: Cli, arguments: list[str], named: l
     assert "Traceback" not in done.err
 
 
-def test_out_that_is_a_file(access_av: Cli, tmp_path: Path) -> None:
+def test_option_out_rejects_an_existing_file(access_av: Cli, tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
     done = access_av("run", "paper", "--out", str(tmp_path / "taken"))
     assert done.code == 2

@@ -89,14 +89,14 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_every_command_is_interrupted() -> None:
+def test_every_command_has_an_interruption_test() -> None:
     known = commands()
     named = {" ".join(words[:2]) if words[0] not in known else words[0] for words in LONG}
     assert named == {*known}
 
 
 @pytest.mark.parametrize("words", LONG, ids=lambda words: "-".join(words[:2]))
-def test_ctrl_c_ends_it_within_a_second(words: tuple[str, ...], place: Path) -> None:
+def test_ctrl_c_ends_every_command_within_a_second(words: tuple[str, ...], place: Path) -> None:
     stream = random.Random("-".join(words[:2]))
     before = {path for path in place.rglob("*") if path.is_file()}
     python_s = PYTHON_S * (1.0 + busy_s())

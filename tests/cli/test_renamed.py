@@ -38,7 +38,9 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize(("old", "new"), renamed.names("options").items())
-def test_old_options(access_av: Callable[..., Finished], old: str, new: str) -> None:
+def test_old_options_are_rejected_with_the_new_name(
+    access_av: Callable[..., Finished], old: str, new: str
+) -> None:
     command = COMMANDS[old]
     done = access_av(*command, old.split()[-1])
     assert done.code == 2
@@ -50,7 +52,9 @@ def test_old_options(access_av: Callable[..., Finished], old: str, new: str) -> 
 
 
 @pytest.mark.parametrize(("old", "new"), renamed.names("commands").items())
-def test_old_commands(access_av: Callable[..., Finished], old: str, new: str) -> None:
+def test_old_commands_are_rejected_with_the_new_name(
+    access_av: Callable[..., Finished], old: str, new: str
+) -> None:
     done = access_av(*old.split(), columns=200)
     assert done.code == 2
     assert f"'{old}'. It was renamed in version 0.2.0: write {new}" in " ".join(done.err.split())
@@ -73,7 +77,7 @@ def test_command_lines_of_earlier_results_are_translated() -> None:
         assert renamed.current(old.split()) == new.split()
 
 
-def test_the_renamed_value_of_option_start(
+def test_start_scratch_is_rejected_with_the_new_value(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
     for name in ("odometry.csv", "angles.csv"):
@@ -84,7 +88,7 @@ def test_the_renamed_value_of_option_start(
     assert "write --start unknown" in " ".join(done.err.split()), done.err
 
 
-def test_old_keys() -> None:
+def test_old_settings_keys_are_rejected_with_the_new_name() -> None:
     scenario = Scenario.load("yard")
     tables = {"serving_ssb": "wake_up.", "fault_probability.all_radio_heads": "integrity."}
     for old, new in renamed.names("keys").items():
@@ -101,7 +105,7 @@ def test_new_keys_exist(access_av: Callable[..., Finished]) -> None:
         assert f'"{new.split(".")[-1]}"' in schema, new
 
 
-def test_old_columns() -> None:
+def test_old_columns_are_rejected_with_the_new_name() -> None:
     for old, new in renamed.names("columns").items():
         with pytest.raises(InputError, match=f"`{old}` was renamed .*: write `{new}`"):
             validation.check(pl.DataFrame({old: [1.0]}), "mine.csv", numbers=[new])

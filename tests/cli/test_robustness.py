@@ -1,35 +1,7 @@
 """Invalid user input, plug-ins and files are rejected with a message, or processed correctly.
 
-One test for each kind of defect that a manual test has found, in the order of this list. Random
-tests are in ``attack/``, those of Ctrl-C in ``test_interrupt.py``.
-
-====  ==============================================  ==============================================
-kind  defect                                          test
-====  ==============================================  ==============================================
-1     a tracker kilometres off                        test_a_random_walk_has_a_limited_error
-2     negative variances                              test_covariances_are_positive
-3     NaN in tables                                   test_tables_hold_no_nan
-4     impossible start times and answers              test_invalid_start_times, test_plug_ins
-5     finite nonsense                                 test_numbers_beyond_physics
-6     drives of any size                              test_drives_too_large
-7     threads, runs and seeds of any size             test_counts_too_large, test_threads_…
-8     very many radio heads                           test_too_many_radio_heads
-9     files without end                               test_files_without_end
-10    loops that do not end                           test_cyclic_and_deeply_nested_files
-11    tracebacks                                      test_invalid_truths, test_aoa_truth, …
-12    names that are paths                            test_invalid_names
-13    names that are markup                           test_invalid_names
-14    escape sequences to the terminal                test_no_escape_sequence_reaches_the_terminal
-15    names that are HTML                             test_names_that_are_html
-16    Ctrl-C                                          test_interrupt
-17    ``results/latest`` that cannot be made          test_latest_link_that_cannot_be_created
-18    two runs in one folder                          test_two_runs_in_one_folder
-19    a full disk                                     test_a_full_disk
-20    keys that are not named                         test_errors_name_the_key
-21    no pickle, copy or hash                         test_settings_are_values
-22    a forked child                                  test_the_page_on_plug_ins_names_fork
-23    readers shared by threads                       test_readers_serve_threads
-====  ==============================================  ==============================================
+One test for each kind of defect that a manual test has found. Random tests are in ``attack/``,
+those of Ctrl-C in ``test_interrupt.py``.
 """
 
 from __future__ import annotations
@@ -80,7 +52,7 @@ def refused(done: Finished, *named: str) -> None:
         assert part in done.err
 
 
-def test_a_random_walk_has_a_limited_error() -> None:
+def test_a_curvature_random_walk_has_a_bounded_error() -> None:
     scenario = access_av.Scenario.from_toml(
         """
         name = "wander"
@@ -152,7 +124,7 @@ def test_tables_hold_no_nan(name: str) -> None:
 
 
 @pytest.mark.parametrize("start_s", ["-1e9", "1e9", "nan", "inf"])
-def test_invalid_start_times(access_av: Cli, drive: Path, start_s: str) -> None:
+def test_invalid_start_times_are_rejected(access_av: Cli, drive: Path, start_s: str) -> None:
     done = access_av(
         "record", "locate", "--recording", drive / "iq.sigmf-meta",
         "--odometry", drive / "odometry.csv",
@@ -179,7 +151,7 @@ def test_invalid_start_times(access_av: Cli, drive: Path, start_s: str) -> None:
         ("site.road.start.heading_rad", 1e15),
     ],
 )
-def test_numbers_beyond_physics(key: str, value: Any) -> None:
+def test_physically_impossible_settings_are_rejected(key: str, value: Any) -> None:
     with pytest.raises(access_av.SettingsError, match=r"must|expected"):
         access_av.Scenario.load("paper").with_overrides({key: value})
 
@@ -196,7 +168,7 @@ def test_numbers_beyond_physics(key: str, value: Any) -> None:
         ("motion.stops", [{"at_m": 100.0, "dwell_s": 8e4}]),
     ],
 )
-def test_drives_too_large(key: str, value: Any) -> None:
+def test_excessive_drive_durations_are_rejected(key: str, value: Any) -> None:
     with pytest.raises(access_av.SettingsError):
         access_av.Scenario.load("paper").with_overrides({key: value})
 
@@ -220,7 +192,9 @@ def test_large_runs_can_be_permitted(access_av: Cli, tmp_path: Path) -> None:
     ],
     ids=" ".join,
 )
-def test_counts_too_large(access_av: Cli, words: list[str]) -> None:
+def test_excessive_numbers_of_runs_and_threads_are_rejected(
+    access_av: Cli, words: list[str]
+) -> None:
     done = access_av("run", "paper", *words)
     assert done.code == 2, done.err
     assert "Traceback" not in done.err
@@ -271,7 +245,9 @@ def test_too_many_radio_heads(access_av: Cli, tmp_path: Path) -> None:
     assert time.monotonic() - began_s < 10.0
 
 
-def test_files_without_end(access_av: Cli, drive: Path, tmp_path: Path) -> None:
+def test_devices_and_pipes_are_rejected_as_input_files(
+    access_av: Cli, drive: Path, tmp_path: Path
+) -> None:
     refused(
         access_av("file", "check", "--kind", "scenario", "/dev/zero"), "/dev/zero", "regular file"
     )
@@ -325,7 +301,7 @@ TUM = b"0.0 0 0 0 0 0 0 1\n0.3 0.1 0 0 0 0 0 1\n"
     ],
     ids=["words", "utf-16", "utf-16-without-mark", "nan", "no-turn", "empty", "bom-and-comment"],
 )
-def test_invalid_truths(
+def test_invalid_truth_trajectories_are_reported(
     access_av: Cli, drive: Path, tmp_path: Path, truth: bytes, code: int
 ) -> None:
     file = tmp_path / "truth.tum"
@@ -353,7 +329,9 @@ def test_invalid_truths(
         ("core:sample_count", 10**15),
     ],
 )
-def test_aoa_truth(access_av: Cli, drive: Path, tmp_path: Path, key: str, value: Any) -> None:
+def test_invalid_angle_annotations_are_rejected(
+    access_av: Cli, drive: Path, tmp_path: Path, key: str, value: Any
+) -> None:
     metadata = json.loads((drive / "iq.sigmf-meta").read_text())
     metadata["annotations"][3][key] = value
     (tmp_path / "iq.sigmf-meta").write_text(json.dumps(metadata))
@@ -361,13 +339,13 @@ def test_aoa_truth(access_av: Cli, drive: Path, tmp_path: Path, key: str, value:
     refused(access_av("record", "aoa", tmp_path / "iq"))
 
 
-def test_a_map_of_one_square(access_av: Cli, tmp_path: Path) -> None:
+def test_an_excessive_map_spacing_causes_no_traceback(access_av: Cli, tmp_path: Path) -> None:
     done = access_av("design", "bound", "yard", "--map-step-m", "1e300", "--out", tmp_path / "out")
     assert done.code in (0, 2)
     assert "Traceback" not in done.err
 
 
-def test_a_foreign_table(access_av: Cli, tmp_path: Path) -> None:
+def test_a_table_of_another_program_is_rejected(access_av: Cli, tmp_path: Path) -> None:
     file = tmp_path / "operating_points.parquet"
     pl.DataFrame({"mode": ["a"], "energy_j": ["b"]}).write_parquet(file)
     refused(access_av("paper", "explore", "--results", tmp_path), "operating_points.parquet")
@@ -376,7 +354,7 @@ def test_a_foreign_table(access_av: Cli, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-8"])
-def test_terminals_of_any_encoding(encoding: str) -> None:
+def test_output_works_with_every_terminal_encoding(encoding: str) -> None:
     done = shell("file", "columns", "trajectories", PYTHONIOENCODING=encoding)  # m², …
     assert done.returncode == 0, done.stderr
     name = shell("file", "check", "größe-日本", PYTHONIOENCODING=encoding)
@@ -414,7 +392,7 @@ def test_a_folder_whose_name_is_not_valid_text(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["../../../x", "[/]", "[red]", "a/b", "", "x" * 65, "\x1b[2J"])
-def test_invalid_names(name: str) -> None:
+def test_invalid_scenario_names_are_rejected(name: str) -> None:
     with pytest.raises(access_av.SettingsError, match="name"):
         access_av.Scenario.load("paper").with_overrides({"name": name})
 
@@ -427,7 +405,7 @@ def test_no_escape_sequence_reaches_the_terminal(access_av: Cli, tmp_path: Path)
     assert "\x1b" not in done.err
 
 
-def test_names_that_are_html(access_av: Cli, tmp_path: Path) -> None:
+def test_html_in_names_is_escaped(access_av: Cli, tmp_path: Path) -> None:
     name = "</script><!--<script>"
     scenario = access_av_scenario({"site.radio_heads[0].name": name})
     file = tmp_path / "x.toml"
@@ -451,7 +429,7 @@ def test_latest_link_that_cannot_be_created(access_av: Cli, tmp_path: Path) -> N
     assert done.code == 0, done.err
 
 
-def test_two_runs_in_one_folder(access_av: Cli, tmp_path: Path) -> None:
+def test_a_results_directory_in_use_is_rejected(access_av: Cli, tmp_path: Path) -> None:
     folder = os.open(tmp_path, os.O_RDONLY)
     fcntl.flock(folder, fcntl.LOCK_EX)
     try:
@@ -480,7 +458,7 @@ FULL_BYTES = 20_000
     ],
     ids=lambda words: words[0],
 )
-def test_a_full_disk(tmp_path: Path, words: tuple[str, ...]) -> None:
+def test_a_full_disk_is_reported(tmp_path: Path, words: tuple[str, ...]) -> None:
     def fill() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (FULL_BYTES, FULL_BYTES))
 
@@ -497,7 +475,7 @@ def test_a_full_disk(tmp_path: Path, words: tuple[str, ...]) -> None:
     assert not list(tmp_path.rglob("*.partial"))
 
 
-def test_a_folder_without_write_permission(access_av: Cli, tmp_path: Path) -> None:
+def test_a_directory_without_write_permission_is_reported(access_av: Cli, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     refused(access_av("run", "paper", "--out", tmp_path / "file/out"), "file")
     refused(access_av("design", "bound", "yard", "--out", "/proc/none"), "/proc/none")
@@ -506,7 +484,7 @@ def test_a_folder_without_write_permission(access_av: Cli, tmp_path: Path) -> No
     )
 
 
-def test_closed_standard_output() -> None:
+def test_a_full_standard_output_is_reported() -> None:
     with open("/dev/full", "w") as full:  # noqa: PTH123
         done = subprocess.run(
             [sys.executable, "-m", "access_av", "file", "show", "--kind", "scenario", "paper"],
@@ -531,7 +509,7 @@ def test_errors_name_the_key(key: str, value: Any) -> None:
 @pytest.mark.parametrize(
     "kind", [access_av.Scenario, access_av.Site, access_av.Vehicle, access_av.Platform]
 )
-def test_settings_are_values(kind: Any) -> None:
+def test_settings_are_equal_and_hashable_by_value(kind: Any) -> None:
     names = kind.names()
     one, same = kind.load(names[0]), kind.load(names[0])
     assert one == same
@@ -551,13 +529,13 @@ def test_objects_that_cannot_be_pickled_are_rejected_with_a_reason(drive: Path) 
         pickle.dumps(recording)
 
 
-def test_the_page_on_plug_ins_names_fork() -> None:
+def test_the_plug_ins_page_warns_of_fork() -> None:
     page = (ROOT / "docs/plug-ins.md").read_text(encoding="utf-8")
     assert "fork" in page
     assert "spawn" in page
 
 
-def test_readers_serve_threads(drive: Path) -> None:
+def test_recordings_and_searchers_work_in_several_threads(drive: Path) -> None:
     recording = access_av.Recording.open(drive / "iq.sigmf-meta")
     expected = [recording.read(start, 500) for start in range(0, 4000, 500)]
     searcher = access_av.nr.Searcher(

@@ -53,7 +53,7 @@ def test_sobol_points_are_spread_evenly() -> None:
         assert counts.tolist() == [16] * 16, (one, other)
 
 
-def test_space_from_tables() -> None:
+def test_nested_tables_define_a_design_space() -> None:
     space = Space.of({"vehicle": {"platform": {"mode": [0, 2]}, "x": {"low": 1, "high": 4}}})
     assert [dimension.key for dimension in space.dimensions] == [
         "vehicle.platform.mode",
@@ -121,7 +121,9 @@ def test_results_do_not_depend_on_the_executor(tmp_path: Path, whole: dict[str, 
         assert all(np.array_equal(found[i]["x"], part(i)["x"]) for i in range(12))
 
 
-def test_two_campaigns_in_one_directory(tmp_path: Path, whole: dict[str, bytes]) -> None:
+def test_two_simultaneous_campaigns_share_one_directory(
+    tmp_path: Path, whole: dict[str, bytes]
+) -> None:
     parts = ResultCache(tmp_path / "both")
     both = [threading.Thread(target=Campaign(parts).run, args=(tasks(),)) for _ in range(2)]
     for one in both:
@@ -323,7 +325,7 @@ finally:
     ("dies", "says"),
     [("worker", "finished"), ("scheduler", "the workers have ended")],
 )
-def test_a_process_of_a_cluster_may_end(
+def test_a_campaign_survives_the_end_of_a_cluster_process(
     tmp_path: Path, whole: dict[str, bytes], dies: str, says: str
 ) -> None:
     pytest.importorskip("distributed")
@@ -378,14 +380,14 @@ def cloud(runs: int, pairs: list[tuple[float, float]]) -> list[Driven]:
 PAIRS = [(1.0, 0.4), (2.0, 0.2), (2.1, 0.35), (4.0, 0.1), (4.1, 0.1), (8.0, 0.3)]
 
 
-def test_pareto_front_with_confidence() -> None:
+def test_the_pareto_front_considers_confidence() -> None:
     driven = cloud(20, PAIRS)
     assert set(front(driven)) - {4} == {0, 1, 3}
     # Designs that common random numbers do not separate may be on the front.
     assert {0, 1, 3} <= set(may_be_front(driven)) <= {0, 1, 3, 4}
 
 
-def test_page_of_many_designs_draws() -> None:
+def test_the_report_of_many_designs_draws_every_chart() -> None:
     rng = np.random.default_rng(5)
     few = cloud(4, PAIRS)
     driven = [
@@ -482,7 +484,7 @@ def test_limits_are_not_met_with_too_few_runs() -> None:
         Query(max_error_m=0.3, percentile=42.0)
 
 
-def test_rounds_of_halving() -> None:
+def test_successive_halving_has_the_documented_rounds() -> None:
     assert rounds(20, halving=True) == [2, 6, 20]
     assert rounds(2, halving=True) == [2]
     assert rounds(1, halving=True) == [1]
@@ -603,7 +605,9 @@ def run(
     return inside
 
 
-def test_command_on_any_scenario(tmp_path: Path, run: Callable[..., Finished]) -> None:
+def test_the_sweep_command_accepts_any_scenario(
+    tmp_path: Path, run: Callable[..., Finished]
+) -> None:
     (tmp_path / "space.toml").write_text(SPACE)
     asked = ("yard", "--space", "space.toml", "--runs", "2", "--json", "--out", "o")
     done = run(tmp_path, "design", "sweep", *asked)

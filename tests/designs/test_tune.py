@@ -40,7 +40,7 @@ def campaign(tmp_path: Path) -> Campaign:
     return Campaign(ResultCache(tmp_path / "parts"))
 
 
-def test_minimum_energy_within_the_error_limit(campaign: Campaign) -> None:
+def test_tuning_minimises_the_energy_within_the_error_limit(campaign: Campaign) -> None:
     scenario = short({"policy": "fixed", "interval_ms": 20.0})
     every = Query(max_rms_m=1.0)
     found = tune(campaign, scenario, every, designs=18, runs=3)
@@ -53,7 +53,7 @@ def test_minimum_energy_within_the_error_limit(campaign: Campaign) -> None:
     assert mean_j == pytest.approx(paired)
 
 
-def test_minimum_error_within_the_energy_limit_and_stored_runs(campaign: Campaign) -> None:
+def test_tuning_minimises_the_error_and_stores_its_runs(campaign: Campaign) -> None:
     scenario = short({"policy": "fixed", "interval_ms": 5000.0})
     bound = Query(max_energy_j=1e6)
     found = tune(campaign, scenario, bound, designs=18, runs=3)
@@ -77,7 +77,9 @@ def pretended(text: str, _seed: int, _first: int, runs: int) -> dict[str, np.nda
     }  # fmt: skip
 
 
-def test_an_optimal_design_is_kept(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tuning_keeps_settings_that_are_already_optimal(
+    campaign: Campaign, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The given set point has the largest interval within the error limit; any other needs more
     energy."""
     monkeypatch.setattr("access_av.designs.driven.simulated", pretended)
@@ -128,7 +130,9 @@ def test_tunable_keys_are_those_of_the_policy() -> None:
     assert not space_of(fixed).dimensions
 
 
-def test_invalid_queries(campaign: Campaign, access_av: Callable[..., Finished]) -> None:
+def test_invalid_limits_of_a_tuning_are_rejected(
+    campaign: Campaign, access_av: Callable[..., Finished]
+) -> None:
     with pytest.raises(InputError, match="no limit given"):
         tune(campaign, short({"policy": "fixed"}), Query())
     none = short({"policy": "fixed", "interval_ms": 80.0}).with_overrides(
@@ -145,7 +149,9 @@ def test_invalid_queries(campaign: Campaign, access_av: Callable[..., Finished])
     assert done.code == 2
 
 
-def test_command(access_av: Callable[..., Finished], tmp_path: Path) -> None:
+def test_the_tune_command_writes_its_files(
+    access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
     (tmp_path / "short.toml").write_text(
         'extends = "paper-real-odometry-2"\n[motion]\nstart_at_m = 290.0\n'
     )

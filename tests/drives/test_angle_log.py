@@ -153,7 +153,7 @@ def test_the_truth_of_a_synthetic_recording_is_shown(drive: Path) -> None:
     assert np.median(np.abs(errors_deg)) < math.degrees(0.1)
 
 
-def test_a_truth_from_the_axis_is_understood() -> None:
+def test_annotated_angles_from_the_array_axis_are_converted() -> None:
     def truth_deg(**stated: float) -> float | None:
         return ArrayTruth.of({"aoa:truth": stated}, 4).azimuth_from_broadside_deg
 

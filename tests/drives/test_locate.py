@@ -309,7 +309,7 @@ def test_a_recording_of_two_antennas_is_refused(
 
 
 @pytest.mark.parametrize("by", ["distance", "speed", "speed alone", "distance alone"])
-def test_odometry_is_used_unchanged(tmp_path: Path, by: str) -> None:
+def test_every_form_of_odometry_gives_equal_accuracy(tmp_path: Path, by: str) -> None:
     driven = robot()
     rows = driven.odometry.sort("time_s")
     turned = (rows["yaw_rate_radps"] / RATE_HZ).cum_sum()

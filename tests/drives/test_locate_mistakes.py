@@ -192,7 +192,7 @@ def test_the_probable_mistake_is_reported(tmp_path: Path, kind: str) -> None:
     assert not drive.is_reliable
 
 
-def test_wheels_in_millimetres_are_not_relied_on(tmp_path: Path) -> None:
+def test_a_drive_with_wheel_distances_in_millimetres_is_not_reliable(tmp_path: Path) -> None:
     """With such distances, the filter can fit every angle."""
     whole = robot(30.0)
     whole.sheet = whole.sheet.replace("odometer = {", "odometer = { track_width_m = 0.26,")
@@ -279,7 +279,7 @@ def test_a_vehicle_that_is_never_found_is_no_success(access_av: Cli, tmp_path: P
     assert "never found" in done.err
 
 
-def test_exit_codes(access_av: Cli, tmp_path: Path) -> None:
+def test_exit_codes_depend_on_the_mistake(access_av: Cli, tmp_path: Path) -> None:
     whole = robot(25.0)
     arguments = whole.write(tmp_path)
     assert access_av(*arguments).code == 0

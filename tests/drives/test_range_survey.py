@@ -118,7 +118,9 @@ def test_two_way_ranges_need_two_radio_heads(tmp_path: Path) -> None:
         locate_stationary(site, vehicle, tmp_path / "one.csv")
 
 
-def test_commands(measured: Path, access_av: Callable[..., Finished], tmp_path: Path) -> None:
+def test_survey_and_locate_commands_use_ranges(
+    measured: Path, access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
     site, vehicle = measured / "site.toml", measured / "vehicle.toml"
     known = [measured / str(it) for it in range(3)]
     done = access_av(
@@ -162,7 +164,7 @@ def test_unusable_logs_are_rejected(measured: Path, tmp_path: Path) -> None:
         survey_offsets(site, vehicle, [tmp_path])
 
 
-def test_downlink_delays_of_openairinterface(data: Path, tmp_path: Path) -> None:
+def test_prs_delays_of_openairinterface_locate_a_receiver(data: Path, tmp_path: Path) -> None:
     """Real delays at three positions; offsets from the two others."""
     folder = data / "ranges/oai_prs"
     if not folder.is_dir():
@@ -208,7 +210,7 @@ def test_downlink_delays_of_openairinterface(data: Path, tmp_path: Path) -> None
     assert np.mean(nees) < 1.5
 
 
-def test_ranges_of_a_hall_with_blocked_paths(data: Path, tmp_path: Path) -> None:
+def test_uwb_ranges_with_blocked_paths_locate_a_receiver(data: Path, tmp_path: Path) -> None:
     """Real ultra-wideband ranges from seven positions; two thirds of the paths are blocked."""
     file = data / "ranges/uwb_iiot/ranges.csv.gz"
     if not file.is_file():

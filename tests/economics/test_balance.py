@@ -69,7 +69,7 @@ def test_the_balance_equals_a_calculation_by_hand() -> None:
     assert found.saved.central == pytest.approx(-1000.0 + 4.0 * (450.4 - yearly))
 
 
-def test_trips_a_day_are_as_stated_and_not_one_after_the_other() -> None:
+def test_the_number_of_trips_per_day_is_the_configured_one() -> None:
     stated = figures()
     del stated["fleet"]["trip_s"]
     stated["fleet"]["trips_per_day"] = 40

@@ -33,7 +33,7 @@ def commands(page: Path) -> list[list[str]]:
     return [shlex.split(line, comments=True)[1:] for line in lines if ".venv/bin/access-av" in line]
 
 
-def test_python_example(tmp_path: Path) -> None:
+def test_the_python_example_of_the_docs_runs(tmp_path: Path) -> None:
     example = "\n".join(blocks(PYTHON, "python"))
     done = subprocess.run(
         [sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=True
@@ -41,7 +41,7 @@ def test_python_example(tmp_path: Path) -> None:
     assert "worst error in Y" in done.stdout
 
 
-def test_command_line_examples(tmp_path: Path, quick_study: Path) -> None:
+def test_the_command_line_examples_of_the_docs_run(tmp_path: Path, quick_study: Path) -> None:
     examples = commands(COMMAND_LINE)
     assert [command[:2] for command in examples] == [
         ["run", "paper"],
@@ -91,7 +91,7 @@ def test_make_commands_exist() -> None:
 
 
 @pytest.mark.parametrize("path", ["docs/study.png", "LICENSE-MIT", "LICENSE-APACHE"])
-def test_files_it_shows_exist(path: str) -> None:
+def test_files_named_in_the_readme_exist_and_are_small(path: str) -> None:
     assert (ROOT / path).stat().st_size < 300_000
 
 

@@ -37,7 +37,9 @@ from conftest import ROOT
         ("about", 0.8, 1.01, False),
     ],
 )
-def test_rules(rule: str, stated: object, obtained: object, met: bool) -> None:
+def test_rules_of_claims_accept_values_within_their_tolerance(
+    rule: str, stated: object, obtained: object, met: bool
+) -> None:
     found = margin({"rule": rule, "stated": stated, "tolerance": 0.25}, obtained)
     assert (found >= 0.0) == met
 
@@ -50,7 +52,9 @@ def test_rules(rule: str, stated: object, obtained: object, met: bool) -> None:
         ((250.0, 250.0, 270.0, 206.5), False),
     ],
 )
-def test_the_stated_modes_qualify(energies_j: tuple[float, ...], met: bool) -> None:
+def test_claim_d2_requires_exactly_the_published_modes(
+    energies_j: tuple[float, ...], met: bool
+) -> None:
     modes = {
         mode: {"energy_j": np.array([energy]), "rms_m": np.array([0.14])}
         for mode, energy in zip((2, 3, 6, 7), energies_j, strict=True)
@@ -206,7 +210,7 @@ def test_a_platform_without_a_mode_is_reported() -> None:
     assert found["a3_theoretical_20ms_worst_m"].verdict != NOT_JUDGED
 
 
-def test_records_have_the_promised_fields() -> None:
+def test_claim_records_have_the_documented_fields() -> None:
     records = json.loads(json.dumps(as_records(check_claims(synthetic.evaluation().outcome))))
     for record in records:
         assert record["verdict"] in VERDICTS
@@ -261,7 +265,7 @@ def test_a_verdict_that_differs_between_seeds_is_seed_sensitive() -> None:
     assert e2.seeds_met == ""
 
 
-def test_the_saving_of_a_day_is_of_the_trip_that_was_driven_and_of_its_duty() -> None:
+def test_the_daily_saving_follows_from_trip_duration_and_duty() -> None:
     short = check_claims(synthetic.evaluation(trip_s=80.33).outcome)
     long = check_claims(replace(synthetic.evaluation(trip_s=178.6).outcome, duty=0.25))
     ids = ("e5_mode0_saved_per_day_kj", "e6_fleet_of_100_saved_per_day_mj")

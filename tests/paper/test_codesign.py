@@ -114,7 +114,9 @@ def test_json_of_a_single_run_has_no_interval(access_av: Callable[..., Finished]
     assert (low_m, high_m) == (None, None)
 
 
-def test_power_command(access_av: Callable[..., Finished]) -> None:
+def test_the_power_model_is_within_10_percent_of_the_measurements(
+    access_av: Callable[..., Finished],
+) -> None:
     done = access_av("design", "power", ENGINE)
     rows = [line for line in done.out.splitlines() if line.rstrip().endswith(tuple("0123456789"))]
     off = [float(line.split()[-1]) for line in rows]

@@ -31,7 +31,9 @@ def energies(demands: dict[int, ModeDemand]) -> Energies:
     return fit_energy(demands)
 
 
-def test_mode_0_meets_the_stated_sums(demands: dict[int, ModeDemand], energies: Energies) -> None:
+def test_the_fit_meets_the_papers_sums_in_mode_0(
+    demands: dict[int, ModeDemand], energies: Energies
+) -> None:
     stated = paper_numbers()["energy_j"]
     for method in METHODS:
         total_j = energies[0][method] * demands[0].fixed_aoa_estimates[method]
@@ -40,7 +42,9 @@ def test_mode_0_meets_the_stated_sums(demands: dict[int, ModeDemand], energies: 
     assert adaptive_j == pytest.approx(stated["adaptive_mode_0"], rel=0.05)
 
 
-def test_budgets_are_met(demands: dict[int, ModeDemand], energies: Energies) -> None:
+def test_the_fit_meets_the_papers_energy_budgets(
+    demands: dict[int, ModeDemand], energies: Energies
+) -> None:
     adaptive_j = {m: energies[m]["music"] * d.adaptive_aoa_estimates for m, d in demands.items()}
     assert adaptive_j[7] == pytest.approx(206.5)
     assert [mode for mode, energy in adaptive_j.items() if energy <= 210.0] == [7]

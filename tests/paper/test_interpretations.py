@@ -102,7 +102,7 @@ def test_claims_are_not_judged_on_another_trip(
     assert f"access-av design bound {name}" in done.err
 
 
-def test_an_unknown_reading_is_named() -> None:
+def test_an_unknown_interpretation_is_rejected_with_its_name() -> None:
     with pytest.raises(InputError, match="unknown interpretation gaet; allowed are: every-ssb"):
         interpretations.load("gaet")
 

@@ -53,7 +53,7 @@ def test_offset_and_scale_correct_an_array_with_linear_phase_errors(
     assert imperfect.rms(corrected(ideal), phase_rad) < 1.3 * imperfect.rms(best, phase_rad)
 
 
-def test_bounds_of_ranging_by_an_ssb() -> None:
+def test_ranging_bounds_scale_with_bandwidth_and_power() -> None:
     ranging = SimpleNamespace(**runpy.run_path(str(ROOT / "examples/outlook/ranging.py")))
     assert ranging.REFERENCES.size == 144
     delay_m, phase_mm = ranging.bounds(10.0, 15e3)

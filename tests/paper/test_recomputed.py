@@ -30,7 +30,8 @@ MODES = range(8)
 STATED = tomllib.loads((ROOT / "python/access_av/paper/paper.toml").read_text(encoding="utf-8"))
 CLAIMS: dict[str, Any] = STATED["claims"]
 DAY_S = 86_400.0
-# Claims that follow from settings or from other figures of the paper; checked by `test_arithmetic`.
+# Claims that follow from settings or from other figures of the paper. They are checked by
+# `test_arithmetic_claims_are_recomputed`.
 WITHOUT_TABLES = {
     *("x1", "x2", "x3", "x4", "x5", "x6", "x7", "x8"),
     *("e9", "e10", "c1", "c2", "c4"),
@@ -327,13 +328,13 @@ def interpretation(request: pytest.FixtureRequest, tables: Tables) -> Interpreta
     return Interpretation(tables, request.param)
 
 
-def test_every_claim_is_computed_again() -> None:
+def test_every_claim_has_a_recomputation() -> None:
     rest = {name for name in CLAIMS if name not in FOUND}
     assert {name.split("_")[0] for name in rest} == WITHOUT_TABLES
 
 
 @pytest.mark.parametrize("name", FOUND)
-def test_claim(name: str, interpretation: Interpretation) -> None:
+def test_a_claim_is_recomputed_from_the_tables(name: str, interpretation: Interpretation) -> None:
     [claim] = [
         it
         for it in interpretation.tables.claims
@@ -382,7 +383,7 @@ def test_claim(name: str, interpretation: Interpretation) -> None:
         )
 
 
-def test_arithmetic(tables: Tables) -> None:
+def test_arithmetic_claims_are_recomputed(tables: Tables) -> None:
     claims = {it["id"].split("_")[0]: it for it in tables.claims if it["interpretation"] == "gate"}
     speed_mps = 15.0 / 3.6
     close(
@@ -537,7 +538,7 @@ def plain(cell: str) -> str:
     return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", cell)).split())
 
 
-def test_the_page_shows_the_tables(tables: Tables) -> None:
+def test_the_report_shows_the_values_of_its_tables(tables: Tables) -> None:
     gate = [it for it in tables.claims if it["interpretation"] == "gate"]
     # Claims: verdict, kind of evidence and deviation.
     shown = rows_of(tables.page, "Verdict")
@@ -605,7 +606,7 @@ def test_claim_groups_follow_from_the_verdicts(tables: Tables) -> None:
         assert cells[3].endswith(f"{adaptive['longest_gap_s'].max():.2f} s")
 
 
-def test_claims_of_each_fit_parameter(tables: Tables) -> None:
+def test_claim_counts_of_each_fit_are_recomputed(tables: Tables) -> None:
     """The shipped row counts the claims as they are listed."""
     gate = [it for it in tables.claims if it["interpretation"] == "gate"]
     counts = [
@@ -620,7 +621,7 @@ def test_claims_of_each_fit_parameter(tables: Tables) -> None:
     close(row["average_saving_percent"], e4)
 
 
-def test_cost_and_carbon_of_the_page(tables: Tables) -> None:
+def test_cost_and_carbon_of_the_report_are_recomputed(tables: Tables) -> None:
     """Roadside units, saved energy and emissions, from the shipped prices and emission factors."""
     folder = ROOT / "python/access_av/economics"
     prices, carbon = (

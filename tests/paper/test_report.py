@@ -29,7 +29,7 @@ def page() -> str:
     return render(synthetic.study())
 
 
-def test_loads_nothing(page: str) -> None:
+def test_the_report_loads_nothing_from_the_network(page: str) -> None:
     """No element loads a resource; the remaining URLs are names of schemas and namespaces."""
     markup = re.sub(r"(<script>).*?(</script>)", r"\1\2", page, flags=re.DOTALL)
     assert not re.search(r"<(link|img|iframe|script)[^>]*\b(src|href)=", markup)
@@ -38,7 +38,7 @@ def test_loads_nothing(page: str) -> None:
     assert '"url"' not in specs
 
 
-def test_holds_every_chart(page: str) -> None:
+def test_the_report_contains_every_chart(page: str) -> None:
     places = set(re.findall(r'class="chart" id="([^"]+)"', page))
     assert places >= {
         "overview", "design-x", "design-y", "snr", "energy-bars", "aoa_estimates", "design-space",
@@ -49,7 +49,7 @@ def test_holds_every_chart(page: str) -> None:
         assert f'"{name}":{{' in page
 
 
-def test_holds_readings_claims_settings_and_version(page: str) -> None:
+def test_the_report_contains_interpretations_claims_settings_and_version(page: str) -> None:
     for text in (
         "a1_adaptive_worst_m", "c2_four_rsu_usd", "seed 1", "2 runs", "version ",
         "Algorithm 1 at every SSB", "by construction", "arithmetic",
@@ -97,7 +97,7 @@ def test_an_evaluation_has_a_one_line_representation() -> None:
     assert len({evaluation, evaluation}) == 1
 
 
-def test_no_zero_has_a_sign() -> None:
+def test_zero_is_printed_without_a_sign() -> None:
     assert (number(-0.0001, 2), value_text(-0.0), unsigned_zero("+0.00")) == ("0.00", "0", "0.00")
     assert (number(-0.01, 2), value_text(-1.5), unsigned_zero("+0.01")) == (
         "-0.01",

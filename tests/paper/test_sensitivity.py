@@ -211,7 +211,7 @@ def test_shares_are_those_of_margins_of_at_least_zero(tables: Tables) -> None:
         assert [row[f"share_met{it}"] for it in ("", "_low", "_high")] == pytest.approx(expected)
 
 
-def test_the_page_shows_the_tables(tables: Tables) -> None:
+def test_the_sensitivity_report_shows_the_values_of_its_tables(tables: Tables) -> None:
     def rows(chart: str) -> list[dict[str, Any]]:
         [found] = tables.charts[chart]["datasets"].values()
         return list(found)

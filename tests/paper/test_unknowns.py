@@ -52,7 +52,7 @@ def drawn(
     )
 
 
-def test_sobol_indices_of_a_known_function() -> None:
+def test_sobol_indices_of_a_known_function_are_estimated() -> None:
     """3 a + 2 ab + choice on (−1, 1): variances 3, 4/9 and 1, noise 0.25; d has no effect."""
     dimensions = (
         *(Dimension(name, name) for name in "ab"),

@@ -127,7 +127,7 @@ def test_the_shipped_hall_contains_its_paths(
     assert 0.005 < result.rms_error_m < 1.0
 
 
-def test_the_bound_has_the_paths_k(tmp_path: Path) -> None:
+def test_the_bound_uses_the_rician_k_of_traced_paths(tmp_path: Path) -> None:
     site = Site.load(str(HALL / "site.toml"))
     table = line_of_sight(site, LANE_M)
     ray_paths.import_paths(table, site, tmp_path / "los.npz", carrier_mhz=3750.0)
@@ -139,7 +139,7 @@ def test_the_bound_has_the_paths_k(tmp_path: Path) -> None:
     assert bound(hall, map_step_m=4.0).site.filter(pl.col("y_m") > 20.0)["bound_m"].is_null().all()
 
 
-def test_arrays_in_column_major_order(tmp_path: Path) -> None:
+def test_npz_arrays_in_column_major_order_are_read(tmp_path: Path) -> None:
     with np.load(HALL / "paths.npz") as held:
         arrays = {name: held[name] for name in held.files}
     by_columns = {name: np.asfortranarray(array) for name, array in arrays.items()}

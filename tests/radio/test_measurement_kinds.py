@@ -21,7 +21,9 @@ def bounds(kinds: pl.DataFrame, heads: int, name: str) -> list[float]:
     return kinds.filter(of_kind)["bound_without_road_m"].to_list()
 
 
-def test_table_has_every_combination(kinds: pl.DataFrame) -> None:
+def test_the_bound_table_has_every_combination_of_measurements_and_clocks(
+    kinds: pl.DataFrame,
+) -> None:
     assert kinds.columns == list(columns.TABLES["bound_kinds"].columns)
     with_clocks = sum(bool(extra & {"delay", "phase"}) for extra in KINDS.values())
     assert kinds.height == 2 * (len(KINDS) - with_clocks + with_clocks * len(CLOCKS))

@@ -148,7 +148,7 @@ def test_the_command_plans_and_rejects_invalid_input(
         plan(SHORT, MASTS, add=5)
 
 
-def test_probability_within_a_circle_is_that_of_draws() -> None:
+def test_the_probability_within_a_circle_agrees_with_random_samples() -> None:
     rng = np.random.default_rng(1)
     for first, second in ((0.1, 0.1), (0.3, 0.05), (0.2, 0.01)):
         drawn = np.hypot(
@@ -158,7 +158,7 @@ def test_probability_within_a_circle_is_that_of_draws() -> None:
         assert abs(share - (drawn <= 0.25).mean()) < 0.006
 
 
-def test_service_levels_need_time_as_well_as_accuracy() -> None:
+def test_a_service_level_requires_enough_hours_of_driving() -> None:
     good = np.full((2, 1000), 0.01)
     assert service_levels.reached_in_words(service_levels.of_runs(good, 0.02)) == "no level"
     hours = service_levels.of_runs(np.full((20, 1000), 0.01), 20.0)
@@ -177,7 +177,7 @@ def test_service_levels_need_time_as_well_as_accuracy() -> None:
     assert [found[0].result, found[1].result] == [LevelResult.TOO_FEW_RUNS] * 2
 
 
-def test_errors_of_an_integrity_case_are_horizontal() -> None:
+def test_integrity_cases_report_horizontal_errors() -> None:
     steps = pl.DataFrame(
         {
             "run": [0, 0],
@@ -252,7 +252,7 @@ def test_cases_of_an_integrity_campaign_are_compared(
     assert "Comparison of variants" in page
 
 
-def test_hypotheses_are_of_three_sizes_and_can_be_driven(tmp_path: Path) -> None:
+def test_fault_cases_of_every_scale_can_be_simulated(tmp_path: Path) -> None:
     for name in ("yard", "paper", "campus-handover"):
         scenario = Scenario.load(name)
         found = hypotheses(scenario)

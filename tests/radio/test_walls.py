@@ -55,7 +55,7 @@ def test_no_angle_is_estimated_through_a_wall(walled: Scenario) -> None:
     assert not hidden(straight[(straight > 30.0) & (straight < 90.0)]).any()
 
 
-def test_the_channel_loses_the_direct_wave_behind_it() -> None:
+def test_the_channel_behind_a_wall_has_no_direct_wave() -> None:
     """A vehicle without the wall in its site receives the radio head weakly, and has errors."""
     nominal = {"truth.sample_errors": False, "site.rician_k_db": 60.0}
     open_air = trip(**nominal)
@@ -88,7 +88,7 @@ def test_the_bound_uses_the_radio_heads_that_the_vehicle_receives(walled: Scenar
     assert shares[0] < shares[1]
 
 
-def test_glass_weakens_and_does_not_hide() -> None:
+def test_a_glass_wall_attenuates_without_hiding_a_radio_head() -> None:
     glass = trip(**{"site.walls": [{**WALL, "loss_db": 3.0}]})
     weaker_db = Bound(trip()).snr_db(np.array([60.0]), np.zeros(1)) - Bound(glass).snr_db(
         np.array([60.0]), np.zeros(1)

@@ -42,7 +42,7 @@ def test_the_route_is_that_of_the_scenario(four_heads: ErrorBound) -> None:
     assert (route["bound_m"][1:] > 0.0).all()
 
 
-def test_map_covers_road_and_heads(four_heads: ErrorBound) -> None:
+def test_the_bound_map_covers_road_and_radio_heads(four_heads: ErrorBound) -> None:
     site, half_m = four_heads.site, 0.5 * four_heads.map_step_m
     for name in ("x_m", "y_m"):
         for table in (four_heads.route, four_heads.heads):
@@ -65,7 +65,7 @@ def test_one_radio_head_leaves_a_direction_undetermined() -> None:
     assert "does not determine a position" in render_bound(alone)
 
 
-def test_snr_is_the_link_budgets() -> None:
+def test_the_snr_of_the_bound_is_that_of_the_link_budget() -> None:
     core = _core.Bound(
         Scenario.load("paper").with_overrides({"site.radio_heads[0].eirp_dbm": -17.0})
     )
@@ -75,7 +75,7 @@ def test_snr_is_the_link_budgets() -> None:
     assert abs(snr_db[0, 0] - 8.083) < 2e-3
 
 
-def test_unusable_places_are_refused() -> None:
+def test_invalid_positions_of_a_bound_are_rejected() -> None:
     core = _core.Bound(Scenario.load("paper"))
     one, two = np.zeros(1), np.zeros(2)
     with pytest.raises(ValueError, match="equal lengths"):
@@ -88,7 +88,7 @@ def test_unusable_places_are_refused() -> None:
             core.at(one, one, 1.0, heading_std_rad)
 
 
-def test_page_loads_nothing_and_names_the_heads(four_heads: ErrorBound) -> None:
+def test_the_bound_report_loads_nothing_and_names_the_radio_heads(four_heads: ErrorBound) -> None:
     page = render_bound(four_heads)
     markup = re.sub(r"(<script>).*?(</script>)", r"\1\2", page, flags=re.DOTALL)
     assert not re.search(r"<(link|img|iframe|script)[^>]*\b(src|href)=", markup)

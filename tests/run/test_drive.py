@@ -61,7 +61,7 @@ def test_dead_reckoning_has_no_protection_level() -> None:
     assert '"stanford"' not in render_drive(Scenario.load("paper"), result, seed=1)
 
 
-def test_page_has_every_chart_and_loads_nothing(guarded: Simulation) -> None:
+def test_the_drive_report_has_every_chart_and_loads_nothing(guarded: Simulation) -> None:
     page = render_drive(GUARDED, guarded, seed=4)
     assert "Service levels" in page
     specs = json.loads(page.split("const charts = ")[1].split(";\n")[0])
@@ -94,7 +94,7 @@ def test_integrity_statistics_without_trajectories(guarded: Simulation) -> None:
     )
 
 
-def test_page_needs_trajectories() -> None:
+def test_a_report_without_trajectories_is_rejected() -> None:
     with pytest.raises(InputError, match="keep_trajectories"):
         render_drive(Scenario.load("paper"), simulate("paper", runs=1), seed=1)
 

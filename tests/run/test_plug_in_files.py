@@ -52,7 +52,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_compare_takes_plug_ins(access_av: Callable[..., Finished], folder: Path) -> None:
+def test_plug_ins_are_compared_on_the_command_line(
+    access_av: Callable[..., Finished], folder: Path
+) -> None:
     texts = ["estimator=mine.py:Mine", "policy=mine.py:EveryTenth"]
     compare = [part for text in texts for part in ("--against", text)]
     done = access_av("run", "short.toml", "--runs", "2", *compare, "--out", "out")
@@ -76,7 +78,7 @@ def simulated(folder: Path, **plug_ins: object) -> pl.DataFrame:
     return product.simulate(scenario, runs=2, seed=1, **plug_ins).runs  # type: ignore[arg-type]
 
 
-def test_designs_take_plug_ins(access_av: Callable[..., Finished], folder: Path) -> None:
+def test_design_sweeps_accept_plug_ins(access_av: Callable[..., Finished], folder: Path) -> None:
     (folder / "space.toml").write_text(
         'estimator = ["", "mine.py:Mine"]\npolicy = ["", "mine.py:EveryTenth"]\n'
     )

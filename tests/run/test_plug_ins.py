@@ -130,7 +130,7 @@ def test_the_energy_of_a_plug_in_estimator_is_its_own_specification() -> None:
         ({"energy_per_execution_j": 1.0, "time_per_execution_s": 1.0}, "both"),
     ],
 )
-def test_invalid_costs_are_rejected(stated: dict[str, Any], named: str) -> None:
+def test_invalid_energies_of_an_estimator_are_rejected(stated: dict[str, Any], named: str) -> None:
     with pytest.raises(ValueError, match=named):
         access_av.simulate(SHORT, estimator=lambda: Stating(**stated))
 
@@ -146,7 +146,7 @@ def test_an_unknown_method_names_the_platform_key_to_set() -> None:
     assert access_av.simulate(stated).runs["energy_j"].item() is None
 
 
-def test_no_angle_causes_no_error() -> None:
+def test_an_estimator_may_return_no_angle() -> None:
     result = access_av.simulate(SHORT, keep_trajectories=True, estimator=lambda _: None)
     assert result.aoa_estimates is not None
     assert set(result.aoa_estimates["reason"]) == {"unusable"}
@@ -408,12 +408,12 @@ def by_another_function(situation: Any) -> bool:
         (by_another_function, "ARRAY"),
     ],
 )
-def test_state_between_runs_is_warned_of(policy: Any, named: str) -> None:
+def test_state_that_survives_a_run_causes_a_warning(policy: Any, named: str) -> None:
     with pytest.warns(UserWarning, match=f"the policy keeps state between runs.*{named}"):
         access_av.simulate(SHORT, runs=2, policy=policy)
 
 
-def test_an_attribute_that_a_function_adds_to_itself_is_warned_of() -> None:
+def test_state_in_function_attributes_causes_a_warning() -> None:
     with pytest.warns(UserWarning, match=r"has changed with_attribute\.count"):
         access_av.simulate(SHORT, runs=2, policy=with_attribute)
 

@@ -73,7 +73,7 @@ def test_a_batch_gives_what_single_calls_give(method: Callable[..., Any], antenn
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_any_strides(method: Callable[..., Any]) -> None:
+def test_arrays_with_any_strides_give_equal_angles(method: Callable[..., Any]) -> None:
     batch = simulate(np.linspace(0.5, 2.5, 10), 20)
     expected = method(batch).angle_rad
     wide = np.zeros((10, 4, 40), complex)
@@ -95,7 +95,7 @@ def test_any_strides(method: Callable[..., Any]) -> None:
 
 
 @pytest.mark.parametrize("method", SEVERAL)
-def test_exact_covariance_of_two_sources(method: Callable[..., Any]) -> None:
+def test_two_sources_are_exact_with_an_exact_covariance(method: Callable[..., Any]) -> None:
     # Orthogonal waveforms without noise: the sample covariance is exact.
     truth = np.array([64.0, 103.0])
     steering = np.exp(1j * np.pi * np.cos(np.radians(truth)) * np.arange(4)[:, None])
@@ -118,7 +118,7 @@ def test_constant_snapshots_are_as_good_as_random_ones(method: Callable[..., Any
     assert rmse / bound < 1.14
 
 
-def test_esprit_by_least_and_total_least_squares() -> None:
+def test_esprit_accepts_least_and_total_least_squares() -> None:
     angles = np.radians([100, 65])  # -10 and 25 degrees from broadside
     steering = np.exp(1j * np.pi * np.cos(angles) * np.arange(8)[:, None])
     waveforms = np.exp(2j * np.pi * np.outer([1, 3], np.arange(16)) / 16)
@@ -127,7 +127,7 @@ def test_esprit_by_least_and_total_least_squares() -> None:
         assert np.sort(found.angle_rad) == pytest.approx(np.sort(angles), abs=1e-9)
 
 
-def test_covariance_keeps_the_mean() -> None:
+def test_the_covariance_does_not_subtract_the_mean() -> None:
     snapshots = simulate([1.0, 2.0], 3)
     expected = snapshots @ snapshots.conj().swapaxes(1, 2) / 20
     assert aoa.covariance(snapshots) == pytest.approx(expected)
@@ -147,7 +147,7 @@ def test_coherent_sources_require_forward_backward_averaging() -> None:
     assert found.angle_rad == pytest.approx(truth, abs=1e-6)
 
 
-def test_number_of_sources() -> None:
+def test_the_number_of_sources_is_estimated() -> None:
     rng = np.random.default_rng(6)
     steering = np.exp(1j * np.pi * np.cos([0.9, 1.6]) * np.arange(4)[:, None])
     snapshots = 3 * steering @ gaussian(rng, 100, 2, 80) + gaussian(rng, 100, 4, 80)
@@ -157,7 +157,7 @@ def test_number_of_sources() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_calibration_from_a_reference_burst(method: Callable[..., Any]) -> None:
+def test_a_reference_burst_calibrates_the_channels(method: Callable[..., Any]) -> None:
     gains = np.array([1, 0.8 * np.exp(2j), 1.2 * np.exp(-1j), 0.9j])
     found = aoa.calibrate(gains[:, None] * simulate(1.1, 60)[0], 1.1)
     assert np.mean(np.abs(found) ** 2) == pytest.approx(1)
@@ -177,7 +177,7 @@ def test_element_spacing_is_used() -> None:
     assert found.verdict.startswith("unresolved: several directions fit")
 
 
-def test_bounds() -> None:
+def test_cramer_rao_bounds_equal_closed_forms() -> None:
     assert aoa.crb_rad(np.pi / 2, 10) == pytest.approx(
         np.sqrt(6 * (1 + 40) / (20 * 100 * 16 * 15)) / np.pi
     )
@@ -214,7 +214,9 @@ GOOD = simulate(1.0, 10)[0]
 )
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
-def test_bad_snapshots(method: Callable[..., Any], snapshots: Any, message: str) -> None:
+def test_invalid_snapshots_are_rejected(
+    method: Callable[..., Any], snapshots: Any, message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         method(snapshots)
 
@@ -232,12 +234,14 @@ def test_bad_snapshots(method: Callable[..., Any], snapshots: Any, message: str)
         (aoa.music, {"calibration": "nothing"}, "one complex gain per antenna"),
     ],
 )
-def test_bad_options(method: Callable[..., Any], options: dict[str, Any], message: str) -> None:
+def test_invalid_options_are_rejected(
+    method: Callable[..., Any], options: dict[str, Any], message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         method(GOOD, **options)
 
 
-def test_other_bad_input() -> None:
+def test_invalid_threads_criteria_and_covariances_are_rejected() -> None:
     with pytest.raises(ValueError, match="`threads` is 0; it must be between 1 and 1024"):
         aoa.music(GOOD[None], threads=0)
     with pytest.raises(ValueError, match="'mdl' or 'aic', not 'bic'"):
@@ -289,7 +293,7 @@ def test_coherent_sources_are_resolved_by_subarrays() -> None:
 
 
 @pytest.mark.parametrize("subarray", range(7, 17))
-def test_subarrays_of_sixteen_antennas(subarray: int) -> None:
+def test_subarrays_of_sixteen_antennas_resolve_coherent_sources(subarray: int) -> None:
     rng = np.random.default_rng(7)
     angles = np.radians([70, 100])
     steering = np.exp(1j * np.pi * np.cos(angles) * np.arange(16)[:, None])
@@ -304,7 +308,7 @@ def test_subarrays_of_sixteen_antennas(subarray: int) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_sixteen_antennas(method: Callable[..., Any]) -> None:
+def test_every_method_supports_sixteen_antennas(method: Callable[..., Any]) -> None:
     rng = np.random.default_rng(6)
     steering = np.exp(1j * np.pi * np.cos(1.1) * np.arange(16)[:, None])
     noise = 0.3 * (rng.normal(size=(16, 20, 2)) @ [1, 1j])
@@ -386,7 +390,7 @@ def test_a_circle_finds_azimuth_and_elevation_at_the_bound() -> None:
     assert (level.elevation_rad, level.elevation_sigma_rad) == (elevation[3], 0)
 
 
-def test_spectrum_over_azimuth_and_elevation() -> None:
+def test_a_spectrum_over_azimuth_and_elevation_peaks_at_the_source() -> None:
     snapshots = towards(np.array([1.0]), np.array([0.6]))[0] * np.ones(9)
     azimuths, elevations = np.linspace(-3, 3, 61), np.linspace(0, 1.5, 16)
     for method in ("bartlett", "music"):
@@ -410,7 +414,9 @@ def test_spectrum_over_azimuth_and_elevation() -> None:
         (CIRCLE, {"calibration": [1, 1]}, "one gain per antenna: 5, not 2"),
     ],
 )
-def test_bad_places(places: Any, options: dict[str, Any], message: str) -> None:
+def test_invalid_antenna_positions_are_rejected(
+    places: Any, options: dict[str, Any], message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         aoa.direction(np.ones((5, 4), complex), places, **options)
 
@@ -437,7 +443,7 @@ def test_a_misfit_of_the_plane_wave_is_reported() -> None:
     assert single.p_value < 0.01
 
 
-def test_pilots_know_their_noise() -> None:
+def test_a_known_noise_variance_gives_consistent_pilot_estimates() -> None:
     rng = np.random.default_rng(22)
     phases = rng.uniform(-2.8, 2.8, 1000)
     steering = np.exp(1j * phases[:, None, None] * np.arange(4)[:, None])
@@ -464,7 +470,7 @@ def test_pilots_know_their_noise() -> None:
             aoa.maximum_likelihood_pilots(np.ones((4, 3), complex), noise_variance=wrong)
 
 
-def test_a_measured_manifold_and_several_sources() -> None:
+def test_a_measured_manifold_resolves_several_sources() -> None:
     turns = np.arange(120) / 120 * 2 * np.pi
     flat = np.stack([np.cos(turns), np.sin(turns)])
     coupling = np.eye(5) + 0.2 * (np.eye(5, k=1) + np.eye(5, k=-1))

@@ -55,7 +55,7 @@ def write(path: Path, azimuths_deg: list[float], **changes: Any) -> Path:
     return path
 
 
-def test_calibration_and_sign_of_the_angle(tmp_path: Path) -> None:
+def test_angles_of_a_calibrated_recording_have_the_correct_sign(tmp_path: Path) -> None:
     azimuths_deg = [-50.0, -10.0, 0.0, 35.0, 60.0]
     bursts = estimate_bursts(write(tmp_path / "array", azimuths_deg))
     assert [burst.sample_start for burst in bursts] == [BURST * (2 * k + 1) for k in range(5)]
@@ -65,7 +65,9 @@ def test_calibration_and_sign_of_the_angle(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("array", "bound_deg"), [(1, 2.5), (2, 2.9), (3, 6.4)])
-def test_real_recordings(data: Path, array: int, bound_deg: float) -> None:
+def test_angles_of_real_recordings_have_the_documented_error(
+    data: Path, array: int, bound_deg: float
+) -> None:
     error_deg = mean_absolute_error_deg(
         estimate_bursts(data / "captures" / f"aoa4_day1_array{array}")
     )
@@ -73,7 +75,9 @@ def test_real_recordings(data: Path, array: int, bound_deg: float) -> None:
     assert error_deg <= bound_deg
 
 
-def test_json_has_the_promised_keys(access_av: Callable[..., Finished], tmp_path: Path) -> None:
+def test_the_json_output_has_the_documented_keys(
+    access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
     done = access_av("record", "aoa", str(write(tmp_path / "array", [20.0])), "--json")
     (burst,) = json.loads(done.out)
     assert set(burst) >= {"sample_start", "azimuth_deg", "sigma_deg", "truth_deg"}
@@ -92,7 +96,9 @@ def test_missing_parts_are_reported(tmp_path: Path) -> None:
         estimate_bursts(write(tmp_path / "c", [20.0], **{"global": silent}))
 
 
-def test_truncated_data_ends_with_2(access_av: Callable[..., Finished], tmp_path: Path) -> None:
+def test_truncated_data_ends_with_exit_code_2(
+    access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
     path = write(tmp_path / "array", [20.0])
     file = path.with_name("array.sigmf-data")
     file.write_bytes(file.read_bytes()[:-5])

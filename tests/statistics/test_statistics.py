@@ -42,11 +42,13 @@ from access_av.statistics import (
         (0.975, 20_000, 20_393.88),
     ],
 )
-def test_chi_squared_quantiles(probability: float, freedom: float, value: float) -> None:
+def test_chi_squared_quantiles_equal_tabulated_values(
+    probability: float, freedom: float, value: float
+) -> None:
     assert chi_squared_quantile(probability, freedom) == pytest.approx(value, rel=1e-6)
 
 
-def test_beta_quantiles() -> None:
+def test_beta_quantiles_equal_closed_forms() -> None:
     # I_x(1, b) = 1 − (1 − x)^b, I_x(a, 1) = x^a, and the symmetric case.
     assert beta_quantile(0.3, 1, 7) == pytest.approx(1 - 0.7 ** (1 / 7), rel=1e-11)
     assert beta_quantile(0.3, 9, 1) == pytest.approx(0.3 ** (1 / 9), rel=1e-11)
@@ -68,7 +70,7 @@ def test_unusable_probabilities_are_refused(wrong: float) -> None:
             refuse()
 
 
-def test_proportions() -> None:
+def test_intervals_of_proportions_equal_published_examples() -> None:
     # Clopper and Pearson, Wilson: the worked examples of Agresti and Coull (1998) and of R's
     # binom.test and prop.test.
     assert clopper_pearson(0, 10) == pytest.approx((0.0, 0.3084971), abs=1e-6)
@@ -166,7 +168,7 @@ def test_an_overconfident_localizer_is_detected() -> None:
     assert found.in_band < 0.5
 
 
-def test_nees_by_hand() -> None:
+def test_nees_equals_a_manual_calculation() -> None:
     # P = [[4, 2], [2, 3]], P⁻¹ = [[3, −2], [−2, 4]] / 8; e = (1, 2): (3 − 8 + 16) / 8.
     step = {
         "run": 0, "time_s": 0.0, "searching": False, "error_x_m": 1.0, "error_y_m": 2.0,
@@ -273,7 +275,7 @@ def test_exceedance_intervals_use_runs_instead_of_epochs() -> None:
     assert found.run_interval == pytest.approx((0.0012651, 0.2487328), abs=1e-6)
 
 
-def test_stanford_regions() -> None:
+def test_stanford_regions_are_counted_by_error_and_level() -> None:
     table = guarded(
         (0.5, 1.0, "ok"),
         (1.0, 1.0, "ok"),
@@ -290,7 +292,7 @@ def test_stanford_regions() -> None:
     }  # fmt: skip
 
 
-def test_alarms_by_hand() -> None:
+def test_alarm_statistics_equal_a_manual_count() -> None:
     steps = (
         (0.1, 0.8, "ok"),
         (0.1, 0.8, "degraded"),  # an early alarm

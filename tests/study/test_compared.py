@@ -91,7 +91,7 @@ def test_verdicts_are_enums_with_separate_wording(
         assert each.badge in ("yes", "fit", "no")
 
 
-def test_paired_intervals_hold_the_difference_as_often_as_they_say() -> None:
+def test_paired_intervals_have_their_coverage() -> None:
     """The runs differ more than the variants."""
     rng = np.random.default_rng(5)
     held = 0

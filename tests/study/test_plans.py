@@ -388,7 +388,7 @@ def test_curves_that_do_not_form_one_road_are_rejected(
         dxf.read(file, road_layer="ROAD", scale_m=1.0)
 
 
-def test_many_small_kinks_do_not_add_up(empty: Drawing, tmp_path: Path) -> None:
+def test_a_digitized_circle_keeps_its_shape(empty: Drawing, tmp_path: Path) -> None:
     """A digitized circle: each kink is below that of a smooth road, their sum is 90 degrees."""
     angles = np.linspace(0.0, 0.5 * np.pi, 2000)
     points = 300.0 * np.column_stack([np.sin(angles), 1.0 - np.cos(angles)])
@@ -402,7 +402,7 @@ def test_many_small_kinks_do_not_add_up(empty: Drawing, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["plant", "site"])
 @pytest.mark.parametrize("parts", [("road",), ("heads",), ("road", "heads"), ("walls",)])
-def test_nothing_of_the_example_remains_in_an_imported_plant(
+def test_an_imported_plant_contains_no_example_values(
     access_av: Callable[..., Any], tmp_path: Path, kind: str, parts: tuple[str, ...]
 ) -> None:
     pytest.importorskip("pyproj", reason="the extra `geo` is not installed")
@@ -443,7 +443,9 @@ def test_nothing_of_the_example_remains_in_an_imported_plant(
         ('name,x_m,y_m\n"gate, south",0,0\n"a ""b""",100,0\n', 2),
     ],
 )
-def test_tables_of_points_are_read_as_a_log_is(tmp_path: Path, text: str, points: int) -> None:
+def test_tables_of_points_have_the_csv_format_of_logs(
+    tmp_path: Path, text: str, points: int
+) -> None:
     file = tmp_path / "road.csv"
     file.write_bytes(text.encode())
     assert len(csv_file.read_road(file).road_m) == points

@@ -43,7 +43,7 @@ def test_values_in_another_unit_cause_a_warning(settings: dict[str, Any], words:
 
 
 @pytest.mark.parametrize(("ends_m", "is_doubtful"), [((-60.0, 180.0), True), ((40.0, 80.0), False)])
-def test_a_radio_head_behind_a_hall_is_doubted_on_the_other_side_of_the_road(
+def test_a_hidden_radio_head_that_fits_the_other_road_side_causes_a_warning(
     ends_m: tuple[float, float], is_doubtful: bool
 ) -> None:
     """Radio head `gate` of `bends`, 25 m to the left of a straight of 200 m, behind a long wall."""
@@ -71,7 +71,7 @@ def test_a_radio_head_behind_a_hall_is_doubted_on_the_other_side_of_the_road(
         (("at_m = 28.0", "at_m = 2800.0"), "targets[0].at_m"),
     ],
 )
-def test_bad_plants_are_refused_by_their_key(change: tuple[str, str], said: str) -> None:
+def test_invalid_plants_are_rejected_with_their_key(change: tuple[str, str], said: str) -> None:
     text = PLANT.replace(*change)
     assert text != PLANT
     with pytest.raises(SettingsError, match=re.escape(said)):

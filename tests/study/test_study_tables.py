@@ -158,7 +158,7 @@ def test_no_point_of_the_front_is_dominated(results: Path) -> None:
     assert chosen["target_error_m"] == points["target_error_m"].min()
 
 
-def test_money_and_carbon_add_up(said: dict[str, Any], page: str) -> None:
+def test_costs_and_carbon_equal_the_sums_of_their_items(said: dict[str, Any], page: str) -> None:
     ways = said["ways"]
     # Published prices are US dollars; the plant counts in euros.
     eur, hours = 0.92, 16.0 * 250.0
@@ -192,7 +192,9 @@ def test_money_and_carbon_add_up(said: dict[str, Any], page: str) -> None:
     assert "EUR" in page
 
 
-def test_places_are_those_of_the_road(results: Path, said: dict[str, Any], page: str) -> None:
+def test_tabulated_positions_lie_on_the_road(
+    results: Path, said: dict[str, Any], page: str
+) -> None:
     places = pl.read_csv(results / "places.csv")
     assert places["along_m"].to_list()[:3] == [0.5, 1.5, 2.5]
     assert (places["passes"] == (places["target_error_m"] <= 0.2)).all()
@@ -246,7 +248,7 @@ def test_variants_are_compared(results: Path, page: str) -> None:
         ("trajectories", "trajectories"),
     ],
 )
-def test_columns_are_those_that_are_documented(results: Path, file: str, table: str) -> None:
+def test_study_tables_have_the_documented_columns(results: Path, file: str, table: str) -> None:
     found = pl.read_parquet(results / f"{file}.parquet").columns
     assert tuple(found) == TABLES[table].of(f"`{file}.parquet`")
 

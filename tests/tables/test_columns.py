@@ -96,7 +96,9 @@ LOST = {"vehicle.start.known": False, "site.radio_heads[0].eirp_dbm": -140.0}
     ],
     ids=["dead-reckoning", "guarded", "lost", "faults"],
 )
-def test_simulation(scenario: str, changes: dict[str, object]) -> None:
+def test_simulation_tables_have_the_documented_columns(
+    scenario: str, changes: dict[str, object]
+) -> None:
     found = simulate(
         Scenario.load(scenario).with_overrides(changes), runs=1, keep_trajectories=True
     )
@@ -107,7 +109,7 @@ def test_simulation(scenario: str, changes: dict[str, object]) -> None:
     check("mean_nees", statistics.mean_nees(found.trajectories))
 
 
-def test_located_drives(tmp_path: Path) -> None:
+def test_tables_of_located_drives_have_the_documented_columns(tmp_path: Path) -> None:
     drives.synthesize("paper-real-odometry-2", tmp_path, duration_s=6.0)
     site, odometry = tmp_path / "site.toml", tmp_path / "odometry.csv"
     vehicle = tmp_path / "vehicle.toml"
@@ -133,7 +135,7 @@ def test_located_drives(tmp_path: Path) -> None:
     check("measurements", drives.locate(site, odometry, ranges, vehicle=of_ranges).ranges)
 
 
-def test_bound() -> None:
+def test_bound_tables_have_the_documented_columns() -> None:
     for scenario in ("paper", "yard"):
         found = bound(scenario, map_step_m=50.0)
         check("positions", found.route)
@@ -141,7 +143,7 @@ def test_bound() -> None:
         check("radio_heads", found.heads)
 
 
-def test_evaluation(quick_study: Path) -> None:
+def test_evaluation_tables_have_the_documented_columns(quick_study: Path) -> None:
     for name in ("errors", "snr"):
         check("steps", pl.read_parquet(quick_study / "latest" / f"{name}.parquet"))
     merged = {"fixed_front": "operating_points", "evaluation_runs": "runs", "resamples": "runs"}
@@ -156,7 +158,7 @@ def test_evaluation(quick_study: Path) -> None:
     check("claims", json.loads((quick_study / "latest/claims.json").read_text()))
 
 
-def test_chosen(access_av: Callable[..., Finished]) -> None:
+def test_assumptions_have_the_documented_columns(access_av: Callable[..., Finished]) -> None:
     done = access_av("paper", "assumptions", "--runs", "1", "--json")
     assert done.code == 0, done.err
     found = json.loads(done.out)
@@ -166,7 +168,7 @@ def test_chosen(access_av: Callable[..., Finished]) -> None:
     assert len(found) > 2 * len(shipped) - 1, "each has an alternative"
 
 
-def test_unknowns() -> None:
+def test_sensitivity_tables_have_the_documented_columns() -> None:
     platform = Platform.load("jetson-agx-xavier")
     with tempfile.TemporaryDirectory() as parts:
         kept = Campaign(ResultCache(Path(parts)))
@@ -176,7 +178,9 @@ def test_unknowns() -> None:
         check(name, found)
 
 
-def test_cells_and_bursts(access_av: Callable[..., Finished], data: Path) -> None:
+def test_cells_and_bursts_have_the_documented_columns(
+    access_av: Callable[..., Finished], data: Path
+) -> None:
     captures = data / "captures"
     one = access_av("record", "scan", captures / "oai-n78.sigmf-meta", "--unconfirmed", "--json")
     array = captures / "semireal4_singtel-n1_day1_array1.sigmf-meta"
@@ -189,7 +193,7 @@ def test_cells_and_bursts(access_av: Callable[..., Finished], data: Path) -> Non
     )
 
 
-def test_cells_without_a_recording() -> None:
+def test_cells_of_a_search_have_the_documented_columns() -> None:
     burst = nr.build_burst(42, ssb_freq_hz=3.7008e9)
     noise = np.random.default_rng(1).normal(scale=1e-3, size=(burst.size, 2)) @ [1, 1j]
     carrier = {"centre_frequency_hz": 3.7008e9, "ssb_freq_hz": 3.7008e9}
@@ -197,7 +201,7 @@ def test_cells_without_a_recording() -> None:
     check("cells", [{"recording": "", **nr.record(cell)}])
 
 
-def test_command(access_av: Callable[..., Finished]) -> None:
+def test_the_columns_command_describes_every_column(access_av: Callable[..., Finished]) -> None:
     done = access_av("file", "columns", "measurements", columns=100)
     assert done.code == 0
     for name in columns.TABLES["measurements"].columns:

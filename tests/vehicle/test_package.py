@@ -42,7 +42,7 @@ def root(package: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_files_have_paths_modes_and_owner(package: Path) -> None:
+def test_packaged_files_have_the_specified_paths_modes_and_owner(package: Path) -> None:
     listing = subprocess.run(
         ["dpkg-deb", "--contents", str(package)],
         capture_output=True,
@@ -90,7 +90,7 @@ def test_equal_input_gives_an_equal_package(package: Path, tmp_path: Path) -> No
     assert built(tmp_path).read_bytes() == package.read_bytes()
 
 
-def test_unit_is_of_the_required_kind(root: Path) -> None:
+def test_the_systemd_unit_has_the_required_settings(root: Path) -> None:
     unit = (root / SERVICE).read_text(encoding="utf-8")
     values = dict(re.findall(r"^([A-Za-z]+)=(.*)$", unit, re.M))
     required = {
@@ -108,7 +108,7 @@ def test_unit_is_of_the_required_kind(root: Path) -> None:
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze")
-def test_unit_is_accepted_by_systemd(root: Path, tmp_path: Path) -> None:
+def test_the_systemd_unit_is_accepted_by_systemd(root: Path, tmp_path: Path) -> None:
     # The program has another path without installation; all other items are verified as installed.
     unit = (root / SERVICE).read_text(encoding="utf-8")
     program = root / "usr/bin/access-av-node"

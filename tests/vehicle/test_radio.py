@@ -34,7 +34,7 @@ def can_soapy(settings: Path, options: list[str]) -> bool:
 
 
 @pytest.mark.skipif(not NODE.exists(), reason=f"no {NODE}: `make test-radio` makes it")
-def test_a_radio_is_on_for_the_bursts_alone(tmp_path: Path) -> None:
+def test_a_radio_is_switched_on_only_for_bursts(tmp_path: Path) -> None:
     settings = tmp_path / "node.toml"
     drive = tmp_path / "drive"
     nominal = ["--site", "yard", "--vehicle", "carrier"]

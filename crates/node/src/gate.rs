@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gate_returns_the_interval_that_was_set() {
+    fn a_receive_window_returns_the_configured_interval() {
         let gate = RxWindow::default();
         assert_eq!(gate.wanted(), None);
         gate.set([1.0, 2.0]);

@@ -7,7 +7,7 @@ mod node;
 mod short_run;
 
 #[test]
-fn node() {
+fn random_node_inputs_cause_no_panic() {
     let ready = b"\x04\x19\x05READY\x0bSocket-Type\0\0\0\x03REP";
     let greeting = [&b"\xff"[..], &[0; 8], b"\x7f\x03\0NULL", &[0; 48]].concat();
     let seeds = [

@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn quarter_circle() {
+    fn an_arc_of_a_quarter_circle_ends_at_its_geometric_end() {
         let end = Pose::default().along_arc(5.0 * PI, 0.1);
         assert!((end.x_m - 10.0).abs() < 1e-12 && (end.y_m - 10.0).abs() < 1e-12);
         assert!((end.heading_rad - PI / 2.0).abs() < 1e-12);

@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_of_a_ramp() {
+    fn quantiles_of_uniform_errors_are_correct() {
         let mut histogram = ErrorHistogram::default();
         assert_eq!(histogram.quantile_m(0.5), None);
         for k in 1..=10_000 {

@@ -323,7 +323,7 @@ def export(
 
     kind = kind_of(site) if Path(site).exists() else None
     is_plant = kind is Kind.PLANT or (kind is None and site not in _core.Site.names())
-    of = _core.Plant.load(site).scenario().site if is_plant else _core.Site.load(site)
+    of = _core.Plant.load(site).scenario().site if is_plant else opt.load_site(site)
     drawn = of_site(of)
     if file.suffix.lower() in (".geojson", ".json"):
         write_whole(file, geojson.text(drawn, _origin(origin)))

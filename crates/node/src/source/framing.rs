@@ -418,7 +418,7 @@ mod tests {
     }
 
     #[test]
-    fn only_required_samples_are_delivered() {
+    fn only_samples_of_the_receive_window_are_delivered() {
         let mut framing = framing(SampleFormat::Ci8, &[0]);
         framing.gate.set([5.0 + 100e-6, 5.0 + 300e-6]);
         for _ in 0..10 {

@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn solves_a_system_made_from_its_solution() {
+    fn a_system_with_a_known_solution_is_solved() {
         let root: Matrix<3> = std::array::from_fn(|i| {
             std::array::from_fn(|j| Complex64::new(1.0 + (i * j) as f64, i as f64 - 2.0 * j as f64))
         });

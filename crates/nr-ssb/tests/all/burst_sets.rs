@@ -23,7 +23,7 @@ fn found(cell: &Cell, ssb_freq_hz: Option<f64>, snr_db: f64) -> Vec<DetectedSsb>
 
 /// Build, search, decode and track at 120 and 240 kHz.
 #[test]
-fn sixty_four_beams_of_frequency_range_2() {
+fn sixty_four_beams_of_frequency_range_2_are_received() {
     for spacing in [SubcarrierSpacing::Khz120, SubcarrierSpacing::Khz240] {
         let mut cell = Cell::random(&mut rng(7), spacing, ANTENNAS);
         cell.ssb_indices = vec![3, 11, 40, 63];

@@ -60,7 +60,7 @@ fn qpsk_bits(symbols: &[Complex32]) -> Vec<u8> {
 }
 
 #[test]
-fn sequences() {
+fn sequences_equal_the_reference_file() {
     for line in lines("pss") {
         assert_eq!(
             signs(&pss(number(line[0]))),
@@ -85,7 +85,7 @@ fn sequences() {
 }
 
 #[test]
-fn positions_in_the_grid() {
+fn signal_positions_equal_the_reference_file() {
     assert_eq!((pss_indices(), sss_indices()), (56..183, 536..663));
     let used = |indices: &[usize]| {
         assert!(indices.is_sorted());
@@ -104,7 +104,7 @@ fn positions_in_the_grid() {
 }
 
 #[test]
-fn every_stage_of_pbch_encoding_and_decoding() {
+fn pbch_encoding_and_decoding_equal_the_reference_file() {
     let mut decoder = Decoder::default();
     let mut chains = 0;
     for line in lines("pbch") {
@@ -163,7 +163,7 @@ fn the_dmrs_index_depends_on_the_burst_set_size() {
 }
 
 #[test]
-fn cases_and_raster() {
+fn burst_cases_and_raster_equal_the_reference_file() {
     for line in lines("case") {
         let case = Case::ALL.into_iter().find(|case| case.name() == line[0]);
         for (index, symbol) in (0..).zip(&line[1..]) {
@@ -208,7 +208,7 @@ fn raster_entries_cover_their_bands() {
 }
 
 #[test]
-fn cyclic_prefixes() {
+fn cyclic_prefixes_equal_the_reference_file() {
     for line in lines("prefix") {
         let spacing = SubcarrierSpacing::from_khz(number(line[0])).unwrap();
         let numerology = Numerology::new(spacing, 256).unwrap();
@@ -219,7 +219,7 @@ fn cyclic_prefixes() {
 }
 
 #[test]
-fn fields_of_the_mib() {
+fn mib_fields_equal_the_reference_file() {
     let mut fields = 0;
     for line in lines("mib") {
         let mib = Mib::from_bits(packed(line[2], 24)).unwrap();

@@ -17,7 +17,7 @@ fn every(half_frames: u16, llrs: &[[f32; 864]]) -> Vec<Period<'_>> {
 
 /// The requirement is at most 0.01. The number of errors refutes 0.01 or more with 95 % confidence.
 #[test]
-fn few_block_errors_at_minus_8_db() {
+fn the_block_error_rate_at_minus_8_db_is_limited() {
     let blocks = 20_000;
     let errors = block_errors(&mut Decoder::new(8).unwrap(), -8.0, blocks, 1);
     println!("list of 8 at -8 dB: {errors} errors in {blocks}");

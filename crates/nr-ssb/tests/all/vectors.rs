@@ -23,7 +23,7 @@ fn assert_close(got: &[Complex32], expected: &[Complex32], what: &str) {
 
 #[test]
 #[ignore = "needs the reference vectors (ACCESS_AV_DATA)"]
-fn sequences() {
+fn sequences_equal_the_reference_vectors() {
     let vectors = Vectors::open("sequences.npz");
     let as_i8 = |sequence: [f32; 127]| sequence.map(|x| x as i8);
     let as_i16 = |indices: &[usize]| indices.iter().map(|&i| i as i16).collect::<Vec<_>>();
@@ -74,7 +74,7 @@ fn sequences() {
 
 #[test]
 #[ignore = "needs the reference vectors (ACCESS_AV_DATA)"]
-fn every_stage_of_the_pbch() {
+fn every_pbch_stage_equals_the_reference_vectors() {
     let vectors = Vectors::open("pbch.npz");
     let stage = |key, width: usize| -> Vec<Vec<u8>> {
         vectors
@@ -114,7 +114,7 @@ fn every_stage_of_the_pbch() {
 
 #[test]
 #[ignore = "needs the reference vectors (ACCESS_AV_DATA)"]
-fn fields_of_the_mib() {
+fn mib_fields_equal_the_reference_vectors() {
     let vectors = Vectors::open("pbch.npz");
     let fields: serde_json::Value = serde_json::from_str(&vectors.text("fields")).unwrap();
     for (cell, expected) in cells(&vectors).iter().zip(fields.as_array().unwrap()) {
@@ -138,7 +138,7 @@ fn fields_of_the_mib() {
 
 #[test]
 #[ignore = "needs the reference vectors (ACCESS_AV_DATA)"]
-fn grids() {
+fn resource_grids_equal_the_reference_vectors() {
     for name in ["pbch.npz", "pbch_extra.npz"] {
         let vectors = Vectors::open(name);
         let grids = vectors.array::<Complex32, _>("grid");
@@ -159,7 +159,7 @@ fn grids() {
 
 #[test]
 #[ignore = "needs the reference vectors (ACCESS_AV_DATA)"]
-fn k_ssb_of_the_extra_cases() {
+fn k_ssb_equals_the_reference_vectors() {
     let vectors = Vectors::open("pbch_extra.npz");
     let expected = vectors.array::<i64, _>("k_ssb");
     for (cell, expected) in cells(&vectors).iter().zip(expected) {
@@ -185,7 +185,7 @@ fn iq(burst: &Burst) -> Vec<Complex32> {
 
 #[test]
 #[ignore = "needs the reference vectors (ACCESS_AV_DATA)"]
-fn bursts_at_15_khz() {
+fn modulated_bursts_at_15_khz_equal_the_reference_vectors() {
     let cases = Vectors::open("pbch.npz");
     let vectors = Vectors::open("burst15k_3p84Msps.npz");
     let cells = cells(&cases);
@@ -208,7 +208,7 @@ fn bursts_at_15_khz() {
 
 #[test]
 #[ignore = "needs the reference vectors (ACCESS_AV_DATA)"]
-fn bursts_at_30_khz() {
+fn modulated_bursts_at_30_khz_equal_the_reference_vectors() {
     let cases = Vectors::open("pbch.npz");
     let vectors = Vectors::open("burst30k_7p68Msps.npz");
     let cell = &cells(&cases)[vectors.array::<i64, _>("base_case")[0] as usize];

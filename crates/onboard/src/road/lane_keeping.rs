@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn the_noise_of_any_step_is_a_covariance() {
+    fn process_noise_of_every_step_length_is_positive_semidefinite() {
         for damping in [0.02, 0.2, 0.9] {
             let keeping = LaneKeeping { damping, ..KEEPING };
             for exponent in -60..20 {

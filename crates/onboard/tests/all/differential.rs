@@ -61,7 +61,7 @@ fn end(sees_turns: bool) -> (Pose, [f64; 3]) {
 }
 
 #[test]
-fn turns_on_the_spot() {
+fn a_vehicle_that_turns_on_the_spot_is_tracked() {
     let (pose, [x_std_m, y_std_m, heading_std_rad]) = end(true);
     assert!((pose.heading_rad - std::f64::consts::FRAC_PI_2).abs() < 3.0 * heading_std_rad);
     assert!((pose.x_m - 5.0).abs() < 3.0 * x_std_m && (pose.y_m - 5.0).abs() < 3.0 * y_std_m);

@@ -268,7 +268,7 @@ fn delays_and_rates_follow_the_clock() {
 }
 
 #[test]
-fn delays_of_the_receiver_reach_the_filter() {
+fn delays_measured_by_the_receiver_update_the_filter() {
     let air = ranging_air();
     let mut site = format!(
         "name = \"hall\"\ncarrier_mhz = {:?}\n",

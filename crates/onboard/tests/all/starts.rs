@@ -276,7 +276,7 @@ fn table_of_starts() {
 }
 
 #[test]
-fn a_correct_start_stays_available() {
+fn the_pose_stays_available_with_a_correct_start() {
     for (name, environment) in [
         ("hall", &HALL),
         ("one-sided", &ONE_SIDED),

@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn an_index_precedes_a_date() {
+    fn a_sample_index_takes_precedence_over_a_date() {
         let mut second = capture(100, "core:global_index", "100");
         let date = "2026-05-01T12:00:05Z".into();
         second.other.insert("core:datetime".to_owned(), date);

@@ -384,7 +384,7 @@ fn a_surveyed_offset_is_subtracted() {
 }
 
 #[test]
-fn missing_common_time_is_an_error() {
+fn ranges_and_odometry_without_common_time_are_rejected() {
     let file = common::scratch("ranges-clock").join("odometry.csv");
     fs::write(&file, "time_s,distance_m\n0,0\n1,1\n2,2\n").unwrap();
     let odometry = read_odometry_csv(&file).unwrap();

@@ -178,7 +178,7 @@ fn numbers_must_be_finite_and_in_range() {
 }
 
 #[test]
-fn an_assumed_road_must_be_straight() {
+fn a_bend_in_an_unsurveyed_segment_is_rejected() {
     assert_message(
         with_line("surveyed = true", "surveyed = false"),
         "site.road.segments[0].turn_rad",

@@ -381,7 +381,7 @@ fn drive_asleep(
 }
 
 #[test]
-fn windows_without_an_ssb_open_the_receiver_and_windows_follow_missing_samples() {
+fn the_receiver_opens_after_empty_windows_and_after_missing_samples() {
     let mut recorded = record(&common::scratch("live-asleep"), 3.0);
     recorded.vehicle.wake_up = Some(WakeUpSettings::Fixed(FixedSettings {
         interval_ms: Some(80.0),

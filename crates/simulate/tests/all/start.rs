@@ -92,7 +92,7 @@ fn during_the_search_all_ssbs_are_received_and_no_pose_is_valid() {
 }
 
 #[test]
-fn settings_that_prevent_a_search_are_rejected() {
+fn settings_that_prevent_a_start_search_are_rejected() {
     let refused = |name: &str, changes: &[(&str, Value)], why: &str| {
         let changes = changes.iter().cloned();
         let unknown = changes.chain([("vehicle.start.known", false.into())]);

@@ -152,7 +152,7 @@ fn seeds_and_runs_determine_the_draws() {
 }
 
 #[test]
-fn std_factor_scales_all_deviations_and_draw_none_removes_them() {
+fn std_factor_scales_all_deviations_and_sample_errors_false_removes_them() {
     let once = uncertain(&[]);
     let thrice = uncertain(&[("truth.std_factor", 3.0.into())]);
     let by = |scenario: &Scenario| departures(scenario, &draw(scenario, 1));

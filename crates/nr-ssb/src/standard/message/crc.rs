@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equals_polynomial_division() {
+    fn crc_equals_polynomial_division() {
         for payload in [0, 1, 0x8000_0000, 0xDEAD_BEEF, 0xFFFF_FFFF_u32] {
             let mut remainder = u64::from(payload) << 24;
             for bit in (24..56).rev() {
@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn is_linear() {
+    fn crc_is_linear() {
         assert_eq!(
             crc24c(0x1234_5678 ^ 0x0F0F_00FF),
             crc24c(0x1234_5678) ^ crc24c(0x0F0F_00FF)

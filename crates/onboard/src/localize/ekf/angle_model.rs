@@ -503,7 +503,7 @@ mod tests {
     }
 
     #[test]
-    fn bend_equals_finite_differences() {
+    fn the_second_derivative_equals_finite_differences() {
         let states = [ALONG, ACROSS, HEADING, MOUNTING];
         let see = |x: [f64; 4]| {
             let (pose, frame) = on_circle(x[0], x[1], x[2], 0.0);
@@ -567,7 +567,7 @@ mod tests {
     }
 
     #[test]
-    fn phases_of_radio_heads_ahead_and_abeam() {
+    fn phases_of_radio_heads_ahead_and_abeam_are_correct() {
         let frame = on_circle(0.0, 0.0, 0.0, 0.0).1;
         let see = |head: RadioHead| {
             AngleModel::new(&head, Pose::default(), &frame, &mean(0.0, 0.0), &ARRAY).unwrap()

@@ -442,7 +442,7 @@ mod tests {
     const MULTIPATH: f64 = 0.9;
 
     #[test]
-    fn a_correlated_bias_is_nominal() {
+    fn a_distance_correlated_bias_is_not_a_fault() {
         // The bias of each radio head changes every three metres, as with reflections.
         let bias_rad = |head: usize, along_m: f64| {
             let number = (along_m / 3.0).floor() as u64 * 4 + head as u64;
