@@ -26,7 +26,7 @@ pub fn read(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > max_bytes {
-        let message = format!("longer than the {max_bytes} bytes that are read of such a file");
+        let message = format!("longer than {max_bytes} bytes, the limit for this kind of file");
         return Err(io::Error::other(message));
     }
     Ok(bytes)

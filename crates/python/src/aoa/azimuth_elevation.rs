@@ -175,8 +175,8 @@ impl MeasuredManifold {
     ) -> PyResult<Self> {
         let wrong = || {
             PyValueError::new_err(
-                "responses must be complex, (azimuths, antennas) or (elevations, azimuths, antennas), \
-                 with one elevation for each of the first axis",
+                "responses must be complex with the shape (azimuths, antennas) or (elevations, azimuths, \
+                 antennas), and elevations_rad must contain one angle for each elevation",
             )
         };
         let elevations_rad = match elevations_rad {

@@ -31,7 +31,7 @@ pub enum ScanError {
     },
     /// Neither the recording nor the settings contain a centre frequency.
     #[error(
-        "{file}: no centre frequency; `captures[0].core:frequency` of the metadata must be in Hz, or it must be given"
+        "{file}: no centre frequency; write `captures[0].core:frequency` (Hz) into the metadata, or pass it with --centre-hz"
     )]
     NoCentreFrequency {
         /// Path of the recording.
@@ -45,7 +45,7 @@ pub enum ScanError {
 /// Returns an explanation of the sample rate in which samples are counted.
 fn rate_of_count(error: &SearchError) -> &'static str {
     if matches!(error, SearchError::TooShort { .. }) {
-        ", counted at the base rate of the search and not at that of the recording"
+        " (counted at the base rate of the search, which may differ from the rate of the recording)"
     } else {
         ""
     }

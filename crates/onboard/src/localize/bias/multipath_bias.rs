@@ -2,10 +2,11 @@
 //!
 //! State and biases remain one Gaussian, with the mean and covariance of the mixture over the jump
 //! hypotheses of an angle (generalised pseudo-Bayes of first order, Bar-Shalom, Li and Kirubarajan
-//! 2001, 11.6). With the state covariance P and the row H of an angle for state and bias, the
-//! hypothesis of a retained bias changes everything along `P Hᵀ`; that of a new bias along the
-//! state's part of it. Every covariance after an angle is therefore a bilinear form of these two
-//! vectors.
+//! 2001, 11.6). Let P be the joint covariance of state and biases, and H the row of the angle. If
+//! the bias is retained, the correction is proportional to the vector `P Hᵀ`. If the bias is drawn
+//! again, the angle measures the state only, and the correction is proportional to the part of
+//! `P Hᵀ` that the state contributes. The change of the covariance by an angle is therefore a
+//! bilinear form of these two vectors.
 
 use super::jump_process::{JumpHypotheses, JumpProcess, MAX_VARIANCE};
 use crate::clone_in_place::clone_in_place;
@@ -14,22 +15,25 @@ use crate::gaussian::{Innovation, Matrix, dot};
 use crate::localize::ekf::state::{Belief, STATES};
 
 /// Covariance of a quantity with an angle that contains the bias of its radio head, and with an
-/// angle that does not.
+/// angle without this bias.
 pub(super) type CrossCovariance = [f64; 2];
 
 /// Update of means and covariances by the mixture over the jump hypotheses of an angle.
 pub(super) struct MixtureUpdate<'a> {
     hypotheses: &'a JumpHypotheses,
-    /// Steps of the mean along both vectors, averaged over the hypotheses.
+    /// Residual times gain of each hypothesis: bias retained, bias drawn again.
     steps: [f64; 2],
+    /// Steps, multiplied by the probabilities of the hypotheses.
     means: [f64; 2],
-    /// Change of covariances along both vectors: the squares, and the product.
+    /// Change of the covariance: coefficients of the outer product of each vector with itself.
     squares: [f64; 2],
+    /// Change of the covariance: coefficient of the outer products of both vectors.
     product: f64,
-    /// Covariance of the bias with the angle, its mean if it is retained, and the difference of the
-    /// means if it is new.
+    /// Covariance of the bias with the angle before the update (rad²).
     cross_with_angle: f64,
+    /// Mean of the bias if it is retained (rad).
     kept_rad: f64,
+    /// Mean of a retained bias minus mean of a bias that is drawn again (rad).
     apart_rad: f64,
 }
 
@@ -68,7 +72,7 @@ impl<'a> MixtureUpdate<'a> {
             + self.product * (one[0] * other[1] + one[1] * other[0])
     }
 
-    /// Returns the covariance of the bias with another quantity.
+    /// Returns the updated covariance of the bias with another quantity, which was `before`.
     pub fn value_covariance(&self, before: f64, with: CrossCovariance) -> f64 {
         let (kept, redrawn) = (&self.hypotheses.kept, &self.hypotheses.redrawn);
         kept.share * (before - kept.narrowing * self.cross_with_angle * with[0])
@@ -79,13 +83,13 @@ impl<'a> MixtureUpdate<'a> {
                 * (self.steps[0] * with[0] - self.steps[1] * with[1])
     }
 
-    /// Returns the mean of the bias.
+    /// Returns the updated mean of the bias.
     pub fn value_mean(&self) -> f64 {
         self.hypotheses.kept.share * self.kept_rad
             + self.hypotheses.redrawn.share * self.hypotheses.mean_rad
     }
 
-    /// Returns the variance of the bias, which was `before`.
+    /// Returns the updated variance of the bias, which was `before`.
     pub fn value_variance(&self, before: f64) -> f64 {
         let (kept, redrawn) = (&self.hypotheses.kept, &self.hypotheses.redrawn);
         kept.share * (before - kept.narrowing * self.cross_with_angle * self.cross_with_angle)
@@ -106,7 +110,7 @@ pub(super) struct HeadBias {
 }
 
 impl HeadBias {
-    /// Returns a state that no angle contains.
+    /// Returns a state of the ranges, which no angle contains.
     pub(super) fn unused() -> Self {
         Self {
             size: JumpProcess::new(0.0),
@@ -183,9 +187,9 @@ impl MultipathBias {
         })
     }
 
-    /// Returns the variance (rad²) of an independent angle that is expected to reduce the state's
-    /// variance along `row` as much as an angle of a radio head with the noise `variance`; infinite
-    /// if the angle would only repeat the bias.
+    /// Returns the variance (rad²) of an angle without bias that is expected to reduce the state's
+    /// variance along `row` as much as an angle of this radio head with the noise `variance`;
+    /// infinite if the angle would only repeat the bias.
     pub fn equivalent_variance(
         &self,
         belief: &Belief,
@@ -211,7 +215,7 @@ impl MultipathBias {
         self.among.get(place).copied().unwrap_or_default()
     }
 
-    /// Predicts with the Jacobian of the state.
+    /// Predicts the covariances of biases and state with the Jacobian of the state's motion.
     pub fn moved(&mut self, jacobian: &Matrix<STATES>) {
         for head in &mut self.heads {
             let before = head.state_covariance;
@@ -252,7 +256,7 @@ impl MultipathBias {
         };
         error.size.learn(travelled_m, hypotheses);
         if hypotheses.density <= 0.0 {
-            return; // as good as impossible
+            return; // the angle has no likelihood under either hypothesis
         }
         let predicted_levels = belief.cross(row);
         let cross_with_angle: [CrossCovariance; STATES] = std::array::from_fn(|i| {
@@ -307,12 +311,15 @@ impl MultipathBias {
         }
     }
 
-    /// Records a Gaussian upper bound of the mixture update for the smoother: a measurement of
-    /// state and bias with the information of a retained bias, a measurement of the state with the
-    /// remaining information, and a transition of the bias to its posterior. The covariance of the
-    /// mixture is at least that of these measurements, because `T M⁻¹ Tᵀ` is jointly convex in `T`
-    /// and `M` (Boyd and Vandenberghe, Convex Optimization, 3.1.7). The difference is process
-    /// noise.
+    /// Records the mixture update for the smoother as three Gaussian steps:
+    ///
+    /// 1. A measurement of state and bias, weighted with the probability of a retained bias.
+    /// 2. A measurement of the state only, weighted with the probability of a bias drawn again.
+    /// 3. A transition of the bias to its posterior.
+    ///
+    /// The covariance of the mixture is at least that after these steps, because `T M⁻¹ Tᵀ` is
+    /// jointly convex in `T` and `M` (Boyd and Vandenberghe, Convex Optimization, 3.1.7). The
+    /// smoother treats the difference as process noise.
     fn note(
         &self,
         journal: &mut Journal<STATES>,
@@ -361,8 +368,8 @@ impl MultipathBias {
         journal.redrawn(head, kept.share, &by_state);
     }
 
-    /// Computes the covariance of each bias with a measurement of the state and of one radio head's
-    /// bias.
+    /// Computes the covariance of each bias with a measurement of the state (`row`) and, for `of`,
+    /// of this radio head's bias.
     fn set_cross_covariances(&mut self, row: &[f64; STATES], of: Option<usize>) {
         for head in 0..self.heads.len() {
             let value_covariance = of.map_or(0.0, |of| self.covariance(head, of));
@@ -383,7 +390,7 @@ impl MultipathBias {
         let total = dot(row, &cross).max(0.0) + variance;
         self.set_cross_covariances(row, None);
         if total <= 0.0 {
-            return; // nothing to learn
+            return; // state and measurement are exact
         }
         for head in &mut self.heads {
             let gain = head.cross_with_angle[1] / total;

@@ -10,29 +10,30 @@ use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
 
 impl Ekf {
-    /// Returns the log-likelihood of an angle relative to an exactly predicted angle with its own
-    /// noise only. With estimated biases the likelihood includes them, and angles within 2 m of
-    /// travel are weighted by their independent fraction.
+    /// Returns the log-likelihood of an angle, minus that of an exactly predicted angle with its own
+    /// noise only. If biases are estimated, the likelihood includes them. Angles within 2 m of
+    /// travel are then weighted by their independent fraction.
     pub fn relative_log_likelihood(&self, head: &RadioHead, measured: &AngleMeasurement) -> f64 {
         log_likelihood(self, &self.predict_measurement(head, measured))
     }
 }
 
-/// Fraction of outliers with a uniformly distributed direction, unless scatter causes more.
+/// Fraction of angles that are outliers with a uniformly distributed direction, unless scatter
+/// causes more.
 const OUTLIERS: f64 = 2e-3;
 
-/// Minimum odds to the nominal mode for the selection of a mode. The protection level covers every
-/// hypothesis, whether selected or not. With lower odds, the position alternates between filters,
-/// which reduces the availability (K = 5 dB: 91 % instead of 94 %).
+/// Minimum posterior odds, against the nominal mode, for the selection of a mode. The protection
+/// level covers every hypothesis, whether selected or not. With lower odds, the position alternates
+/// between filters, which reduces the availability (K = 5 dB: 91 % instead of 94 %).
 pub(super) const MIN_ODDS: f64 = 100.0;
 
-/// Log-likelihood ratio at which a sequential test is decided, with an error probability of one in
-/// three million (e⁻¹⁵; Wald 1945), the prior probability of a radio head fault. The ratios of
-/// modes are limited to it, so that later evidence can reverse the decision.
+/// Log-likelihood ratio at which a sequential test decides. The error probability of the decision is
+/// e⁻¹⁵, one in three million (Wald 1945). The log-likelihood ratios of modes are limited to this
+/// value, so that later evidence can reverse a decision.
 pub(in crate::localize) const CERTAIN: f64 = 15.0;
 
-/// Log-likelihood ratio of a physically impossible jump of the speed: wheel slip, unless the
-/// measurement is an outlier.
+/// Log-likelihood ratio of wheel slip after a physically impossible jump of the speed. The
+/// alternative is an outlier of the speed measurement.
 pub(super) const SPEED_JUMP: f64 = 6.0;
 
 /// A filter and its prediction of an angle.
@@ -46,7 +47,7 @@ impl LikelihoodRatio {
     /// Ratio of one.
     pub const NONE: Self = Self(0.0);
 
-    /// Returns the ratio relative to another mode with the given ratio.
+    /// Returns the ratio to another mode, whose ratio to the nominal mode is `other`.
     pub const fn to(self, other: Self) -> Self {
         Self((self.0 - other.0).clamp(-CERTAIN, CERTAIN))
     }
@@ -103,8 +104,8 @@ impl LikelihoodRatio {
         Self(self.0.max(other.0))
     }
 
-    /// Subtracts the excess of the largest ratio over [`CERTAIN`], so that any other mode can still
-    /// be selected later.
+    /// Subtracts the amount by which the largest ratio `most` exceeds [`CERTAIN`], so that another
+    /// mode can still be selected later.
     pub const fn limit_by(&mut self, most: Self) {
         self.0 = (self.0 - (most.0 - CERTAIN).max(0.0)).max(-CERTAIN);
     }
@@ -115,14 +116,13 @@ impl LikelihoodRatio {
     }
 }
 
-/// Returns the log-likelihood of an angle relative to an exactly predicted angle with its own noise
-/// only, so that positions can be compared.
+/// Returns the log-likelihood of an angle, minus that of an exactly predicted angle with its own
+/// noise only. Positions can be compared by the sum of these values.
 ///
-/// The measurement variance of dependent angles is increased by an amount that differs between
-/// positions. The result is relative to a density with the same measurement variance, so that the
-/// increase does not change it. With an estimated time-correlated bias, an angle is weighted by its
-/// independent fraction. Angles outside the gate, and angles of an excluded radio head, are treated
-/// as outliers.
+/// A dependent angle has an increased measurement variance, and the increase differs between
+/// positions. Both log-likelihoods use this variance, so that the increase cancels. If a
+/// time-correlated bias is estimated, an angle is weighted by its independent fraction instead.
+/// Angles outside the gate, and angles of an excluded radio head, are treated as outliers.
 pub(in crate::localize) fn log_likelihood(
     ekf: &Ekf,
     predicted: &Result<PredictedMeasurement, UpdateReason>,
@@ -144,10 +144,10 @@ pub(in crate::localize) fn log_likelihood(
     -0.5 * (innovation.mahalanobis2() + growth.ln())
 }
 
-/// Returns the log-likelihood in which the uncertainty of a hypothesis reduces it: second-order
-/// terms and odometry are part of the prediction, not of the angle's noise. In contrast,
-/// [`log_likelihood`] does not penalise a hypothesis that is so uncertain that it
-/// agrees with any angle.
+/// Returns the log-likelihood of an angle, reduced by the uncertainty of the hypothesis: the
+/// variances of second-order terms and of the odometry count as uncertainty of the prediction, not
+/// as noise of the angle. In contrast, [`log_likelihood`] does not penalise a hypothesis that is so
+/// uncertain that every angle agrees with it.
 pub(in crate::localize) fn log_likelihood_as_stated(
     ekf: &Ekf,
     predicted: &Result<PredictedMeasurement, UpdateReason>,
@@ -162,7 +162,7 @@ pub(in crate::localize) fn log_likelihood_as_stated(
     }
 }
 
-/// Span over which a range that is an outlier is uniformly distributed (m).
+/// Width of the uniform distribution of outliers of a range (m).
 const OUTLIER_SPAN_M: f64 = 100.0;
 
 /// Returns the probability density of a range (1/m): Gaussian, or a uniformly distributed outlier.
@@ -201,7 +201,8 @@ pub(super) fn conditional_fraction(ekf: &Ekf, predicted: &PredictedMeasurement) 
 fn density(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
     let inlier = predicted.hypotheses.as_ref().map_or_else(
         || {
-            // The measurement variance of a repeated angle would exceed that of the state.
+            // The variance of a repeated angle is inflated, because it repeats earlier errors. Use
+            // the variance of a first angle instead.
             let mut alone = predicted.innovation;
             let belief = (alone.variance - alone.measurement_variance).max(0.0);
             alone.variance = belief + first_variance(ekf, predicted);
