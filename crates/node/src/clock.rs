@@ -18,8 +18,8 @@ const STEP_S: f64 = 2e-3;
 /// Minimum silence, in seconds, that counts as an interruption. Transport and a loaded computer delay blocks
 /// by less.
 pub const INTERRUPTION_S: f64 = 0.25;
-/// Time in seconds without samples that come faster than in real time, after which those of an interruption are
-/// missing and not late.
+/// Maximum time, in seconds, until samples of an interruption are regarded as missing. It begins
+/// with the last samples that arrived faster than in real time, because these are late samples.
 pub const CATCH_UP_S: f64 = 0.2;
 /// Minimum decrease of the delay, in seconds, that shows that samples arrive faster than in real time.
 pub const CAUGHT_UP_S: f64 = 0.01;
@@ -197,9 +197,11 @@ struct RateMonitor {
     window: Option<Window>,
     /// Minimum delay of the previous window, relative to counted samples, in seconds.
     before_s: Option<f64>,
-    /// Number, duration and change of the delay of the consecutive windows with a wrong rate.
+    /// Number of consecutive windows with a wrong rate.
     count: u32,
+    /// Duration of the consecutive windows with a wrong rate, in seconds.
     lasted_s: f64,
+    /// Change of the delay over the consecutive windows with a wrong rate, in seconds.
     growth_s: f64,
 }
 

@@ -8,8 +8,9 @@ use serde::Serialize;
 
 /// Number of buckets per decade, starting at 1 µs: a quantile has an error of at most 12 %.
 const PER_DECADE: usize = 20;
-/// Number of decades, up to 100 s.
+/// Number of decades of the histogram, up to 100 s.
 const DECADES: usize = 8;
+/// Lower end of the histogram, in seconds.
 const MIN_S: f64 = 1e-6;
 const BUCKETS: usize = PER_DECADE * DECADES;
 /// Length of a part of the sliding window, in seconds.

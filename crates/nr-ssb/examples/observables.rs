@@ -21,9 +21,9 @@ use nr_ssb::SubcarrierSpacing::{Khz15, Khz30};
 use nr_ssb::observables::delay::Multipath;
 use nr_ssb::observables::range_rate::RateSource;
 
-/// SSBs of one run, after which cell, position and speed change, and SSBs until the first one of
-/// them that counts.
+/// Number of SSBs of one run. Cell, position and speed change after a run.
 const RUN: usize = 25;
+/// Number of SSBs at the start of a run that are not evaluated.
 const SETTLE: usize = 5;
 
 fn main() {

@@ -26,8 +26,9 @@ const MAX_BYTES: u64 = 8 << 30;
 /// Text before the delay.
 const DELAY: &str = "DL PRS ToA ==>";
 
-/// Duration of a frame, and of a cycle of the system frame number (s).
+/// Duration of a frame (s).
 const FRAME_S: f64 = 0.01;
+/// Duration of a cycle of the system frame number (s).
 const CYCLE_S: f64 = 10.24;
 
 /// Maximum decrease of the time between two lines (s): lines of slots are written by several threads.
@@ -39,8 +40,9 @@ struct Line {
     date: Option<Date>,
     pci: u16,
     ssb_index: u8,
-    /// System frame number and slot.
+    /// System frame number.
     frame: f64,
+    /// Slot in the frame.
     slot: f64,
     delay_samples: f64,
     fft_size: f64,

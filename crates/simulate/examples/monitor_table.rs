@@ -16,8 +16,9 @@ use onboard::settings::{Shipped, TomlFile};
 use simulate::scenario::{FaultKind, FaultSettings, Scenario};
 use simulate::{Simulation, Step};
 
-/// Begin of the fault in the first run, difference from one run to the next, and duration, in seconds.
+/// Start of the fault in the first run, in seconds.
 const FROM_S: f64 = 60.0;
+/// Difference between the starts of the fault in successive runs, in seconds.
 const STEP_S: f64 = 11.0;
 const LASTS_S: f64 = 15.0;
 

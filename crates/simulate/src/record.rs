@@ -83,9 +83,9 @@ pub struct RunRecord {
     pub aoa_estimates: Vec<AngleResult>,
     /// Number of SSB bursts received.
     pub bursts_received: usize,
-    /// Number of delays, range rates and carrier phases of received SSBs ...
+    /// Number of measured delays, range rates and carrier phases of received SSBs.
     pub ranges: usize,
-    /// ... and of those that the localizer accepted.
+    /// Number of delays, range rates and carrier phases that the localizer accepted.
     pub accepted_ranges: usize,
     /// Estimated constants of the vehicle at the end of the run; `None` if the localizer estimates
     /// none.

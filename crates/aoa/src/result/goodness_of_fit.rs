@@ -81,8 +81,9 @@ pub(crate) struct Model {
 pub(crate) struct Residual {
     /// Power that is correlated with the waveforms.
     pub(crate) coherent: f64,
-    /// `tr E` and `tr E^2`.
+    /// `tr E`, with the residual covariance `E` that is not correlated with the waveforms.
     pub(crate) rest: f64,
+    /// `tr E^2`.
     pub(crate) rest_squared: f64,
 }
 
@@ -90,13 +91,15 @@ pub(crate) struct Residual {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tests {
     model: Model,
-    /// Degrees of freedom of each part, at least 1.
+    /// Degrees of freedom of the coherent part of the residual, at least 1.
     coherent_freedom: f64,
+    /// Degrees of freedom of the rest of the residual, at least 1.
     rest_freedom: f64,
     dimensions_left: f64,
-    /// Factor on the variance of an angle far above the threshold SNR, and relative increase of the
-    /// variance at that SNR.
+    /// Factor on the variance of an angle far above the threshold SNR, because the noise is
+    /// estimated.
     unknown_noise: f64,
+    /// Relative increase of the variance at the threshold SNR.
     increase_at_threshold: f64,
     /// Factor on the threshold SNR.
     needed: f64,

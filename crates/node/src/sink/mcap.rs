@@ -31,8 +31,8 @@ const SPEED_VARIANCE: f64 = 1e-4;
 /// Variance of a yaw rate in (rad/s)².
 const YAW_RATE_VARIANCE: f64 = 1e-4;
 
-/// Maximum time between two chunks: after `kill -9` the file is readable up to this time before its end, and up
-/// to the time that records wait for their thread.
+/// Maximum time between two chunks. After `kill -9`, the file is readable except the last chunk and
+/// the records that wait for their thread.
 const CHUNK: Duration = Duration::from_secs(1);
 /// Maximum number of events in one diagnostic message.
 const MAX_EVENTS: usize = 100;

@@ -59,7 +59,7 @@ pub struct Shown {
     pub heads: Vec<HeadStatus>,
     /// Number of operations and their energy.
     pub energy: LiveEnergy,
-    /// Result of the samples that the pipeline was given.
+    /// Counts of the samples that the pipeline has processed.
     pub counts: StreamCounts,
 }
 

@@ -75,10 +75,11 @@ pub struct MatchedFilter {
     inverse_energy: Vec<Vec<f32>>,
     product: Vec<Complex32>,
     scratch: Vec<Complex32>,
-    /// Statistics of one hypothesis; maximum over the hypotheses; index of the maximum. Even lags
-    /// precede odd ones.
+    /// Statistics of one frequency hypothesis, by lag. All even lags precede the odd ones.
     sum: Vec<f32>,
+    /// Maximum of the statistics over the hypotheses, in the same order.
     best: Vec<f32>,
+    /// Index of the hypothesis with the maximum, in the same order.
     best_hypothesis: Vec<u32>,
 }
 

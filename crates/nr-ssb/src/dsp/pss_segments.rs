@@ -44,20 +44,21 @@ const PLANE: usize = 4 * LAGS;
 const SEGMENTS: [usize; 3] = [0, 43, 86];
 /// Central subcarrier of a segment.
 const MIDDLE: isize = 21;
-/// Number of subcarriers from the first of a PSS to its centre, and to the first of its last
-/// segment.
+/// Number of subcarriers from the first subcarrier of a PSS to its centre.
 const TO_CENTRE: isize = 64;
+/// Number of subcarriers from the first subcarrier of a PSS to its last segment.
 const TO_LAST: isize = 86;
 /// Number of segment positions of a PSS, plus one that is being filled.
 const RING: usize = TO_LAST as usize + 2;
-/// Number of samples on either side of the window into which most of a segment leaks, because it is
-/// limited to 48 subcarriers, ...
+/// Number of samples on either side of the window into which most of a segment leaks. A segment
+/// leaks because it is limited to 48 subcarriers.
 const NEIGHBOURS: usize = 3;
-/// ... up to 0.6 % of its energy. With 48 times this fraction of the neighbouring energy added to
-/// that of the window, a strong signal next to a silent window has a statistic of one at most.
+/// Leakage factor: 48 times 0.6 %, the maximum fraction of the energy that leaks into the
+/// neighbouring samples. The energy of the window is increased by this fraction of the neighbouring
+/// energy. A strong signal next to a silent window then has a statistic of at most one.
 const LEAK: f32 = 0.29;
-/// Fraction for leakage beyond that distance, 7e-5 of a segment's energy, applied to the energy of
-/// the whole block.
+/// Leakage factor beyond that distance (7e-5 of a segment's energy), applied to the energy of the
+/// whole block.
 const FAR_LEAK: f32 = 1.2e-5;
 
 /// Maximum number of segment positions in a tile: 192 positions of 43 subcarriers are within the
@@ -119,13 +120,16 @@ pub(crate) struct SegmentFilter {
     scratch: Vec<Complex32>,
     /// Spectrum of each antenna's block, lowest frequency first.
     spectra: Vec<Vec<Complex32>>,
-    /// 48 divided by the energy under the window at the previous subcarrier, for each antenna, ...
+    /// 48 divided by the energy under the window at the previous subcarrier, for each antenna.
     last_inverse_energy: Vec<[f32; LAGS]>,
-    /// ... at the current one, and halfway between both.
+    /// 48 divided by the energy under the window at the current subcarrier.
     inverse_energy: [f32; LAGS],
+    /// 48 divided by the energy under the window halfway between the previous and the current
+    /// subcarrier.
     inverse_energy_between: [f32; LAGS],
-    /// Correlation at the previous and the current subcarrier, for each antenna and segment.
+    /// Correlation at the previous subcarrier, for each antenna and segment.
     last: Vec<[Vec<Complex32>; 3]>,
+    /// Correlation at the current subcarrier.
     here: Vec<Complex32>,
     /// Summed powers for each position (modulo the ring) and segment.
     planes: Vec<[[f32; PLANE]; 3]>,
@@ -194,7 +198,7 @@ impl SegmentFilter {
             for (antenna, samples) in antennas.iter().enumerate() {
                 self.load(antenna, samples.get(start..).unwrap_or_default());
             }
-            // One position more than needed, for the frequency halfway to it.
+            // Compute one additional position, for the frequency halfway to it.
             for number in 0..=tile.positions {
                 let position = tile.first + number as isize;
                 self.correlate(tile, position, number);

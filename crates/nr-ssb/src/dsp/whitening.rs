@@ -8,14 +8,14 @@ use super::base_rate::SSB_SAMPLES;
 use super::received_grid::MAX_ANTENNAS;
 use crate::numeric::hermitian::cholesky;
 
-/// Step between samples for the covariance estimate, ...
+/// Step between the samples that the covariance estimate uses.
 const STRIDE: usize = 4;
-/// ... in the quietest quarter of this number of parts of a block. They contain a loaded neighbour
-/// cell, but not the SSBs that are searched for. If a strong SSB were whitened too, it would no
-/// longer be separated from weaker ones below it.
+/// Number of parts of a block. The covariance is estimated in the quietest quarter of the parts.
+/// They contain a loaded neighbour cell, but not the SSBs that are searched for. If a strong SSB
+/// were whitened too, weaker SSBs below it could not be separated from it.
 const PARTS: usize = 64;
-/// Squared coherence of two antennas above which whitening is applied; that of noise is the inverse
-/// of the number of samples.
+/// Squared coherence of two antennas above which whitening is applied. The squared coherence of
+/// noise is the inverse of the number of samples.
 const COHERENT: f64 = 0.05;
 
 /// Rows of weights, one per whitened channel.

@@ -29,12 +29,13 @@ const WIDTH: usize = SUBCARRIERS / GROUPS;
 /// Number of eigenvectors: the eigenvalue of the next one is below −60 dB at the longest delay
 /// spread that the band does not resolve.
 const MODES: usize = 6;
-/// Number of delay spreads, a factor of two apart, and the smallest one, in samples: 5 ns to 660 ns
-/// at 15 kHz.
+/// Number of delay spreads of the prior, a factor of two apart: 5 ns to 660 ns at 15 kHz.
 const SPREADS: usize = 8;
+/// Smallest delay spread of the prior, in samples.
 const SHORTEST: f64 = 0.02;
-/// Number of K factors, the smallest one and their distance, in dB.
+/// Number of K factors of the prior.
 const FACTORS: usize = 14;
+/// Smallest K factor of the prior, in dB.
 const MIN_K_DB: f64 = -7.5;
 const STEP_K_DB: f64 = 2.5;
 /// Mean and standard deviation of K, in dB.
@@ -54,12 +55,15 @@ const WEAK: f64 = 0.1;
 /// from the exponential model. With −40 dB, the NEES of the delay at 30 dB is up to 19 in the
 /// channels of TR 38.901.
 const NOISE_FLOOR: f64 = 1e-2;
-/// Number of delays of a grid, and maximum number of grids, each finer than the last one.
+/// Number of delays of a grid.
 const GRID: usize = 17;
+/// Maximum number of grids, each finer than the previous one.
 const GRIDS: usize = 6;
-/// Range of the first grid before and after the delay of a single path, in samples, in addition to
-/// six standard deviations.
+/// Range of the first grid before the delay of a single path, in samples, in addition to six
+/// standard deviations.
 const BEFORE: f64 = 3.0;
+/// Range of the first grid after the delay of a single path, in samples, in addition to six
+/// standard deviations.
 const AFTER: f64 = 0.3;
 
 /// Number of known elements of every group: PSS, SSS and DM-RS; and with the PBCH.
@@ -92,8 +96,9 @@ pub(crate) struct Posterior {
     pub(crate) delay: f64,
     /// Variance of the delay in samples² due to multipath, in addition to noise.
     pub(crate) multipath_variance: f64,
-    /// Mean and standard deviation of the first path's share of the power.
+    /// Mean of the first path's share of the power.
     pub(crate) share: f64,
+    /// Standard deviation of the first path's share of the power.
     pub(crate) share_sigma: f64,
     /// Mean of the power of the other paths relative to the first one.
     pub(crate) diffuse: f64,

@@ -72,7 +72,7 @@ impl<const A: usize> ArrayObservables<A> {
             .zip(&self.amplitude_variance)
             .zip(response)
         {
-            // Maximum ratio for the given response.
+            // Maximum-ratio combining with the given response.
             let scaled = weight.conj() / noise.max(f64::MIN_POSITIVE);
             sum += scaled * y;
             variance += scaled.norm_sqr() * noise;

@@ -99,13 +99,15 @@ impl RangeRate {
 pub(crate) struct Instant<const A: usize> {
     /// Reference time in seconds.
     pub(crate) time_s: f64,
-    /// Amplitudes at this time, and their variance due to noise.
+    /// Complex amplitude of each antenna at the reference time.
     pub(crate) amplitudes: [Complex64; A],
+    /// Variance of each amplitude due to noise.
     pub(crate) variance: [f64; A],
     /// Variance of the phase due to multipath, at one antenna.
     pub(crate) multipath: f64,
-    /// Frequency offset within the SSB in Hz, and its variance due to noise.
+    /// Frequency offset within the SSB in Hz.
     pub(crate) frequency_hz: f64,
+    /// Variance of the frequency offset within the SSB due to noise (Hz²).
     pub(crate) frequency_variance: f64,
 }
 
@@ -119,8 +121,9 @@ pub(crate) struct RateTracker<const A: usize> {
 #[derive(Debug, Clone)]
 struct Previous<const A: usize> {
     instant: Instant<A>,
-    /// Best frequency offset in Hz, and its variance.
+    /// Most accurate estimate of the frequency offset in Hz.
     frequency_hz: f64,
+    /// Variance of this estimate (Hz²).
     variance: f64,
 }
 
@@ -212,7 +215,8 @@ fn phase_change<const A: usize>(previous: &Instant<A>, next: &Instant<A>) -> (f6
         energies[0] += a.norm_sqr() * weight;
         energies[1] += b.norm_sqr() * weight;
     }
-    // The weights contain the sum of both variances: each amplitude has half of it, or its share.
+    // Each weight is the inverse of the sum of both variances. The noise of one amplitude is its
+    // own share of this sum.
     let share = |of: &Instant<A>| {
         let total: f64 = (0..A)
             .map(|i| of.variance[i] / (previous.variance[i] + next.variance[i]).max(1e-300))

@@ -199,7 +199,7 @@ fn implied_lmax(
     if same { certain } else { Some(lmax) }
 }
 
-/// Whether the half frame of the DM-RS, which encodes it for Lmax 4, is that of the PBCH.
+/// Whether DM-RS and PBCH encode the same half frame. The DM-RS encodes it for Lmax 4 only.
 fn fits(payload: &BchPayload, lmax: Lmax, ibar_ssb: u8) -> bool {
     lmax != Lmax::L4 || payload.half_frame == (ibar_ssb >= 4)
 }

@@ -21,8 +21,9 @@ const NOISE_CANDIDATES: f64 = 16.0;
 const MAX_OFFSETS: usize = 24;
 /// Number of lags per thread and chunk, at the base rate.
 const CHUNK: usize = 4 * HOP;
-/// Additional samples before and after a chunk, for the front end's filter and the PSS itself.
+/// Number of additional samples before a chunk, for the front end's filter.
 const BEFORE: usize = 256;
+/// Number of additional samples after a chunk, for the front end's filter and the PSS.
 const AFTER: usize = 512;
 
 /// Detected PSS.

@@ -14,9 +14,9 @@ pub(super) struct Beam<const A: usize> {
     pub tracker: Tracker<A>,
     /// Expected start of the next SSB, in samples.
     pub next_start: f64,
-    /// Number of periods between the last received SSB and the expected one, and start of the last
-    /// received SSB.
+    /// Number of periods between the last received SSB and the expected one.
     periods: f64,
+    /// Start of the last received SSB, in samples.
     last_seen: f64,
     /// Whether the beam was received since a search detected it.
     pub is_followed: bool,

@@ -22,15 +22,17 @@ pub(super) const GUARD: f64 = 16.0;
 /// Time after which an unsuccessful search over all offsets restarts, and after which missing beams
 /// are searched for, in seconds.
 const LOST_INTERVAL_S: f64 = 0.1;
-/// Period (s) per frequency offset that is searched in a burst without beams, and maximum number of
-/// offsets.
+/// SSB period divided by the number of frequency offsets that are searched in a burst without beams
+/// (s).
 const PERIOD_OF_OFFSET_S: f64 = 0.04;
+/// Maximum number of frequency offsets that are searched in a burst without beams.
 const MAX_OFFSETS: f64 = 4.0;
 /// Interval of the measurement of DC offset and tones, in seconds; [`LOST_INTERVAL_S`] if an SSB is
 /// missing.
 const TONE_INTERVAL_S: f64 = 1.0;
-/// Number of samples before and after the expected SSB from which tones are subtracted.
+/// Number of samples before the start of the expected SSB from which tones are subtracted.
 const BEFORE: usize = 1500;
+/// Number of samples after the start of the expected SSB from which tones are subtracted.
 const AFTER: usize = 2596;
 /// Maximum deviation of a beam from its period, in samples, far above any clock drift.
 const OFF_PERIOD: f64 = 100.0;
@@ -71,18 +73,20 @@ pub struct WindowReceiver<const A: usize> {
     config: ReceiverConfig,
     searcher: Searcher,
     beams: Vec<Beam<A>>,
-    /// Start of the last search (samples), and its end.
+    /// Start of the last search, in samples.
     search_begun: f64,
+    /// End of the last search, in samples.
     search_until: f64,
     searches: u64,
-    /// Frequency offset of the last detected beams, in Hz, and number of offsets searched without
-    /// success since then.
+    /// Frequency offset of the last detected beams, in Hz.
     offset_hz: f64,
+    /// Number of frequency offsets that were searched without success since then.
     failed_searches: u32,
     /// Total duration of unreported missing samples, in samples.
     unreported_gap: f64,
-    /// Position of the last tone measurement (samples), and the samples without tones.
+    /// Position of the last tone measurement, in samples.
     tones_measured: f64,
+    /// Samples after removal of the tones.
     cleaned: Vec<Vec<Complex32>>,
 }
 

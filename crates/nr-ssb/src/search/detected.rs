@@ -34,7 +34,8 @@ pub struct DetectedSsb {
     pub sample_start: f64,
     /// Carrier frequency offset in Hz.
     pub cfo_hz: f64,
-    /// Phase step between symbols in excess of that of the offset (TS 38.211 §5.4), in radians.
+    /// Phase step between symbols (TS 38.211 §5.4) minus the step caused by the frequency offset,
+    /// in radians.
     pub symbol_phase_step_rad: f64,
     /// SNR of a resource element, mean over the antennas, in dB.
     pub snr_db: f64,
@@ -73,6 +74,6 @@ pub struct ReceivedElements<'a> {
 pub struct SearchCounts {
     /// Number of examined maxima of the matched filter.
     pub pss_candidates: usize,
-    /// Number of them whose PBCH was decoded, because they were probable SSBs.
+    /// Number of examined maxima that were probable SSBs, so that their PBCH was decoded.
     pub pbch_tried: usize,
 }

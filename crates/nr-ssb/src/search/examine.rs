@@ -26,10 +26,12 @@ const DECODE_FLOOR: f32 = 0.7;
 /// dB). A stronger "cell" without a decodable PBCH, overlapping another SSB, is a residue of that
 /// SSB.
 const CERTAIN_DECODE_SNR_DB: f64 = -2.0;
-/// Power ratio in dB above which a cell without a decodable PBCH, at the time and with the PSS of a
-/// stronger cell, is a residue of the stronger cell. A cell clipped at 0.3 to 1.5 times its RMS
-/// amplitude leaves an apparent cell 15.4 to 31 dB below it (`tests/all/distorted.rs`).
+/// Minimum power ratio of a stronger cell to its residue, in dB. A residue is a cell without a
+/// decodable PBCH that has the time and the PSS of the stronger cell. A cell clipped at 0.3 to 1.5
+/// times its RMS amplitude leaves an apparent cell 15.4 to 31 dB below it
+/// (`tests/all/distorted.rs`).
 const RESIDUE_DB: f64 = 15.0;
+/// Maximum distance of a residue from the stronger cell, in samples.
 const RESIDUE_SAMPLES: f64 = 1.0;
 /// Maximum distance of two detections of one SSB, in samples.
 const SAME_SSB_SAMPLES: f64 = CYCLIC_PREFIX as f64;
@@ -38,8 +40,9 @@ const SAME_SSB_SAMPLES: f64 = CYCLIC_PREFIX as f64;
 pub(super) struct Examiner {
     antennas: usize,
     base_rate_hz: f64,
-    /// Central carrier frequency offset of the search, and the maximum distance from it, in Hz.
+    /// Central carrier frequency offset of the search, in Hz.
     centre_hz: f64,
+    /// Maximum distance of a carrier frequency offset from the central one, in Hz.
     tolerated_hz: f64,
     cell_threshold: f32,
     acquirer: Acquirer,

@@ -20,7 +20,7 @@ pub(super) struct FrequencyLoop {
     /// Frequency offset in cycles per sample.
     pub(super) cfo_cycles: f64,
     variance: f64,
-    /// Phase step between symbols in excess of that of the offset.
+    /// Phase step between symbols minus the step caused by the frequency offset, in radians.
     pub(super) phase_step: f64,
 }
 

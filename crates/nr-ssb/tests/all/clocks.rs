@@ -6,8 +6,9 @@ use nr_ssb::search::{SearchConfig, Searcher};
 use nr_ssb::track::Tracker;
 use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
 
-/// Samples around an SSB that are received.
+/// Number of received samples around an SSB.
 const WINDOW: usize = 2048;
+/// Number of received samples before an SSB.
 const MARGIN: f64 = 400.0;
 const BEAM: u8 = 5;
 

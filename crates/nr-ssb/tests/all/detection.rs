@@ -33,9 +33,9 @@ fn rates(antennas: usize, snr_db: f64, trials: u64) -> (f64, f64) {
     (found as f64 / trials as f64, decoded as f64 / trials as f64)
 }
 
-/// Number of trials, and minimum number of detections that is consistent with a probability of 0.95
-/// at three sigma.
+/// Number of trials.
 const TRIALS: u64 = 80;
+/// Minimum fraction of detections that is consistent with a probability of 0.95 at three sigma.
 const FEWEST: f64 = 0.95 - 3.0 * 0.0244;
 
 #[test]

@@ -10,8 +10,9 @@ use num_complex::Complex64;
 use crate::air;
 use crate::moving::{Echoes, Error, Moving, SsbErrors, summary};
 
-/// SSBs of one run, and SSBs at its beginning that are not counted.
+/// Number of SSBs of one run.
 const RUN: usize = 30;
+/// Number of SSBs at the start of a run that are not evaluated.
 const SETTLE: usize = 6;
 
 /// Returns SSBs at 3.6 and 7.2 MHz after sleeps of 20 ms to 5 s.

@@ -21,21 +21,22 @@ pub struct AngleRecord {
 pub struct HeadStatus {
     /// The radio head.
     pub head: RadioHead,
-    /// Whether [`Live::exclude`](super::Live::exclude) has excluded it.
+    /// Whether [`Live::exclude`](super::Live::exclude) has excluded the radio head.
     pub is_excluded: bool,
-    /// Whether the integrity monitor excluded its last angle, because it is identified as faulty.
+    /// Whether the integrity monitor has identified the radio head as faulty and excluded its last
+    /// angle.
     pub is_faulty: bool,
-    /// SNR per antenna and resource element of its last SSB, in dB.
+    /// SNR of the last SSB of the radio head, per antenna and resource element, in dB.
     pub snr_db: Option<f64>,
-    /// Time of the last SSB with an angle estimate, in seconds ...
+    /// Time of the last SSB with an angle estimate, in seconds.
     pub last_angle_s: Option<f64>,
-    /// ... and of the last one with an accepted angle.
+    /// Time of the last SSB with an accepted angle, in seconds.
     pub last_accepted_s: Option<f64>,
     /// Residual of the last angle in radians; see [`AngleRecord::residual_rad`].
     pub residual_rad: Option<f64>,
-    /// Number of accepted angles ...
+    /// Number of accepted angles.
     pub accepted: u64,
-    /// ... and of rejected angles.
+    /// Number of rejected angles.
     pub refused: u64,
 }
 

@@ -23,9 +23,11 @@ pub const MAX_GROWTH_M: f64 = 10.0;
 /// an unknown calibration.
 const COUNTER_STD: f64 = 0.05;
 
-/// Standard deviations of the position (m) and the heading (rad) of a vehicle whose counter did not
-/// change: it may have been pushed or turned on the spot.
+/// Standard deviation of the position of a vehicle whose distance counter did not change (m): it
+/// may have been pushed.
 const STANDING_STD_M: f64 = 0.05;
+/// Standard deviation of the heading of a vehicle whose distance counter did not change (rad): it
+/// may have been turned on the spot.
 const STANDING_STD_RAD: f64 = 0.02;
 
 /// Standard deviation of the yaw change per distance, in rad/m: half the curvature of a bend with a

@@ -3,8 +3,8 @@
 use crate::geometry::Pose;
 use crate::settings::{Check, LocalizerSettings, SettingsError, Site, Vehicle};
 
-/// Returns the vehicle with the start of a drive, and that start: `start`, otherwise that of its
-/// settings, otherwise unknown.
+/// Returns the vehicle with a start pose, and this pose. The pose is `start` if it is given, otherwise
+/// the start pose of the vehicle file, otherwise unknown.
 ///
 /// # Errors
 /// [`SettingsError`] if the start is unknown and a search is impossible.

@@ -67,14 +67,14 @@ pub enum Reason {
     NoOdometry,
     /// The odometry is too old.
     OdometrySilent {
-        /// For how long, in seconds.
+        /// Age of the newest odometry, in seconds.
         age_s: f64,
     },
     /// No angle has been accepted yet.
     NoAngle,
     /// No angle has been accepted for some time.
     AnglesSilent {
-        /// For how long, in seconds.
+        /// Time since the last accepted angle, in seconds.
         age_s: f64,
     },
     /// Several positions are consistent with the angles.
@@ -231,9 +231,9 @@ pub struct Status {
     pub pose: Option<Pose>,
     /// Covariance of (x, y, heading), row-major, in m², m·rad and rad².
     pub covariance: Option<[[f64; 3]; 3]>,
-    /// Speed measured by the odometer, in m/s ...
+    /// Speed measured by the odometer, in m/s.
     pub speed_mps: f64,
-    /// ... and yaw rate, counter-clockwise in rad/s, if it is measured.
+    /// Yaw rate, counter-clockwise in rad/s, if the vehicle measures it.
     pub yaw_rate_radps: Option<f64>,
     /// State of the pose.
     pub state: State,

@@ -25,16 +25,15 @@ pub struct StreamConfig {
 pub struct StreamCounts {
     /// Duration of the processed samples, in seconds.
     pub taken_s: f64,
-    /// Number of gaps according to the times of the blocks, except after a segment that the caller
-    /// ended ...
+    /// Number of gaps between the times of the blocks. Gaps after a segment that the caller ended
+    /// are not counted.
     pub gaps: u64,
-    /// ... and their total duration, in seconds.
+    /// Total duration of these gaps, in seconds.
     pub lost_s: f64,
-    /// Number of gaps that the times of the blocks do not report, according to the times of the
-    /// SSBs ...
+    /// Number of gaps without a step of the block times, inferred from the times of the SSBs.
     pub inferred_gaps: u64,
-    /// ... and their total duration modulo the SSB period, in seconds. Subsequent times are
-    /// corrected by it.
+    /// Total duration of the inferred gaps modulo the SSB period, in seconds. Subsequent times are
+    /// corrected by this duration.
     pub unreported_gap_s: f64,
     /// Number of blocks that began before the end of the previous one.
     pub overlaps: u64,

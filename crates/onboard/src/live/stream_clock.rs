@@ -36,7 +36,8 @@ pub enum Continuity {
         /// Duration of the repetition in seconds.
         again_s: f64,
     },
-    /// Block of another or restarted stream: it begins more than a second before.
+    /// Block of another or restarted stream: it begins more than a second before the end of the
+    /// previous block.
     Restart,
 }
 

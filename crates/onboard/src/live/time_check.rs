@@ -16,15 +16,15 @@ pub const MAX_ANGLE_LEAD_S: f64 = 1.0;
 /// Number of consecutive messages, consistent with each other, that establish a new time base.
 pub const RUN: u32 = 5;
 
-/// Minimum time between the arrivals of the first and the last message of such a run, in seconds.
-/// The messages of a backlog that is sent again arrive within a shorter time.
+/// Minimum time between the arrivals of the first and the last message of a run, in seconds. The
+/// messages of a backlog that is sent again arrive within a shorter time.
 const RUN_S: f64 = 0.2;
 
-/// Maximum difference between the durations of such a run by its stamps and by its arrivals, in seconds: jitter of
-/// the transport.
+/// Maximum difference between the duration of a run by its stamps and by its arrivals, in seconds.
+/// It permits jitter of the transport.
 const JITTER_S: f64 = 0.1;
 
-/// Maximum time between two messages of such a run without arrival times, in seconds.
+/// Maximum time between two messages of a run without arrival times, in seconds.
 const MAX_SPACING_S: f64 = 1.0;
 
 /// Minimum time between the last accepted message and a new time base, in seconds.
@@ -61,7 +61,7 @@ pub enum TimeDefect {
     OutOfRange {
         /// The stamp.
         time_s: f64,
-        /// Unit in which it is a Unix time.
+        /// Unit in which the stamp is a Unix time, if there is one.
         unit: Option<TimeUnit>,
     },
     /// The stamps advance in proportion to the elapsed time, but in another unit.
@@ -87,7 +87,7 @@ pub enum TimeDefect {
     Backward {
         /// The stamp.
         time_s: f64,
-        /// Time by which it is earlier, in seconds.
+        /// Time from the stamp to the last accepted message, in seconds.
         by_s: f64,
     },
     /// Later than its arrival allows.
@@ -215,8 +215,8 @@ impl Run {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TimeCheck {
     last: Option<Stamp>,
-    /// Maximum of time stamp minus arrival time over recent messages, in seconds: that of the
-    /// messages with the smallest delay.
+    /// Maximum of time stamp minus arrival time over recent messages, in seconds. The messages with
+    /// the smallest delay determine it.
     lead_s: Option<f64>,
     run: Option<Run>,
     /// Messages rejected since the last accepted one.

@@ -16,9 +16,9 @@ use crate::range::RangeMeasurement;
 pub struct Recovered {
     /// Time of the recovery, in seconds.
     pub time_s: f64,
-    /// Change of the position, in metres ...
+    /// Change of the position by the recovery, in metres.
     pub moved_m: f64,
-    /// ... and of the heading, counter-clockwise in radians.
+    /// Change of the heading by the recovery, counter-clockwise in radians.
     pub turned_rad: f64,
 }
 

@@ -25,10 +25,10 @@ const COPIES: usize = 8;
 /// Time between two copies in seconds: the oldest one is at least [`HISTORY_S`] old.
 const SPACING_S: f64 = HISTORY_S / (COPIES - 2) as f64;
 
-/// Usual number of stored inputs ...
+/// Usual number of stored inputs, for which memory is allocated at the start.
 const USUAL_EVENTS: usize = 256;
 
-/// ... and its maximum; above it, the oldest copies are removed early.
+/// Maximum number of stored inputs. Above it, the oldest copies are removed early.
 const MAX_EVENTS: usize = 4096;
 
 /// Localizer with replay of late angles.
@@ -41,9 +41,9 @@ pub struct OutOfSequenceBuffer {
     copies: usize,
     /// Memory that is exchanged with the localizer's in a replay, so that it can be reused.
     spare: Option<Box<dyn Localizer>>,
-    /// Time of the newest odometry ...
+    /// Time of the newest odometry (s).
     now_s: f64,
-    /// ... and of the newest input.
+    /// Time of the newest input (s).
     newest_s: f64,
 }
 

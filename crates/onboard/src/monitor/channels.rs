@@ -17,9 +17,9 @@ use super::fault::Fault;
 use crate::observation::{MAX_ELEMENTS, SsbObservation};
 use crate::settings::{Site, Vehicle};
 
-/// Motion in metres, and time in seconds, after which the fading of a radio head is independent.
-/// The motion exceeds one wavelength.
+/// Motion after which the fading of a radio head is independent (m). It exceeds one wavelength.
 const FADING_M: f64 = 0.1;
+/// Time after which the fading of a radio head is independent (s).
 const FADING_S: f64 = 1.0;
 /// Minimum SNR of an SSB with all its snapshots, in dB.
 const MIN_SNR_DB: f64 = 10.0;
@@ -116,7 +116,7 @@ pub struct ChannelMonitor {
     /// Evidence that each channel is dead.
     dead: [f64; MAX_ELEMENTS],
     is_dead: [bool; MAX_ELEMENTS],
-    /// Accepted hypothesis, and the evidence that the fault has ended.
+    /// Accepted fault hypothesis, with the evidence that the fault has ended.
     accepted: Option<(Hypothesis, f64)>,
     counted: Vec<Counted>,
 }

@@ -11,8 +11,9 @@ use crate::observation::OdometrySample;
 const MOVING_MPS: f64 = 0.1;
 /// Maximum interval between two samples in seconds; a longer one interrupts the run.
 const MAX_S: f64 = 0.5;
-/// Minimum number of samples in motion from which the rate is estimated, and number at which all counts are halved.
+/// Minimum number of samples in motion from which the repetition rate is estimated.
 const MIN_SAMPLES: u32 = 50;
+/// Number of samples at which all counts are halved.
 const MAX_SAMPLES: u32 = 400;
 /// Minimum fraction of samples at which the change alternates its sign. Independent noise has two
 /// thirds; a smooth motion has almost none.
@@ -24,9 +25,9 @@ const MIN_RUN: u32 = 5;
 /// Maximum duration of a run in seconds; a longer run is normal, because a source without noise has
 /// replaced the odometer.
 const MAX_RUN_S: f64 = 60.0;
-/// Maximum deviation of a repeated step of the distance: relative to the integrated speed, and in
-/// metres.
+/// Maximum deviation of a repeated step of the distance, relative to the integrated speed.
 const STEP_SHARE: f64 = 1e-3;
+/// Maximum deviation of a repeated step of the distance, in metres.
 const STEP_M: f64 = 1e-6;
 
 /// Counts repeated samples.
@@ -39,8 +40,9 @@ pub struct Constancy {
     samples: u32,
     repeated: u32,
     alternating: u32,
-    /// Number of current repetitions, and time of the first of them in seconds.
+    /// Number of repetitions in the current run.
     run: u32,
+    /// Time of the first repetition of the current run, in seconds.
     run_since_s: f64,
     /// Whether the current run belongs to a fault, so that it does not change the estimated rate.
     is_fault: bool,

@@ -16,9 +16,9 @@ use crate::settings::{Site, Vehicle};
 
 /// Number of SSBs in a window.
 const WINDOW: u32 = 8;
-/// Number of consecutive windows with a second direction after which it is reported, and without it
-/// after which the report ends.
+/// Number of consecutive windows with a second direction after which it is reported.
 const BEGINS: u32 = 2;
+/// Number of consecutive windows without a second direction after which the report ends.
 const ENDS: u32 = 4;
 /// Minimum motion in metres between two SSBs in a window. The fading changes within half a
 /// wavelength. At standstill, scatter is as constant as a second wave.
@@ -38,8 +38,9 @@ const MAX_CORRELATION: f64 = 0.8;
 /// Minimum Rician K of the site in dB. With stronger scatter, up to one false report per run was
 /// measured, because reflections resemble a second radio head over 16 SSBs.
 const MIN_K_DB: f64 = 13.0;
-/// Minimum and maximum number of antennas.
+/// Minimum number of antennas.
 const MIN_ANTENNAS: usize = 3;
+/// Maximum number of antennas.
 const MAX_ANTENNAS: usize = 8;
 
 type Vector = [Complex64; MAX_ELEMENTS];
@@ -52,8 +53,9 @@ struct Window {
     distance_m: f64,
     count: u32,
     covariance: [Vector; MAX_ELEMENTS],
-    /// Number of consecutive windows with a second direction, and without one.
+    /// Number of consecutive windows with a second direction.
     with: u32,
+    /// Number of consecutive windows without a second direction.
     without: u32,
     is_reported: bool,
 }

@@ -40,9 +40,11 @@ const RETAINED_S: f64 = 2.5;
 pub struct Fallback {
     site: Site,
     vehicle: Vehicle,
-    /// Copies of the localizer, one interval [`RETAINED_S`] apart, and time of the newer one in seconds.
+    /// Older copy of the localizer, one interval [`RETAINED_S`] before the newer one.
     older: Option<Box<Relocalizer>>,
+    /// Newer copy of the localizer.
     newer: Option<Box<Relocalizer>>,
+    /// Time of the newer copy in seconds.
     newer_s: f64,
     speed_mps: f64,
     distance_m: f64,

@@ -27,8 +27,9 @@ const STANDSTILL_INTERVAL_S: f64 = 0.5;
 const STANDING_MPS: f64 = 0.01;
 /// Minimum speed for the confirmation of a standstill, in m/s.
 const MIN_MOVING_MPS: f64 = 0.5;
-/// Maximum motion between two angles at standstill, in metres and radians.
+/// Maximum motion between two angles at standstill, in metres.
 const STANDING_M: f64 = 0.02;
+/// Maximum heading change between two angles at standstill, in radians.
 const STANDING_RAD: f64 = 0.1;
 /// Standard deviation of an angle at standstill in addition to its noise, in radians, due to
 /// scatterers that move.
@@ -36,10 +37,10 @@ const STANDING_SIGMA_RAD: f64 = 0.02;
 /// Standard deviation of an angle in motion in addition to its noise, in radians, due to changing
 /// multipath.
 const MOVING_SIGMA_RAD: f64 = 0.06;
-/// Maximum acceleration due to the friction of tyres, in m/s², and minimum change of the speed that
-/// is compared with it, in m/s. A smaller change may be noise, or a step of the commanded wheel
-/// speed of a small robot.
+/// Maximum acceleration due to the friction of tyres, in m/s².
 const FRICTION_MPS2: f64 = 10.0;
+/// Minimum change of the speed that is compared with the maximum acceleration, in m/s. A smaller
+/// change may be noise, or a step of the commanded wheel speed of a small robot.
 const SUDDEN_MPS: f64 = 1.0;
 /// Normal quantile of the false-alarm rate of one test at standstill, 1e-6.
 const QUANTILE: f64 = 4.753;
@@ -57,16 +58,17 @@ const DRIFT: f64 = 0.25;
 const OUTLIER: f64 = 9.0;
 /// Minimum squared normalised difference between the hypotheses for a comparison.
 const DISTINCT: f64 = 8.0;
-/// Maximum age of a reference in motion and at standstill, in seconds.
+/// Maximum age of a reference in motion, in seconds.
 const MOVING_AGE_S: f64 = 2.0;
+/// Maximum age of a reference at standstill, in seconds.
 const STANDING_AGE_S: f64 = 30.0;
 /// Time in seconds after which the only radio head gets a new reference if its angle has jumped.
 const JUMPED_S: f64 = 1.0;
 /// Number of jumps of the only radio head within [`STANDING_AGE_S`] that indicate motion.
 const SINGLE_JUMPS: u32 = 3;
-/// Conditions for the end of a fault: duration without a contradicting angle, in seconds, and
-/// number of confirming angles.
+/// Duration without a contradicting angle after which a fault can end, in seconds.
 const CONFIRMED_S: f64 = 1.5;
+/// Number of confirming angles after which a fault can end.
 const CONFIRMED_ANGLES: u32 = 4;
 
 /// Reference angle of one radio head.
@@ -81,8 +83,9 @@ struct Reference {
     variance: f64,
     /// Evidence of a standing vehicle and of reversed motion.
     evidence: [f64; 2],
-    /// Time of the first jump of the angle at standstill, in seconds, and number of jumps.
+    /// Time of the first jump of the angle at standstill, in seconds.
     jumped_s: Option<f64>,
+    /// Number of jumps of the angle at standstill.
     jumps: u32,
     /// Whether the next angle replaces the reference.
     is_stale: bool,

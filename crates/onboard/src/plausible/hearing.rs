@@ -16,6 +16,7 @@ const FOUND_DB: f64 = -10.0;
 const FOR_A_PLACE: usize = 3;
 /// Maximum number of positions that are examined along a road.
 const MAX_PLACES: f64 = 400.0;
+/// Minimum distance between examined positions along a road (m).
 const STEP_M: f64 = 5.0;
 /// Minimum distance of a vehicle from a radio head (m).
 const NEAREST_M: f64 = 10.0;

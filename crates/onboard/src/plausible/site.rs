@@ -81,6 +81,7 @@ const ROWS: &[Usual] = &[
 
 /// NR frequency range FR1 in MHz (TS 38.104, 5.1).
 const FR1_MHZ: [f64; 2] = [410.0, 7125.0];
+/// NR frequency range FR2 in MHz (TS 38.104, 5.1).
 const FR2_MHZ: [f64; 2] = [24_250.0, 71_000.0];
 
 /// Maximum coordinate of a local frame (m). Grid coordinates are larger: UTM eastings start at 166
@@ -90,8 +91,9 @@ const LOCAL_M: f64 = 1e5;
 const DEGREES: f64 = 0.3;
 /// Minimum distance between antennas of one mast (m).
 const SAME_PLACE_M: f64 = 0.05;
-/// Step along the road, and maximum number of steps.
+/// Step along the road (m).
 const STEP_M: f64 = 1.0;
+/// Maximum number of steps along the road.
 const MAX_STEPS: f64 = 2000.0;
 /// Minimum bend radius of a vehicle's road (m).
 const MIN_RADIUS_M: f64 = 0.3;

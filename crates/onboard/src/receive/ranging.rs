@@ -21,8 +21,9 @@ pub(super) struct RangingClock {
     case: Case,
     base_rate_hz: f64,
     period_s: f64,
-    /// Reception time of the first SSB minus its position in the burst, and the last delay (s).
+    /// Reception time of the first SSB minus its position in the burst (s).
     origin_s: Option<f64>,
+    /// Last delay (s).
     last_s: f64,
 }
 

@@ -28,12 +28,13 @@ use crate::manifold::ArrayManifold;
 
 /// Grid of decay time constants, in samples at the base rate.
 const DECAYS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
-/// Range of the line of sight's delay relative to the delay of the maximum power, in samples.
+/// Minimum delay of the line of sight relative to the delay of the maximum power, in samples.
 const EARLIEST: f64 = -1.0;
+/// Maximum delay of the line of sight relative to the delay of the maximum power, in samples.
 const LATEST: f64 = 0.5;
-/// Number of delays on the grid for each time constant, and number of subsequent bisections of
-/// their spacing.
+/// Number of delays on the grid for each time constant.
 const DELAYS: usize = 6;
+/// Number of subsequent bisections of the spacing of the delays.
 const HALVINGS: i32 = 4;
 /// Threshold of the channel variation in standard deviations of the noise: exceeded by one of 10⁵
 /// SSBs of a flat channel.
@@ -241,8 +242,9 @@ struct Scatter {
     /// Lower Cholesky factor with an inverted diagonal.
     factor: [Band; GROUPS],
     log_determinant: f64,
-    /// Whitened line of sight, and its energy `e`.
+    /// Whitened line of sight.
     line_of_sight: Band,
+    /// Energy `e` of the whitened line of sight.
     energy: f64,
 }
 

@@ -18,9 +18,9 @@ const BULGE_M: f64 = 0.5;
 /// Maximum ratio of the lengths of neighbouring legs of one bend.
 const GROWTH: f64 = 1.5;
 
-/// Minimum heading change at one point for a corner instead of a point of a bend (rad), and the
-/// radius of the arc that replaces it (m).
+/// Minimum heading change at one point for a corner (rad). A smaller change is part of a bend.
 const CORNER_RAD: f64 = 0.7;
+/// Radius of the arc that replaces a corner (m).
 const CORNER_RADIUS_M: f64 = 5.0;
 
 /// Number of chords of the arc that replaces a corner.

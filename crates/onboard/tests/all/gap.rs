@@ -9,8 +9,9 @@ use onboard::observation::OdometrySample;
 use onboard::road::Gap;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
 
-/// Radius of the bends that the road may have in the gap (m), and their turn (rad).
+/// Radius of the bends that the road may have in the gap (m).
 const RADIUS_M: f64 = 200.0;
+/// Heading change of the bends that the road may have in the gap (rad).
 const TURN_RAD: f64 = 0.1;
 
 /// Returns a tracker on a straight road: 90 m, 80 m unsurveyed, and 90 m.

@@ -12,15 +12,17 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-/// Standard deviation of the electrical angles (rad) and share of outliers.
+/// Standard deviation of the electrical angles (rad).
 const SIGMA_RAD: f64 = 0.06;
+/// Share of outliers among the angles.
 const OUTLIERS: f64 = 0.03;
 
 /// Interval of the odometry (s); angles with every fourth sample.
 const STEP_S: f64 = 0.05;
 
-/// Duration of a drive (s), and speed (m/s).
+/// Duration of a drive (s).
 const DRIVE_S: f64 = 90.0;
+/// Speed of the vehicle (m/s).
 const SPEED_MPS: f64 = 1.5;
 
 const VEHICLE: &str = "

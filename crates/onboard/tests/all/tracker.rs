@@ -117,14 +117,14 @@ fn an_unverified_angle_is_weighted_by_its_likelihood() {
             .distance_m(before.pose.point());
         (moved_m, tracker.pose(0.12).principal_variances()[0])
     };
-    // An angle close to the prediction is most probably correct ...
+    // An angle close to the prediction is most probably correct.
     let ((sure_m, sure_m2), (unsure_m, unsure_m2)) = (after(0.1, true), after(0.1, false));
     assert!(
         unsure_m < sure_m && unsure_m > 0.8 * sure_m,
         "{unsure_m} {sure_m}"
     );
     assert!(unsure_m2 > sure_m2);
-    // ... and an angle far from it, but within the gate, contains no information.
+    // An angle far from the prediction, but within the gate, contains no information.
     let ((sure_m, _), (unsure_m, _)) = (after(0.33, true), after(0.33, false));
     assert!(sure_m > 0.0);
     assert_eq!(unsure_m, 0.0);

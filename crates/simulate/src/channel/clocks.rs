@@ -41,8 +41,9 @@ impl Clock {
 /// Clocks of one run; exact clocks unless the vehicle uses one-way delays.
 pub(super) struct Clocks {
     vehicle: Option<Clock>,
-    /// Clock of each oscillator, and the oscillator of each radio head.
+    /// Clock of each oscillator.
     oscillators: Vec<Clock>,
+    /// Index of the oscillator of each radio head.
     of_heads: Vec<usize>,
     period_s: f64,
     /// Number of the burst to which the clocks have advanced.

@@ -97,7 +97,7 @@ impl Cell {
     pub fn ssb_start(&self, ssb_index: u8) -> f64 {
         let numerology = Numerology::new(self.spacing, 256).unwrap();
         let symbol = self.case().start_symbol(ssb_index).unwrap();
-        // SSBs never begin at a symbol with the long prefix, except that the search counts 18.
+        // The search counts a prefix of 18 samples for every symbol; a longer prefix shifts the start.
         let long = numerology.cp_len(symbol) - numerology.ssb_cp_len();
         self.delay + (numerology.symbol_start(symbol) + long) as f64
     }

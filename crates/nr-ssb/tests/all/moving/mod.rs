@@ -20,8 +20,9 @@ use crate::air;
 pub const ANTENNAS: usize = 4;
 pub const LIGHT_M_S: f64 = 299_792_458.0;
 const SSB_FREQ_HZ: f64 = 3.6e9;
-/// Samples around an SSB that are received.
+/// Number of received samples around an SSB.
 const WINDOW: usize = 2048;
+/// Number of received samples before an SSB.
 const MARGIN: f64 = 400.0;
 const BEAM: u8 = 3;
 

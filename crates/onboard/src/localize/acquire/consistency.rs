@@ -14,9 +14,9 @@ const LEAST: u32 = 5;
 /// count.
 const RECENT: u32 = 32;
 
-/// Fraction of rejected angles above which a radio head is inconsistent with the filter, and below
-/// which it is consistent.
+/// Fraction of rejected angles above which a radio head is inconsistent with the filter.
 const LOST: f64 = 0.5;
+/// Fraction of rejected angles below which a radio head is consistent with the filter.
 const SURE: f64 = 0.2;
 
 /// Mean squared Mahalanobis distance, limited by the gate, above which a radio head is

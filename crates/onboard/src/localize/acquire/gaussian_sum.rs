@@ -43,8 +43,9 @@ const FOUND_STD_RAD: f64 = 0.2;
 /// Minimum number of radio heads that determine a position without a road.
 pub(super) const MIN_HEADS: usize = 3;
 
-/// Number of initial headings in each grid cell, and maximum number of hypotheses.
+/// Number of initial headings in each grid cell.
 const HEADINGS: u32 = 12;
+/// Maximum number of hypotheses.
 const MAX_HYPOTHESES: f64 = 4000.0;
 
 /// Minimum weight of a remaining hypothesis relative to the best, in the reported covariance. The
@@ -66,7 +67,7 @@ clone_in_place! {
     /// Hypothesis of the pose.
     #[derive(Debug)]
     struct Hypothesis {
-        /// Index of its road; 0 without a road.
+        /// Index of the road of the hypothesis; 0 without a road.
         road: usize,
         ekf: Ekf,
         log_likelihood: f64,

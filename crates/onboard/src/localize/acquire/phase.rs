@@ -45,11 +45,12 @@ pub(super) struct Evidence {
     pub other_start_is_likelier: bool,
     /// Whether the search of a given start has found the reported position.
     pub agrees: bool,
-    /// Whether no odometry has arrived since the search was reported; the covariance then covers
-    /// both solutions.
+    /// Whether no odometry has arrived since the search was reported. The covariance then covers
+    /// the position of the filter and that of the search.
     pub is_just_reported: bool,
-    /// Whether the minimum distance for a result has been driven; whether a long distance has.
+    /// Whether the vehicle has driven the minimum distance for a result of the search.
     pub has_moved: bool,
+    /// Whether the vehicle has driven a long distance since the start of the search.
     pub has_moved_far: bool,
     /// Whether angles were received for the maximum duration of a search.
     pub maximum_search_duration_reached: bool,

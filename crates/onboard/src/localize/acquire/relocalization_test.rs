@@ -42,25 +42,29 @@ clone_in_place! {
         pub refutes: bool,
         /// Whether the selected hypothesis explains contradicting angles without a lost vehicle.
         may_explain_contradictions: bool,
-        /// Prior probability that the given start is wrong, and the vehicle is anywhere in the area
-        /// of the radio heads: that of a radio head fault.
+        /// Prior probability that the given start is wrong, and that the vehicle is anywhere in the
+        /// area of the radio heads. It equals the prior probability of a radio head fault.
         wrong_start: f64,
         /// Number of independent epochs for which the error of a wrong start lasts.
         epochs: f64,
-        /// Log odds of another start below which a given start is confirmed: those of the integrity risk.
+        /// Log odds of other starts below which the given start is confirmed: the log odds of the
+        /// integrity risk.
         confirmed_at: f64,
         /// Log-likelihood of the angles for the filter.
         of_filter: f64,
-        /// Distance driven at the start of the search, and since then (m).
+        /// Distance driven at the start of the search (m).
         since_m: f64,
+        /// Distance driven since the start of the search (m).
         pub driven_m: f64,
-        /// Time of the last angle, and duration of reception (s).
+        /// Time of the last angle (s).
         received_s: f64,
+        /// Time with angles since the start of the search, or since it was reported (s).
         pub listened_s: f64,
-        /// Number of angles, number of independent ones, and distance driven at the last
-        /// independent angle of each radio head (m).
+        /// Number of angles.
         angles: u32,
+        /// Number of independent angles.
         independent: u32,
+        /// Distance driven at the last independent angle of each radio head (m).
         independent_m: Vec<f64>,
     }
 }

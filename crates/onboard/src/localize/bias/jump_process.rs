@@ -11,18 +11,20 @@
 
 use crate::gaussian::Innovation;
 
-/// Number of levels, and their variances (rad²): from a calibration residual to an almost unknown
-/// direction.
+/// Number of levels of the bias.
 pub(super) const LEVELS: usize = 4;
+/// Variance of each level (rad²): from a calibration residual to an almost unknown direction.
 pub(super) const VARIANCES: [f64; LEVELS] = [0.02 * 0.02, 0.1 * 0.1, 0.3 * 0.3, 1.0];
 
-/// From this level on, a radio head contributes almost no information, and a larger deviation is an
-/// outlier.
+/// Index of the first large level. A radio head with a large bias contributes almost no
+/// information.
 const LARGE: usize = 2;
+/// Squared bias above which a bias is large (rad²).
 pub const MAX_VARIANCE: f64 = VARIANCES[LARGE];
 
-/// Correlation distance of bias and level (m).
+/// Correlation distance of the bias (m).
 pub(super) const VALUE_M: f64 = 1.0;
+/// Correlation distance of the level (m).
 pub(super) const LEVEL_M: f64 = 20.0;
 
 /// Correlation distance of the short-lived error (m).
@@ -60,11 +62,13 @@ pub struct JumpProcess {
 pub struct JumpHypothesis {
     /// Probability of the hypothesis.
     pub share: f64,
-    /// Residual `r` (rad); mean `E 1/S` of the inverse innovation variance over the levels
-    /// (1/rad²); and `E 1/S − r² Var 1/S` (1/rad²). The gain is `P Hᵀ E 1/S`, and the covariance is
-    /// `P − P Hᵀ (E 1/S − r² Var 1/S) H P`.
+    /// Residual `r` (rad).
     pub residual: f64,
+    /// Mean `E 1/S` of the inverse innovation variance over the levels (1/rad²). The gain is `P Hᵀ
+    /// E 1/S`.
     pub gain: f64,
+    /// `E 1/S − r² Var 1/S` (1/rad²). The updated covariance is `P − P Hᵀ (E 1/S − r² Var 1/S) H
+    /// P`.
     pub narrowing: f64,
 }
 
@@ -74,13 +78,16 @@ pub struct JumpHypotheses {
     pub density: f64,
     pub kept: JumpHypothesis,
     pub redrawn: JumpHypothesis,
-    /// Probability of each level given this angle, and given the distance alone.
+    /// Probability of each level given this angle.
     levels: [f64; LEVELS],
+    /// Probability of each level before this angle, given the distance driven.
     predicted_levels: [f64; LEVELS],
-    /// New bias: mean (rad), variance (rad²), and its covariance with the state relative to the
-    /// state's covariance with the angle.
+    /// Mean of a bias that is drawn again, given this angle (rad).
     pub mean_rad: f64,
+    /// Variance of this bias (rad²).
     pub variance: f64,
+    /// Covariance of this bias with the state, divided by the negative covariance of the state with
+    /// the angle.
     pub narrowing: f64,
 }
 
@@ -149,7 +156,8 @@ impl JumpProcess {
         let repetition = share(travelled_m).recip();
         let (kept_residual, redrawn_residual) = (seen.residual - value_rad, seen.residual);
         let mut weights = [[0.0; LEVELS]; 2];
-        // Inverse of the variance of an angle, and the part of a new bias in it.
+        // Inverse of the variance of an angle, and the share of a bias that is drawn again in this
+        // variance.
         let (mut inverse, mut of_value) = ([[0.0; LEVELS]; 2], [0.0; LEVELS]);
         let mut left = [0.0; LEVELS];
         for (level, value) in VARIANCES.into_iter().enumerate() {

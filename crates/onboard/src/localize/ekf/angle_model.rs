@@ -30,12 +30,14 @@ impl ArrayModel {
     /// Returns the factor of the scatter variance that remains when angles at a distance of
     /// `travelled_m` are averaged, relative to independent angles.
     ///
-    /// Scatter from all directions has a flat spectrum over the distance travelled, of one cycle
-    /// per wavelength to either side. The line of sight is a line in it, at the cosine `direction_cosine` of
-    /// the angle between the line of sight and the direction of travel. Sampling folds the spectrum
-    /// at multiples of 1/Δ. The average cannot remove the part that is folded onto the line:
-    /// `λ/(2Δ)` times the number of integers m with `|m λ/Δ − direction_cosine| < 1`. Up to half a wavelength
-    /// this is one independent angle per half wavelength; for large distances it tends to 1.
+    /// As a function of the distance travelled, scatter from all directions has a flat spectrum
+    /// between −1 and 1 cycle per wavelength. The line of sight is a spectral line at
+    /// `direction_cosine`, the cosine of the angle between line of sight and direction of travel.
+    /// Sampling with the step Δ (`travelled_m`) folds the spectrum at multiples of 1/Δ. An average
+    /// cannot remove the scatter that is folded onto the spectral line. Its fraction is `λ/(2Δ)`
+    /// times the number of integers m with `|m λ/Δ − direction_cosine| < 1`. Steps up to half a
+    /// wavelength give one independent angle per half wavelength. For large steps, the factor tends
+    /// to 1.
     pub fn correlation(&self, travelled_m: f64, direction_cosine: f64) -> f64 {
         if !travelled_m.is_finite() {
             return 1.0;
@@ -46,7 +48,7 @@ impl ArrayModel {
             spacing * (direction_cosine - 1.0),
             spacing * (direction_cosine + 1.0),
         );
-        // The line itself, m = 0, is within the band.
+        // At least the copy m = 0, the line of sight itself, is within the band.
         let copies = (last.ceil() - first.floor() - 1.0).max(1.0);
         copies / (2.0 * spacing)
     }
@@ -142,15 +144,16 @@ pub struct SecondOrder {
 pub(super) struct LineOfSight {
     /// Bearing of the radio head from the array, in the map frame (rad).
     pub bearing_rad: f64,
-    /// Horizontal distance, and distance (m).
+    /// Horizontal distance (m).
     ground_m: f64,
+    /// Distance in space (m).
     pub range_m: f64,
     /// Cosine of the angle between the horizontal line of sight and the vehicle's forward axis.
     along: f64,
-    /// Derivatives of the array's position by each state, towards the radio head and to the left of
-    /// that direction.
+    /// Derivatives of the array's position with respect to each state: towards the radio head, and
+    /// to the left of that direction.
     pub position_rows: [[f64; STATES]; 2],
-    /// Derivatives of the bearing by each state.
+    /// Derivatives of the bearing with respect to each state.
     pub bearing_row: [f64; STATES],
 }
 

@@ -148,9 +148,9 @@ impl CorrelatedNoise {
 /// second: half a radian (rad²).
 const UNKNOWN_TURN_RAD2: f64 = 0.25;
 
-/// Angle random walk (rad/√s) and bias (rad/s) of an unspecified yaw rate: of a gyroscope, and of
-/// two wheels.
+/// Angle random walk (rad/√s) and bias (rad/s) of an unspecified gyroscope.
 const USUAL_GYROSCOPE: [f64; 2] = [1e-3, 1e-3];
+/// Angle random walk (rad/√s) and bias (rad/s) of an unspecified yaw rate of two wheels.
 const USUAL_WHEELS_TURN: [f64; 2] = [0.05, 0.01];
 
 /// Standard deviations of an unspecified array: mounting angle (rad) and phase (rad per element).

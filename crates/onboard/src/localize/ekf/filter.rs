@@ -34,15 +34,15 @@ pub(super) enum OffMap {
 pub(super) struct Head {
     pub known: RadioHead,
     pub excluded: bool,
-    /// Kind of its last angle that was used.
+    /// Kind of the last used angle of the radio head.
     pub kind: MeasurementKind,
-    /// Distance driven at the last used angle (m) ...
+    /// Distance driven at the last used angle (m).
     pub last_update_m: f64,
-    /// ... its time (s) ...
+    /// Time of the last used angle (s).
     pub last_update_s: f64,
-    /// ... the heading (rad) ...
+    /// Heading of the vehicle at the last used angle (rad).
     pub last_update_rad: f64,
-    /// ... and the residual after the update.
+    /// Residual of the last used angle after its update.
     pub last_residual: Option<Residual>,
     /// Number of successive rejected ranges.
     pub rejected_ranges: u16,
@@ -230,13 +230,13 @@ impl Ekf {
 /// Constant: specified and estimated value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatedConstant {
-    /// Specified value ...
+    /// Specified value.
     pub stated: f64,
-    /// ... and its standard deviation.
+    /// Specified standard deviation.
     pub stated_std: f64,
-    /// Estimated value ...
+    /// Estimated value.
     pub found: f64,
-    /// ... and its standard deviation.
+    /// Standard deviation of the estimate.
     pub std: f64,
 }
 

@@ -28,8 +28,9 @@ pub(crate) struct FreeMotion {
     pub yaw_noise_rad_per_sqrt_s: f64,
 }
 
-/// Minimum standard deviations of the pose after a motion without odometry, in metres and radians.
+/// Minimum standard deviation of the position after a motion without odometry (m).
 const MIN_STD_M: f64 = 0.3;
+/// Minimum standard deviation of the heading after a motion without odometry (rad).
 const MIN_STD_RAD: f64 = 0.05;
 
 impl Ekf {

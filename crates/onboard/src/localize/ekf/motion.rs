@@ -84,13 +84,13 @@ pub struct Step {
     pub jacobian: Matrix<STATES>,
     /// Covariance of the step's noise.
     pub noise: Matrix<STATES>,
-    /// Heading change (rad) ...
+    /// Heading change of the step (rad).
     pub turn_rad: f64,
-    /// ... its derivative by the state before the step ...
+    /// Derivative of the heading change with respect to the state before the step.
     pub turn_row: [f64; STATES],
-    /// ... its covariance with the noise of the step ...
+    /// Covariance of the heading change with the noise of the step.
     pub turn_shared: [f64; STATES],
-    /// ... and its variance due to that noise (rad²).
+    /// Variance of the heading change due to the noise of the step (rad²).
     pub turn_variance: f64,
 }
 

@@ -1,8 +1,10 @@
 //! Plausibility of the odometer: jumps of its speed due to slip, and lost samples.
 
-/// Weight of the newest step in the mean square: a larger step is learned fast and forgotten
-/// slowly.
+/// Weight of the newest step in the mean square if the step is larger. Larger steps are learned
+/// fast.
 const RISE: f64 = 0.2;
+/// Weight of the newest step in the mean square if the step is smaller. Larger steps are forgotten
+/// slowly.
 const FALL: f64 = 0.01;
 
 /// Ratio to the usual step above which a step is unusual.

@@ -19,9 +19,9 @@ pub(super) const MAX_STEPS: f64 = 1000.0;
 /// Speeds above this multiple of the vehicle's top speed are replaced by it.
 const WILD: f64 = 10.0;
 
-/// Minimum change of the speed for slip, in standard deviations of a speed measurement, and maximum
-/// increase of the odometer scale's standard deviation by slip.
+/// Minimum change of the speed for slip, in standard deviations of a speed measurement.
 const SIGMAS_OF_SLIP: f64 = 5.0;
+/// Maximum increase of the odometer scale's standard deviation by slip.
 pub(in crate::localize) const MAX_SLIP: f64 = 0.3;
 
 /// Range of the ratio between the distance by the speeds and the measured distance in which the

@@ -50,17 +50,19 @@ pub(in crate::localize) struct PredictedMeasurement {
     pub innovation: Innovation,
     /// Variance of the angle's own noise (rad²).
     pub own_variance: f64,
-    /// Aperture, direction cosine and variance of the surveys, as in [`AngleModel`].
+    /// Aperture, as in [`AngleModel`].
     pub aperture: f64,
+    /// Direction cosine, as in [`AngleModel`].
     pub direction_cosine: f64,
+    /// Variance due to survey errors, as in [`AngleModel`] (rad²).
     pub survey_variance: f64,
-    /// Time (s), distance (m) and heading change (rad) since the previous update with the radio
-    /// head.
+    /// Time since the previous update with the radio head (s).
     pub elapsed_s: f64,
+    /// Distance (m) and heading change (rad) since the previous update with the radio head.
     pub moved: (f64, f64),
-    /// Variance due to the extrapolation beyond the newest odometry sample, and variance due to the
-    /// second-order terms of the prediction (rad²).
+    /// Variance due to the extrapolation beyond the newest odometry sample (rad²).
     pub coasted_variance: f64,
+    /// Variance due to the second-order terms of the prediction (rad²).
     pub bend_variance: f64,
     /// Hypotheses for the time-correlated bias, if it is estimated and the radio head is used.
     pub hypotheses: Option<JumpHypotheses>,

@@ -11,9 +11,10 @@ const PRIOR_PAIRS: u32 = 16;
 /// of radio heads.
 const MIN_WEIGHT: f64 = 1.0 / 2048.0;
 
-/// Maximum squared deviation of a difference, and the mean square of a normal distribution
-/// truncated there, `1 − 2cφ(c)/erf(c/√2)`.
+/// Maximum squared deviation of a difference, in variances.
 const MOST: f64 = 9.0;
+/// Mean square of a standard normal distribution that is truncated at this deviation c: `1 −
+/// 2cφ(c)/erf(c/√2)`.
 const OF_MOST: f64 = 0.973_345;
 
 /// Half the mean squared difference of successive angles divided by their specified variance (von

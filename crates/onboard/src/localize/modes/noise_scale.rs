@@ -5,17 +5,19 @@ use crate::clone_in_place::clone_in_place;
 use crate::geometry::wrap_angle;
 use crate::localize::ekf::ExcludedInnovation;
 
-/// Minimum weight of the newest difference, and number of differences that the specified noise
-/// counts as.
+/// Minimum weight of the newest difference.
 const MIN_WEIGHT: f64 = 1.0 / 128.0;
+/// Weight of the specified noise, as a number of differences.
 const STATED: u32 = 16;
 
-/// Limit of a difference in standard deviations, and the mean square of a normal distribution with
-/// that limit: `erf(c/√2) − 2cφ(c) + 2c²Φ(−c)` (Huber, Robust Statistics, 5.2). The larger limit
-/// includes the tails that scatter causes; the smaller one yields the noise without outliers.
+/// Limit of a difference, in standard deviations: includes the tails that scatter causes.
 const MOST: f64 = 3.0;
+/// Mean square of a standard normal distribution whose values are limited to c:
+/// `erf(c/√2) − 2cφ(c) + 2c²Φ(−c)` (Huber, Robust Statistics, 5.2).
 const OF_MOST: f64 = 0.995_007;
+/// Smaller limit of a difference, in standard deviations: yields the noise without outliers.
 const CORE: f64 = 1.5;
+/// Mean square of a standard normal distribution whose values are limited to [`CORE`].
 const OF_CORE: f64 = 0.778_465;
 
 clone_in_place! {

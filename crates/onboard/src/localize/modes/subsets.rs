@@ -20,9 +20,11 @@ const WEIGHTS: [f64; 3] = [0.5, 0.125, 0.03125];
 /// are no fault.
 const MAX_DEVIATION_SIGMAS: f64 = 3.0;
 
-/// Statistic, in standard deviations, above which a radio head is faulty, and below which it is
-/// consistent. Error probabilities of a single Gaussian test: 4e-8 and 5e-4.
+/// Statistic, in standard deviations, above which a radio head is faulty. Error probability of a
+/// single Gaussian test: 4e-8.
 pub(super) const DETECTED: f64 = 5.5;
+/// Statistic, in standard deviations, below which a radio head is consistent. Error probability of
+/// a single Gaussian test: 5e-4.
 pub(super) const CLEARED: f64 = 3.5;
 
 /// Time without a contradiction after which a source is fault-free again (s).
@@ -38,8 +40,9 @@ pub struct HeadTest {
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 struct Average {
     mean: f64,
-    /// Variance due to the noise of the angles; the variance of the state is common to all of them.
+    /// Part of the variance that is due to the noise of the angles.
     noise: f64,
+    /// Part of the variance that is due to the state, which all averaged angles share.
     belief: f64,
 }
 
@@ -123,12 +126,13 @@ impl SubsetFilter {
 /// All filters without one or two radio heads.
 #[derive(Debug)]
 pub(super) struct Subsets {
-    /// First the filters without one radio head, in order; then those without two; then unused ones
-    /// for reuse.
+    /// Filters: first those without one radio head, in order of the radio heads; then those without
+    /// two; then unused ones for reuse.
     filters: Vec<SubsetFilter>,
     used: usize,
-    /// Index of the last angle of each radio head, and of all of them.
+    /// Index of the last angle of each radio head.
     last: Vec<u64>,
+    /// Number of angles of all radio heads.
     angles: u64,
 }
 

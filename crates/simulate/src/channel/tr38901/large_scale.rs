@@ -6,8 +6,8 @@ use super::environment::{Environment, Kind};
 use crate::cholesky::cholesky;
 
 /// Number of large-scale parameters, in the order of step 4: shadowing, K, delay spread, azimuth
-/// spread and zenith spread of arrival. Departure angles do not matter because a radio head has one
-/// antenna.
+/// spread and zenith spread of arrival. Departure angles are not modelled, because a radio head has
+/// one antenna.
 pub const COUNT: usize = 5;
 const SHADOWING: usize = 0;
 const K: usize = 1;

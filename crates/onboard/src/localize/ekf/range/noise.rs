@@ -5,9 +5,10 @@
 //! the posterior of the variance ratio over a few levels is updated with the likelihood of each
 //! innovation (Bar-Shalom, Li and Kirubarajan 2001, 11.6.2).
 
-/// Variance ratios are powers of two, from `2^FIRST_EXPONENT`: standard deviations from half to 5.7
-/// times the specified one.
+/// Exponent of the smallest variance ratio. Ratios are powers of two, so that standard deviations
+/// are 0.5 to 5.7 times the specified one.
 const FIRST_EXPONENT: i32 = -2;
+/// Number of variance ratios.
 const LEVELS: usize = 8;
 
 /// Logarithm of the prior probability of a ratio relative to that of the next one closer to 1.
