@@ -115,13 +115,13 @@ def attack(
 def main() -> None:
     """Runs the campaign; exit code 1 if there are findings."""
     options = argparse.ArgumentParser(prog="python -m attack", description=__doc__)
-    options.add_argument("--seed", type=int, help="repeat an attack; else a new one each time")
-    options.add_argument("--inputs", type=int, default=20_000, help="cases other than drives")
-    options.add_argument("--drives", type=int, default=2_000, help="random drives")
+    options.add_argument("--seed", type=int, help="seed of the attack [default: a new one]")
+    options.add_argument("--inputs", type=int, default=20_000, help="number of random inputs")
+    options.add_argument("--drives", type=int, default=2_000, help="number of random drives")
     options.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    options.add_argument("--only", metavar="KIND-NUMBER", help="make and run one case of the seed")
+    options.add_argument("--only", metavar="KIND-NUMBER", help="run only this case of the seed")
     options.add_argument(
-        "--keep", type=Path, help="where failing cases go; else results/attack-SEED"
+        "--keep", type=Path, help="folder for failing cases [default: results/attack-SEED]"
     )
     chosen = options.parse_args()
     seed = secrets.randbits(32) if chosen.seed is None else chosen.seed

@@ -143,12 +143,22 @@ def main(arguments: list[str]) -> int:
     options = argparse.ArgumentParser(prog="python -m attack node", description=__doc__)
     options.add_argument("--seed", type=int, default=1, help="seed of the runs [1]")
     options.add_argument("--repetitions", type=int, default=10, help="runs of each fault [10]")
-    options.add_argument("--at-once", type=int, default=4, help="nodes at once [4]")
-    options.add_argument("--first", action="store_true", help="run before others (needs root)")
-    options.add_argument("--only", metavar="TEXT", help="faults whose name contains this")
-    options.add_argument("--out", type=Path, help="JSON file of all verdicts")
-    options.add_argument("--markdown", type=Path, help="file of the table for the documentation")
-    options.add_argument("--keep", type=Path, help="folder that keeps the files of each run")
+    options.add_argument(
+        "--at-once", type=int, default=4, help="number of nodes that run at once [4]"
+    )
+    options.add_argument(
+        "--first",
+        action="store_true",
+        help="real-time priority for node and transmitter (needs root)",
+    )
+    options.add_argument("--only", metavar="TEXT", help="run only faults whose name contains TEXT")
+    options.add_argument("--out", type=Path, help="JSON file to write with all verdicts")
+    options.add_argument(
+        "--markdown", type=Path, help="Markdown file to write with the table of the documentation"
+    )
+    options.add_argument(
+        "--keep", type=Path, help="folder for the files of each run [default: they are removed]"
+    )
     chosen = options.parse_args(arguments)
     faults = [it for it in FAULTS if chosen.only is None or chosen.only in it.name]
     if not faults:

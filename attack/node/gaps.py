@@ -78,7 +78,9 @@ def run(condition: Condition, folder: Path, recorded: Path) -> tuple[list[float 
 def main(arguments: list[str]) -> int:
     """Exit code 1 if an SSB is received late."""
     options = argparse.ArgumentParser(prog="python -m attack node gaps", description=__doc__)
-    options.add_argument("--without-load", action="store_true", help="leave the computer idle")
+    options.add_argument(
+        "--without-load", action="store_true", help="start no processes that load the computer"
+    )
     chosen = options.parse_args(arguments)
     context = multiprocessing.get_context("spawn")
     stopped = context.Event()

@@ -177,7 +177,7 @@ def test_costs_and_carbon_equal_the_sums_of_their_items(said: dict[str, Any], pa
     assert uwb["capital"]["central"] == pytest.approx((anchors * 400.0 + 6 * 100.0) * eur)
     kwh = (anchors * 2.0 + 6 * 0.2) * hours / 1000.0
     assert uwb["yearly"]["central"] == pytest.approx(kwh * 0.15 * eur)
-    ours = ways["5G receivers, computers are there anyway"]
+    ours = ways["5G receivers, with existing computers"]
     kwh = said["day"]["trips_wh"]["central"] / 1000.0 * 250.0
     assert ours["yearly"]["central"] == pytest.approx(kwh * 0.15 * eur)
     assert ours["capital"]["central"] == pytest.approx(6 * 30.71 * eur)

@@ -38,7 +38,9 @@ def scan(
     ssb_freq_hz: Annotated[
         float | None,
         Option(
-            min=0.0, help="Centre frequency of the SSB, in Hz.", show_default="all of the raster"
+            min=0.0,
+            help="Centre frequency of the SSB, in Hz.",
+            show_default="all points of the synchronization raster",
         ),
     ] = None,
     scs_khz: Annotated[

@@ -60,7 +60,7 @@ def run(
             chosen, runs=runs, seed=seed, threads=threads, keep_trajectories=True, progress=tick
         )
     if result.trajectories is None or result.aoa_estimates is None:  # keep_trajectories is set
-        raise RuntimeError("the simulation kept no trajectories")
+        raise RuntimeError("the simulation stored no trajectories")
     directory.write_table("trajectories.parquet", result.trajectories)
     directory.write_table("aoa_estimates.parquet", result.aoa_estimates)
     first = result.trajectories.filter(run=0)

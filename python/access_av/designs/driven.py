@@ -235,7 +235,7 @@ def simulated(
         **{role: load(role, text) for role, text in plug_ins},
     )
     if found.errors_m is None:  # errors_every is set
-        raise RuntimeError("the simulation kept no errors")
+        raise RuntimeError("the simulation stored no error samples")
     error_m = np.hypot(found.errors_m[..., 0], found.errors_m[..., 1])
     columns = ["aoa_estimates", "bursts_received", "rms_error_m", "max_error_m"]
     columns += ["energy_j"] if "estimator" in dict(plug_ins) else []

@@ -69,8 +69,7 @@ class Rail:
             return volt * ampere, self.bus_v * abs(ampere) + self.current_a * abs(volt)
         if self.power is None:
             raise SensorError(
-                f"{self.label} of {self.chip}: the sensor has the sensor has "
-                f"neither power nor voltage and current"
+                f"{self.label} of {self.chip}: the sensor has neither power nor voltage and current"
             )
         rounded_w = self.power_unit_w + self.current_a * USUAL_RAIL_V
         return _number(self.power) * self.power_unit_w, rounded_w

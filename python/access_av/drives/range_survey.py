@@ -173,7 +173,7 @@ def survey_offsets(
     for row, folder in enumerate(folders):
         log = log_of(folder)
         if log is None:
-            raise InputError(f"{folder}: no range log is here; add one of {', '.join(LOGS)}")
+            raise InputError(f"{folder}: no range log; add one of {', '.join(LOGS)}")
         columns, one_way, sample_m, said = _core.read_ranges(site, log)
         remarks += [f"{log}: {it}" for it in said]
         index = places_of(columns, heads)
@@ -182,8 +182,8 @@ def survey_offsets(
         known = (index >= 0) & np.isfinite(antenna_m[:, 0])
         if not known.any():
             raise InputError(
-                f"{log}: no range is to a radio head of {site.name} at a time of truth.tum; a "
-                "truth of one line is that of a stationary receiver"
+                f"{log}: no range belongs to a radio head of {site.name} and to the time span of "
+                "truth.tum; write one line into truth.tum for a stationary receiver"
             )
         index, time_s, antenna_m = index[known], time_s[known], antenna_m[known]
         distance_m = np.linalg.norm(antenna_m - positions_m[index], axis=1)
@@ -192,7 +192,10 @@ def survey_offsets(
         found[row] = median_ranges(excess_m, index, epoch, len(heads), sample_m)
         ranges += np.bincount(index, minlength=len(heads))
     if one_way and np.isfinite(found).any(axis=0).sum() < 2:
-        raise InputError("one-way delays of one radio head contain its offset and the clock")
+        raise InputError(
+            "one-way delays of one radio head do not separate its offset from the vehicle clock; add "
+            "delays of a second radio head"
+        )
     mean_m, std_m = _over_positions(found, ranging.offset_std_m, common=one_way)
     changed: dict[str, Any] = {}
     for at in np.flatnonzero(np.isfinite(mean_m)).tolist():

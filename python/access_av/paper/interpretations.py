@@ -136,21 +136,20 @@ def check_trip(scenario: Scenario) -> None:
         what
         for what, place in (
             ("its road", ("site", "road")),
-            ("its radio heads' places", ("site", "radio_heads")),
+            ("the positions of its radio heads", ("site", "radio_heads")),
             ("its motion", ("motion",)),
             ("its top speed", ("vehicle", "top_speed_kmh")),
             ("its localizer", ("vehicle", "localizer", "kind")),
-            ("its receiver, which knows pilots,", ("vehicle", "receiver", "pilots")),
+            ("its receiver, which uses pilots,", ("vehicle", "receiver", "pilots")),
         )
         if _at(paper, place) != _at(other, place)
     ]
     if differs:
         raise InputError(
-            f"scenario {scenario.name}: {differs[0]} is not the paper's, whose claims `access-av "
-            "evaluate` judges on the paper's trip; for errors, angle estimates and energy of this "
-            "one: "
-            f"access-av run {scenario.name}; for what any localizer could reach: access-av design "
-            f"bound {scenario.name}"
+            f"scenario {scenario.name}: {differs[0]} must equal the paper's, because `access-av "
+            "paper evaluate` judges claims about the paper's trip; for errors, angle estimates and "
+            f"energy of this scenario: access-av run {scenario.name}; for the smallest error of any "
+            f"localizer: access-av design bound {scenario.name}"
         )
 
 

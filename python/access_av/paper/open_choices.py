@@ -55,7 +55,7 @@ OPEN_WORLD = (
 # permits.
 SHIPPED_WORLD = (0.5, 0.875, 0.25, 0.0, 0.75, 1.0 / 3.0)
 CONTROLLER = (
-    Dimension("link_error_db", "link budget off by / dB", -6.0, 6.0),
+    Dimension("link_error_db", "error of the link budget / dB", -6.0, 6.0),
     Dimension("set_point", "set point", choices=("expected", "absolute")),
     Dimension("offset_db", "set point / dB", -3.0, 12.0),
     Dimension("scale_db", "SNR scale / dB", 2.0, 20.0, is_log=True),

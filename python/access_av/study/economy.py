@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from access_av.study.points import Point
 
 OURS, WITH_COMPUTER, LIDAR, ROADSIDE, UWB = (
-    "5G receivers, computers are there anyway",
+    "5G receivers, with existing computers",
     "5G receivers, each with a computer",
     "LiDARs, each with a computer",
     "roadside units",

@@ -257,7 +257,7 @@ def drive(
         **(plug_ins or {}),
     )
     if found.errors_m is None or found.levels_m is None:  # errors_every is set
-        raise RuntimeError("the simulation kept no errors")
+        raise RuntimeError("the simulation stored no error samples")
     errors_m = np.hypot(found.errors_m[:, :, 0], found.errors_m[:, :, 1]).astype(np.float64)
     errors_m[np.isnan(errors_m)] = np.inf
     time_s = found.steps["time_s"].to_numpy()

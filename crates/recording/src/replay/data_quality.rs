@@ -84,8 +84,8 @@ pub fn warnings(
     let beyond = angles.iter().filter(turns).count();
     if 10 * beyond > angles.len() {
         let text = format!(
-            "{beyond} of {} angles are of more than a whole turn; check whether phase_rad or \
-             angle_rad, and their deviation, are in degrees",
+            "{beyond} of {} angles exceed a full turn; check whether phase_rad or angle_rad, and their \
+             standard deviations, are in degrees",
             angles.len()
         );
         warnings.push((start_s, text));
@@ -103,8 +103,9 @@ pub fn warnings(
     let contradicting = both.clone().filter(contradicts).count();
     if 10 * contradicting > both.count() {
         let text = format!(
-            "{contradicting} of {} angles have a phase_rad that is not 2π d/λ cos angle_rad (in a row; \
-             else angle_rad itself); phase_rad is used; check which is which, and the array's settings",
+            "phase_rad and angle_rad contradict each other for {contradicting} of {} angles (antennas in a \
+             row: phase_rad = 2π d/λ cos angle_rad; otherwise: phase_rad = angle_rad); phase_rad is \
+             used; check whether the columns are exchanged, and the array's settings",
             angles.len()
         );
         warnings.push((start_s, text));
@@ -151,7 +152,9 @@ fn without_array<'a>(
         let count = angles.iter().filter(is_of_it).count();
         (count > 0).then(|| {
             format!(
-                "{count} angles of pci {}, ssb_index {} were measured at the radio head (at_head is 1), but                  the site does not define the direction of its array; they are not used; add                  radio_heads[{number}].array.azimuth_rad to the site",
+                "{count} angles of pci {}, ssb_index {} were measured at the radio head (at_head is 1), but \
+                 the site does not define the direction of its array; they are not used; add \
+                 radio_heads[{number}].array.azimuth_rad to the site",
                 head.pci, head.ssb_index
             )
         })

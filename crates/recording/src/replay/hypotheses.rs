@@ -338,12 +338,12 @@ pub fn of_drive() -> Vec<Hypothesis> {
         ),
         (
             "distances and speeds are twice the true ones",
-            "odometer.scale; the wheels' diameter against their radius",
+            "odometer.scale, and whether the diameter of the wheels was used as their radius",
             Correction::Odometry(|it| scale(it, 0.5)),
         ),
         (
             "distances and speeds are half of the true ones",
-            "odometer.scale; the wheels' radius against their diameter",
+            "odometer.scale, and whether the radius of the wheels was used as their diameter",
             Correction::Odometry(|it| scale(it, 2.0)),
         ),
         (

@@ -91,7 +91,7 @@ impl RecordingWriter {
             return Err(RecordingError::Write {
                 file: self.data_file.display().to_string(),
                 message: format!(
-                    "channels of lengths {:?} given; it takes {} of one length",
+                    "the channels have the lengths {:?}; the recording needs {} channels of equal length",
                     channels
                         .iter()
                         .map(|samples| samples.len())

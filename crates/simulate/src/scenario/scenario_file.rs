@@ -265,7 +265,7 @@ impl Scenario {
             [15.0, 30.0].contains(&self.site.ssb.subcarrier_spacing_khz),
             "site.ssb.subcarrier_spacing_khz",
             self.site.ssb.subcarrier_spacing_khz,
-            "samples can be synthesised at 15 and 30",
+            "samples can be synthesised at 15 and 30 kHz",
         )?;
         let count = if self.site.carrier_mhz <= 3000.0 {
             4

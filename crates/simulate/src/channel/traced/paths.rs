@@ -176,13 +176,13 @@ impl Paths {
             let length_m = delays_s[row] * SPEED_OF_LIGHT_MPS;
             if length_m < straight_m - SLACK_M {
                 return PathsError::that(format!(
-                    "`delay_s` in row {row}: a path of {length_m:.2} m, where `head_m` and `place_m` \
-                     lie {straight_m:.2} m apart: not in one frame"
+                    "`delay_s` in row {row}: the path of {length_m:.2} m is shorter than the distance of \
+                     {straight_m:.2} m between `head_m` and `place_m`: they are not in one frame"
                 ));
             }
             if length_m > LONGEST_M {
                 return PathsError::that(format!(
-                    "`delay_s` is {} in row {row}: a path of {:.0} km; it is in seconds",
+                    "`delay_s` is {} in row {row}, a path of {:.0} km; it must be in seconds",
                     delays_s[row],
                     1e-3 * length_m
                 ));
