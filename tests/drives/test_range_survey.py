@@ -160,7 +160,7 @@ def test_unusable_logs_are_rejected(measured: Path, tmp_path: Path) -> None:
         survey_offsets(site, vehicle, [tmp_path])
     shutil.copy(log, tmp_path / "ranges.log")
     (tmp_path / "truth.tum").write_text("1000 0 0 0 0 0 0 1\n1001 5 0 0 0 0 0 1\n")
-    with pytest.raises(InputError, match="no range is to a radio head"):
+    with pytest.raises(InputError, match="no range belongs to a radio head"):
         survey_offsets(site, vehicle, [tmp_path])
 
 

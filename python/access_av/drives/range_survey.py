@@ -193,8 +193,8 @@ def survey_offsets(
         ranges += np.bincount(index, minlength=len(heads))
     if one_way and np.isfinite(found).any(axis=0).sum() < 2:
         raise InputError(
-            "one-way delays of one radio head do not separate its offset from the vehicle clock; add "
-            "delays of a second radio head"
+            "one-way delays of one radio head do not separate its offset from the vehicle clock; "
+            "add delays of a second radio head"
         )
     mean_m, std_m = _over_positions(found, ranging.offset_std_m, common=one_way)
     changed: dict[str, Any] = {}

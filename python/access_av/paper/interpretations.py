@@ -147,8 +147,8 @@ def check_trip(scenario: Scenario) -> None:
     if differs:
         raise InputError(
             f"scenario {scenario.name}: {differs[0]} must equal the paper's, because `access-av "
-            "paper evaluate` judges claims about the paper's trip; for errors, angle estimates and "
-            f"energy of this scenario: access-av run {scenario.name}; for the smallest error of any "
+            "paper evaluate` judges claims about this trip; for errors, estimates and energy "
+            f"of this scenario: access-av run {scenario.name}; for the smallest error of any "
             f"localizer: access-av design bound {scenario.name}"
         )
 
