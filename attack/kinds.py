@@ -33,7 +33,7 @@ KINDS: dict[str, tuple[Callable[[Random, Case], list[str]], int]] = {
 
 
 def inputs(seed: int, count: int) -> list[tuple[str, int]]:
-    """Returns kinds and numbers of the given number of inputs, in random order."""
+    """Returns kind and case number of each input, in random order."""
     random = Random(seed)
     weights = [weight for _, weight in KINDS.values()]
     return [(kind, n) for n, kind in enumerate(random.choices(list(KINDS), weights, k=count))]

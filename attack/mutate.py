@@ -37,7 +37,7 @@ def number(random: Random, old: float = 1.0) -> float:
 
 
 def value(random: Random, old: Any) -> Any:
-    """Returns another value, usually of the same type."""
+    """Returns a random replacement of a value, usually of the same type."""
     if random.random() < 0.1:
         return random.choice((True, 3, 2.5, "word", [], {}, [1, "a"], {"a": 1}, [[[]]]))
     if isinstance(old, bool):

@@ -37,7 +37,7 @@ start = { position_std_m = 0.05, heading_std_rad = 0.05 }
 
 @dataclass
 class Robot:
-    """Content of the files of a drive; a test may change it before it locates the drive."""
+    """Contents of the files of a drive; tests change them before they locate the drive."""
 
     odometry: pl.DataFrame
     angles: pl.DataFrame

@@ -124,7 +124,7 @@ def one(kind: str, **values: object) -> Change:
 
 
 def raw(content: bytes, period_s: float) -> Change:
-    """Adds the same bytes periodically."""
+    """Inserts the given bytes into the message stream periodically."""
 
     def apply(messages: list[Message], context: Context) -> list[Message]:
         begin_s, end_s = context.window

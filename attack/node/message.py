@@ -25,7 +25,7 @@ class Message(NamedTuple):
         return Message(self.send_s, {**self.content, **values})
 
     def in_milliseconds(self) -> Message:
-        """Copy whose time stamp is written in milliseconds."""
+        """Returns a copy with the time stamp in milliseconds."""
         return self._replace(time_scale=1e3)
 
     def encode(self, epoch_s: float) -> bytes:

@@ -89,7 +89,7 @@ class Node:
         return self.process.pid
 
     def disk_path(self) -> Path:
-        """The disk as the node sees it."""
+        """Path of the small disk in the mount namespace of the node."""
         return Path(f"/proc/{self.pid}/root{self.disk}")
 
     def kill(self) -> None:
@@ -104,7 +104,7 @@ class Node:
             os.kill(self.pid, number)
 
     def watch(self) -> None:
-        """Notes an exit that no fault has caused, once."""
+        """Records once that the process has exited although no fault requires it."""
         if self.process is not None and self.process.poll() is not None:
             self.unexpected_exits.append(self.process.returncode)
             self.process = None
@@ -173,7 +173,7 @@ class Client:
 
 
 def main_program() -> list[str]:
-    """The program, or an error that says how to build it."""
+    """Returns the path of the program; an error names the build command if it is missing."""
     if not PROGRAM.exists():
         sys.exit(f"error: no {PROGRAM}: `cargo build -p access-av-node` makes it")
     return [str(PROGRAM)]

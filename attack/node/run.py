@@ -201,7 +201,7 @@ rate_hz = {1.0 / MQTT_PERIOD_S}
         time.sleep(max(0.0, epoch_s + self.duration_s - time.time()))
 
     def look(self) -> None:
-        """Notes whether the process and the sink under test still work."""
+        """Records whether the process and the sink under test still work."""
         if not self.fault.stops_node:
             self.node.watch()
             if self.node.process is None:

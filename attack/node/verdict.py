@@ -66,7 +66,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class PosePoint:
-    """A pose as a consumer sees it."""
+    """A pose as a client of the node receives it."""
 
     at_s: float
     state: str

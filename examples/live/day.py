@@ -47,7 +47,7 @@ def messages_of(folder: Path) -> list[dict[str, Any]]:
 
 
 class Text(NamedTuple):
-    """Text of a drive, its number of messages, and how many of them must be rejected."""
+    """Text of a drive, its number of messages, and the number that must be rejected."""
 
     text: str
     messages: int

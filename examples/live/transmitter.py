@@ -231,7 +231,7 @@ class RawTransmitter:
         return f"tcp://{host}:{port}"
 
     def _parts(self) -> list[tuple[float, bytes | memoryview]]:
-        """Yields the whole stream: the end time of each part, and its bytes."""
+        """Yields the stream in parts: end time and bytes of each part."""
         noise = memoryview(self._integers(self.drive.noise[:, : 1 << 16]))
         sample_bytes = 4 * self.drive.antennas * self.times
         parts: list[tuple[float, bytes | memoryview]] = []

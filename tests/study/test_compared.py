@@ -1,4 +1,4 @@
-"""Comparison of variants, and the verdicts of it."""
+"""Comparison of variants, and the verdicts on the differences."""
 
 from __future__ import annotations
 

@@ -128,7 +128,7 @@ class Page:
             return str(answer.read().decode())
 
     def until(self, path: str, wanted: Callable[[Any], bool]) -> Any:
-        """Reads JSON until it is as wanted."""
+        """Reads JSON messages until one fulfils the condition."""
         end_s, content = time.monotonic() + LONGEST_S, None
         while time.monotonic() < end_s:
             try:

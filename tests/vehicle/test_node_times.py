@@ -100,7 +100,7 @@ class Run:
         until_s: float,
         change: Callable[[Message], Iterator[Message]] = lambda it: iter([it]),
     ) -> None:
-        """Sends the drive up to a time as it was driven."""
+        """Sends the drive in real time up to the given time."""
         if self.began_s == 0.0:
             self.began_s = time.monotonic() - self.messages[0][0]
         while self.messages and self.messages[0][0] <= until_s:

@@ -60,7 +60,7 @@ class Design:
 
     @property
     def driven(self) -> str:
-        """Returns the scenario without its platform, which determines the runs.
+        """Returns the scenario without its platform; designs with equal scenarios have equal runs.
 
         A plug-in estimator has its own energy, which depends on the platform.
         """

@@ -137,7 +137,7 @@ class Query:
         return found
 
     def instead(self, name: str, factor: float) -> str:
-        """Returns a limit multiplied by a factor, and the present limit, as text.
+        """Returns a relaxed limit (the limit multiplied by a factor) and the present limit as text.
 
         Examples
         --------

@@ -168,7 +168,7 @@ def tune(
 
 @dataclass(frozen=True)
 class _Goal:
-    """Order of designs: violation of the limits, then objective."""
+    """Sort key of a design: violation of the limits, then objective."""
 
     limits: Query
 

@@ -104,7 +104,7 @@ class Counters:
 
     @property
     def period_s(self) -> float | None:
-        """Returns the time between two values, if it is known."""
+        """Returns the time between two sensor values in seconds; ``None`` if it is unknown."""
         if self.zones:
             return RAPL_PERIOD_S
         known = [rail.period_s for rail in self.rails if rail.period_s is not None]
@@ -130,7 +130,7 @@ def find(sysfs: Path) -> Counters | None:
 
 
 def _choose(rails: list[Rail]) -> Counters | None:
-    """Returns the rail that includes the others, otherwise all rails."""
+    """Returns the rail that includes all other rails; without such a rail, all rails."""
     total = [rail for rail in rails if rail.label in TOTALS]
     chosen = tuple(total[:1] or rails)
     if not chosen:
@@ -213,7 +213,7 @@ def _places(sysfs: Path, *patterns: str) -> list[Path]:
 
 
 def _rapl(sysfs: Path) -> Counters | None:
-    """Returns the top zones of RAPL: the platform if available, otherwise the packages."""
+    """Returns the top zones of RAPL: the platform zone if it exists, otherwise the packages."""
     zones = []
     for zone in sorted(sysfs.glob("class/powercap/intel-rapl:*")):
         most = _text(zone / "max_energy_range_uj")

@@ -1,4 +1,4 @@
-"""Power modes of the computer: of nvpmodel, of cpufreq, otherwise the present one."""
+"""Power modes of the computer by nvpmodel or cpufreq; without both, the present mode."""
 
 from __future__ import annotations
 

@@ -263,7 +263,7 @@ class _Model:
         self.steps = np.where(np.arange(len(keys)) < 2 * len(heads), STEP_M, STEP_RAD)
 
     def nominal(self, values: Numbers, stds: Numbers) -> tuple[_core.Site, _core.Vehicle]:
-        """Returns site and vehicle with these parameters and standard deviations."""
+        """Returns copies of site and vehicle with the given parameters and standard deviations."""
         count = len(self.heads)
         places, place_stds = values[: 2 * count].reshape(-1, 2), stds[: 2 * count].reshape(-1, 2)
         changed: dict[str, Any] = {}

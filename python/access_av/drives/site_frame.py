@@ -45,7 +45,7 @@ def displacement_probability(
     written_stds: Numbers,
     nis: float = 1.0,
 ) -> float:
-    """Returns the probability that the written positions have an offset beyond their deviations.
+    """Returns the probability that the surveyed positions have a common offset beyond their σ.
 
     Parameters
     ----------

@@ -124,7 +124,7 @@ def explanation(poses: pl.DataFrame, errors: pl.DataFrame) -> str | None:
 
 
 def _extent_m(of: pl.DataFrame) -> float:
-    """Returns the extent of positions without single wrong ones."""
+    """Returns the extent of the positions in metres, without single outliers."""
     places = of.select("x_m", "y_m").to_numpy()
     low, high = np.percentile(places, OF_EXTENT, axis=0)
     return math.hypot(*(high - low))

@@ -30,7 +30,7 @@ ITEM = ("units", "price", "yearly", "power_w", "embodied_kg")
 
 @dataclass(frozen=True)
 class Way:
-    """One way to localize the fleet.
+    """One localization technology for the fleet, for example LiDARs.
 
     Attributes
     ----------

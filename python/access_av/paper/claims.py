@@ -231,12 +231,12 @@ def _judge(
 
 
 def _tolerance(entry: Mapping[str, Any]) -> float | None:
-    """Returns the maximum allowed deviation of the rule ``about``."""
+    """Returns the maximum relative deviation that the rule ``about`` allows."""
     return float(entry.get("tolerance", 0.0)) if entry["rule"] == "about" else None
 
 
 def _deviation(entry: Mapping[str, Any], value: Any) -> float | None:
-    """Returns the maximum relative deviation of the rule ``about``."""
+    """Returns the relative deviation of an obtained from a stated value (rule ``about``)."""
     if entry["rule"] != "about":
         return None
     exact = margin({**entry, "tolerance": 0.0}, value)

@@ -30,7 +30,7 @@ EXTENTS = ("low", "value", "high")
 
 @dataclass(frozen=True)
 class Point:
-    """One localization method in one power mode, with equal runs.
+    """Result of one localization method in one power mode.
 
     Attributes
     ----------

@@ -28,7 +28,7 @@ TAPED = tuple(method.replace("_", "-") for method in METHODS)
 
 @dataclass(frozen=True)
 class Driven:
-    """Results of a setting: runs, statistics at each SSB, and some horizontal errors."""
+    """Results of a setting: runs, statistics at each SSB, and a sample of horizontal errors."""
 
     drives: Drives
     steps: pl.DataFrame

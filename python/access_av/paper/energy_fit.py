@@ -164,7 +164,7 @@ def fit_energy(
 
 
 def _fit_music(modes: Mapping[int, ModeDemand], *, own: bool) -> dict[int, Numbers]:
-    """Returns MUSIC's energies; those of the prior unless each mode has its own power."""
+    """Returns the energies of MUSIC: fitted if each mode has its own power, otherwise the prior."""
     sums_j = paper_numbers()["energy_j"]
     narrow_j, wide_j = (
         float(of_claim(claim, "query")["max_energy_j"]) for claim in (NARROW_BUDGET, WIDE_BUDGET)
@@ -221,7 +221,7 @@ def _follower(demand: ModeDemand, music_j: Numbers, method: str, ratio: Numbers)
 def _common_factor(
     modes: Mapping[int, ModeDemand], music: Mapping[int, Numbers], ratio: Mapping[str, Numbers]
 ) -> Numbers:
-    """Returns the factor for a stated saving, which is linear in its inverse."""
+    """Returns the factor that gives the stated saving; the saving is linear in 1 / factor."""
     wanted: float = of_claim("e4_average_saving_percent") / 100.0
     constant = scaled = np.zeros(())
     for mode, demand in modes.items():

@@ -178,9 +178,9 @@ def resamples(runs: int, count: int, seed: int = 0) -> Numbers:
 
 
 def interval(values: Numbers) -> tuple[float, float]:
-    """Returns the 95 % interval of a number over the variants after the first.
+    """Returns the 95 % interval of a figure, from its values in the bootstrap resamples.
 
-    Without resamples both ends are the number itself.
+    Without resamples, both ends are the figure itself.
     """
     low, high = np.quantile(values[1:] if len(values) > 1 else values, (0.025, 0.975))
     return float(low), float(high)

@@ -168,7 +168,7 @@ def _task(
 
 
 def _rule(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns the part of a claim that determines its margin."""
+    """Returns the rule of a claim with its bound, from which the margin is computed."""
     return {key: entry.get(key) for key in ("rule", "stated", "tolerance", "query")}
 
 

@@ -74,7 +74,7 @@ def halves(study: Study) -> list[Half]:
 
 
 def controller(ablations: Sequence[Ablation]) -> tuple[int, int, int]:
-    """In how many power modes the controller helps, makes no difference, and harms."""
+    """Numbers of power modes in which the controller helps, makes no difference, and harms."""
     found = Counter(each.matters for each in ablations)
     return found[1], found[0], found[-1]
 
@@ -148,7 +148,7 @@ def main_figures(study: Study) -> list[MainFigure]:
 
 
 def headline(study: Study) -> str:
-    """Returns one line about the claim groups that hold together."""
+    """Returns a headline: the claim groups that hold under one interpretation."""
     found = halves(study)
     both = [half for half in found if half.accuracy and half.energy]
     if any(not half.gated and half.keeps_t_max for half in both):

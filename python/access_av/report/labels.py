@@ -58,7 +58,7 @@ class Axis:
 
     @property
     def place(self) -> tuple[str, list[float], bool]:
-        """Column, domain, and whether the scale is logarithmic."""
+        """Axis of a chart: column, domain, and whether the scale is logarithmic."""
         values = list(self.values) or [1.0 if self.log else 0.0]
         return self.column, domain(values, log=self.log), self.log
 

@@ -37,7 +37,7 @@ class Frame:
 
     @classmethod
     def about(cls, places: list[pl.DataFrame], margin_m: float, tallest_px: float) -> Frame:
-        """Returns the frame of positions (``x_m``, ``y_m``) with a margin."""
+        """Returns the frame that contains the positions (``x_m``, ``y_m``) and a margin."""
         every = pl.concat(it.select(pl.col("x_m", "y_m").cast(pl.Float64)) for it in places)
         (x_low, y_low), (x_high, y_high) = every.min().row(0), every.max().row(0)
         return cls.between(
@@ -48,7 +48,7 @@ class Frame:
     def between(
         cls, x_m: tuple[float, float], y_m: tuple[float, float], tallest_px: float
     ) -> Frame:
-        """Returns the frame with this minimum range."""
+        """Returns the frame, enlarged to the given minimum extent."""
         *domains, height_px = to_scale(x_m, y_m, tallest_px)
         across, upward = (alt.Scale(domain=it, nice=False, zero=False) for it in domains)
         return cls(across, upward, height_px)

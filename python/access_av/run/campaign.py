@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 
 
 class CampaignError(InputError):
-    """Lost workers; finished parts are kept."""
+    """Workers of a campaign have ended; finished parts are kept."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """One part of a campaign.
+    """One independent computation of a campaign, whose results are one file.
 
     Attributes
     ----------

@@ -137,7 +137,7 @@ limit of 1 m, 8 % contradictions between radio heads, array and odometer.
 
 
 def _percent(share: float) -> str:
-    """Returns a share in percent, without rounding to 0 or 100 %.
+    """Returns a share in percent; a share between 0 and 1 is not rounded to 0 or 100 %.
 
     Examples
     --------

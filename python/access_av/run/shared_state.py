@@ -20,7 +20,7 @@ COUNTERS = (itertools.count, itertools.cycle, itertools.repeat)
 
 
 class SharedState:
-    """Values of plug-ins that all runs share, for a warning if the runs change them.
+    """Values that a plug-in shares between runs; a warning is issued if runs change them.
 
     Results of a plug-in that reads such a value depend on the number of threads. The code of a
     function does not show every way to change one: attributes of a class or a function, random

@@ -105,7 +105,7 @@ class ObtainedRisk:
 
     @classmethod
     def of(cls, trajectories: pl.DataFrame, correlation_s: float) -> ObtainedRisk | None:
-        """Evaluates a table of trajectories; ``None`` if it is too short for a tail.
+        """Evaluates a table of trajectories; ``None`` if it has too few exceedances for a tail.
 
         One value is the maximum squared ratio of error and level in state ``ok`` within
         ``correlation_s`` seconds. A longer error therefore counts more than once.

@@ -98,7 +98,7 @@ def study_plant(
     known: dict[tuple[str, int], Driven] = {}
 
     def plan(left: int) -> None:
-        """Sets the number of remaining runs of the present part of the study."""
+        """Sets the number of remaining runs of the current part of the study, for the progress."""
         nonlocal planned
         planned = done + left + after
 

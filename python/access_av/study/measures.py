@@ -62,7 +62,7 @@ class Measure:
 
     @property
     def what(self) -> str:
-        """Description of the changes."""
+        """Description of the changes of the plant, for the report."""
         return "; ".join(it.what for it in self.remedies)
 
     @property

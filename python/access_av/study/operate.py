@@ -129,7 +129,7 @@ class _Finalist:
     blocks: list[Driven]
 
     def driven_mode(self, own: int) -> int:
-        """Power mode of the runs: the vehicle's own if the group contains it."""
+        """Power mode in which the group is simulated: the vehicle's own mode if it is included."""
         modes = [it.number for it in self.modes]
         return own if own in modes else modes[0]
 
@@ -192,7 +192,7 @@ def operate(
 def _recommendation(
     plant: _core.Plant, targets: Targets, screened: list[Point], finalists: list[_Finalist]
 ) -> Recommendation:
-    """Returns the recommendation of all blocks, with those of each seed."""
+    """Returns the recommendation from the drives of all seeds, and those from each seed."""
     by_seed = [
         [one for it in finalists for one in it.points(it.blocks[which::2], targets)]
         for which in range(2)

@@ -84,7 +84,7 @@ class Point:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Keys of the scenario that select this point, and their values."""
+        """Keys of the scenario that select the operating point, with their values."""
         return {**self.operation.settings, MODE_KEY: self.mode}
 
     @property

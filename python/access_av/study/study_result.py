@@ -93,7 +93,7 @@ class Study(Result):
 
     @property
     def remedies(self) -> list[Measure]:
-        """All measures; the single ones first, the most effective one at the top."""
+        """All measures: single measures first, in order of their effect."""
         return [] if self.measured is None else self.measured.every
 
     @property

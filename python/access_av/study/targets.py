@@ -1,4 +1,4 @@
-"""Targets of a plant: that of the whole trip, and those of positions and stretches."""
+"""Targets of a plant: for the whole trip, and for positions and stretches."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ class Driven(ErrorSamples):
         return replace(self, scenario=scenario)
 
     def named(self, name: str) -> Driven:
-        """Returns these runs with another name."""
+        """Returns the runs under another name of the variant."""
         return replace(self, name=name)
 
     @classmethod

@@ -73,7 +73,7 @@ class Table:
         return cls(name, entry["row"], entry["where"], tuple(entry["columns"]), null, kinds)
 
     def of(self, *kinds: str) -> tuple[str, ...]:
-        """Returns the columns of rows of these kinds.
+        """Returns the columns of the table for rows of the given kinds.
 
         Examples
         --------

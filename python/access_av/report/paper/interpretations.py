@@ -214,7 +214,7 @@ def power_modes(evaluation: Evaluation) -> str:
 
 
 def _pair(stated: float | None, used: float) -> str:
-    """Returns one value if paper and platform agree, otherwise both."""
+    """Returns the value of paper and platform as text: one if they agree, otherwise both."""
     if stated is not None and math.isclose(stated, used, rel_tol=ROUNDED):
         return f"{stated:g}"
     return f"{'–' if stated is None else f'{stated:g}'} (platform {used:g})"

@@ -1,4 +1,4 @@
-"""Breaks the standard in one place after the other; the golden vectors must notice each time.
+"""Mutation test: changes one constant of the standard at a time; the golden vectors must fail.
 
 `python mutate.py [DIRECTORY]` works on a copy of the workspace in DIRECTORY (a temporary one).
 """
