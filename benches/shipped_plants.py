@@ -25,7 +25,7 @@ Recommended = tuple[str, set[str]]
 
 
 def main() -> None:
-    """Prints a row for each plant; exit code 1 if one has no sound point."""
+    """Prints a row for each plant; exit code 1 if a plant has no valid recommendation."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("plants", nargs="*", default=access_av.Plant.names())
     parser.add_argument("--seeds", type=int, default=1, help="number of seeds, from 1")

@@ -26,7 +26,7 @@ def test_results_are_ordered_by_energy(points: pl.DataFrame) -> None:
     assert found["energy_j"].is_sorted()
 
 
-def test_every_bound_is_met(points: pl.DataFrame) -> None:
+def test_selected_points_meet_every_limit_of_the_query(points: pl.DataFrame) -> None:
     found = explore(
         points, Query(max_energy_j=260.0, max_rms_m=0.15, max_worst_m=0.2, max_aoa_estimates=350)
     )

@@ -87,7 +87,7 @@ pub enum RecordingError {
     UnequalChannels {
         /// Path of the differing file.
         file: String,
-        /// Number of its samples.
+        /// Number of samples in the file.
         samples: u64,
         /// Path of the first channel's file.
         first: String,

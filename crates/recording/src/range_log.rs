@@ -43,7 +43,7 @@ const MIN_DELAY_NS: f64 = 1e-3;
 pub struct LoggedRange {
     /// Physical cell identity of the radio head.
     pub pci: u16,
-    /// Index of its SSB.
+    /// SSB index of the radio head.
     pub ssb_index: u8,
     /// The range.
     pub measured: RangeMeasurement,

@@ -95,7 +95,7 @@ def integrity(
 
     Columns: share of the time with state ok; share of that time with an error above the protection
     level; maximum time above the alert limit without an alarm; integrity risk per hour; level
-    divided by error. ≤ is the upper end of a 95 % interval. A narrow terminal omits the last ones.
+    divided by error. ≤ is the upper end of a 95 % interval. Narrow terminals omit the last columns.
 
     Writes integrity.parquet, report.html (table and Stanford diagrams), parts/ and manifest.json.
     --sweep and --against repeat every case and write compared.parquet.

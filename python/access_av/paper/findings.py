@@ -188,7 +188,7 @@ def _aoa_estimates(outcome: Outcome, modes: tuple[int, ...]) -> Finding:
         driven.append(f"{label(method)} {least:.0f}")
     return Finding(
         counts,
-        note="The trip's duration over the base wake-up time. With an SSB every 20 ms "
+        note="The trip's duration divided by the base wake-up time. With an SSB every 20 ms "
         f"and the base wake-up time as minimum interval, the runs have: {', '.join(driven)}.",
     )
 

@@ -29,7 +29,8 @@ class Drives:
     Attributes
     ----------
     aoa_estimates, worst_x_m, worst_y_m, rms_error_m
-        Arrays over variants. Worst is along the track, of the mean over runs of the absolute error.
+        Arrays over variants. The worst error is the maximum along the track of the mean absolute
+        error over the runs.
     horizontal_m
         Root sum square of the mean absolute errors in x and y, shape (variants, every fifth SSB).
     longest_gap_s

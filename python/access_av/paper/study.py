@@ -313,7 +313,7 @@ def fit_platform(
 
     See Also
     --------
-    access_av.paper.energy_fit.fit_energy : How.
+    access_av.paper.energy_fit.fit_energy : Method of the fit.
     """
     board = Platform.load(platform)
     found = evaluate(

@@ -149,7 +149,7 @@ def within(first_std_m: ArrayLike, second_std_m: ArrayLike, radius_m: float) -> 
     """Returns the probability of a Gaussian position within a circle around its mean.
 
     In polar coordinates, ``1 - (1/2π) ∫ exp(-r²/2 q(θ)) / (σ₁ σ₂ q(θ)) dθ`` with
-    ``q = cos²θ/σ₁² + sin²θ/σ₂²``; in the angle of the rounded Gaussian the weight is even.
+    ``q = cos²θ/σ₁² + sin²θ/σ₂²``. With axes divided by their σ, all angles have equal weight.
 
     Parameters
     ----------

@@ -277,7 +277,7 @@ def simulate(
         ``time_per_execution_s`` specifies the cost of an estimate; without it the runs have
         no energy.
     policy
-        Replaces the vehicle's wake-up policy: a class, or a function that makes a policy, as of
+        Replaces the vehicle's wake-up policy: a class, or a function that makes a policy, as for
         ``estimator``; a function of the situation that keeps no state may be given itself. The
         object is called with the :class:`Situation <access_av._core.Situation>` at each burst that
         is received, and returns whether to estimate the angles of its SSBs, or a list with an

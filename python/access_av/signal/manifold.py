@@ -43,13 +43,13 @@ class ManifoldFit:
     terms
         Order of the Fourier series, selected by cross-validation.
     orientations_rad
-        Rotation of the array in each group, by the group's label: azimuth in the array's frame less
-        the given one. 0 if the orientation is known.
+        Rotation of the array in each group, by the group's label: azimuth in the array's frame
+        minus the given azimuth. 0 if the orientation is known.
     residual
         Share of each snapshot's power that the manifold does not explain, ``(snapshots,)``, 0 to 1.
     azimuth_error_rad
-        Azimuth of each snapshot, estimated by a manifold that was fitted without it, less the given
-        one, in ``(-pi, pi]``.
+        Azimuth of each snapshot, estimated by a manifold that was fitted without it,
+        minus the given azimuth, in ``(-pi, pi]``.
     sigma_rad
         RMS of `azimuth_error_rad`, including outliers by reflections, because reflections are as
         frequent at other positions. To be added in quadrature to the standard deviation of an

@@ -103,14 +103,14 @@ class Map:
         Parameters
         ----------
         origin
-            Latitude and longitude of the zero; the first position where ``None``.
+            Latitude and longitude of the zero. ``None``: the first position.
         given
             Whether the origin was given by the user.
 
         Returns
         -------
         tuple or None
-            The origin; ``None`` where the file is in metres of the plant's frame.
+            The origin; ``None`` if the file is in metres of the plant's frame.
 
         Raises
         ------
@@ -333,7 +333,8 @@ def text(drawn: Drawn, origin: Origin | None) -> str:
     drawn
         Site; its road is written as points.
     origin
-        Latitude and longitude of the map's zero; metres, so named, where ``None``.
+        Latitude and longitude of the map's zero. ``None``: coordinates are written in metres, and
+        the file names this reference system.
 
     Raises
     ------

@@ -80,7 +80,7 @@ class ObtainedRisk:
 
     Examples
     --------
-    A Gaussian error that is another one every 10 s, and a level of four deviations.
+    An independent Gaussian error every 10 s, and a protection level of four standard deviations.
 
     >>> rng = np.random.default_rng(1)
     >>> count = 50 * 40

@@ -104,7 +104,7 @@ class Integrity:
     def of_runs(
         cls, counts: Mapping[str, NDArray[np.float64]], median_level_over_error: float
     ) -> Integrity:
-        """Evaluates counts: steps of each run by state, and ``beyond`` the level in state ``ok``.
+        """Evaluates numbers of steps of each run: by state, and ``beyond`` the level while ``ok``.
 
         Examples
         --------

@@ -263,8 +263,8 @@ impl Tests {
         let larger = |a: f64, b: f64| if a > b { a } else { b };
         let least = power * ROUNDING;
         let rest = larger(left.rest, least);
-        // Noise variance in one real dimension: given or estimated, from the rest of the residual,
-        // and from its coherent part.
+        // Noise variance in one real dimension by three sources: the given or estimated noise power,
+        // the rest of the residual, and the coherent part of the residual.
         let of_noise = 0.5 * noise_power / f64::from(self.model.snapshots);
         let of_rest = rest / self.rest_freedom;
         let of_coherent = left.coherent / self.coherent_freedom;

@@ -48,7 +48,7 @@ pub struct Mcap {
     settings: McapOutput,
     file: Option<Open>,
     number: u32,
-    /// Pose by odometry alone, which gives the transform `map` → `odom`.
+    /// Pose that uses only odometry; it defines the transform `map` → `odom`.
     odom: Pose,
     odom_s: Option<f64>,
     last_pose_s: f64,

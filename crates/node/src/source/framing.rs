@@ -186,8 +186,9 @@ impl Framing {
         self.up_to(|[_, until_s]| until_s)
     }
 
-    /// Returns the number of next samples up to a time of the window: all if the window is over and
-    /// the next one is not yet set, and 0 if all samples are required.
+    /// Returns the number of samples from the next one to the time `time_s` of the receive window.
+    /// All samples are counted if the window is over and the next window is not yet set. 0 if every
+    /// sample is required.
     fn up_to(&self, time_s: impl Fn([f64; 2]) -> f64) -> usize {
         let next_s = match &self.clock {
             Times::Counted(zero_s) => Some(zero_s + self.counted as f64 / self.rate_hz),

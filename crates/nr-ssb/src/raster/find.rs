@@ -11,7 +11,7 @@ use crate::standard::numerology::SubcarrierSpacing;
 pub struct RasterFind {
     /// Raster point.
     pub point: RasterPoint,
-    /// Subcarrier spacing of its SSBs.
+    /// Subcarrier spacing of the SSBs.
     pub spacing: SubcarrierSpacing,
     /// Samples of the recording per sample at the base rate, the unit of
     /// [`DetectedSsb::sample_start`].

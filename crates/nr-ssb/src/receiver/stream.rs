@@ -26,7 +26,7 @@ pub struct StreamReceiver<const A: usize> {
     start: i64,
     /// Index of the next input sample.
     next_input: u64,
-    /// End of the samples for which a search has been decided.
+    /// End of the samples that were either searched or skipped, at the base rate.
     searched: i64,
 }
 

@@ -15,7 +15,7 @@ use crate::standard::pci::Pci;
 pub struct DetectedSsb {
     /// Physical cell identity.
     pub pci: Pci,
-    /// ī_SSB of its DM-RS, which determines the low bits of the SSB index for a given `lmax`.
+    /// ī_SSB of the DM-RS, which determines the low bits of the SSB index for a given `lmax`.
     pub ibar_ssb: u8,
     /// SSB index. Without a decoded PBCH it is derived from the DM-RS for the more probable `lmax`;
     /// for Lmax 64 it contains the three low bits only.

@@ -181,7 +181,7 @@ impl<const A: usize> Tracker<A> {
         let (blocks, noise) = (&tracked.blocks, &tracked.noise_variance);
         self.frequency.follow(elapsed_s, blocks, noise);
         tracked.cfo_hz = self.cfo_hz();
-        // For a path on `N` elements in noise.
+        // Delay variance of a single path, by the SNR of all pilots and antennas together.
         let pilots: u16 = tracked.pilots.iter().sum();
         let snr = 10.0_f64.powf(0.1 * tracked.snr_db) * A as f64 * f64::from(pilots);
         let variance = 0.5 / (PHASE_SPREAD * snr.max(1.0));

@@ -43,7 +43,7 @@ pub enum LiveError {
         "angle: time_s is {by_s:.3} s ahead of the odometry; at most {MAX_ANGLE_LEAD_S} s are allowed; the clocks of angles or samples and of odometry must agree"
     )]
     AngleAhead {
-        /// Time by which it is ahead, in seconds.
+        /// Time from the odometry to the angle, in seconds.
         by_s: f64,
     },
     /// An angle that was received before.

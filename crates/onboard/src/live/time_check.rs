@@ -77,7 +77,7 @@ pub enum TimeDefect {
     Repeated {
         /// The stamp.
         time_s: f64,
-        /// Whether all values are equal, too.
+        /// Whether all values of both messages are equal.
         is_copy: bool,
     },
     /// Earlier than the stamp of the last accepted message.

@@ -142,7 +142,7 @@ pub struct Integrity {
     pub protection_level_m: f64,
     /// Protection level along the vehicle's heading (m).
     pub protection_level_along_m: f64,
-    /// Protection level across it (m).
+    /// Protection level across the vehicle's heading (m).
     pub protection_level_across_m: f64,
     /// State that follows from the protection level and the faults.
     pub state: IntegrityState,

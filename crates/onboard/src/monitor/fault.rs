@@ -147,7 +147,7 @@ pub struct ActiveFault {
     /// The fault.
     #[serde(flatten)]
     pub fault: Fault,
-    /// Time of its detection in seconds.
+    /// Time of the detection of the fault, in seconds.
     pub since_s: f64,
 }
 

@@ -27,8 +27,9 @@ struct Drive {
     live: Live,
     random: ChaCha8Rng,
     step: u32,
-    /// Error of the clocks of odometry and angles, in seconds.
+    /// Error of the odometry's clock, in seconds.
     odometry_clock_s: f64,
+    /// Error of the angles' clock, in seconds.
     angle_clock_s: f64,
     distance_offset_m: f64,
     /// Whether the error exceeded the protection level in state `ok`.

@@ -257,8 +257,9 @@ struct Sums {
 struct Fault {
     at_step: i32,
     clock_m: f64,
-    /// Change of the first radio head's delays (m) and carrier phases (cycles).
+    /// Change of the first radio head's delays (m).
     offset_m: f64,
+    /// Change of the first radio head's carrier phases (cycles).
     cycles: f64,
 }
 

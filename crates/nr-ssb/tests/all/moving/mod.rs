@@ -143,8 +143,9 @@ pub struct Moving {
     ofdm: Ofdm,
     echoes: Option<Echoes>,
     tracker: Option<Tracker<ANTENNAS>>,
-    /// Pseudorange at time zero in seconds, and its rate.
+    /// Pseudorange at time zero, in seconds.
     pseudorange_s: f64,
+    /// Rate of the pseudorange, in seconds per second.
     rate: f64,
     snr_db: f64,
     bounds: [f64; 3],

@@ -12,7 +12,7 @@ pub struct Tally {
     pub searches: u64,
     /// Searches that reported a cell, decoded or not.
     pub false_cells: u64,
-    /// Number of these with a MIB and a correct CRC.
+    /// Number of false cells with a MIB and a correct CRC.
     pub false_mibs: u64,
     pub pss_candidates: u64,
     pub pbch_tried: u64,

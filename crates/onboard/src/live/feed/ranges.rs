@@ -17,7 +17,7 @@ const MIN_DELAY_NS: f64 = 1e-4;
 pub struct RangeObservation {
     /// Physical cell identity of the radio head.
     pub pci: u16,
-    /// Index of its SSB in the burst.
+    /// SSB index of the radio head.
     pub ssb_index: u8,
     /// Time in seconds.
     pub time_s: f64,

@@ -42,7 +42,7 @@ struct HeadStatistics {
     refused: f64,
     surprise: f64,
     received: u32,
-    /// Index of its last angle among all angles.
+    /// Index of the radio head's last angle among all angles.
     last: u32,
 }
 

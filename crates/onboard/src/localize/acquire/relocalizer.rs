@@ -117,7 +117,7 @@ impl Solution {
         }
     }
 
-    /// Returns the time of its last restart (s).
+    /// Returns the time of the solution's last restart (s).
     fn begun_s(&self) -> f64 {
         (self.monitor()).map_or(f64::NEG_INFINITY, IntegrityMonitor::begun_s)
     }

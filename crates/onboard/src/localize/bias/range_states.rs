@@ -25,11 +25,11 @@ pub(in crate::localize) type RangeTerms = [(usize, f64); 4];
 /// State of one radio head.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::localize) enum HeadState {
-    /// Offset of its ranges (m).
+    /// Offset of the ranges of a radio head (m).
     Offset,
-    /// Offset of its range rates (m/s): frequency error.
+    /// Offset of the range rates of a radio head (m/s), caused by its frequency error.
     RateOffset,
-    /// Offset of its carrier phases (m): unknown number of wavelengths.
+    /// Offset of the carrier phases of a radio head (m): the unknown number of wavelengths.
     PhaseOffset,
 }
 

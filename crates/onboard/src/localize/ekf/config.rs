@@ -13,7 +13,7 @@ const MIN_LANE_RMS_M: f64 = 0.02;
 /// Maximum yaw rate of the lane keeping, in standard deviations.
 const SIGMAS_OF_SWING: f64 = 5.0;
 
-/// Wavelength along the road of its survey errors, for points every few metres (m).
+/// Wavelength of the road's survey errors along the road (m), for surveyed points every few metres.
 const SURVEY_WAVELENGTH_M: f64 = 15.0;
 
 /// Filter configuration in SI units and radians, from site and vehicle.

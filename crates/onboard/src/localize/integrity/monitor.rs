@@ -85,7 +85,7 @@ clone_in_place! {
         is_found: bool,
         /// Distance driven (m) at the last time without an unidentified fault.
         trusted_m: f64,
-        /// Time of the last restart of its filters (s).
+        /// Time of the last restart of the filters (s).
         begun_s: f64,
         /// Whether the odometer scale certainly contradicted its specification, and has not been
         /// estimated since.

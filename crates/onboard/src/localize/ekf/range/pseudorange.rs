@@ -54,7 +54,7 @@ pub(super) struct Distance {
     pub row: [f64; STATES],
     /// Variance of the prediction in addition to that of the state (m²).
     pub variance: f64,
-    /// Its part due to the curvature of the distance.
+    /// Part of the variance that is due to the curvature of the distance.
     pub curvature_variance: f64,
 }
 
