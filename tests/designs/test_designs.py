@@ -255,7 +255,7 @@ RECIPES = {
 
 
 @pytest.mark.parametrize("recipe", RECIPES)
-def test_a_recipe_gives_equal_bytes(
+def test_executors_of_the_documented_recipes_give_equal_bytes(
     tmp_path: Path, whole: dict[str, bytes], recipe: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module, text = RECIPES[recipe]

@@ -607,7 +607,7 @@ def test_claim_groups_follow_from_the_verdicts(tables: Tables) -> None:
 
 
 def test_claim_counts_of_each_fit_are_recomputed(tables: Tables) -> None:
-    """The shipped row counts the claims as they are listed."""
+    """The row of the shipped fit has the numbers of the listed claims."""
     gate = [it for it in tables.claims if it["interpretation"] == "gate"]
     counts = [
         sum(it["verdict"] == "reproduced" for it in gate),

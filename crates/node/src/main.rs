@@ -26,7 +26,7 @@ use recording::load;
 use recording::replay::{as_stated, with_phase};
 use tokio::signal::unix::{SignalKind, signal};
 
-/// Locates the vehicle: samples and odometry in, poses out by file, socket and MQTT, a page to look at.
+/// Locates the vehicle from samples and odometry. Writes poses to files, sockets and MQTT, and serves a web page.
 #[derive(Clone, Parser)]
 #[command(version, about)]
 struct Arguments {

@@ -26,7 +26,7 @@ const FIRST_RETRY: Duration = Duration::from_millis(250);
 const MAX_RETRY: Duration = Duration::from_secs(2);
 /// Maximum time for which the start of the node waits for the outputs. A slower output opens later.
 const START_PATIENCE: Duration = Duration::from_millis(500);
-/// Maximum time for an output to finish after the last record without progress.
+/// Maximum time without progress of an output that finishes after the last record.
 const END_PATIENCE: Duration = Duration::from_secs(5);
 
 /// Creates the outputs of the settings; nothing is opened.

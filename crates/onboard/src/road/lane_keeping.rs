@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn the_joint_estimate_has_the_moments_of_both() {
+    fn combined_lane_keeping_has_the_moments_of_both_processes() {
         let survey = LaneKeeping {
             rms_m: 0.02,
             wavelength_m: 20.0,

@@ -169,7 +169,7 @@ mod tests {
         for state in [MOUNTING, PHASE] {
             assert!(std(&after, state) <= std(&before, state) + 1e-9, "{state}");
         }
-        // A guessed speed teaches nothing of the odometer.
+        // A guessed speed contains no information about the odometer scale.
         assert_eq!(after.belief.mean[SCALE], before.belief.mean[SCALE]);
         assert_eq!(std(&after, SCALE), std(&before, SCALE));
         assert_eq!(after.config, before.config);
