@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from access_av.tables.toml import tomllib
 from conftest import ROOT
 
 if TYPE_CHECKING:
@@ -104,6 +105,24 @@ def hash_texts(text: str) -> list[str]:
     return blocks
 
 
+def toml_texts(text: str) -> list[str]:
+    """Comments and string values of a TOML file; comments only of a template."""
+    try:
+        values = [tomllib.loads(text)]
+    except tomllib.TOMLDecodeError:
+        return hash_texts(text)
+    texts = []
+    while values:
+        value = values.pop()
+        if isinstance(value, dict):
+            values += value.values()
+        elif isinstance(value, list):
+            values += value
+        elif isinstance(value, str) and len(re.findall(r"[A-Za-z]{2,}", value)) > 2:
+            texts.append(without_code(value))
+    return hash_texts(text) + texts
+
+
 def page_texts(text: str) -> list[str]:
     """Paragraphs of an HTML page, without tags and scripts."""
     text = re.sub(r"<(script|style).*?</\1>", "", text, flags=re.DOTALL)
@@ -136,7 +155,7 @@ READERS = {
     ".py": python_texts,
     ".pyi": python_texts,
     ".rs": rust_texts,
-    ".toml": hash_texts,
+    ".toml": toml_texts,
     ".yml": hash_texts,
     ".html": page_texts,
     "": hash_texts,

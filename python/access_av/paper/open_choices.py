@@ -37,7 +37,7 @@ WORLD = (
     Dimension("eirp_dbm", "radiated power / dBm", -23.3, -11.3),
     Dimension("rician_k_db", "Rician K / dB", 5.0, 45.0),
     Dimension("scatter", "scatter", choices=("per-antenna", "rays")),
-    Dimension("correlation_m", "shadowing lasts / m", 0.05, 20.0, is_log=True),
+    Dimension("correlation_m", "correlation of shadowing / m", 0.05, 20.0, is_log=True),
     Dimension("heading", "heading between estimates", choices=("held", "mean")),
     Dimension("snapshots", "snapshots", 10.0, 40.0),
 )
@@ -45,11 +45,11 @@ WORLD = (
 OPEN_WORLD = (
     Dimension("eirp_dbm", "radiated power / dBm", -23.3, 10.0),
     *WORLD[1:],
-    Dimension("axis", "array's axis", choices=("along", "across")),
+    Dimension("axis", "array axis", choices=("along", "across")),
     Dimension("odometer", "odometer", choices=("exact", "real")),
-    Dimension("grid_deg", "MUSIC's grid / degrees", choices=("none", "0.5", "1")),
+    Dimension("grid_deg", "MUSIC grid / degrees", choices=("none", "0.5", "1")),
     # The SSB selection also applies to fixed intervals.
-    Dimension("ssb_selection", "between two SSBs", choices=("first-after", "last-before")),
+    Dimension("ssb_selection", "SSB for a wake-up time", choices=("first-after", "last-before")),
 )
 # Environment of the shipped scenario; its shadowing has a shorter correlation than the range
 # permits.
