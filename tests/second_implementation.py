@@ -59,8 +59,8 @@ class Trip:
         steering, step = np.exp(-1j * np.outer(n, coarse)), (coarse[1] - coarse[0]) / 3.0
         omega = coarse[np.array([abs(e @ steering).argmax(axis=1) for e in self.signal])]
         while step > 2.0 * np.pi / points:
-            beside = omega[..., None] + step * np.array([-1.0, 0.0, 1.0])
-            turned = np.exp(-1j * beside[..., None] * n)
+            phases = omega[..., None] + step * np.array([-1.0, 0.0, 1.0])
+            turned = np.exp(-1j * phases[..., None] * n)
             best = abs(np.einsum("rtcn,rtn->rtc", turned, self.signal)).argmax(axis=2)
             omega, step = omega + step * (best - 1), step / 3.0
         return np.asarray(np.arccos(np.angle(np.exp(1j * omega)) / np.pi))

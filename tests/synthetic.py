@@ -131,7 +131,7 @@ def study(*, controller_gain: float = 0.0) -> Study:
         ],
         front=[(80.0, drives(0.6, 1005)), (240.0, drives(0.9, 335))],
         proposed_vs_paper=[
-            own_design.beside(shown, mode.number, drives(0.1, 30), knows_road=True)
+            own_design.compared_with_paper(shown, mode.number, drives(0.1, 30), knows_road=True)
             for mode in shown.platform.modes
         ],
         sensitivity=None,

@@ -51,10 +51,10 @@ def test_the_summary_changes_if_a_removed_fit_parameter_changes_verdicts(
     taken: str | None, evaluations: list[Evaluation]
 ) -> None:
     made = study(evaluations[:1], [name for name in FREEDOMS if name != taken])
-    [half] = summary.halves(made)
-    assert half.accuracy, "no energy is in it"
-    assert half.energy == (taken not in ("ratio", "factor"))
-    assert summary.headline(made) == (BOTH if half.energy else NONE)
+    [group] = summary.claim_groups(made)
+    assert group.accuracy, "no energy is in it"
+    assert group.energy == (taken not in ("ratio", "factor"))
+    assert summary.headline(made) == (BOTH if group.energy else NONE)
 
 
 def test_the_effect_of_a_fit_parameter_equals_an_evaluation_with_it(

@@ -20,17 +20,17 @@ if TYPE_CHECKING:
 
 
 def test_the_total_is_known_before_the_first_run(tmp_path: Path) -> None:
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
     results.run(
         ["every-ssb", "gate"],
         runs=1,
         seed=1,
         seeds=2,
         out=tmp_path / "out",
-        progress=lambda *it: told.append(it),
+        progress=lambda *it: reported.append(it),
     )
-    done = [it for it, _ in told]
-    assert {total for _, total in told} == {done[-1]}
+    done = [it for it, _ in reported]
+    assert {total for _, total in reported} == {done[-1]}
     assert done == sorted(done)
     assert done[0] < 0.01 * done[-1], "the first of more than 100 simulations"
     # The report is part of the work: it begins before the total is reached.
@@ -38,8 +38,8 @@ def test_the_total_is_known_before_the_first_run(tmp_path: Path) -> None:
 
 
 def test_a_stage_is_complete_even_if_it_fails() -> None:
-    told: list[tuple[int, int]] = []
-    work = Stages([6, 4], lambda *it: told.append(it))
+    reported: list[tuple[int, int]] = []
+    work = Stages([6, 4], lambda *it: reported.append(it))
 
     def fail() -> None:
         with work.stage() as tick:
@@ -50,7 +50,7 @@ def test_a_stage_is_complete_even_if_it_fails() -> None:
         fail()
     with work.stage() as tick:
         tick(1, 2)
-    assert told == [(2, 10), (6, 10), (8, 10), (10, 10)]
+    assert reported == [(2, 10), (6, 10), (8, 10), (10, 10)]
 
 
 def test_the_number_of_tracker_settings_is_that_of_the_simulated_ones() -> None:

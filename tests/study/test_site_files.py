@@ -298,8 +298,8 @@ def test_exported_and_imported_walls_are_equal(
     assert found == pytest.approx(np.array(corners), abs=1e-3)
     only_a_road = tmp_path / "road.geojson"
     only_a_road.write_text(json.dumps(ROAD), "utf-8")
-    beside = ("--road", only_a_road, "--walls", only_a_road)
-    done = access_av("file", "new", "site", again, *beside, "--force")
+    imported = ("--road", only_a_road, "--walls", only_a_road)
+    done = access_av("file", "new", "site", again, *imported, "--force")
     assert done.code == 2
     assert "a wall" in done.err
 

@@ -201,12 +201,12 @@ def locate(
             )
             tick(len(located), len(beliefs))
     drive = next(iter(located.values()))
-    beside = _beside(located, true, sorted(percentile or PERCENTS))
+    comparison = _compare_variants(located, true, sorted(percentile or PERCENTS))
     if drive.smoothed is not None and drive.smoothed.is_empty() and not _lost(drive):
         raise InputError(f"{vehicle}: --smooth needs localizer.kind = tracker")
     numbers = drives.summary(drive, truth)
     doubt = None if true is None else drives.truth_doubt(drive, true)
-    write_compared(beside, directory)
+    write_compared(comparison, directory)
     drive.write_mcap(directory.path / "drive.mcap")
     drive.write_tum(directory.path / "trajectory.tum")
     directory.write_table("poses.parquet", drive.poses)
@@ -217,7 +217,7 @@ def locate(
     if drive.smoothed is not None:
         directory.write_table("smoothed.parquet", drive.smoothed)
         drive.write_smoothed_tum(directory.path / "smoothed.tum")
-    page = render_located(drive, plant, carrier, numbers, true, compared_section(beside))
+    page = render_located(drive, plant, carrier, numbers, true, compared_section(comparison))
     directory.write_text("report.html", page)
     directory.write_text("site.toml", plant.to_toml())
     directory.write_text("vehicle.toml", carrier.to_toml())
@@ -235,13 +235,13 @@ def locate(
     )
     directory.link_latest()
     if as_json:
-        more = {"compared": records(beside), "directory": str(directory.path)}
+        more = {"compared": records(comparison), "directory": str(directory.path)}
         print(json_text({**result, **more}))
     else:
         _show(drive, numbers)
         if doubt is not None:
             show_warning(f"{truth}: {doubt}")
-        show_compared(beside)
+        show_compared(comparison)
         if (operation := Operation.under(carrier, drive.poses)) is not None:
             console.print(f"{operation.in_words()} {operation.what_helps()}".strip())
         say(f"Files: {directory.path}")
@@ -322,7 +322,7 @@ def _changed(belief: tuple[Site, Vehicle], keys: dict[str, Any]) -> tuple[Site, 
     return site.with_overrides(parts["site"]), vehicle.with_overrides(parts["vehicle"])
 
 
-def _beside(
+def _compare_variants(
     located: dict[str, Drive], truth: pl.DataFrame | None, percents: list[float]
 ) -> list[Compared]:
     """Compares the variants of a located drive; empty for a single variant."""

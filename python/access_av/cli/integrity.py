@@ -135,27 +135,27 @@ def integrity(
     cases = []
     for label, its in driven.items():
         cases += [replace(case, variant=label) for case in its]
-    beside = _beside(cases, sorted(percentile or PERCENTS))
-    write_compared(beside, directory)
+    comparison = _compare_variants(cases, sorted(percentile or PERCENTS))
+    write_compared(comparison, directory)
     records = [case.as_record() for case in cases]
     directory.write_table("integrity.parquet", pl.DataFrame(records))
-    page = render_integrity(cases, records, runs, seed, compared_section(beside))
+    page = render_integrity(cases, records, runs, seed, compared_section(comparison))
     directory.write_text("report.html", page)
     directory.write_manifest(scenario=scenario, runs=runs, seed=seed, warnings=chosen.warnings())
     if as_json:
         result = {
             "cases": records,
-            "compared": as_records(beside),
+            "compared": as_records(comparison),
             "directory": str(directory.path),
         }
         print(json_text(result))
         return
     _show(records)
-    show_compared(beside)
+    show_compared(comparison)
     say(f"Report: {directory.path / 'report.html'}")
 
 
-def _beside(cases: Sequence[Case], percents: list[float]) -> list[Compared]:
+def _compare_variants(cases: Sequence[Case], percents: list[float]) -> list[Compared]:
     """Compares each case with that of the first variant; empty for a single variant."""
     from access_av.study.compare import beside_first
 

@@ -329,9 +329,9 @@ def export(
         write_whole(file, geojson.text(drawn, _origin(origin)))
         say(f"Written: {file}")
     elif file.suffix.lower() == ".csv":
-        beside = file.with_name(f"{file.stem}-heads.csv")
+        heads_file = file.with_name(f"{file.stem}-heads.csv")
         write_whole(file, csv_file.road_text(drawn.road_m, decimal_comma=decimal_comma))
-        write_whole(beside, csv_file.heads_text(drawn.heads, decimal_comma=decimal_comma))
-        say(f"Written: {file}, {beside}")
+        write_whole(heads_file, csv_file.heads_text(drawn.heads, decimal_comma=decimal_comma))
+        say(f"Written: {file}, {heads_file}")
     else:
         raise InputError(f"{file}: its name must end in .geojson, .json or .csv")

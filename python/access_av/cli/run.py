@@ -69,9 +69,9 @@ def run(
         columns = ("time_s", f"{prefix}x_m", f"{prefix}y_m", f"{prefix}heading_rad")
         directory.write_text(name, tum_trajectory(*(poses[column] for column in columns)))
     asked = percentile or PERCENTS
-    beside = side_by_side(scenarios, asked, runs, seed, threads, plug_ins)
-    write_compared(beside, directory)
-    page = render_drive(chosen, result, seed, compared_section(beside))
+    comparison = side_by_side(scenarios, asked, runs, seed, threads, plug_ins)
+    write_compared(comparison, directory)
+    page = render_drive(chosen, result, seed, compared_section(comparison))
     directory.write_text("report.html", page)
     directory.write_text("scenario.toml", chosen.resolved().to_toml())
     assumed = optimistic_assumptions(chosen)
@@ -85,7 +85,7 @@ def run(
     )
     directory.link_latest()
 
-    show_compared(beside)
+    show_compared(comparison)
     title = f"{chosen.name}: {runs} run{'s' * (runs > 1)}, seed {seed}"
     show_simulation(result, title, energy_boundary(chosen))
     if assumed:

@@ -83,10 +83,10 @@ def study(
     directory.write_json("study.json", found.summary())
     asked = percentile or [50.0, found.percent]
     nominal = found.nominal
-    beside = side_by_side(scenarios, asked, nominal.runs, seed, threads, baseline=nominal)
-    write_compared(beside, directory)
+    comparison = side_by_side(scenarios, asked, nominal.runs, seed, threads, baseline=nominal)
+    write_compared(comparison, directory)
     combined = combinations(vary or ())
-    directory.write_text("report.html", render_study(found, compared_section(beside, combined)))
+    directory.write_text("report.html", render_study(found, compared_section(comparison, combined)))
     if (point := recommended_toml(found)) is not None:
         directory.write_text("recommended.toml", point)
     directory.write_text("plant.toml", chosen.to_toml())
@@ -98,7 +98,11 @@ def study(
     )
     directory.link_latest()
     if as_json:
-        result = {**found.summary(), "compared": records(beside), "directory": str(directory.path)}
+        result = {
+            **found.summary(),
+            "compared": records(comparison),
+            "directory": str(directory.path),
+        }
         print(json_text(result))
         return
     console.print(found.verdict)
@@ -129,7 +133,7 @@ def study(
         console.print(made)
     if combined and len(vary or ()) > 1:
         console.print(f"Combinations: {combined}.")
-    show_compared(beside)
+    show_compared(comparison)
     if found.point is not None:
         agreement = found.recommendation.agreement.value
         console.print(f"Recommended: {found.point.name}; two seeds: {agreement}.")

@@ -131,7 +131,7 @@ class Driver:
                 **exact,
                 rms_error_m=rms_m,
                 longest_gap_s=float(found.runs.select(pl.col("longest_gap_s").max()).item()),
-                besides_j=float(other_j.to_numpy().mean()),
+                other_energy_j=float(other_j.to_numpy().mean()),
                 track_m=np.hypot(
                     *(found.steps[f"mean_abs_error_{axis}_m"].to_numpy() for axis in "xy")
                 ),

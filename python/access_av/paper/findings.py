@@ -158,7 +158,7 @@ def energy_j(outcome: Outcome, mode: int, method: str, *, adaptive: bool = False
             f"Platform {outcome.platform} has no energy per estimate of {label(method)} in "
             f"mode {mode}."
         )
-    return np.asarray(drives.aoa_estimates * per_execution_j + drives.besides_j)
+    return np.asarray(drives.aoa_estimates * per_execution_j + drives.other_energy_j)
 
 
 def savings_percent(outcome: Outcome, mode: int) -> dict[str, Numbers]:

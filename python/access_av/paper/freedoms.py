@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from access_av.paper.claims import ARITHMETIC, BY_CONSTRUCTION, check_claims
 from access_av.paper.energy_fit import FREEDOMS, NONE, SHIPPED, numbers
-from access_av.paper.statements import half, stated_claims
+from access_av.paper.statements import claim_group, stated_claims
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -74,7 +74,7 @@ class FitOption:
 def met_halves(claims: Sequence[Claim]) -> tuple[bool, bool]:
     """Returns whether an interpretation meets the accuracy claims, and the energy claims."""
     met = {claim.id for claim in claims if claim.met}
-    return met.issuperset(half("accuracy")), met.issuperset(half("energy"))
+    return met.issuperset(claim_group("accuracy")), met.issuperset(claim_group("energy"))
 
 
 def ladder(

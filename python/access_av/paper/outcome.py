@@ -35,7 +35,7 @@ class Drives:
         Root sum square of the mean absolute errors in x and y, shape (variants, every fifth SSB).
     longest_gap_s
         Maximum time between two estimates, over all runs.
-    besides_j
+    other_energy_j
         Energy other than that of the estimates, if the platform includes it.
     worst_of_runs_m
         Maximum error of each run in x or y over every SSB; ``None`` if runs are unknown.
@@ -53,7 +53,7 @@ class Drives:
     rms_error_m: Numbers
     horizontal_m: Numbers
     longest_gap_s: float | Numbers = 0.0
-    besides_j: float = 0.0
+    other_energy_j: float = 0.0
     worst_of_runs_m: Numbers | None = None
     track_m: Numbers | None = None
     runs: pl.DataFrame | None = None

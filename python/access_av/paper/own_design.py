@@ -122,7 +122,9 @@ def compare(
             base_ms = mode.base_wake_up_ms["music"]
             scenario = _ours(evaluation.scenario, base_ms, knows_road=knows_road)
             drives = driver.drive(scenario).drives
-            found.append(beside(evaluation, mode.number, drives, knows_road=knows_road))
+            found.append(
+                compared_with_paper(evaluation, mode.number, drives, knows_road=knows_road)
+            )
             progress(len(found), 2 * len(driver.platform.modes))
     return found
 
@@ -136,7 +138,9 @@ def simulations(platform: Platform) -> int:
     )
 
 
-def beside(evaluation: Evaluation, mode: int, ours: Drives, *, knows_road: bool) -> Comparison:
+def compared_with_paper(
+    evaluation: Evaluation, mode: int, ours: Drives, *, knows_road: bool
+) -> Comparison:
     """Compares runs of the proposed method with the paper's adaptive point in a mode."""
     papers = evaluation.outcome.adaptive[mode]
     papers_j: float | None = None
@@ -144,7 +148,9 @@ def beside(evaluation: Evaluation, mode: int, ours: Drives, *, knows_road: bool)
     try:
         papers_j = float(energy_j(evaluation.outcome, mode, "music", adaptive=True)[0])
         per_execution_j = evaluation.outcome.energy_per_execution_j[mode]["music"]
-        ours_j = float(np.atleast_1d(ours.aoa_estimates[0] * per_execution_j)[0]) + papers.besides_j
+        ours_j = (
+            float(np.atleast_1d(ours.aoa_estimates[0] * per_execution_j)[0]) + papers.other_energy_j
+        )
     except MissingFigureError:
         pass
     less_m = papers.rms_error_m - ours.rms_error_m

@@ -292,9 +292,9 @@ def confirmed(
     ]
     driven = [one for [one] in again(candidates)]
     index, first = max(zip(best, driven, strict=True), key=lambda item: item[1].held)
-    [beside] = again([_neighbours(found, index)])
+    [neighbours_again] = again([_neighbours(found, index)])
     rest = [one for one in driven if one is not first]
-    return [first, *sorted(beside + rest, key=lambda each: -each.held)]
+    return [first, *sorted(neighbours_again + rest, key=lambda each: -each.held)]
 
 
 def _neighbours(found: Sample, index: int) -> dict[str, dict[str, Any]]:
@@ -306,5 +306,5 @@ def _neighbours(found: Sample, index: int) -> dict[str, dict[str, Any]]:
             step = 1.0 / len(dimension.choices) if dimension.choices else 0.1
             there[d] += step if start[d] < 0.5 else -step
             values = named(found.dimensions, there.tolist())
-            neighbours[f"beside it, {dimension.label}: {values[dimension.key]}"] = values
+            neighbours[f"next to it, {dimension.label}: {values[dimension.key]}"] = values
     return neighbours

@@ -39,12 +39,12 @@ def of_claim(claim_id: str, key: str = "stated") -> Any:
     return stated_claims()[claim_id][key]
 
 
-def half(name: str) -> tuple[str, ...]:
+def claim_group(name: str) -> tuple[str, ...]:
     """Returns the ids of a claim group: ``accuracy`` or ``energy``.
 
     Examples
     --------
-    >>> half("accuracy")
+    >>> claim_group("accuracy")
     ('a1_adaptive_worst_m', 'a2_adaptive_beats_fixed')
     """
-    return tuple(key for key, entry in stated_claims().items() if entry.get("half") == name)
+    return tuple(key for key, entry in stated_claims().items() if entry.get("claim_group") == name)

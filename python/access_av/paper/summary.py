@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Half:
+class ClaimGroups:
     """Claim groups that hold under an interpretation, with their conditions.
 
     Attributes
@@ -51,7 +51,7 @@ class Half:
     controller: tuple[int, int, int]
 
 
-def halves(study: Study) -> list[Half]:
+def claim_groups(study: Study) -> list[ClaimGroups]:
     """Returns the claim groups that hold under each interpretation."""
     found = []
     for each in study.evaluations:
@@ -60,7 +60,7 @@ def halves(study: Study) -> list[Half]:
             one for one in study.ablations if one.interpretation == each.interpretation.name
         ]
         found.append(
-            Half(
+            ClaimGroups(
                 interpretation=each.interpretation,
                 accuracy=accuracy,
                 energy=energy,
@@ -149,11 +149,11 @@ def main_figures(study: Study) -> list[MainFigure]:
 
 def headline(study: Study) -> str:
     """Returns a headline: the claim groups that hold under one interpretation."""
-    found = halves(study)
-    both = [half for half in found if half.accuracy and half.energy]
-    if any(not half.gated and half.keeps_t_max for half in both):
+    found = claim_groups(study)
+    both = [group for group in found if group.accuracy and group.energy]
+    if any(not group.gated and group.keeps_t_max for group in both):
         return "The paper's accuracy and its saving hold together under the published Algorithm 1"
-    if both and all(half.gated for half in both):
+    if both and all(group.gated for group in both):
         return "Accuracy and saving hold together only if estimates wait for a better SSB"
     if both:
         return "Accuracy and saving hold together, but t_max is not kept"
@@ -167,10 +167,10 @@ def headline(study: Study) -> str:
 
 def bought_text(study: Study) -> str:
     """Returns the further fit parameter with which both claim groups hold, if there is one."""
-    found = halves(study)
-    if not study.fit_options or any(half.accuracy and half.energy for half in found):
+    found = claim_groups(study)
+    if not study.fit_options or any(group.accuracy and group.energy for group in found):
         return ""
-    titles = {half.interpretation.name: half.interpretation.title for half in found}
+    titles = {group.interpretation.name: group.interpretation.title for group in found}
     for each in study.fit_options:
         if each.both:
             named = ", ".join(f"“{titles[name]}”" for name in each.both)
@@ -182,31 +182,31 @@ def bought_text(study: Study) -> str:
     return "Both hold with no set of parameters of the energy fit."
 
 
-def _saving_percent(study: Study, half: Half) -> float | None:
-    claims = {claim.id: claim.obtained for claim in study.of(half.interpretation.name)}
+def _saving_percent(study: Study, group: ClaimGroups) -> float | None:
+    claims = {claim.id: claim.obtained for claim in study.of(group.interpretation.name)}
     return claims.get(SAVING)
 
 
 def lead(study: Study) -> str:
     """Returns a paragraph about the claim groups that hold under each interpretation."""
-    found = halves(study)
+    found = claim_groups(study)
 
-    def titles(chosen: list[Half]) -> str:
-        named = [f"“{half.interpretation.title}”" for half in chosen]
+    def titles(chosen: list[ClaimGroups]) -> str:
+        named = [f"“{group.interpretation.title}”" for group in chosen]
         return ", ".join(named) if named else "no interpretation"
 
-    both = [half for half in found if half.accuracy and half.energy]
+    both = [group for group in found if group.accuracy and group.energy]
+    accurate = [group for group in found if group.accuracy and not group.energy]
+    saving = [group for group in found if group.energy and not group.accuracy]
     sentences = [
-        "Accuracy claims (a1, a2) without the energy claims hold under "
-        f"{titles([half for half in found if half.accuracy and not half.energy])}. Energy claims "
-        "(e3, e4) without the accuracy claims hold under "
-        f"{titles([half for half in found if half.energy and not half.accuracy])}. Both hold under "
-        f"{titles(both)}."
+        f"Accuracy claims (a1, a2) without the energy claims hold under {titles(accurate)}. "
+        f"Energy claims (e3, e4) without the accuracy claims hold under {titles(saving)}. "
+        f"Both hold under {titles(both)}."
     ]
     saved = [
-        f"“{half.interpretation.title}” saves {percent:.1f} %"
-        for half in found
-        if half.accuracy and (percent := _saving_percent(study, half)) is not None
+        f"“{group.interpretation.title}” saves {percent:.1f} %"
+        for group in found
+        if group.accuracy and (percent := _saving_percent(study, group)) is not None
     ]
     if saved and not both:
         sentences.append(
@@ -214,23 +214,23 @@ def lead(study: Study) -> str:
             f"{', '.join(saved)}. A saving within 10 % of the "
             f"stated {of_claim(SAVING)} % counts as reproduced."
         )
-    for half in both:
+    for group in both:
         t_max = (
             "t_max is kept"
-            if half.keeps_t_max
-            else f"t_max is exceeded (longest gap {half.longest_gap_s:.2f} s)"
+            if group.keeps_t_max
+            else f"t_max is exceeded (longest gap {group.longest_gap_s:.2f} s)"
         )
-        if half.gated:
+        if group.gated:
             sentences.append(
-                f"Under “{half.interpretation.title}” estimates wait for a better SSB, which "
+                f"Under “{group.interpretation.title}” estimates wait for a better SSB, which "
                 "Algorithm 1 "
                 f"does not contain; {t_max}. Compared with a constant, Algorithm 1 "
-                f"{controller_text(half.controller)}."
+                f"{controller_text(group.controller)}."
             )
         else:
             sentences.append(
-                f"Under “{half.interpretation.title}” {t_max}, and Algorithm 1 "
-                f"{controller_text(half.controller)} compared with an equal number of fixed "
+                f"Under “{group.interpretation.title}” {t_max}, and Algorithm 1 "
+                f"{controller_text(group.controller)} compared with an equal number of fixed "
                 f"wake-ups."
             )
     return " ".join(filter(None, [*sentences, bought_text(study)]))

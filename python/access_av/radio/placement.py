@@ -110,7 +110,7 @@ def plan(
         scenario = _core.Scenario.load(scenario)
     site = as_dict(scenario.site)
     heads = site["radio_heads"]
-    candidates = _beside(scenario, site) if masts is None else _candidates(masts)
+    candidates = _next_to_route(scenario, site) if masts is None else _candidates(masts)
     if not 1 <= add <= len(candidates):
         raise InputError(f"--add {add}: only {len(candidates)} candidate masts exist")
     eirp_dbm = heads[0]["eirp_dbm"] if eirp_dbm is None else eirp_dbm
@@ -181,7 +181,7 @@ def _p90_m(scenario: _core.Scenario) -> float:
     return float(along_route(scenario)["bound_m"].quantile(0.9, "linear") or math.nan)
 
 
-def _beside(scenario: _core.Scenario, site: dict[str, Any]) -> list[dict[str, Any]]:
+def _next_to_route(scenario: _core.Scenario, site: dict[str, Any]) -> list[dict[str, Any]]:
     """Returns positions around the largest bound, at the height of the site's first radio head."""
     route = along_route(scenario)
     weakest = route.row(int(route["bound_m"].arg_max() or 0), named=True)

@@ -33,7 +33,7 @@ def render_integrity(
     records: Sequence[dict[str, Any]],
     runs: int,
     seed: int,
-    beside: str = "",
+    comparison: str = "",
 ) -> str:
     """Returns the campaign as a self-contained HTML page."""
     rows = [
@@ -82,7 +82,7 @@ def render_integrity(
         sections=[
             warnings(first.warnings()),
             section("Cases", "", table(HEAD, rows, numbers=range(2, 13))),
-            beside,
+            comparison,
             section("Stanford diagrams", "", diagrams),
             section("Provenance", "", source("Scenario of the first case", first.to_toml())),
         ],

@@ -13,8 +13,7 @@ from access_av.paper import summary
 from access_av.paper.chosen import entries
 from access_av.paper.claims import NO_EVIDENCE, NOT_REPRODUCED, REPRODUCED
 from access_av.paper.margins import ROUNDED
-from access_av.paper.statements import METHODS, of_claim, paper_numbers
-from access_av.paper.statements import half as half_of
+from access_av.paper.statements import METHODS, claim_group, of_claim, paper_numbers
 from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, colours, finish
 from access_av.report.labels import Axis, labelled
 from access_av.report.parts import Html, badge, code, figure, records, small, table
@@ -35,22 +34,22 @@ PROMISED = (("accuracy", 0), ("energy", -1))
 def interpretations(study: Study) -> str:
     """Returns the section on the interpretations and the claim groups that hold under each."""
     rows = []
-    for index, half in enumerate(summary.halves(study), start=1):
-        claims = study.of(half.interpretation.name)
-        t_max = "kept" if half.keeps_t_max else "exceeded"
-        if half.interpretation.keeps_t_max and not half.keeps_t_max:
+    for index, group in enumerate(summary.claim_groups(study), start=1):
+        claims = study.of(group.interpretation.name)
+        t_max = "kept" if group.keeps_t_max else "exceeded"
+        if group.interpretation.keeps_t_max and not group.keeps_t_max:
             t_max = "claimed, and exceeded"
-        shown = half.interpretation
+        shown = group.interpretation
         rows.append(
             {
                 "Interpretation": Html(
                     f"<b>{index} {escape(shown.title)}</b>"
                     f"<small>{escape(shown.scenario.description)} · {code(shown.name)}</small>"
                 ),
-                "Accuracy claims": _met(half.accuracy),
-                "Energy claims": _met(half.energy),
-                "t_max": f"{t_max}, {half.longest_gap_s:.2f} s",
-                "Algorithm 1": summary.controller_text(half.controller),
+                "Accuracy claims": _met(group.accuracy),
+                "Energy claims": _met(group.energy),
+                "t_max": f"{t_max}, {group.longest_gap_s:.2f} s",
+                "Algorithm 1": summary.controller_text(group.controller),
                 "Claims": summary.counts_text(claims),
             }
         )
@@ -65,23 +64,23 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
     """Returns the chart of maximum error and average saving of each interpretation."""
     kinds = {"neither": GREY, "accuracy": BLUE, "energy": ORANGE, "both": GREEN}
     rows = []
-    for index, half in enumerate(summary.halves(study), start=1):
-        by_id = {it.id: it.obtained for it in study.of(half.interpretation.name)}
-        worst_m, saving = (by_id[half_of(name)[at]] for name, at in PROMISED)
+    for index, group in enumerate(summary.claim_groups(study), start=1):
+        by_id = {it.id: it.obtained for it in study.of(group.interpretation.name)}
+        worst_m, saving = (by_id[claim_group(name)[at]] for name, at in PROMISED)
         if worst_m is not None and saving is not None:
             rows.append(
                 {
                     "number": str(index),
-                    "interpretation": half.interpretation.title,
+                    "interpretation": group.interpretation.title,
                     "worst": worst_m,
                     "saving": saving,
-                    "claims": list(kinds)[half.accuracy + 2 * half.energy],
+                    "claims": list(kinds)[group.accuracy + 2 * group.energy],
                 }
             )
     if not rows:
         return ""
-    bound_m, stated = (of_claim(half_of(name)[at]) for name, at in PROMISED)
-    tolerance = of_claim(half_of("energy")[-1], "tolerance")
+    bound_m, stated = (of_claim(claim_group(name)[at]) for name, at in PROMISED)
+    tolerance = of_claim(claim_group("energy")[-1], "tolerance")
     low, high = stated * (1 - tolerance), stated * (1 + tolerance)
     table = pl.DataFrame(rows)
     least_m = min(0.1, *table["worst"])
