@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def built(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
-    """Constructed codes; the cache is in a temporary directory."""
+    """List of the chart codes generated so far; the cache is in a temporary directory."""
     codes = list[str]()
 
     def javascript_bundle() -> str:

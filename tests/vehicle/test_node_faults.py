@@ -90,7 +90,7 @@ class Driven:
         return [json.loads(line) for line in text.splitlines(keepends=True) if line.endswith("\n")]
 
     def wait_for(self, wanted: Callable[[list[dict[str, Any]]], bool], *, limit_s: float) -> float:
-        """Waits until the JSON output is as wanted; returns the time that it took."""
+        """Waits until the JSON output fulfils the condition; returns the waiting time."""
         began = time.monotonic()
         while not wanted(self.records()):
             assert time.monotonic() - began < limit_s, self.records()[-3:]

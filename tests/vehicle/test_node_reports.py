@@ -139,7 +139,7 @@ class Page:
             if wanted(content):
                 return content
             time.sleep(0.05)
-        raise AssertionError(f"{path} is not as wanted: {content}")
+        raise AssertionError(f"{path} does not fulfil the condition: {content}")
 
 
 @pytest.fixture

@@ -251,7 +251,7 @@ def driven(scenario: str, first_run: int, runs: int, seed: int) -> dict[str, NDA
         keep_trajectories=True,
     )
     if found.trajectories is None:  # keep_trajectories is set
-        raise RuntimeError("the simulation kept no trajectories")
+        raise RuntimeError("the simulation stored no trajectories")
     steps = found.trajectories.filter(pl.col("protection_level_m").is_not_null())
     state = steps["integrity"].cast(pl.Enum(STATES)).to_physical()
     return {

@@ -164,7 +164,7 @@ class Study(Result):
     def trajectory(self) -> pl.DataFrame:
         """Truth and estimate of the example run, by step."""
         if self.example_run.trajectories is None:  # keep_trajectories is set
-            raise RuntimeError("the simulation kept no trajectories")
+            raise RuntimeError("the simulation stored no trajectories")
         return self.example_run.trajectories
 
     def summary(self) -> dict[str, Any]:

@@ -2,13 +2,13 @@
 
 TS 38.211 (sequences, mapping), 38.212 (payload, CRC, polar code, rate matching), 38.213 (cases),
 38.104 (raster). Bit by bit and slow: nothing is shared with the crate, nor copied from elsewhere.
-`python make.py --check DIR` holds it to vectors of other encoders (`sequences.npz`, `pbch.npz`).
+`python make.py --check DIR` compares it with vectors of other encoders (`sequences.npz`, `pbch.npz`).
 """
 
 import sys
 
 # TS 38.212 Table 5.3.1.2-1: bit channels of N = 512 from the least reliable on, the last 56 sorted.
-# (Found here by no construction: the standard gives a table, of which these are the entries.)
+# (These entries are copied from the table of the standard. No construction rule produces them.)
 INFORMATION = """
 247 253 254 255 367 375 379 381 382 383 415 431 439 441 443 444 445 446 447 463 469 470 471 473
 474 475 476 477 478 479 483 485 486 487 489 490 491 492 493 494 495 497 498 499 500 501 502 503

@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn constants_are_retained_and_the_pose_returns() {
+    fn motion_without_odometry_retains_array_constants_and_recovers_the_pose() {
         let ([before, after, last], error_m) = drive();
         let std = |ekf: &Ekf, state: usize| ekf.belief.covariance[state][state].sqrt();
         // The angles of 20 s have determined the array, and the motion without odometry forgets none of it.
