@@ -17,8 +17,8 @@ import json
 import time
 
 import access_av
+from access_av.run.runs import drive
 from access_av.study.remedies import remedies
-from access_av.study.trips import drive
 
 STUDY_SEED, SEED = 1, 1001
 

@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 import access_av
+from access_av.run.runs import drive
 from access_av.study.targets import Targets
-from access_av.study.trips import drive
 from access_av.verdicts import Judgement
 
 if TYPE_CHECKING:
-    from access_av.study.trips import Driven
+    from access_av.run.runs import Runs
 
 # Offset of the seed of the new runs; those of a study are below 10 000.
 SEED_OFFSET = 500_000
@@ -63,7 +63,7 @@ def _compared(folder: Path, runs: int, pairs: int) -> list[bool]:
     return agreed
 
 
-def _targets(folder: Path, plant: Any, base: Driven) -> list[bool]:
+def _targets(folder: Path, plant: Any, base: Runs) -> list[bool]:
     """Whether the verdicts do not contradict each other: both of them 95 % certain."""
     stated = pl.read_parquet(folder / "targets.parquet").filter(variant="unchanged")
     certain = {Judgement.MET, Judgement.MISSED}
@@ -100,7 +100,7 @@ def _recommended(
     return [error_agrees, energy_agrees]
 
 
-def _measure(plant: Any, stated: dict[str, Any], before: Driven, percent: float, seed: int) -> bool:
+def _measure(plant: Any, stated: dict[str, Any], before: Runs, percent: float, seed: int) -> bool:
     """Whether the stated difference is in the 95 % interval of the new pairs."""
     changed = plant.scenario()
     # A further radio head replaces the list of radio heads: keys of single ones come after it.

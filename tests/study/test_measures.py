@@ -10,12 +10,12 @@ import pytest
 
 from access_av import Plant
 from access_av.economics.carbon import Range
+from access_av.run.runs import Runs, drive
 from access_av.study.economy import Prices
 from access_av.study.measures import measures
 from access_av.study.operate import operate
 from access_av.study.remedies import Remedy
 from access_av.study.targets import Targets
-from access_av.study.trips import Driven, drive
 from access_av.verdicts import Agreement, Judgement
 
 if TYPE_CHECKING:
@@ -28,11 +28,11 @@ FREE = {"site.rician_k_db": 11.0}
 
 
 @pytest.fixture(scope="module")
-def real() -> Driven:
+def real() -> Runs:
     return drive("unchanged", PLANT.scenario(), 2, 1)
 
 
-def made(real: Driven, name: str, scenario: _core.Scenario, level_m: float, seed: int) -> Driven:
+def made(real: Runs, name: str, scenario: _core.Scenario, level_m: float, seed: int) -> Runs:
     """Drives of 600 s with errors about a level: 99 % of them are within three times it."""
     random = np.random.default_rng(seed)
     errors_m = level_m * np.abs(random.standard_normal((RUNS, len(real.time_s))))
@@ -69,12 +69,12 @@ def prices(each: dict[str, float]) -> Prices:
     ],
 )
 def test_the_cheapest_set_that_meets_the_target_is_found(
-    real: Driven, ratios: dict[str, float], costs: dict[str, float], cheapest: str | None
+    real: Runs, ratios: dict[str, float], costs: dict[str, float], cheapest: str | None
 ) -> None:
     level_m = 0.33  # 99 % within 0.85 m; 0.3 m are required
     simulated = []
 
-    def simulate(name: str, scenario: _core.Scenario, runs: int, seed: int) -> Driven:
+    def simulate(name: str, scenario: _core.Scenario, runs: int, seed: int) -> Runs:
         simulated.append(name)
         assert runs == RUNS
         ratio = float(np.prod([ratios[it] for it in name.split(" + ")]))
@@ -113,11 +113,11 @@ def test_the_cheapest_set_that_meets_the_target_is_found(
     ],
 )
 def test_seeds_agree_or_the_difference_is_evaluated(
-    real: Driven, levels: dict[int, list[float]], agreement: Agreement, chosen: str | None
+    real: Runs, levels: dict[int, list[float]], agreement: Agreement, chosen: str | None
 ) -> None:
     bursts = {200: 30, 500: 12, 1000: 6}
 
-    def simulate(name: str, scenario: _core.Scenario, runs: int, seed: int) -> Driven:
+    def simulate(name: str, scenario: _core.Scenario, runs: int, seed: int) -> Runs:
         assert runs == RUNS
         interval_ms = next((it for it in levels if name.startswith(f"every {it} ms")), None)
         level_m = 0.2 if interval_ms is None else levels[interval_ms][seed // 1000]
@@ -139,7 +139,7 @@ def test_seeds_agree_or_the_difference_is_evaluated(
     assert {it.point.mode for it in found.rivals} >= set(range(8)) - {found.point.mode}
 
 
-def test_a_target_of_a_road_section_is_evaluated_there_only(real: Driven) -> None:
+def test_a_target_of_a_road_section_is_evaluated_there_only(real: Runs) -> None:
     plant = PLANT.with_overrides(
         {
             "targets": [

@@ -199,8 +199,6 @@ def drive(
     progress: Callable[[int, int], None] | None = None,
 ) -> list[dict[str, NDArray[Any]]]:
     """Simulates each design from run ``first_run``; designs with equal runs are simulated once."""
-    texts = [(design.driven, tuple(design.plug_ins.items())) for design in designs]
-    different = list(dict.fromkeys(texts))
     tasks = [
         Task(
             depends_on={
@@ -211,10 +209,10 @@ def drive(
             work=simulated,
             arguments=(text, seed, first_run, runs, *([plug_ins] if plug_ins else [])),
         )
-        for text, plug_ins in different
+        for design in designs
+        for text, plug_ins in ((design.driven, tuple(design.plug_ins.items())),)
     ]
-    parts = dict(zip(different, campaign.run(tasks, progress), strict=True))
-    return [parts[text] for text in texts]
+    return campaign.run(tasks, progress)
 
 
 def simulated(

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 RESAMPLES = 200
 # Percentiles use every 25th SSB (0.5 s), because closer errors are correlated.
 SPARSE = 25
+# Columns of the statistics at each SSB that are kept: the others of 250 settings take 50 MB.
+STEPS = ("time_s", "mean_abs_error_x_m", "mean_abs_error_y_m", "mean_true_snr_db")
 # Methods of the paper that are simulated in every environment.
 TAPED = tuple(method.replace("_", "-") for method in METHODS)
 
@@ -82,6 +84,9 @@ class Driver:
         core, threads = self.platform.core, self.threads
         serving = [it for it in self.traces if it.serve(scenario, platform=core)]
         if not serving:
+            # A trace takes 100 MB. Keep that of the first environment, which most interpretations
+            # use; release the latest one before the next one is recorded.
+            del self.traces[1:]
             made = MeasurementTraces.record(
                 scenario,
                 self.runs,
@@ -91,9 +96,7 @@ class Driver:
                 threads=threads,
             )
             serving = [it for it in [made] if it and it.serve(scenario, platform=core)]
-            # A trace takes 100 MB. Keep that of the first environment, which most interpretations
-            # use, and the latest ones.
-            self.traces = [*self.traces[:1], *serving]
+            self.traces += serving
         if not serving:
             return simulate(
                 scenario,
@@ -137,7 +140,7 @@ class Driver:
                 ),
                 runs=drives.runs.with_columns(other_j, found.runs["longest_gap_s"]),
             ),
-            found.steps,
+            found.steps.select(STEPS),
             ErrorSamples(
                 errors_m=np.hypot(*np.moveaxis(found.errors_m[:, ::SPARSE], -1, 0)),
                 duration_s=float(found.steps["time_s"][-1]),

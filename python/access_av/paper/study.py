@@ -232,6 +232,7 @@ def study(
         judgements[other] = judged(found, stated)
     claims = with_seeds(judgements) if seeds > 1 else judgements[seed]
     shown = _shown(evaluations)
+    del driver.traces[1:]
     with work.stage() as tick:
         front = ablation.front(driver, shown.interpretation)
         proposed_vs_paper = own_design.compare(driver, shown, tick)

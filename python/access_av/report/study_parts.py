@@ -11,18 +11,18 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from access_av.economics.carbon import Range
+    from access_av.run.runs import Runs
     from access_av.study.points import Point
     from access_av.study.study_result import Study
-    from access_av.study.trips import Driven
 
 
-def lost(driven: Driven) -> str:
+def lost(driven: Runs) -> str:
     """Returns the number of lost drives as text."""
     runs = driven.lost_runs
     return badge(f"LOST in {runs} of {driven.runs}", "no") if runs else f"0 of {driven.runs}"
 
 
-def reliability_rows(drives: Iterable[Driven]) -> list[dict[str, str]]:
+def reliability_rows(drives: Iterable[Runs]) -> list[dict[str, str]]:
     """Returns the reliability of each variant: lost drives, state ``ok``, reasons, errors."""
     return [
         {
@@ -39,7 +39,7 @@ def reliability_rows(drives: Iterable[Driven]) -> list[dict[str, str]]:
     ]
 
 
-def ok(driven: Driven) -> str:
+def ok(driven: Runs) -> str:
     """Returns the share of the time in state ``ok`` as text."""
     return "–" if driven.ok_share is None else f"{driven.ok_share:.1%}"
 

@@ -61,7 +61,7 @@ class Campaign:
     def run(
         self, tasks: Sequence[Task], progress: Callable[[int, int], None] | None = None
     ) -> list[dict[str, NDArray[Any]]]:
-        """Returns the parts in the order of the tasks, and computes the missing ones.
+        """Returns the parts in the order of the tasks; computes missing ones, equal ones once.
 
         Parameters
         ----------
@@ -75,35 +75,37 @@ class Campaign:
         CampaignError
             Lost workers.
         """
-        found = [self.parts.read(task.depends_on) for task in tasks]
-        missing = [index for index, part in enumerate(found) if part is None]
-        done = len(tasks) - len(missing)
-        for index, made in self._computed(tasks, missing):
-            found[index] = self.parts.put(tasks[index].depends_on, made)
+        names = [self.parts.name(task.depends_on) for task in tasks]
+        different = dict(zip(names, tasks, strict=True))
+        found = {name: self.parts.read(it.depends_on) for name, it in different.items()}
+        missing = {name: different[name] for name, part in found.items() if part is None}
+        done = len(different) - len(missing)
+        for name, made in self._computed(missing):
+            found[name] = self.parts.put(different[name].depends_on, made)
             done += 1
             if progress is not None:
-                progress(done, len(tasks))
-        return [part for part in found if part is not None]
+                progress(done, len(different))
+        return [part for name in names if (part := found[name]) is not None]
 
     def _computed(
-        self, tasks: Sequence[Task], missing: Sequence[int]
-    ) -> Iterator[tuple[int, Mapping[str, NDArray[Any]]]]:
+        self, missing: Mapping[str, Task]
+    ) -> Iterator[tuple[str, Mapping[str, NDArray[Any]]]]:
         if self.executor is None:
-            for index in missing:
-                yield index, tasks[index].work(*tasks[index].arguments)
+            for name, task in missing.items():
+                yield name, task.work(*task.arguments)
             return
-        running: dict[Future[Mapping[str, NDArray[Any]]], int] = {}
+        running: dict[Future[Mapping[str, NDArray[Any]]], str] = {}
         lost: BaseException | None = None
         try:
-            for index in missing:
+            for name, task in missing.items():
                 try:
-                    future = self.executor.submit(tasks[index].work, *tasks[index].arguments)
+                    future = self.executor.submit(task.work, *task.arguments)
                 except BrokenExecutor as error:
                     lost = error
                     break
-                running[future] = index
+                running[future] = name
             for future in as_completed(list(running)):
-                index = running.pop(future)
+                name = running.pop(future)
                 try:
                     made = future.result()
                 except (Exception, CancelledError) as error:
@@ -112,7 +114,7 @@ class Campaign:
                     # Keep what other workers have finished.
                     lost = error
                     continue
-                yield index, made
+                yield name, made
         finally:
             for future in running:
                 future.cancel()

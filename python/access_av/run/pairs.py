@@ -10,6 +10,7 @@ import numpy as np
 from access_av.run.service_levels import INDEPENDENT_S
 from access_av.statistics.paired import paired_difference
 from access_av.statistics.percentiles import PERCENTS, finite, percentiles
+from access_av.statistics.proportions import share_interval
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -80,6 +81,11 @@ class ErrorSamples:
         """Returns a percentile of the error with its 95 % interval."""
         [found] = self.percentiles([percent])
         return found
+
+    def within(self, error_m: float) -> tuple[float, float, float]:
+        """Share of the time within an error, and the ends of its 95 % interval."""
+        shares = (self.errors_m <= error_m).mean(axis=1)
+        return float(shares.mean()), *share_interval(shares, self.independent)
 
     @property
     def lost(self) -> NDArray[np.bool_]:

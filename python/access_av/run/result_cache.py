@@ -61,7 +61,7 @@ class ResultCache:
 
     def read(self, depends_on: Any) -> dict[str, NDArray[Any]] | None:
         """Reads a part; ``None`` if it is missing or damaged (with a warning)."""
-        file = self._file(depends_on)
+        file = self.path / self.name(depends_on)
         if not file.is_file():
             return None
         try:
@@ -80,13 +80,15 @@ class ResultCache:
         OSError
             Write error; the message names the part, and no file remains.
         """
-        target = self._file(depends_on)
+        target = self.path / self.name(depends_on)
         held = io.BytesIO()
         np.savez_compressed(held, **made)  # type: ignore[arg-type]
         self.path.mkdir(parents=True, exist_ok=True)
         write_whole(target, held.getbuffer(), durable=True)
         return dict(made)
 
-    def _file(self, depends_on: Any) -> Path:
+    @staticmethod
+    def name(depends_on: Any) -> str:
+        """Returns the file name of a part."""
         text = json.dumps([version("access-av"), depends_on], sort_keys=True)
-        return self.path / f"{hashlib.sha256(text.encode()).hexdigest()[:32]}.npz"
+        return f"{hashlib.sha256(text.encode()).hexdigest()[:32]}.npz"

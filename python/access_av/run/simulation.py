@@ -28,7 +28,7 @@ from access_av.tables.numbers import number
 from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -345,6 +345,28 @@ def simulate(
     if runs > 1:
         shared.warn_of_changes(stacklevel=2)
     return Simulation.of(found, scenario, seed)
+
+
+def simulate_each(
+    scenarios: Sequence[Scenario],
+    *,
+    runs: int,
+    plug_ins: Sequence[Mapping[str, Any]] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    **how: Any,
+) -> Iterator[Simulation]:
+    """Simulates scenarios one after the other, with plug-ins by role and one total of runs.
+
+    ``how`` are further arguments of :func:`simulate`; equal seeds give equal environments.
+    """
+    for index, scenario in enumerate(scenarios):
+
+        def tell(done: int, _: int, before: int = index * runs) -> None:
+            if progress is not None:
+                progress(before + done, runs * len(scenarios))
+
+        its = plug_ins[index] if plug_ins else {}
+        yield simulate(scenario, runs=runs, progress=tell, **its, **how)
 
 
 def _warn_of_localizer(scenario: Scenario) -> None:

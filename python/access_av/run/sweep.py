@@ -11,7 +11,7 @@ import polars as pl
 from access_av._core import Scenario
 from access_av.errors import InputError
 from access_av.run.difference import Difference, difference
-from access_av.run.simulation import Simulation, simulate
+from access_av.run.simulation import Simulation, simulate_each
 from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
@@ -138,26 +138,18 @@ def sweep(
         raise InputError(
             f"vary: {len(combined)} combinations; at most {MAX_COMBINATIONS} are allowed"
         )
-    results = []
-    for number, chosen in enumerate(combined):
-
-        def tell(done: int, _: int, before: int = number * runs) -> None:
-            if progress is not None:
-                progress(before + done, runs * len(combined))
-
-        keys = {key: value for key, value in chosen.items() if key not in PLUG_INS}
-        plug_ins = {key: value for key, value in chosen.items() if key in PLUG_INS}
-        results.append(
-            simulate(
-                scenario.with_overrides(keys),
-                runs=runs,
-                seed=seed,
-                threads=threads,
-                errors_every=ERRORS_EVERY,
-                progress=tell,
-                **plug_ins,
-            )
+    keys = [{key: it for key, it in each.items() if key not in PLUG_INS} for each in combined]
+    results = [
+        *simulate_each(
+            [scenario.with_overrides(it) for it in keys],
+            plug_ins=[{key: it[key] for key in PLUG_INS if key in it} for it in combined],
+            runs=runs,
+            seed=seed,
+            threads=threads,
+            errors_every=ERRORS_EVERY,
+            progress=progress,
         )
+    ]
     values = [{key: _shown(value) for key, value in chosen.items()} for chosen in combined]
     rows = [
         _row(each, result, difference(result, results[0], percent=percent))

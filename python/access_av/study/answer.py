@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from access_av import _core
 from access_av.errors import InputError
 from access_av.run.pairs import UNCHANGED
+from access_av.run.runs import drive
 from access_av.run.service_levels import INDEPENDENT_S
 from access_av.run.simulation import simulate
 from access_av.settings import as_dict
@@ -18,14 +19,13 @@ from access_av.study.places import by_place, radio_head_sides, worst_places
 from access_av.study.remedies import remedies
 from access_av.study.study_result import Study
 from access_av.study.targets import Targets
-from access_av.study.trips import drive
 from access_av.study.unverified import unverified
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from access_av.study.trips import Driven
+    from access_av.run.runs import Runs
 
 # Angles of all drives of the nominal plant, without a given number of runs. A vehicle that wakes
 # up by its own error estimates the angles of about a quarter of the SSBs.
@@ -95,14 +95,14 @@ def study_plant(
     pairs, few, fewest = (min(full, max(2, round(share * usual))) for share in SHARES)
     # Completed runs, planned runs in total, and planned runs of later parts.
     done, planned, after = 0, 0, 0
-    known: dict[tuple[str, int], Driven] = {}
+    known: dict[tuple[str, int], Runs] = {}
 
     def plan(left: int) -> None:
         """Sets the number of remaining runs of the current part of the study, for the progress."""
         nonlocal planned
         planned = done + left + after
 
-    def driven(name: str, variant: _core.Scenario, count: int, of_seed: int = seed) -> Driven:
+    def driven(name: str, variant: _core.Scenario, count: int, of_seed: int = seed) -> Runs:
         """Simulates a scenario, or returns earlier runs of equal scenario and seed."""
         nonlocal done
 

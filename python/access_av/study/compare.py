@@ -12,7 +12,7 @@ import polars as pl
 
 from access_av.errors import InputError
 from access_av.run.pairs import ErrorSamples
-from access_av.study.trips import Driven, drive
+from access_av.run.runs import Runs, drive
 from access_av.tables.toml import tomllib
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Compared:
         shares = self.driven.state_shares
         if shares is None:
             return "no monitor"
-        reasons = self.driven.not_ok_shares if isinstance(self.driven, Driven) else None
+        reasons = self.driven.not_ok_shares if isinstance(self.driven, Runs) else None
         others = (
             [f"{share:.1%} {state}" for state, share in shares.items() if state != "ok"]
             if reasons is None

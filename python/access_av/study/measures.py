@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from access_av import _core
+    from access_av.run.runs import Runs
     from access_av.statistics.percentiles import Percentile
     from access_av.study.economy import Prices
     from access_av.study.operate import Simulate
     from access_av.study.remedies import Remedy
     from access_av.study.targets import Targets
-    from access_av.study.trips import Driven
 
 # Maximum number of simulated sets of measures, the cheapest first.
 MOST_SETS = 4
@@ -49,7 +49,7 @@ class Measure:
     """
 
     remedies: tuple[Remedy, ...]
-    driven: Driven
+    driven: Runs
     error: Percentile
     delta_m: tuple[float, float, float]
     judgement: Judgement
@@ -92,7 +92,7 @@ class Measures:
         Measures of several remedies, the cheapest one first.
     """
 
-    before: Driven
+    before: Runs
     single: list[Measure]
     sets: list[Measure]
 
@@ -111,7 +111,7 @@ class Measures:
 def measures(
     scenario: _core.Scenario,
     changes: Sequence[Remedy],
-    before: Driven,
+    before: Runs,
     targets: Targets,
     prices: Prices,
     seed: int,

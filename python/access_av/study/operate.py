@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from access_av.run.runs import Runs
 from access_av.study import economy
 from access_av.study.points import (
     MODE_KEY,
@@ -17,7 +18,6 @@ from access_av.study.points import (
     points,
     recommended,
 )
-from access_av.study.trips import Driven
 from access_av.verdicts import Agreement, Judgement
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from access_av.study.targets import Targets
 
     # Simulation function: name, scenario, number of runs, seed.
-    Simulate = Callable[[str, _core.Scenario, int, int], Driven]
+    Simulate = Callable[[str, _core.Scenario, int, int], Runs]
 
 # Operations that are simulated in every power mode with two seeds: the one that screening
 # recommends, the vehicle's own, and their rivals.
@@ -126,15 +126,15 @@ class _Finalist:
     operation: Operation
     modes: list[PowerMode]
     scenario: _core.Scenario
-    blocks: list[Driven]
+    blocks: list[Runs]
 
     def driven_mode(self, own: int) -> int:
         """Power mode in which the group is simulated: the vehicle's own mode if it is included."""
         modes = [it.number for it in self.modes]
         return own if own in modes else modes[0]
 
-    def points(self, blocks: list[Driven], targets: Targets) -> list[Point]:
-        driven = Driven.joined(blocks)
+    def points(self, blocks: list[Runs], targets: Targets) -> list[Point]:
+        driven = Runs.joined(blocks)
         return points(driven, self.operation, self.modes, targets, simulated=True)
 
 
@@ -146,7 +146,7 @@ def likely_blocks(scenario: _core.Scenario) -> int:
 def operate(
     plant: _core.Plant,
     targets: Targets,
-    nominal: Driven,
+    nominal: Runs,
     runs: int,
     seed: int,
     simulate: Simulate,
@@ -214,7 +214,7 @@ def _name(found: list[Point]) -> str | None:
 def _screened(
     scenario: _core.Scenario,
     targets: Targets,
-    nominal: Driven,
+    nominal: Runs,
     runs: int,
     seed: int,
     simulate: Simulate,

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from access_av.study.trips import Driven
+    from access_av.run.runs import Runs
 
 # Half-width (m) of the section whose errors determine the percentile at a position.
 WINDOW_M = 5.0
@@ -46,7 +46,7 @@ class WorstPlace:
     why: str
 
 
-def by_place(driven: Driven, percent: float, error_m: float) -> pl.DataFrame:
+def by_place(driven: Runs, percent: float, error_m: float) -> pl.DataFrame:
     """Returns error, bound, geometry and signal at every metre of the road.
 
     Returns

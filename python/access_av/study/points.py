@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from access_av.device.platform import Platform
+from access_av.run.runs import EXTENTS, Energy, Runs
 from access_av.settings import as_dict, platform_name, ssb_period_s
 from access_av.statistics.pareto import pareto_front
-from access_av.study.trips import EXTENTS, Driven, Energy
 from access_av.verdicts import Judgement
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Point:
         Whether the drives meet all targets.
     """
 
-    driven: Driven
+    driven: Runs
     operation: Operation
     mode: int
     mode_name: str
@@ -159,7 +159,7 @@ def own_mode(scenario: _core.Scenario) -> int:
 
 
 def points(
-    driven: Driven,
+    driven: Runs,
     operation: Operation,
     modes: Sequence[PowerMode],
     targets: Targets,
@@ -173,7 +173,7 @@ def points(
     found = []
     for mode in modes:
         in_mode = driven.scenario.with_overrides({MODE_KEY: mode.number})
-        energy = driven.in_scenario(in_mode).energy(platform)
+        energy = driven.energy(platform, in_mode.vehicle)
         if energy is None:  # such modes are in no group
             raise RuntimeError(f"mode {mode.number} has no energy in the platform file")
         found.append(

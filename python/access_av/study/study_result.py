@@ -16,6 +16,7 @@ from access_av.tables.result import Origin, Result, origin
 if TYPE_CHECKING:
     from access_av import _core
     from access_av.economics.balance import Way
+    from access_av.run.runs import Runs
     from access_av.run.simulation import Simulation
     from access_av.statistics.percentiles import Percentile
     from access_av.study.measures import Measure, Measures
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from access_av.study.places import WorstPlace
     from access_av.study.points import Point
     from access_av.study.targets import TargetResult, Targets
-    from access_av.study.trips import Driven
     from access_av.study.unverified import Unverified
     from access_av.verdicts import Judgement
 
@@ -59,8 +59,8 @@ class Study(Result):
     plant: _core.Plant
     seed: int
     targets: Targets
-    nominal: Driven
-    poor_los: Driven
+    nominal: Runs
+    poor_los: Runs
     places: pl.DataFrame
     worst: list[WorstPlace]
     heads: pl.DataFrame
@@ -124,15 +124,15 @@ class Study(Result):
             raise RuntimeError("the vehicle has no integrity monitor")
         return limit_m
 
-    def results(self, driven: Driven) -> list[TargetResult]:
+    def results(self, driven: Runs) -> list[TargetResult]:
         """Returns the result of runs for each target."""
         return self.targets.results(driven)
 
-    def judged(self, driven: Driven) -> Judgement:
+    def judged(self, driven: Runs) -> Judgement:
         """Returns the judgement of runs for all targets."""
         return self.targets.judgement(driven)
 
-    def in_words(self, driven: Driven) -> str:
+    def in_words(self, driven: Runs) -> str:
         """Returns lost runs and the target's percentile with its interval as text."""
         found = driven.percentile(self.percent)
         lost = f"LOST in {driven.lost_runs} of {driven.runs} drives; " if driven.lost_runs else ""
@@ -335,7 +335,7 @@ def _rival(it: Rival) -> dict[str, Any]:
     }
 
 
-def _figures(study: Study, driven: Driven) -> dict[str, Any]:
+def _figures(study: Study, driven: Runs) -> dict[str, Any]:
     share, low, high = driven.within(study.error_m)
     reasons = driven.not_ok_shares
     return {

@@ -9,15 +9,14 @@ import numpy as np
 import polars as pl
 
 from access_av.run.error_bound import along_route
-from access_av.study.trips import share_within
 from access_av.verdicts import Judgement
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from access_av import _core
+    from access_av.run.runs import Runs
     from access_av.statistics.percentiles import Percentile
-    from access_av.study.trips import Driven
 
 WHOLE_TRIP = "whole trip"
 
@@ -96,7 +95,7 @@ class Targets:
             found.append(StretchTarget(label, from_m, to_m, own_m, own_percent))
         return cls(found, time_s, along_m)
 
-    def results(self, driven: Driven) -> list[TargetResult]:
+    def results(self, driven: Runs) -> list[TargetResult]:
         """Returns the result of each target; the nominal position assigns an epoch to a section."""
         at_m = np.interp(driven.time_s, self.time_s, self.along_m)
         found = []
@@ -106,10 +105,10 @@ class Targets:
             first = min(first, len(at_m) - 1)
             errors = driven.between(first, max(last, first + 1))
             error = errors.percentile(target.percent)
-            found.append(TargetResult(target, error, share_within(errors, target.error_m)))
+            found.append(TargetResult(target, error, errors.within(target.error_m)))
         return found
 
-    def judgement(self, driven: Driven) -> Judgement:
+    def judgement(self, driven: Runs) -> Judgement:
         """Returns the judgement of runs for all targets."""
         return Judgement.of_all(it.judgement for it in self.results(driven))
 

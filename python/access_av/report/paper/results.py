@@ -36,8 +36,9 @@ def write(
     progress: Callable[[int, int], None],
 ) -> None:
     """Writes tables, claims, report, scenarios, platform and manifest."""
-    for name, table in made.tables().items():
-        directory.write_table(f"{name}.parquet", table)
+    tables = made.tables()
+    for name in list(tables):
+        directory.write_table(f"{name}.parquet", tables.pop(name))
     directory.write_json("claims.json", as_records(made.claims))
     progress(1, 4)
     specs: dict[str, Spec] = {}

@@ -1,4 +1,4 @@
-"""Runs of one variant of a plant, and paired differences between variants."""
+"""Runs of one scenario as plain data: errors, protection levels, counts and energy."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from access_av.run.pairs import ErrorSamples
 from access_av.run.simulation import simulate
 from access_av.settings import platform_name, ssb_period_s
 from access_av.statistics.integrity import Integrity
-from access_av.statistics.proportions import share_interval
 from access_av.verdicts import NotOk
 
 if TYPE_CHECKING:
@@ -26,6 +25,8 @@ if TYPE_CHECKING:
 # Interval of the stored errors (s): a vehicle moves less than its width in this time.
 KEPT_EVERY_S = 0.1
 EXTENTS = ("low", "value", "high")
+# Attributes with one row per run.
+PER_RUN = ("errors_m", "levels_m", "aoa_estimates", "bursts_received", "seeds")
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Energy:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Driven(ErrorSamples):
+class Runs(ErrorSamples):
     """Runs of one scenario.
 
     Attributes
@@ -108,39 +109,24 @@ class Driven(ErrorSamples):
         energy = self.energy()
         return None if energy is None else energy["value"].total_j
 
-    def first(self, runs: int) -> Driven:
+    def first(self, runs: int) -> Runs:
         """Returns the first `runs` runs, for paired comparisons."""
-        return replace(
-            self,
-            errors_m=self.errors_m[:runs],
-            levels_m=self.levels_m[:runs],
-            aoa_estimates=self.aoa_estimates[:runs],
-            bursts_received=self.bursts_received[:runs],
-            seeds=self.seeds[:runs],
-            integrity=_of_runs(self.integrity, slice(runs)),
-        )
+        its: dict[str, Any] = {name: getattr(self, name)[:runs] for name in PER_RUN}
+        return replace(self, **its, integrity=self.integrity and self.integrity.first(runs))
 
-    def in_scenario(self, scenario: _core.Scenario) -> Driven:
-        """Returns these runs with another scenario that has identical runs."""
-        return replace(self, scenario=scenario)
-
-    def named(self, name: str) -> Driven:
+    def named(self, name: str) -> Runs:
         """Returns the runs under another name of the variant."""
         return replace(self, name=name)
 
     @classmethod
-    def joined(cls, parts: Sequence[Driven]) -> Driven:
+    def joined(cls, parts: Sequence[Runs]) -> Runs:
         """Joins the runs of several seeds of one scenario."""
+        every: dict[str, Any] = {
+            name: np.concatenate([getattr(it, name) for it in parts]) for name in PER_RUN
+        }
         of_parts = [it.integrity for it in parts if it.integrity is not None]
-        return replace(
-            parts[0],
-            errors_m=np.concatenate([it.errors_m for it in parts]),
-            levels_m=np.concatenate([it.levels_m for it in parts]),
-            aoa_estimates=np.concatenate([it.aoa_estimates for it in parts]),
-            bursts_received=np.concatenate([it.bursts_received for it in parts]),
-            seeds=np.concatenate([it.seeds for it in parts]),
-            integrity=_together(of_parts) if len(of_parts) == len(parts) else None,
-        )
+        integrity = Integrity.joined(of_parts) if len(of_parts) == len(parts) else None
+        return replace(parts[0], **every, integrity=integrity)
 
     def between(self, first: int, last: int) -> ErrorSamples:
         """Returns the errors of the epochs from ``first`` to before ``last``."""
@@ -151,15 +137,16 @@ class Driven(ErrorSamples):
             duration_s=share * self.duration_s,
         )
 
-    def within(self, error_m: float) -> tuple[float, float, float]:
-        """Share of the time within an error, and the ends of its 95 % interval."""
-        return share_within(self, error_m)
+    def energy(
+        self, platform: Platform | None = None, vehicle: _core.Vehicle | None = None
+    ) -> dict[str, Energy] | None:
+        """Energy of a trip by ``low``, ``value`` and ``high``; ``None`` without a figure.
 
-    def energy(self, platform: Platform | None = None) -> dict[str, Energy] | None:
-        """Energy of a trip by ``low``, ``value`` and ``high``; ``None`` without a figure."""
+        ``vehicle`` may differ from that of the scenario if its runs are identical.
+        """
         if self.has_own_estimator:
             return None
-        vehicle = self.scenario.vehicle
+        vehicle = vehicle or self.scenario.vehicle
         core = (platform or Platform.load(platform_name(self.scenario.vehicle))).core
         estimates, bursts_received = (
             round(float(it.mean())) for it in (self.aoa_estimates, self.bursts_received)
@@ -213,28 +200,6 @@ class Driven(ErrorSamples):
         )
 
 
-def share_within(driven: ErrorSamples, error_m: float) -> tuple[float, float, float]:
-    """Share of the time within an error, and the ends of its 95 % interval."""
-    shares = (driven.errors_m <= error_m).mean(axis=1)
-    return float(shares.mean()), *share_interval(shares, driven.independent)
-
-
-def _of_runs(found: Integrity | None, runs: slice) -> Integrity | None:
-    if found is None:
-        return None
-    counts = {name: it[runs] for name, it in found.by_run.items()}
-    return Integrity.of_runs(counts, found.median_level_over_error)
-
-
-def _together(parts: Sequence[Integrity]) -> Integrity:
-    counts = {
-        name: np.concatenate([np.asarray(it.by_run[name]) for it in parts])
-        for name in parts[0].by_run
-    }
-    ratio = float(np.average([it.median_level_over_error for it in parts]))
-    return Integrity.of_runs(counts, ratio)
-
-
 def drive(
     name: str,
     scenario: _core.Scenario,
@@ -243,7 +208,7 @@ def drive(
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
     plug_ins: Mapping[str, Any] | None = None,
-) -> Driven:
+) -> Runs:
     """Simulates a scenario; an equal seed gives every variant equal environments."""
     period_s = ssb_period_s(scenario.site)
     every = max(1, round(KEPT_EVERY_S / period_s))
@@ -261,7 +226,7 @@ def drive(
     errors_m = np.hypot(found.errors_m[:, :, 0], found.errors_m[:, :, 1]).astype(np.float64)
     errors_m[np.isnan(errors_m)] = np.inf
     time_s = found.steps["time_s"].to_numpy()
-    return Driven(
+    return Runs(
         name=name,
         scenario=scenario,
         errors_m=errors_m,
