@@ -226,7 +226,8 @@ fn mcap_files_are_rotated_and_each_is_complete() {
 #[test]
 fn file_input_is_processed_at_maximum_speed_and_nothing_is_dropped() {
     let folder = scratch("fast");
-    // Twice the capacity of the queue; status messages follow the time of the drive.
+    // The drive has twice as many samples as the queue holds. Status messages are sent by the time
+    // of the drive, not by real time.
     let seconds: u32 = 200;
     let lines: String = (0..=50 * seconds)
         .map(|number| odometry(0.02 * f64::from(number)))

@@ -48,7 +48,10 @@ def _least(margins: list[Numbers]) -> Numbers:
 
 
 def _each(compare: Callable[[float, Any, float], Numbers]) -> Callable[..., Numbers]:
-    """Returns a comparison of numbers; of several numbers by name, all must be met."""
+    """Returns a rule that compares numbers.
+
+    If a claim states several named numbers, the rule returns the smallest of their margins.
+    """
 
     def rule(entry: Mapping[str, Any], obtained: Any) -> Numbers:
         stated, tolerance = entry["stated"], float(entry.get("tolerance", 0.0))

@@ -273,7 +273,7 @@ impl OutOfSequenceBuffer {
                 .map_or(self.events.len(), |place| taken_in + place);
             self.events.insert(place, update.event(Some(number)));
         }
-        // Later copies do not contain the input.
+        // Copies of the localizer from after the input's time do not contain the input: they are discarded.
         self.copies = from;
         for index in taken_in..self.events.len() {
             let Some(event) = self.events.get_mut(index) else {

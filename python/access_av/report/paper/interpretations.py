@@ -220,7 +220,10 @@ def _pair(stated: float | None, used: float) -> str:
 
 
 def _value(claim: Claim, value: object) -> str:
-    """Returns a stated or obtained value; a table of settings is shown once, above the claims."""
+    """Returns the stated or obtained value of a claim as text.
+
+    The table of power modes (claim x2) is only named, because the page shows it above the claims.
+    """
     if claim.id.startswith("x2_") and isinstance(value, list):
         return "table of power modes"
     return summary.shown_value(value)

@@ -128,12 +128,12 @@ impl NoiseScale {
         head_noise.unwrap_or(self.of_all)
     }
 
-    /// Returns the ratio of a radio head.
+    /// Returns the variance ratio of a radio head's angles, at least 1.
     pub fn ratio_of(&self, head: usize) -> f64 {
         self.of(head).with_tails.max(1.0)
     }
 
-    /// Returns the ratio of a radio head without outliers.
+    /// Returns the variance ratio of a radio head's angles, computed without outliers; at least 1.
     pub fn core_ratio_of(&self, head: usize) -> f64 {
         self.of(head).core.max(1.0)
     }
