@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 
 use crate::error::RecordingError;
 
+/// Maximum size of a file that is read as a whole: tables, logs, trajectories, metadata of recordings.
+pub const MAX_BYTES: u64 = 512 << 20;
+
 /// Opens a regular file. Pipes and devices are rejected because they have no reliable end.
 ///
 /// # Errors
@@ -23,12 +26,14 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// # Errors
 /// Errors of [`open`]; an error for a longer file.
 pub fn read(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    open(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > max_bytes {
+    let file = open(path)?;
+    if file.metadata()?.len() > max_bytes {
         let message = format!("longer than {max_bytes} bytes, the limit for this kind of file");
         return Err(io::Error::other(message));
     }
+    let mut bytes = Vec::new();
+    // The file may grow.
+    file.take(max_bytes).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 

@@ -42,7 +42,7 @@ pub use angle_log::{
     AngleLog, AngleRemark, LoggedAngle, angle_log_of_columns, read_angle_log, write_angle_log,
 };
 pub use error::RecordingError;
-pub use file::write as write_file;
+pub use file::{MAX_BYTES as MAX_FILE_BYTES, write as write_file};
 pub use library::{Files, load};
 pub use mcap::{McapWriter, read_angles_mcap, read_odometry_mcap, write_drive_mcap};
 pub use odometry::{OdometryFields, OdometryIssue, OdometryLog, OdometryRemark};

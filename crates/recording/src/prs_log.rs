@@ -20,9 +20,6 @@ use crate::file as files;
 use crate::range_log::{LoggedRange, RangeLog};
 use crate::sigmf::date::{Date, parse};
 
-/// Maximum size of a log in bytes: a day of four radio heads at 100 Hz.
-const MAX_BYTES: u64 = 8 << 30;
-
 /// Text before the delay.
 const DELAY: &str = "DL PRS ToA ==>";
 
@@ -63,7 +60,8 @@ pub fn is_prs_log(file: &Path) -> bool {
 /// [`RecordingError`] if the file cannot be read, has no line with a delay, or contradicts the
 /// subcarrier spacing. Invalid single lines are reported as remarks only.
 pub fn read_prs_log(file: &Path, spacing_khz: f64) -> Result<RangeLog, RecordingError> {
-    let bytes = files::read(file, MAX_BYTES).map_err(|source| RecordingError::io(file, source))?;
+    let bytes =
+        files::read(file, files::MAX_BYTES).map_err(|source| RecordingError::io(file, source))?;
     let text = String::from_utf8_lossy(&bytes);
     let slots = (10.0 * spacing_khz / 15.0).round();
     let mut log = RangeLog {
@@ -93,7 +91,7 @@ pub fn read_prs_log(file: &Path, spacing_khz: f64) -> Result<RangeLog, Recording
         }
         let time_s = clock.advance_to(FRAME_S * (line.frame + line.slot / slots), line.date);
         let sample_m = SPEED_OF_LIGHT_MPS / (line.fft_size * spacing_khz * 1e3);
-        log.sample_m = Some(log.sample_m.unwrap_or(0.0).max(sample_m));
+        log.include_sample(sample_m);
         log.ranges.push(LoggedRange {
             pci: line.pci,
             ssb_index: line.ssb_index,

@@ -65,6 +65,11 @@ pub struct RangeLog {
 }
 
 impl RangeLog {
+    /// Includes the length of a sample (m) of a delay: the largest one counts.
+    pub(crate) fn include_sample(&mut self, sample_m: f64) {
+        self.sample_m = Some(self.sample_m.unwrap_or(0.0).max(sample_m));
+    }
+
     /// Sorts the ranges by time, and reports decreasing times.
     pub(crate) fn sort(&mut self) {
         let time_s = |it: &LoggedRange| it.measured.time_s;
@@ -125,7 +130,7 @@ pub fn read_range_log(file: &Path) -> Result<RangeLog, RecordingError> {
             Ok((range, sample_m)) => {
                 log.ranges.push(range);
                 if kind == "delay_samples" {
-                    log.sample_m = Some(log.sample_m.unwrap_or(0.0).max(sample_m));
+                    log.include_sample(sample_m);
                 }
             }
             Err(why) => {

@@ -11,9 +11,6 @@ use crate::file as files;
 use crate::foreign::text_of;
 use crate::number::Numbers;
 
-/// Maximum size of a table in bytes: a day of samples at 50 Hz.
-const MAX_BYTES: u64 = 512 << 20;
-
 /// Allowed column separators.
 const SEPARATORS: [char; 3] = [',', ';', '\t'];
 
@@ -43,8 +40,8 @@ impl Table {
     /// [`RecordingError`] if the file cannot be read, a required column is missing, or a requested
     /// column occurs twice. An unusable row is not an error; its entry describes the defect.
     pub fn read(file: &Path, required: &[&str], optional: &[&str]) -> Result<Self, RecordingError> {
-        let bytes =
-            files::read(file, MAX_BYTES).map_err(|source| RecordingError::io(file, source))?;
+        let bytes = files::read(file, files::MAX_BYTES)
+            .map_err(|source| RecordingError::io(file, source))?;
         let text = text_of(&bytes, "CSV").map_err(|message| RecordingError::Syntax {
             file: file.display().to_string(),
             format: "CSV",

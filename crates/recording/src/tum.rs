@@ -9,9 +9,6 @@ use crate::foreign::text_of;
 use onboard::geometry::{Pose, wrap_angle};
 use onboard::time_unit::TimeUnit;
 
-/// Maximum size of a trajectory in bytes: a day of poses at 50 Hz.
-const MAX_BYTES: u64 = 512 << 20;
-
 /// Maximum coordinate of a position (m), larger than in any map projection.
 const MAX_COORDINATE_M: f64 = 1e8;
 
@@ -55,7 +52,8 @@ pub fn write_tum(file: &Path, poses: &[TimedPose]) -> Result<(), RecordingError>
 /// [`RecordingError::Io`]; [`RecordingError::Value`] for a line that is not eight numbers, or whose
 /// time is not in seconds.
 pub fn read_tum(file: &Path) -> Result<Vec<TimedPose>, RecordingError> {
-    let bytes = files::read(file, MAX_BYTES).map_err(|source| RecordingError::io(file, source))?;
+    let bytes =
+        files::read(file, files::MAX_BYTES).map_err(|source| RecordingError::io(file, source))?;
     let text = text_of(&bytes, "TUM").map_err(|message| RecordingError::Syntax {
         file: file.display().to_string(),
         format: "TUM",

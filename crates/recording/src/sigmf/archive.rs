@@ -11,9 +11,6 @@ use crate::foreign::format_of;
 
 /// Maximum size of a collection file in bytes: names and hashes of recordings.
 const MAX_COLLECTION_BYTES: u64 = 16 << 20;
-/// Maximum size of the metadata in an archive in bytes: some hours of annotated SSBs.
-const MAX_META_BYTES: u64 = 512 << 20;
-
 /// Number of bytes that determine the format of a file.
 const MAGIC_BYTES: u64 = 16;
 
@@ -55,8 +52,8 @@ pub fn recording_in(archive: &Path) -> Result<(Vec<u8>, Extent), RecordingError>
         let mut entry = entry.map_err(syntax)?;
         let name = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
         if let Some(stem) = name.strip_suffix(".sigmf-meta") {
-            if entry.size() > MAX_META_BYTES {
-                let allowed = format!("metadata must be at most {MAX_META_BYTES} bytes long");
+            if entry.size() > files::MAX_BYTES {
+                let allowed = format!("metadata must be at most {} bytes long", files::MAX_BYTES);
                 return Err(RecordingError::value(
                     archive,
                     name.as_str(),

@@ -10,9 +10,6 @@ use crate::error::RecordingError;
 use crate::file as files;
 use crate::foreign::text_of;
 
-/// Maximum size of a metadata file in bytes: some hours of annotated SSBs.
-const MAX_BYTES: u64 = 512 << 20;
-
 /// Maximum number of channels.
 const MAX_CHANNELS: usize = 1024;
 /// Maximum sample rate of SigMF in Hz.
@@ -282,7 +279,7 @@ fn check_frequencies(before: &Capture, capture: &Capture) -> Result<(), String> 
 /// # Errors
 /// [`RecordingError::Io`].
 pub(super) fn read_text(file: &Path) -> Result<Vec<u8>, RecordingError> {
-    files::read(file, MAX_BYTES).map_err(|source| RecordingError::io(file, source))
+    files::read(file, files::MAX_BYTES).map_err(|source| RecordingError::io(file, source))
 }
 
 fn is_unset(value: &Value) -> bool {

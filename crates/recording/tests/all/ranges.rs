@@ -446,3 +446,16 @@ fn delays_of_openairinterface_are_read() {
     assert!(log.remarks[0].1.contains("line 3") && log.remarks[0].1.contains("power"));
     assert!(log.has_delays && log.sample_m.is_some());
 }
+
+#[test]
+fn a_prs_log_above_the_maximum_size_is_rejected_before_it_is_read() {
+    let file = common::scratch("prs-too-long").join("ranges.log");
+    // Without data, so that it occupies no disk.
+    let created = fs::File::create(&file).unwrap();
+    created.set_len(recording::MAX_FILE_BYTES + 1).unwrap();
+    let error = read_prs_log(&file, 30.0).unwrap_err().to_string();
+    assert!(
+        error.contains(&recording::MAX_FILE_BYTES.to_string()),
+        "{error}"
+    );
+}
