@@ -78,8 +78,10 @@ pub struct SsbDetection {
 pub struct SsbRanging {
     /// Delay of the first path in seconds, relative to a constant that is common to all cells.
     pub delay_s: f64,
-    /// Standard deviation of the delay in seconds, including noise and multipath.
+    /// Standard deviation of the delay in seconds, including noise and multipath ...
     pub delay_sigma_s: f64,
+    /// ... and its part due to noise, which is independent from one SSB to the next.
+    pub delay_noise_sigma_s: f64,
     /// Whether the first path may be weaker than the others, or blocked; the standard deviation of
     /// the delay then does not cover its error.
     pub is_first_path_uncertain: bool,

@@ -594,8 +594,12 @@ impl Pipeline {
         let time_s = ssb.time_s - self.angle_time_offset_s;
         let delay = (!ranging.is_first_path_uncertain).then(|| {
             let range_m = SPEED_OF_LIGHT_MPS * ranging.delay_s;
+            let noise_m = SPEED_OF_LIGHT_MPS * ranging.delay_noise_sigma_s;
             let sigma_m = SPEED_OF_LIGHT_MPS * ranging.delay_sigma_s;
-            RangeMeasurement::range(time_s, range_m, Some(sigma_m))
+            RangeMeasurement {
+                scatter_m: (sigma_m * sigma_m - noise_m * noise_m).max(0.0).sqrt(),
+                ..RangeMeasurement::range(time_s, range_m, Some(noise_m))
+            }
         });
         // A rate derived from carrier phases contains the same information as the phases.
         let uses_rate = using.range_rate && !(using.carrier_phase && ranging.is_rate_of_phases);

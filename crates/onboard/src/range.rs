@@ -32,6 +32,9 @@ pub struct RangeMeasurement {
     /// Standard deviation of the noise in the unit of the value; `None` for that of the vehicle's
     /// settings, which exists for ranges only.
     pub sigma: Option<f64>,
+    /// Standard deviation of a further error of a range due to multipath (m). Ranges of a radio head share
+    /// it over a metre of travel.
+    pub scatter_m: f64,
 }
 
 impl RangeMeasurement {
@@ -42,6 +45,7 @@ impl RangeMeasurement {
             quantity: RangeQuantity::Range,
             value: range_m,
             sigma: sigma_m,
+            scatter_m: 0.0,
         }
     }
 
@@ -52,6 +56,7 @@ impl RangeMeasurement {
             quantity: RangeQuantity::RangeRate { interval_s },
             value: rate_mps,
             sigma: Some(sigma_mps),
+            scatter_m: 0.0,
         }
     }
 
@@ -69,6 +74,7 @@ impl RangeMeasurement {
             quantity: RangeQuantity::CarrierPhase,
             value: -metres_per_rad * phase_rad,
             sigma: Some(metres_per_rad * sigma_rad),
+            scatter_m: 0.0,
         }
     }
 }

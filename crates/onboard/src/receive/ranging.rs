@@ -66,6 +66,7 @@ impl RangingClock {
         Some(SsbRanging {
             delay_s: self.last_s,
             delay_sigma_s: delay.sigma_s,
+            delay_noise_sigma_s: delay.noise_sigma_s,
             is_first_path_uncertain: delay.multipath == Multipath::Uncertain,
             rate_mps: range_rate.rate_m_s,
             rate_sigma_mps: range_rate.sigma_m_s,

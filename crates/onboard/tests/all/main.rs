@@ -8,7 +8,7 @@ mod gap;
 mod live_ranges;
 mod live_times;
 mod random_drives;
-mod range_kinds;
+mod range_drive;
 mod ranges;
 mod receiver;
 mod recovery;

@@ -44,6 +44,8 @@ pub(super) struct Head {
     pub last_update_rad: f64,
     /// Residual of the last used angle after its update.
     pub last_residual: Option<Residual>,
+    /// Distance driven at the last used range (m).
+    pub last_range_m: f64,
     /// Number of successive rejected ranges.
     pub rejected_ranges: u16,
 }
@@ -101,6 +103,7 @@ impl Ekf {
             last_update_s: f64::NEG_INFINITY,
             last_update_rad: f64::NEG_INFINITY,
             last_residual: None,
+            last_range_m: f64::NEG_INFINITY,
             rejected_ranges: 0,
         };
         let mut ekf = Self {

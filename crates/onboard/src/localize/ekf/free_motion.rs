@@ -51,8 +51,9 @@ impl Ekf {
         self.config.noise.odometer_m_per_sqrt_s = motion.distance_noise;
         self.config.yaw_noise_rad_per_sqrt_s = motion.yaw_noise_rad_per_sqrt_s;
         for head in &mut self.heads {
-            // The distance since the last angle is unknown.
+            // The distance since the last angle and range is unknown.
             head.last_update_m -= motion.start.position_std_m;
+            head.last_range_m -= motion.start.position_std_m;
             head.last_residual = None;
         }
         self.forget_odometry();

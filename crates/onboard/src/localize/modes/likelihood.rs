@@ -95,7 +95,8 @@ impl LikelihoodRatio {
             && !(predicted.is_new_sequence || by_nominal.is_new_sequence)
         {
             let ratio = range_density(predicted) / range_density(by_nominal);
-            self.0 = (self.0 + ratio.ln()).max(-CERTAIN);
+            let share = (predicted.information_fraction).min(by_nominal.information_fraction);
+            self.0 = (self.0 + share * ratio.ln()).max(-CERTAIN);
         }
     }
 

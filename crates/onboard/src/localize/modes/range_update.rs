@@ -42,9 +42,10 @@ impl Bank {
                 };
                 for (mine, test) in subset.without.iter().zip(&mut subset.range_tests) {
                     if *mine == number {
-                        test.push(&predicted.innovation);
+                        test.push(&predicted.independent_innovation());
                     }
                 }
+                subset.ekf.note_range(&predicted);
             }
         }
         let predicted = self.nominal.predict_range(head, measured);

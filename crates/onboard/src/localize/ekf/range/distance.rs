@@ -2,11 +2,15 @@
 //! error s, the vehicle clock c (one-way delays only) and the offset b of the radio head.
 
 use super::pseudorange::PredictedRange;
-use crate::localize::bias::{CLOCK, DRIFT, HeadState, RANGE_SCALE};
+use crate::localize::bias::{CLOCK, DRIFT, HeadState, RANGE_SCALE, independent};
 use crate::localize::ekf::filter::Ekf;
 use crate::localize::output::UpdateReason;
 use crate::radio_head::RadioHead;
 use crate::range::RangeMeasurement;
+
+/// Minimum independent fraction of multipath. At standstill there is no new information, but the variance
+/// must remain finite.
+const MIN_FRACTION: f64 = 1e-5;
 
 impl Ekf {
     pub(super) fn predict_distance(
@@ -26,18 +30,24 @@ impl Ekf {
             (DRIFT, seen.lag_s),
             (offset, 1.0),
         ];
+        // Noise is independent from one range to the next, multipath is not.
+        let (noise, scatter) = (sigma_m * sigma_m, measured.scatter_m * measured.scatter_m);
+        let variance = noise + scatter;
+        let independent_fraction = independent(seen.travelled_m).max(MIN_FRACTION);
         let shift_m = state_m(CLOCK) + seen.lag_s * state_m(DRIFT) + state_m(offset);
-        Ok(self.predicted(
+        let mut predicted = self.predicted(
             &seen,
             measured.quantity,
             measured.value - (distance.range_m + shift_m),
             distance.row,
             terms,
-            sigma_m * sigma_m,
+            variance,
             [
                 self.range_noise.ratio(),
                 distance.variance + seen.clock_variance(),
             ],
-        ))
+        );
+        predicted.information_fraction = variance / (noise + scatter / independent_fraction);
+        Ok(predicted)
     }
 }

@@ -23,6 +23,10 @@ pub(in crate::localize) struct PredictedRange {
     pub(super) terms: RangeTerms,
     /// Specified variance of the measurement's own noise.
     pub(super) stated_variance: f64,
+    /// Fraction of the measurement that is independent of the previous one of its radio head.
+    pub information_fraction: f64,
+    /// Distance driven at the measurement (m).
+    pub(super) place_m: f64,
     /// Whether a carrier phase starts a new sequence, because its number of wavelengths is unknown.
     pub is_new_sequence: bool,
     /// State that the carrier phase then determines: phase offset of the radio head or of all.
@@ -43,6 +47,9 @@ pub(super) struct Sighted<'a> {
     pub sight: LineOfSight,
     /// Time since the newest odometry (s).
     pub lag_s: f64,
+    /// Distance driven at the measurement (m), and since the last used range of the radio head.
+    pub place_m: f64,
+    pub travelled_m: f64,
     ahead_variance: f64,
     ahead: Option<Step>,
 }
@@ -78,7 +85,8 @@ impl Ekf {
         }
         let (index, head) = self.head_of(head, measured.time_s)?;
         // Predict to the time of the measurement.
-        let (_, ahead_variance, ahead) = self.coast(measured.time_s);
+        let (ahead_m, ahead_variance, ahead) = self.coast(measured.time_s);
+        let place_m = self.driven_m + ahead_m;
         let mean = *(ahead.as_ref()).map_or(&self.belief.mean, |ahead| &ahead.mean);
         let (pose, frame) = locate(&mean, 0.0, self.map.as_deref());
         let position_m = if measured.quantity == RangeQuantity::CarrierPhase {
@@ -107,6 +115,8 @@ impl Ekf {
             frame,
             sight,
             lag_s,
+            place_m,
+            travelled_m: (place_m - head.last_range_m).abs(),
             ahead_variance,
             ahead,
         })
@@ -155,6 +165,8 @@ impl Ekf {
             row,
             terms,
             stated_variance,
+            information_fraction: 1.0,
+            place_m: seen.place_m,
             is_new_sequence: false,
             phase_state: HeadState::PhaseOffset.number(seen.index, self.heads.len(), seen.model),
             innovation: Innovation {
@@ -162,6 +174,23 @@ impl Ekf {
                 variance: known.max(0.0) + measurement_variance,
                 measurement_variance,
             },
+        }
+    }
+}
+
+impl PredictedRange {
+    /// Returns the innovation with the variance of the independent part of the measurement.
+    pub fn independent_innovation(&self) -> Innovation {
+        let Innovation {
+            residual,
+            variance,
+            measurement_variance,
+        } = self.innovation;
+        let independent_variance = measurement_variance / self.information_fraction;
+        Innovation {
+            residual,
+            variance: variance - measurement_variance + independent_variance,
+            measurement_variance: independent_variance,
         }
     }
 }

@@ -72,15 +72,25 @@ impl Ekf {
         if is_outlier {
             return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
         }
+        self.note_range(&predicted);
         self.bias.update_with_range(
             &mut self.belief,
             &predicted.row,
             &predicted.terms,
             seen.residual,
-            seen.measurement_variance,
+            predicted.independent_innovation().measurement_variance,
         );
         self.keep_bounds();
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// Stores where a range was received that contains multipath.
+    pub(in crate::localize) fn note_range(&mut self, predicted: &PredictedRange) {
+        if predicted.quantity == RangeQuantity::Range
+            && let Some(head) = self.heads.get_mut(predicted.index)
+        {
+            head.last_range_m = predicted.place_m;
+        }
     }
 
     /// Estimates the noise of the ranges with an innovation, and counts successive outliers.
