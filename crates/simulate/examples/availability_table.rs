@@ -5,6 +5,9 @@
 //! Channels are `nominal`, `K=5` or a model of TR 38.901; faults are those of `access-av
 //! design integrity`. `beyond` is the fraction of the `ok` steps whose error exceeds the protection level.
 //! `silent` is the longest time in state `ok` with an error that exceeds the alert limit.
+//!
+//! `clocks=W` adds delays and range rates of the SSBs: the radio heads share an oscillator with a random walk of W ns/√s.
+//! Faults of delays start after 20 s: `clock` (100 ns at the vehicle) and `path` (20 m longer at one radio head).
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
 use std::error::Error;
@@ -21,6 +24,10 @@ const FROM_S: f64 = 20.0;
 
 /// Array mounting of the fault `array` (rad): 1°.
 const MOUNTING_RAD: f64 = 0.0175;
+
+/// Step of the vehicle's clock in the fault `clock` (ns), and additional delay of a blocked first path (ns): 20 m.
+const CLOCK_STEP_NS: f64 = 100.0;
+const LONGER_PATH_NS: f64 = 66.7;
 
 /// Array phase of the fault `phase` (rad per element).
 const PHASE_RAD: f64 = 0.05;
@@ -44,7 +51,7 @@ fn main() -> Result<()> {
     let keys = keys.collect::<Result<Vec<_>>>()?;
     println!("{runs} runs, seeds {seeds:?}, {keys:?}");
     println!(
-        "scenario          channel  fault      ok %  unavail %  beyond   runs  99 % (m)  90 % (m)  worst (m)  silent (s)  level/error"
+        "scenario          channel  fault      ok %  unavail %  beyond   runs  99 % (m)  95 % (m)  90 % (m)  worst (m)  silent (s)  level/error"
     );
     for name in list(2, "yard") {
         for channel in list(3, "nominal") {
@@ -88,6 +95,10 @@ fn with_fault(
             "channel".into(),
             value_of(&format!("{{ model = \"{channel}\" }}"))?,
         );
+    }
+    let (mut keys, mut faultless) = (keys.to_vec(), Vec::new());
+    if let Some(at) = keys.iter().position(|(key, _)| key == "clocks") {
+        faultless = with_clocks(site, &keys.remove(at).1)?;
     }
     let count = site.radio_heads.len();
     let moved = |which: std::ops::Range<usize>, by_m: [f64; 2]| {
@@ -142,6 +153,19 @@ fn with_fault(
                 "kind = \"odometer-slip\", ratio = 1.02".into(),
             )?]),
         ),
+        "clock" => set(
+            "faults",
+            Value::Array(vec![whole(format!(
+                "kind = \"late-arrival\", by_ns = {CLOCK_STEP_NS:?}"
+            ))?]),
+        ),
+        "path" => set(
+            "faults",
+            Value::Array(vec![whole(format!(
+                "kind = \"late-arrival\", radio_head = {}, by_ns = {LONGER_PATH_NS:?}",
+                count / 2
+            ))?]),
+        ),
         "all" => set("truth.site.radio_heads", moved(0..count, [2.0, 0.0])),
         "two" => set("truth.site.radio_heads", moved(0..2, [2.0, 0.0])),
         "one" => set(
@@ -153,13 +177,33 @@ fn with_fault(
         other => return Err(format!("no fault {other}").into()),
     };
     let guard = [("vehicle.integrity.enabled".to_owned(), Value::from(true))];
-    let over = over.into_iter().chain(guard).chain(keys.iter().cloned());
+    let over = over.into_iter().chain(guard).chain(faultless).chain(keys);
     let over: Vec<(String, Value)> = over.collect();
     Ok(scenario.with_overrides(
         over.iter()
             .map(|(key, value)| (key.as_str(), value.clone())),
         &Shipped,
     )?)
+}
+
+/// Returns the settings of one-way delays and of radio heads on one oscillator with this random walk (ns/√s).
+fn with_clocks(site: &Site, wander_ns_per_sqrt_s: &Value) -> Result<Vec<(String, Value)>> {
+    let heads = site.radio_heads.iter().map(|head| {
+        let mut head = Table::try_from(head)?;
+        head.insert("clock_group".into(), 1.into());
+        head.insert("clock_offset_std_ns".into(), 50.0.into());
+        head.insert(
+            "clock_wander_ns_per_sqrt_s".into(),
+            wander_ns_per_sqrt_s.clone(),
+        );
+        head.insert("clock_frequency_std_ppb".into(), 20.0.into());
+        Ok(Value::Table(head))
+    });
+    let heads = heads.collect::<Result<Vec<_>>>()?;
+    Ok(vec![
+        ("site.radio_heads".into(), Value::Array(heads)),
+        ("vehicle.ranging.kind".into(), "one-way".into()),
+    ])
 }
 
 fn print(name: &str, channel: &str, fault: &str, driven: &[Campaign]) {
@@ -173,11 +217,12 @@ fn print(name: &str, channel: &str, fault: &str, driven: &[Campaign]) {
     let share = |count: usize| 100.0 * count as f64 / total.epochs.max(1) as f64;
     let p = |q| errors.quantile_m(q).unwrap_or(f64::NAN);
     println!(
-        "{name:17} {channel:8} {fault:8} {:6.1} {:10.2}  {:.1e}  {affected:4}  {:8.2}  {:7.2}  {:9.2}  {:10.1}  {:6.1}",
+        "{name:17} {channel:8} {fault:8} {:6.1} {:10.2}  {:.1e}  {affected:4}  {:8.2}  {:8.2}  {:8.2}  {:9.2}  {:10.1}  {:6.1}",
         share(total.ok),
         share(total.unavailable),
         total.risk(),
         p(0.99),
+        p(0.95),
         p(0.9),
         total.worst_m,
         total.longest_silence_s,

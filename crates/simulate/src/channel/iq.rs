@@ -234,7 +234,7 @@ impl IqAir {
         let first_symbol = self.case.start_symbol(head.ssb_index)?;
         let time_s = number as f64 * self.period_s;
         let sight = channel.array().line_of_sight(&state(time_s), head);
-        let clock_s = self.clocks.delay_s(index);
+        let clock_s = self.clocks.delay_s(index) + self.faults.delay_s(index, time_s);
         let delay = (sight.distance_m / SPEED_OF_LIGHT_MPS + clock_s) * rate_hz;
         let clock_turn = -(self.ssb_freq_hz * clock_s).fract();
         let start = half_frame_start + self.numerology.symbol_start(first_symbol) as f64 + delay;

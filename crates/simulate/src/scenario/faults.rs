@@ -82,6 +82,17 @@ pub enum FaultKind {
         #[schemars(inner(range(min = -1e5, max = 1e5)))]
         by_m: [f64; 2],
     },
+    /// The signals arrive late by the clock of the receiver: a clock step, or a blocked first path if a
+    /// radio head is given. Only simulated samples (`fidelity = "iq"`) contain it.
+    LateArrival {
+        /// Number of the radio head in the site, from 0. Default: all radio heads, a step of the
+        /// vehicle's clock.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        radio_head: Option<usize>,
+        /// Additional delay in nanoseconds.
+        #[schemars(range(min = -1e4, max = 1e4))]
+        by_ns: f64,
+    },
 }
 
 impl FaultKind {
@@ -128,7 +139,11 @@ impl FaultSettings {
         match self.what {
             FaultKind::NonLineOfSight { radio_head, .. }
             | FaultKind::MovedHead { radio_head, .. }
-            | FaultKind::DuplicateHead { radio_head, .. } => check.that(
+            | FaultKind::DuplicateHead { radio_head, .. }
+            | FaultKind::LateArrival {
+                radio_head: Some(radio_head),
+                ..
+            } => check.that(
                 radio_head < heads,
                 &key("what.radio_head"),
                 radio_head,
@@ -149,7 +164,10 @@ impl FaultSettings {
                 has_antenna("what.antennas[0]", first)?;
                 has_antenna("what.antennas[1]", second)
             }
-            FaultKind::OdometerSlip { .. }
+            FaultKind::LateArrival {
+                radio_head: None, ..
+            }
+            | FaultKind::OdometerSlip { .. }
             | FaultKind::OdometerFrozen
             | FaultKind::OdometerHeld
             | FaultKind::OdometerStopped

@@ -43,6 +43,19 @@ impl Faults {
         self.at(time_s).next().is_some()
     }
 
+    /// Returns the additional delay of the signals of radio head `index` in seconds.
+    pub fn delay_s(&self, index: usize, time_s: f64) -> f64 {
+        let delay_ns = |fault| match fault {
+            FaultKind::LateArrival { radio_head, by_ns }
+                if radio_head.is_none_or(|it| it == index) =>
+            {
+                by_ns
+            }
+            _ => 0.0,
+        };
+        1e-9 * self.at(time_s).map(delay_ns).sum::<f64>()
+    }
+
     /// Applies the faults to the antenna gains of the radio head with index `index`.
     pub fn distort(
         &self,
