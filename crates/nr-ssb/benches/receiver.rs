@@ -90,7 +90,7 @@ fn scan_off_raster_20_ms_at_46_msps(bencher: divan::Bencher) {
 /// antennas.
 #[divan::bench]
 fn yardstick_16_transforms_of_256(bencher: divan::Bencher) {
-    let fft = rustfft::FftPlanner::new().plan_fft_forward(256);
+    let fft = nr_ssb::fft::forward(256);
     let mut scratch = vec![nr_ssb::Complex32::ZERO; fft.get_inplace_scratch_len()];
     let mut buffer = vec![nr_ssb::Complex32::ZERO; 256];
     bencher.bench_local(|| {

@@ -160,6 +160,7 @@
 //! | encode and decode the PBCH | [`pbch`]; its parts [`crc`], [`polar`], [`rate_matching`] |
 //! | combine the PBCHs of several periods | [`pbch::Decoder::combine`] |
 //! | convert between subcarriers and samples | [`Ofdm`] |
+//! | plan Fourier transforms | [`fft`] |
 //!
 //! # Errors
 //! Invalid inputs return an [`Error`]. Errors of a recording, a search or a tracked cell are a
@@ -187,6 +188,7 @@ pub use dsp::tones::{Tone, tones};
 pub use error::Error;
 pub use input::{diagnose, front_end};
 pub use num_complex::Complex32;
+pub use numeric::fft;
 pub use one_ssb::measure;
 pub use standard::band::{self, Band};
 pub use standard::coding::{polar, rate_matching};

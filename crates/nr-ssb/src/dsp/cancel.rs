@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use num_complex::{Complex32, Complex64};
-use rustfft::{Fft, FftPlanner};
 
 use super::alignment::Alignment;
 use super::base_rate::{CYCLIC_PREFIX, SYMBOL_FFT, SYMBOL_SAMPLES};
+use crate::numeric::fft::{self, Fft};
 use crate::numeric::phasors::fill_phasors;
 use crate::standard::grid::{SUBCARRIERS, SYMBOLS, SsbGrid};
 
@@ -21,7 +21,7 @@ pub(crate) struct Canceller {
 
 impl Canceller {
     pub(crate) fn new() -> Self {
-        let fft = FftPlanner::new().plan_fft_inverse(SYMBOL_FFT);
+        let fft = fft::inverse(SYMBOL_FFT);
         let scratch = fft.get_inplace_scratch_len();
         Self {
             fft,

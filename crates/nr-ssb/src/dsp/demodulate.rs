@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
 
 use super::alignment::Alignment;
 use super::base_rate::{CYCLIC_PREFIX, SSB_SAMPLES, SYMBOL_FFT, SYMBOL_SAMPLES};
 use super::received_grid::ReceivedGrid;
+use crate::numeric::fft::{self, Fft};
 use crate::numeric::phasors::fill_phasors;
 use crate::standard::grid::SUBCARRIERS;
 
@@ -27,7 +27,7 @@ pub struct Demodulator {
 impl Demodulator {
     /// Creates the FFT plan.
     pub fn new() -> Self {
-        let fft = FftPlanner::new().plan_fft_forward(SYMBOL_FFT);
+        let fft = fft::forward(SYMBOL_FFT);
         let scratch = fft.get_inplace_scratch_len();
         Self {
             fft,

@@ -18,12 +18,12 @@
 use std::sync::Arc;
 
 use num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
 
 use super::base_rate::SYMBOL_FFT;
 use super::pss_symbol::pss_symbol;
 use super::received_grid::MAX_ANTENNAS;
 use super::whitening::whitening;
+use crate::numeric::fft::{self, Fft};
 
 /// Length of an overlap-save transform.
 const BLOCK: usize = 4096;
@@ -87,9 +87,8 @@ impl MatchedFilter {
     /// Creates a correlator for `antennas` channels at 256 samples per symbol. Offsets are in Hz at
     /// subcarrier spacing `scs_hz`, at most 64 subcarriers, rounded to the nearest bin.
     pub fn new(scs_hz: f64, cfo_hypotheses_hz: &[f64], antennas: usize) -> Self {
-        let mut planner = FftPlanner::new();
-        let forward = planner.plan_fft_forward(BLOCK);
-        let inverse = planner.plan_fft_inverse(HALF_BLOCK);
+        let forward = fft::forward(BLOCK);
+        let inverse = fft::inverse(HALF_BLOCK);
         let replicas = [0, 1, 2].map(|n_id_2| {
             let mut replica = pss_symbol(n_id_2);
             replica.resize(BLOCK, Complex32::ZERO);

@@ -20,9 +20,9 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use num_complex::{Complex32, Complex64};
-use rustfft::{Fft, FftPlanner};
 
 use super::base_rate::SYMBOL_FFT;
+use crate::numeric::fft::{self, Fft};
 use crate::numeric::phasors::fill_phasors;
 use crate::standard::sequence::pss::{SYNC_LEN, pss};
 
@@ -137,9 +137,8 @@ pub(crate) struct SegmentFilter {
 
 impl SegmentFilter {
     pub(crate) fn new(antennas: usize) -> Self {
-        let mut planner = FftPlanner::new();
-        let forward = planner.plan_fft_forward(BLOCK);
-        let inverse = planner.plan_fft_inverse(NARROW);
+        let forward = fft::forward(BLOCK);
+        let inverse = fft::inverse(NARROW);
         let scratch = forward
             .get_inplace_scratch_len()
             .max(inverse.get_inplace_scratch_len());
@@ -474,11 +473,7 @@ mod tests {
     /// probability of 4e-15.
     #[test]
     fn the_edge_of_an_empty_band_gives_no_pss_detection() {
-        let mut planner = FftPlanner::new();
-        let (forward, inverse) = (
-            planner.plan_fft_forward(8192),
-            planner.plan_fft_inverse(8192),
-        );
+        let (forward, inverse) = (fft::forward(8192), fft::inverse(8192));
         let tiles = tiles(60);
         let mut filter = SegmentFilter::new(1);
         for edge in [-40_isize, 7, 33] {

@@ -1,9 +1,9 @@
 //! PSS in the time domain.
 
 use num_complex::Complex32;
-use rustfft::FftPlanner;
 
 use super::base_rate::SYMBOL_FFT;
+use crate::numeric::fft;
 use crate::standard::sequence::pss::pss;
 
 /// Returns the PSS in the time domain: 256 samples with unit energy, without cyclic prefix.
@@ -13,9 +13,7 @@ pub(crate) fn pss_symbol(n_id_2: u8) -> Vec<Complex32> {
         let bin = (56 + n + SYMBOL_FFT - 120) % SYMBOL_FFT;
         symbol[bin] = Complex32::new(*chip, 0.0);
     }
-    FftPlanner::new()
-        .plan_fft_inverse(SYMBOL_FFT)
-        .process(&mut symbol);
+    fft::inverse(SYMBOL_FFT).process(&mut symbol);
     // Σ|p|² = 127 · 256 after the unnormalised transform.
     let scale = 1.0 / (127.0 * SYMBOL_FFT as f32).sqrt();
     symbol.iter().map(|sample| sample * scale).collect()

@@ -20,10 +20,10 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use num_complex::{Complex32, Complex64};
-use rustfft::{Fft, FftPlanner};
 
 use super::received_grid::MAX_ANTENNAS;
 use crate::numeric::decibel::decibel;
+use crate::numeric::fft::{self, Fft};
 use crate::numeric::hermitian::{Matrix, cholesky, solve};
 use crate::numeric::phasors::fill_phasors;
 
@@ -141,7 +141,7 @@ impl ToneCanceller {
     }
 
     fn with_frame(frame: usize, antennas: usize) -> Self {
-        let fft = FftPlanner::new().plan_fft_forward(frame);
+        let fft = fft::forward(frame);
         let scratch = vec![Complex32::ZERO; fft.get_inplace_scratch_len()];
         Self {
             fft,
@@ -562,12 +562,11 @@ mod tests {
 
     #[test]
     fn a_tone_in_an_empty_band_is_one_line() {
-        let mut planner = FftPlanner::new();
         let mut samples = noise(9, 32_768);
-        planner.plan_fft_forward(32_768).process(&mut samples);
+        fft::forward(32_768).process(&mut samples);
         // Noise in the lower half of the band only.
         samples[..16_384].fill(Complex32::ZERO);
-        planner.plan_fft_inverse(32_768).process(&mut samples);
+        fft::inverse(32_768).process(&mut samples);
         let mut samples: Vec<_> = samples.iter().map(|x| x / 32_768.0).collect();
         let true_cycles = [0.2123, 0.4761];
         for cycles in true_cycles {

@@ -12,10 +12,10 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use num_complex::{Complex32, Complex64};
-use rustfft::{Fft, FftPlanner};
 
 use crate::dsp::base_rate::SYMBOL_FFT;
 use crate::dsp::received_grid::MAX_ANTENNAS;
+use crate::numeric::fft::{self, Fft};
 
 /// Maximum ratio of the input rate to the base rate.
 const MAX_OVERSAMPLING: f64 = 4096.0;
@@ -145,9 +145,8 @@ impl FrontEnd {
             .unwrap_or(1);
         let (block, input_block) = (repeats * interpolation, repeats * decimation);
         let margin = MIN_MARGIN.next_multiple_of(interpolation);
-        let mut planner = FftPlanner::new();
-        let forward = planner.plan_fft_forward(input_block);
-        let inverse = planner.plan_fft_inverse(block);
+        let forward = fft::forward(input_block);
+        let inverse = fft::inverse(block);
         let scratch = forward
             .get_inplace_scratch_len()
             .max(inverse.get_inplace_scratch_len());

@@ -2,6 +2,7 @@
 
 pub(crate) mod decibel;
 pub(crate) mod false_alarm;
+pub mod fft;
 pub(crate) mod hermitian;
 #[cfg(test)]
 pub(crate) mod noise;

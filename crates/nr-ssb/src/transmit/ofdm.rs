@@ -7,9 +7,9 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use num_complex::{Complex32, Complex64};
-use rustfft::{Fft, FftPlanner};
 
 use crate::error::Error;
+use crate::numeric::fft::{self, Fft};
 use crate::standard::grid::SUBCARRIERS;
 use crate::standard::numerology::Numerology;
 
@@ -49,9 +49,8 @@ impl Ofdm {
     /// Creates the FFT plans of `numerology`.
     pub fn new(numerology: Numerology) -> Self {
         let size = numerology.fft_size();
-        let mut planner = FftPlanner::new();
-        let forward = planner.plan_fft_forward(size);
-        let inverse = planner.plan_fft_inverse(size);
+        let forward = fft::forward(size);
+        let inverse = fft::inverse(size);
         let scratch = forward
             .get_inplace_scratch_len()
             .max(inverse.get_inplace_scratch_len());

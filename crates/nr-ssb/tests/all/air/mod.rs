@@ -7,12 +7,12 @@ use std::f64::consts::TAU;
 
 use nr_ssb::{
     BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci, SubcarrierSpacing,
+    fft,
 };
 use num_complex::Complex64;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use rustfft::FftPlanner;
 
 /// Received signal of one cell.
 #[derive(Debug, Clone)]
@@ -121,9 +121,8 @@ impl Cell {
 /// Applies a circular delay, which may be a fraction of a sample.
 pub fn delayed(samples: &[Complex32], fraction: f64) -> Vec<Complex32> {
     let n = samples.len();
-    let mut planner = FftPlanner::new();
     let mut spectrum = samples.to_vec();
-    planner.plan_fft_forward(n).process(&mut spectrum);
+    fft::forward(n).process(&mut spectrum);
     for (k, bin) in spectrum.iter_mut().enumerate() {
         let signed = if k < n / 2 {
             k as f64
@@ -132,7 +131,7 @@ pub fn delayed(samples: &[Complex32], fraction: f64) -> Vec<Complex32> {
         };
         *bin *= phasor(-TAU * signed * fraction / n as f64) / n as f32;
     }
-    planner.plan_fft_inverse(n).process(&mut spectrum);
+    fft::inverse(n).process(&mut spectrum);
     spectrum
 }
 
@@ -148,14 +147,13 @@ pub fn raised(samples: &[Complex32], factor: usize, cycles: f64) -> Vec<Complex3
 /// Interpolates to `up / down` times the rate; `down` must divide the number of samples.
 pub fn resampled(samples: &[Complex32], up: usize, down: usize) -> Vec<Complex32> {
     let n = samples.len();
-    let mut planner = FftPlanner::new();
     let mut spectrum = samples.to_vec();
-    planner.plan_fft_forward(n).process(&mut spectrum);
+    fft::forward(n).process(&mut spectrum);
     let mut wide = vec![Complex32::ZERO; n / down * up];
     let end = wide.len() - n / 2;
     wide[..n / 2].copy_from_slice(&spectrum[..n / 2]);
     wide[end..].copy_from_slice(&spectrum[n / 2..]);
-    planner.plan_fft_inverse(wide.len()).process(&mut wide);
+    fft::inverse(wide.len()).process(&mut wide);
     wide.iter().map(|x| x / n as f32).collect()
 }
 
