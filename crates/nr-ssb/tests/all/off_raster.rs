@@ -122,7 +122,7 @@ fn a_cell_with_an_oscillator_error_of_20_ppm_is_detected() {
     let mut rng = air::rng(6);
     for spacing in [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30] {
         for ssb_freq_hz in [3_600.96e6, 3_625.175e6, 3_465.626e6, 3_615.599e6] {
-            for cfo_ppm in [-20.0, -10.0, -5.0, 5.0, 10.0, 20.0] {
+            for cfo_ppm in [-20.0, -5.0, 20.0] {
                 let mut cell = air::Cell::random(&mut rng, spacing, 1);
                 (cell.ssb_freq_hz, cell.ssb_indices) = (ssb_freq_hz, vec![1]);
                 cell.delay = 200.3;
@@ -205,33 +205,29 @@ fn a_weak_cell_off_the_raster_is_found_next_to_a_strong_one_on_it() {
 /// Detection limits of a cell on and off the raster, with one SSB in 3 ms on one antenna.
 #[test]
 fn detection_limits_on_and_off_the_raster_are_similar() {
-    let trials = 25;
-    let mut last = [0; 2];
-    for snr_db in [-6.0, -4.0] {
-        let mut found = [0; 2];
-        for trial in 0..trials {
-            let mut rng = air::rng(4000 + trial);
-            let mut cell = air::Cell::random(&mut rng, SubcarrierSpacing::Khz30, 1);
-            cell.lmax = nr_ssb::Lmax::L8;
-            cell.ssb_indices = vec![1];
-            cell.delay = 200.0 + rng.random_range(0.0..1000.0);
-            // Oscillators of base station and receiver within 2 ppm.
-            cell.cfo_hz = rng.random_range(-7e3..7e3);
-            for (place, found) in [3_600.96e6, 3_600.675e6].into_iter().zip(&mut found) {
-                cell.ssb_freq_hz = place;
-                let offset_hz = 15e3 * 55.0;
-                let samples = on_the_air(&cell, offset_hz, snr_db, &mut rng);
-                let slices = air::slices(&samples);
-                let finds = scan(&slices, RATE_HZ, Some(place - offset_hz)).unwrap();
-                let mut ssbs = finds.iter().flat_map(|it| &it.ssbs);
-                *found += u32::from(ssbs.any(|it| it.pci.get() == cell.pci));
-            }
+    let (trials, snr_db) = (25, -4.0);
+    let mut found = [0; 2];
+    for trial in 0..trials {
+        let mut rng = air::rng(4000 + trial);
+        let mut cell = air::Cell::random(&mut rng, SubcarrierSpacing::Khz30, 1);
+        cell.lmax = nr_ssb::Lmax::L8;
+        cell.ssb_indices = vec![1];
+        cell.delay = 200.0 + rng.random_range(0.0..1000.0);
+        // Oscillators of base station and receiver within 2 ppm.
+        cell.cfo_hz = rng.random_range(-7e3..7e3);
+        for (place, found) in [3_600.96e6, 3_600.675e6].into_iter().zip(&mut found) {
+            cell.ssb_freq_hz = place;
+            let offset_hz = 15e3 * 55.0;
+            let samples = on_the_air(&cell, offset_hz, snr_db, &mut rng);
+            let slices = air::slices(&samples);
+            let finds = scan(&slices, RATE_HZ, Some(place - offset_hz)).unwrap();
+            let mut ssbs = finds.iter().flat_map(|it| &it.ssbs);
+            *found += u32::from(ssbs.any(|it| it.pci.get() == cell.pci));
         }
-        let [on, off] = found;
-        println!("{snr_db} dB: {on} of {trials} on the raster, {off} off it");
-        last = found;
     }
-    assert!(last.iter().all(|found| *found >= 22), "{last:?}");
+    let [on, off] = found;
+    println!("{snr_db} dB: {on} of {trials} on the raster, {off} off it");
+    assert!(found.iter().all(|found| *found >= 22), "{found:?}");
 }
 
 #[test]

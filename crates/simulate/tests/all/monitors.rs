@@ -3,15 +3,30 @@
 use onboard::localize::IntegrityState;
 use onboard::monitor::Fault;
 use onboard::settings::{Shipped, TomlFile};
-use simulate::scenario::{FaultKind, FaultSettings, Scenario};
+use simulate::scenario::{FaultKind, FaultSettings, MotionSettings, Scenario};
 use simulate::{RunRecord, Step};
 
-use crate::common::{drives, shipped};
+use crate::common::{drives, shipped, value};
 
 const FROM_S: f64 = 20.0;
 const UNTIL_S: f64 = 30.0;
 
-/// Returns the yard with a fault.
+/// Returns the first leg of the yard, up to `length_m` and with the stops before it.
+fn first_leg(length_m: f64) -> Scenario {
+    let yard = shipped("yard");
+    let mut stops = yard.motion.stops.clone();
+    stops.retain(|it| it.at_m < length_m);
+    let path = format!("{{ start.x_m = -140.0, segments = [{{ length_m = {length_m:?} }}] }}");
+    let path = [("motion.path", value(&path))];
+    let motion = MotionSettings {
+        stops,
+        ..yard.motion.clone()
+    };
+    let short = Scenario { motion, ..yard };
+    short.with_overrides(path, &Shipped).unwrap()
+}
+
+/// Returns the first 70 s of the yard with a fault.
 fn with(what: FaultKind) -> Scenario {
     let fault = FaultSettings {
         from_s: FROM_S,
@@ -20,7 +35,7 @@ fn with(what: FaultKind) -> Scenario {
     };
     Scenario {
         faults: vec![fault],
-        ..shipped("yard")
+        ..first_leg(200.0)
     }
 }
 
@@ -96,7 +111,7 @@ fn the_state_is_ok_again_within_ten_seconds_after_a_fault_of_the_odometry() {
         };
         let scenario = Scenario {
             faults: vec![fault],
-            ..shipped("yard")
+            ..first_leg(400.0)
         };
         for run in drives(&scenario, 5, 1) {
             let after = run.steps.iter().filter(|it| it.time_s > UNTIL_S);
@@ -112,7 +127,7 @@ fn the_state_is_ok_again_within_ten_seconds_after_a_fault_of_the_odometry() {
 #[test]
 fn a_departure_that_the_odometry_misses_is_detected_by_the_angles() {
     // At 42.3 s the yard's vehicle has been stopped for 8 s.
-    let nominal = drives(&shipped("yard"), 5, 1).remove(0);
+    let nominal = drives(&first_leg(200.0), 5, 1).remove(0);
     let moves = |pair: &[Step]| pair[0].truth.point().distance_m(pair[1].truth.point()) > 0.0;
     let stop = nominal
         .steps
@@ -130,7 +145,7 @@ fn a_departure_that_the_odometry_misses_is_detected_by_the_angles() {
     };
     let scenario = Scenario {
         faults: vec![fault],
-        ..shipped("yard")
+        ..first_leg(200.0)
     };
     for run in drives(&scenario, 5, 1) {
         let first = run.steps.iter().find(|it| !it.faults.is_empty()).unwrap();
@@ -160,7 +175,7 @@ fn a_departure_that_the_odometry_misses_is_detected_by_the_angles() {
 /// The odometry repeats its cruising speed while the vehicle brakes with 0.5 m/s² before its first stop.
 #[test]
 fn odometry_held_at_its_speed_is_detected_while_the_vehicle_brakes() {
-    let nominal = drives(&shipped("yard"), 5, 1).remove(0);
+    let nominal = drives(&first_leg(200.0), 5, 1).remove(0);
     assert!(nominal.steps.iter().all(|it| it.faults.is_empty()));
     let stands = |pair: &[Step]| pair[0].truth.point().distance_m(pair[1].truth.point()) == 0.0;
     let mut pairs = nominal.steps.windows(2).skip(500);
@@ -174,7 +189,7 @@ fn odometry_held_at_its_speed_is_detected_while_the_vehicle_brakes() {
     };
     let scenario = Scenario {
         faults: vec![fault],
-        ..shipped("yard")
+        ..first_leg(200.0)
     };
     for run in drives(&scenario, 5, 1) {
         let first = run.steps.iter().find(|it| !it.faults.is_empty()).unwrap();
@@ -248,7 +263,9 @@ fn two_radio_heads_with_one_pci_are_reported_within_twenty_ssbs() {
     let overrides = [("site.rician_k_db", 20.0.into())];
     let scenario = Scenario {
         faults: vec![fault],
-        ..shipped("yard").with_overrides(overrides, &Shipped).unwrap()
+        ..first_leg(200.0)
+            .with_overrides(overrides, &Shipped)
+            .unwrap()
     };
     for run in drives(&scenario, 6, 2) {
         let [before, during] = faulty(&run);

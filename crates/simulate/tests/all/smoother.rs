@@ -60,7 +60,7 @@ fn nees(estimate: &PoseEstimate, truth: &Step) -> f64 {
 
 #[test]
 fn smoothed_drives_are_more_accurate_and_consistent() {
-    let runs = 30;
+    let runs = 16;
     for name in ["paper-real-odometry", "paper-real-odometry-2"] {
         let drives = drives(&unguarded(name), runs);
         // Mean over a drive of the reduction of the squared error by smoothing, actual and
