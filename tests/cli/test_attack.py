@@ -24,7 +24,7 @@ def attack(tmp_path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_a_short_attack_finds_no_defect(tmp_path: Path) -> None:
-    done = attack(tmp_path, "--seed", "2024", "--inputs", "120", "--drives", "12")
+    done = attack(tmp_path, "--seed", "2024", "--inputs", "60", "--drives", "6")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "seed 2024" in done.stdout
     assert "no findings" in done.stdout

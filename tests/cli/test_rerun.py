@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import polars as pl
 import pytest
 
 from access_av.tables.inputs import inputs
 from short_plant import LAST_METRES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import Finished
+
+    Cli = Callable[..., Finished]
 
 SCENARIO = """\
 extends = "paper-real-odometry-2"
@@ -73,14 +80,15 @@ def write_ranges(where: Path) -> None:
         (folder / "ranges.csv").write_text("\n".join(["time_s,pci,range_m", *rows]) + "\n")
 
 
-def access_av(where: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "access_av", *arguments],
-        cwd=where,
-        env={**os.environ, "COLUMNS": "200"},
-        capture_output=True,
-        text=True,
-    )
+@pytest.fixture
+def run(access_av: Cli, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Finished]:
+    """Runs the command line in this process; ``rerun`` repeats the command in another one."""
+
+    def run(where: Path, *arguments: str) -> Finished:
+        monkeypatch.chdir(where)
+        return access_av(*arguments, columns=200)
+
+    return run
 
 
 @pytest.fixture(scope="module")
@@ -97,20 +105,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("log2", ("--angles", "--run", "1")),
     )
     for name, options in drives:
-        done = access_av(where, "record", "synth", "short.toml", *options, "--out", name)
-        assert done.returncode == 0, done.stderr
+        command = ("record", "synth", "short.toml", *options, "--out", name)
+        subprocess.run([sys.executable, "-m", "access_av", *command], cwd=where, check=True)
     return where
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_results_of_every_command_are_repeated(name: str, folder: Path) -> None:
+def test_the_results_of_every_command_are_repeated(name: str, folder: Path, run: Cli) -> None:
     if name == "tune":
         pytest.importorskip("optuna", reason="the extra `optuna` is not installed")
-    done = access_av(folder, *COMMANDS[name], "--out", f"of-{name}")
-    assert done.returncode in (0, 3), done.stderr
-    repeated = access_av(folder, "rerun", f"of-{name}", "--json")
-    assert repeated.returncode == 0, repeated.stdout + repeated.stderr
-    record = json.loads(repeated.stdout)
+    done = run(folder, *COMMANDS[name], "--out", f"of-{name}")
+    assert done.code in (0, 3), done.err
+    repeated = run(folder, "rerun", f"of-{name}", "--json")
+    assert repeated.code == 0, repeated.out + repeated.err
+    record = json.loads(repeated.out)
     assert record["identical"]
     assert record["differences"] == record["changed_inputs"] == []
     files = [it for it in (folder / f"of-{name}").rglob("*") if it.is_file()]
@@ -118,16 +126,18 @@ def test_the_results_of_every_command_are_repeated(name: str, folder: Path) -> N
     assert record["written_by"] == record["repeated_by"]
 
 
-def test_a_command_line_of_an_earlier_version_is_repeated(folder: Path, tmp_path: Path) -> None:
-    done = access_av(folder, "design", "bound", "short.toml", "--out", str(tmp_path / "old"))
-    assert done.returncode == 0, done.stderr
+def test_a_command_line_of_an_earlier_version_is_repeated(
+    folder: Path, tmp_path: Path, run: Cli
+) -> None:
+    done = run(folder, "design", "bound", "short.toml", "--out", str(tmp_path / "old"))
+    assert done.code == 0, done.err
     file = tmp_path / "old/manifest.json"
     manifest = json.loads(file.read_text())
     program, *words = manifest["command"]
     assert words[:2] == ["design", "bound"]
     file.write_text(json.dumps({**manifest, "command": [program, *words[1:]]}))
-    repeated = access_av(folder, "rerun", str(tmp_path / "old"))
-    assert repeated.returncode == 0, repeated.stdout + repeated.stderr
+    repeated = run(folder, "rerun", str(tmp_path / "old"))
+    assert repeated.code == 0, repeated.out + repeated.err
 
 
 def test_every_command_with_results_is_tried() -> None:
@@ -147,13 +157,13 @@ def test_every_command_with_results_is_tried() -> None:
 
 
 @pytest.fixture
-def results(folder: Path, tmp_path: Path) -> Path:
-    done = access_av(folder, "run", "short.toml", "--out", str(tmp_path / "mine"))
-    assert done.returncode == 0, done.stderr
+def results(folder: Path, tmp_path: Path, run: Cli) -> Path:
+    done = run(folder, "run", "short.toml", "--out", str(tmp_path / "mine"))
+    assert done.code == 0, done.err
     return tmp_path / "mine"
 
 
-def test_differences_are_listed(folder: Path, results: Path) -> None:
+def test_differences_are_listed(folder: Path, results: Path, run: Cli) -> None:
     table = pl.read_parquet(results / "aoa_estimates.parquet")
     moved = table.with_columns(pl.col("time_s") + 0.25)
     moved.write_parquet(results / "aoa_estimates.parquet")
@@ -162,39 +172,43 @@ def test_differences_are_listed(folder: Path, results: Path) -> None:
     (results / "notes.txt").write_text("mine")
     manifest = json.loads((results / "manifest.json").read_text())
     (results / "manifest.json").write_text(json.dumps({**manifest, "seed": 7}))
-    done = access_av(folder, "rerun", str(results))
-    assert done.returncode == 3, done.stderr
-    lines = dict(line.split(": ", 1) for line in done.stdout.splitlines() if ": " in line)
+    done = run(folder, "rerun", str(results))
+    assert done.code == 3, done.err
+    lines = dict(line.split(": ", 1) for line in done.out.splitlines() if ": " in line)
     assert lines["aoa_estimates.parquet"] == "columns differ: time_s by up to 0.25"
     assert lines["truth.tum"].startswith("line 1: '0 0 0' instead of ")
     assert lines["report.html"] == "only in the new results"
     assert lines["notes.txt"] == "missing in the new results"
     assert lines["manifest.json"] == "entries differ: seed"
-    assert "5 of " in done.stdout
+    assert "5 of " in done.out
 
 
-def test_the_copy_of_the_settings_replaces_a_changed_input(folder: Path, results: Path) -> None:
+def test_the_copy_of_the_settings_replaces_a_changed_input(
+    folder: Path, results: Path, run: Cli
+) -> None:
     scenario = folder / "short.toml"
     try:
         scenario.write_text(SCENARIO.replace("285", "280"))
-        changed = access_av(folder, "rerun", str(results), "--json")
+        changed = run(folder, "rerun", str(results), "--json")
         scenario.unlink()
-        missing = access_av(folder, "rerun", str(results), "--json")
+        missing = run(folder, "rerun", str(results), "--json")
     finally:
         scenario.write_text(SCENARIO)
     for done, said in ((changed, "has changed"), (missing, "is missing")):
-        assert said in " ".join(done.stderr.split())
-        record = json.loads(done.stdout)
+        assert said in " ".join(done.err.split())
+        record = json.loads(done.out)
         # The page shows the settings as they were given, here those of the copy.
         assert {it["file"] for it in record["differences"]} <= {"report.html"}, record
         assert len(record["changed_inputs"]) == 1
 
 
-def test_results_that_cannot_be_repeated_are_reported(folder: Path, results: Path) -> None:
+def test_results_that_cannot_be_repeated_are_reported(
+    folder: Path, results: Path, run: Cli
+) -> None:
     def refused(*arguments: str) -> str:
-        done = access_av(folder, "rerun", *arguments)
-        assert done.returncode == 2, done.stdout
-        return " ".join(done.stderr.split())
+        done = run(folder, "rerun", *arguments)
+        assert done.code == 2, done.out
+        return " ".join(done.err.split())
 
     assert "no results of a command (" in refused(str(folder))
     assert "working directory does not exist" in refused(str(results), "--directory", "nowhere")

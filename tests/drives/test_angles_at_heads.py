@@ -83,7 +83,7 @@ def test_a_drive_is_located_by_angles_measured_at_the_radio_heads(tmp_path: Path
 
 
 def test_angles_of_heads_without_an_array_are_reported_and_not_used(tmp_path: Path) -> None:
-    drive = seen_by_heads(duration_s=20.0)
+    drive = seen_by_heads(duration_s=6.0)
     drive.with_arrays = False
     found = drive.locate(tmp_path)
     assert not found.angles["accepted"].any()
