@@ -10,13 +10,14 @@ export CARGO_INCREMENTAL ?= 0
 
 # All tests of a file run in one process and share its simulated drives. One process more than cores, because some
 # tests only wait.
-PYTEST := $(BIN)/python -m pytest --numprocesses $(shell expr $$(nproc 2>/dev/null || echo 1) + 1) --dist loadscope
+PYTEST := $(BIN)/python -m pytest --numprocesses $(shell expr $$(nproc 2>/dev/null || echo 1) + 1) \
+  --dist loadscope --no-loadscope-reorder
 
 # Reference vectors and recordings, next to the project.
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
 
 .DEFAULT_GOAL := help
-.PHONY: help demo live check test attack test-radio test-aarch64 count-aarch64 dist package lint lint-python docs figures picture bench clean
+.PHONY: help demo live check test campaign attack test-radio test-aarch64 count-aarch64 dist package lint lint-python docs figures picture bench clean
 
 help: ## List these commands
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -32,18 +33,23 @@ $(NODE): $(SOURCES)
 	cargo build --package access-av-node
 
 check: lint ## Run formats, lints, types and the fast tests of both languages
-	cargo test --workspace --quiet --lib
+	cargo test --workspace --exclude access-av-python --quiet --lib
 	$(PYTEST) -m "not slow"
 
-# Clippy checks the examples; linking them takes longer than all doc tests.
-TESTED := --workspace --quiet --lib --bins --tests
+# Without examples, which clippy checks, and without the targets with `test = false` in their Cargo.toml, which have no
+# unit tests. Linking them takes longer than all doc tests.
+TESTED := --workspace --quiet --tests
 
 test: lint ## Run formats, lints, types and all tests of both languages
-	@if [ -d "$(DATA)" ]; then ACCESS_AV_DATA="$(DATA)" cargo test $(TESTED) -- --include-ignored --skip table_of_; \
+	@if [ -d "$(DATA)" ]; then ACCESS_AV_DATA="$(DATA)" cargo test $(TESTED) -- --include-ignored --skip table_of_ --skip campaign_of_; \
 	  else echo "not tested: reference vectors and recordings; no $(DATA) (ACCESS_AV_DATA)"; \
 	  cargo test $(TESTED); fi
 	cargo test --workspace --quiet --doc
 	$(PYTEST)
+
+campaign: attack ## Run `make attack`, thousands of random drives, and Ctrl-C at 20 times in each command (hours)
+	cargo test $(TESTED) -- --ignored campaign_of_
+	ACCESS_AV_INTERRUPTIONS=20 $(BIN)/python -m pytest tests/cli/test_interrupt.py
 
 attack: .venv/installed-test $(NODE) ## Run random inputs, drives and plug-ins, and inject faults into the running node (SEED=… repeats; hours)
 	$(BIN)/python -m attack $(if $(SEED),--seed $(SEED)) $(ATTACK)
@@ -94,8 +100,7 @@ lint: .venv/installed-test ## Check formats, lints and types of both languages
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/mypy
-	$(BIN)/stubtest access_av._core
+	$(BIN)/mypy & types=$$!; $(BIN)/stubtest access_av._core && wait $$types
 
 docs: .venv/installed-docs ## Build the documentation site target/docs/site/index.html; warnings are errors
 	$(BIN)/access-av file columns --markdown > docs/columns.md

@@ -48,7 +48,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.stem in SLOW:
             item.add_marker(pytest.mark.slow)
-    # Parallel workers start the longest files first, so that all workers end at about the same time.
+    # Workers start the longest files first, so that all of them end at about the same time.
     items.sort(key=lambda it: (it.path.stem != LONGEST, it.path.stem not in SLOW))
 
 
