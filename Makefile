@@ -29,8 +29,9 @@ NODE := target/debug/access-av-node
 live: .venv/installed-live $(NODE) ## Send a simulated drive to the node in real time, and open its page (Ctrl-C ends it)
 	$(BIN)/python examples/live/live.py --node $(NODE) $(LIVE)
 
+# With `--package`, features of dependencies differ, and `nr-ssb` and `onboard` are compiled again.
 $(NODE): $(SOURCES)
-	cargo build --package access-av-node
+	cargo build --workspace --bin access-av-node
 
 check: lint ## Run formats, lints, types and the fast tests of both languages
 	cargo test --workspace --exclude access-av-python --quiet --lib
