@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from access_av.run.pairs import ErrorSamples
 from access_av.run.simulation import Simulation, simulate
 
 if TYPE_CHECKING:
+    from collections.abc import MutableMapping
+
     from access_av._core import Scenario
     from access_av.device.platform import Platform
     from access_av.statistics.percentiles import Percentile
@@ -36,6 +39,7 @@ class Driven:
     steps: pl.DataFrame
     errors: ErrorSamples
 
+    @cached_property
     def percentiles(self) -> list[Percentile]:
         """Returns percentiles of the horizontal error over all runs and times."""
         return self.errors.percentiles(resamples=RESAMPLES)
@@ -51,7 +55,7 @@ class Driver:
     threads: int | None = None
     count: int = RESAMPLES
     methods: tuple[str, ...] = TAPED
-    known: dict[str, Driven] = field(default_factory=dict)
+    known: MutableMapping[str, Driven] = field(default_factory=dict)
     traces: list[MeasurementTraces] = field(default_factory=list)
 
     @property

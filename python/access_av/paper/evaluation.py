@@ -262,7 +262,7 @@ def evaluate_with(
         driver.trip_s,
         settings=settings_of(interpretation, platform) | {"runs": driver.runs},
     )
-    errors = {setting: as_columns(each.percentiles()) for setting, each in driven.items()}
+    errors = {setting: as_columns(each.percentiles) for setting, each in driven.items()}
     return Evaluation(
         interpretation=interpretation,
         points=pl.DataFrame(
