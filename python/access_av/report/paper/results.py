@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
-import vl_convert
 
 from access_av.device.platform import Platform
 from access_av.errors import InputError
 from access_av.paper.claims import as_records
 from access_av.paper.interpretations import SHIPPED, load_all
 from access_av.paper.study import Study, study
-from access_av.report.paper.evaluation import render
 from access_av.tables import validation
 from access_av.tables.results_directory import RESULTS, ResultsDirectory
 
@@ -36,6 +34,11 @@ def write(
     progress: Callable[[int, int], None],
 ) -> None:
     """Writes tables, claims, report, scenarios, platform and manifest."""
+    # Libraries of charts take 40 MB: import them after the simulations have released their memory.
+    import vl_convert
+
+    from access_av.report.paper.evaluation import render
+
     tables = made.tables()
     for name in list(tables):
         directory.write_table(f"{name}.parquet", tables.pop(name))
