@@ -311,6 +311,15 @@ def test_progress_is_printed_as_lines_in_a_pipe(
     lines = capsys.readouterr().err.splitlines()
     assert lines
     assert all(line.startswith("Evaluating: 25 %, 0 s, about ") for line in lines)
+    with terminal.progress("Driving") as tick:
+        tick(3, 4, "nominal channel")
+        tick(0, 8, "measures")
+        time.sleep(0.2)
+        tick(2, 8, "measures")
+        time.sleep(0.2)
+    lines = capsys.readouterr().err.splitlines()
+    assert all(line.startswith("Driving, measures: ") for line in lines)
+    assert lines[-1].startswith("Driving, measures: 2 of 8, 0 s, about ")
     with terminal.progress("Soon over") as tick:
         tick(1, 2)
     assert capsys.readouterr().err == ""

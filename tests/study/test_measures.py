@@ -11,6 +11,7 @@ import pytest
 from access_av import Plant
 from access_av.economics.carbon import Range
 from access_av.run.runs import Runs, drive
+from access_av.statistics.integrity import Integrity
 from access_av.study.economy import Prices
 from access_av.study.measures import measures
 from access_av.study.operate import operate
@@ -82,13 +83,14 @@ def test_the_cheapest_set_that_meets_the_target_is_found(
 
     before = made(real, "unchanged", PLANT.scenario(), level_m, 1)
     changes = [Remedy(name, name, FREE, name, 1) for name in ratios]
-    planned: list[int] = []
+    stages: list[tuple[str, int]] = []
     found = measures(
         PLANT.scenario(), changes, before, Targets.of(PLANT), prices(costs), 1, simulate,
-        planned.append,
+        lambda *stage: stages.append(stage),
     )  # fmt: skip
     assert (found.cheapest and found.cheapest.name) == cheapest
-    assert planned[-1] == 0
+    assert stages[0] == ("measures", RUNS * len(ratios))
+    assert stages[1][1] >= RUNS * (len(simulated) - len(ratios))
     assert simulated[:3] == list(ratios)
     if cheapest is None:
         assert simulated[3:] == ["a + b + c"]
@@ -129,7 +131,7 @@ def test_seeds_agree_or_the_difference_is_evaluated(
         )
 
     nominal = made(real, "unchanged", PLANT.scenario(), 0.2, 1)
-    found = operate(PLANT, Targets.of(PLANT), nominal, RUNS, 1, simulate, lambda _: None)
+    found = operate(PLANT, Targets.of(PLANT), nominal, RUNS, 1, simulate, lambda *_: None)
     assert found.point is not None
     assert found.chosen in found.front
     assert found.agreement is agreement
@@ -137,6 +139,56 @@ def test_seeds_agree_or_the_difference_is_evaluated(
         assert found.point.operation.name == chosen
         assert found.point.judgement is Judgement.MET
     assert {it.point.mode for it in found.rivals} >= set(range(8)) - {found.point.mode}
+
+
+@pytest.mark.parametrize(
+    ("shares", "chosen"),
+    [
+        # Half of a percentage point less than the vehicle's own operation: the cheapest is taken.
+        ({200: 0.895, 500: 0.895, 1000: 0.895}, "every 1000 ms"),
+        ({200: 0.95, 500: 0.88, 1000: 0.6}, "every 200 ms"),
+        # No other operation is available: the vehicle's own one is recommended.
+        ({200: 0.8, 500: 0.88, 1000: 0.6}, "unchanged"),
+    ],
+)
+def test_operations_that_are_less_often_ok_are_not_recommended(
+    real: Runs, shares: dict[int, float], chosen: str
+) -> None:
+    bursts = {200: 30, 500: 12, 1000: 6}
+
+    def simulate(name: str, scenario: _core.Scenario, runs: int, seed: int) -> Runs:
+        interval_ms = next((it for it in shares if name.startswith(f"every {it} ms")), None)
+        # Methods with unknown pilots are more expensive, and as often ok as the vehicle's own one.
+        assert runs == RUNS
+        share = 0.9 if interval_ms is None else shares[interval_ms]
+        count = 150 if interval_ms is None else bursts[interval_ms]
+        ok = 1000.0 * (share + 0.02 * np.random.default_rng(seed).standard_normal(RUNS))
+        counts = {"ok": ok, "degraded": 1000.0 - ok, "unavailable": 0.0 * ok}
+        counts |= {"too_wide": 1000.0 - ok, "beyond": 0.0 * ok}
+        expensive = name.startswith(("music", "root-music", "esprit"))
+        return replace(
+            made(real, name, scenario, 0.05, seed),
+            bursts_received=np.full(RUNS, count + expensive),
+            aoa_estimates=np.full(RUNS, 3 * count),
+            integrity=Integrity.of_runs(counts, 3.0),
+        )
+
+    nominal = simulate("unchanged", PLANT.scenario(), RUNS, 1)
+    found = operate(PLANT, Targets.of(PLANT), nominal, RUNS, 1, simulate, lambda *_: None)
+    assert found.point is not None
+    assert found.point.operation.name == chosen
+    assert found.point.is_available
+    assert all(found.points[place].is_available for place in found.front)
+    for it in found.points:
+        assert it.ok_delta is not None
+        is_fixed = it.operation.name.startswith("every ")
+        expected = shares[int(it.operation.name.split()[1])] - 0.9 if is_fixed else 0.0
+        assert it.ok_delta[0] == pytest.approx(expected, abs=1e-9)
+    # A rival whose availability differs is no equivalent of the recommended point.
+    for rival in found.rivals:
+        assert rival.ok_delta is not None
+        if rival.ok_delta[0] < -0.01 and rival.ok_delta[2] < 0.0:
+            assert not rival.is_equivalent
 
 
 def test_a_target_of_a_road_section_is_evaluated_there_only(real: Runs) -> None:

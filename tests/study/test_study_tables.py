@@ -138,12 +138,37 @@ def test_the_energy_of_a_trip_follows_from_the_platform_and_its_drives(results: 
     assert points["listening_value_j"][0] == pytest.approx(energy[1])
 
 
+def ok_shares(results: Path, variant: str) -> Any:
+    """Share of the SSBs in state ok, by drive."""
+    rows = pl.read_parquet(results / "drives.parquet").filter(variant=variant)
+    steps = ("ok_steps", "level_steps", "suspected_steps", "unavailable_steps")
+    return (rows["ok_steps"] / rows.select(pl.sum_horizontal(*steps)).to_series()).to_numpy()
+
+
+def difference(values: Any) -> list[float]:
+    """Mean of paired differences and its 95 % interval by Student's t."""
+    from scipy.stats import t
+
+    mean, runs = values.mean(), len(values)
+    half = t.ppf(0.975, runs - 1) * values.std(ddof=1) / np.sqrt(runs)
+    return [mean, mean - half, mean + half]
+
+
 def test_no_point_of_the_front_is_dominated(results: Path) -> None:
     points = pl.read_parquet(results / "points.parquet").with_columns(
         energy_j=pl.sum_horizontal(f"{it}_value_j" for it in ("estimates", "listening", "idle"))
     )
     points = points.filter(pl.col("variant").str.contains(", mode"))  # the finalists
     assert points["is_simulated"].all()
+    # The vehicle's own operation in its own mode, 0: a share of ok that is lower by more than one
+    # percentage point excludes a point.
+    own = ok_shares(results, "unchanged, mode 0").mean()
+    kept = [
+        bool(ok_shares(results, variant).mean() - own >= -0.01) for variant in points["variant"]
+    ]
+    assert True in kept
+    assert not points.filter("on_front", ~pl.Series(kept)).height
+    points = points.filter(kept)
     for one in points.filter("on_front").iter_rows(named=True):
         better = points.filter(
             pl.col("energy_j") < one["energy_j"], pl.col("target_error_m") <= one["target_error_m"]
@@ -337,7 +362,15 @@ def test_reliability_is_counted_from_the_drives(
     sums = drives.filter(variant=chosen["variant"]).select(pl.sum(*steps)).row(0, named=True)
     of_chosen = sums["ok_steps"] / sum(sums.values())
     assert f"State ok: {of_chosen:.1%} of the time" in page
-    assert f"with the operation of the vehicle file {said['nominal']['ok_share']:.1%};" in page
+    assert said["recommended"]["ok_share"] == pytest.approx(of_chosen)
+    pairs = ok_shares(results, chosen["variant"]) - ok_shares(results, "unchanged, mode 0")
+    expected = difference(pairs)
+    stated = [said["recommended"][f"ok_delta{end}"] for end in ("", "_low", "_high")]
+    assert stated == pytest.approx(expected, abs=1e-9)
+    ends = [re.sub(r"^[+-](0\.0)$", r"\1", f"{100.0 * it:+.1f}") for it in expected]
+    assert f"{ends[0]} points ({ends[1]} to {ends[2]})" in page
+    assert expected[0] >= -0.01
+    assert "at most 1 percentage point below that of the vehicle's own operation" in page
     assert said["alert_limit_m"] == pytest.approx(0.4)
     assert "alert limit 0.4 m (twice the target’s 0.2 m)" in page
 
@@ -348,7 +381,9 @@ def test_run_accepts_the_recommended_point(
     file = results / "recommended.toml"
     done = access_av("run", file, "--runs", "1", "--out", tmp_path / "run")
     assert done.code == 0, done.err
-    written = tomllib.loads(file.read_text("utf-8"))
+    text = file.read_text("utf-8")
+    assert "# Candidates: points whose share of time in state ok is at most 1 percentage" in text
+    written = tomllib.loads(text)
     for key, value in said["recommended"]["settings"].items():
         held = written
         for name in key.split("."):
@@ -400,7 +435,12 @@ def test_rivals_are_compared_in_pairs_and_equivalence_is_reported(
         assert rival["delta_j"] == pytest.approx(delta_j)
         share = (delta_j * 240 / 3600.0 + (row["idle_value_w"] * 96.0 - idle)) / whole_wh
         assert rival["day_share"] == pytest.approx(share)
+        pairs = ok_shares(results, row["variant"]) - ok_shares(results, chosen["variant"])
+        of_ok = difference(pairs)
+        stated = [rival[f"ok_delta{end}"] for end in ("", "_low", "_high")]
+        assert stated == pytest.approx(of_ok, abs=1e-9)
         same = delta[1] <= 0.0 <= delta[2] and (delta_j == 0.0 or abs(share) < 0.01)
+        same &= abs(of_ok[0]) <= 0.01 or of_ok[1] <= 0.0 <= of_ok[2]
         assert rival["is_equivalent"] == same
     recommended = said["recommended"]
     others = set(recommended["by_seed"]) - {recommended["name"]}

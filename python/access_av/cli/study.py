@@ -75,7 +75,7 @@ def study(
             seed=seed,
             threads=threads,
             force_remedies=force_remedies,
-            progress=tick,
+            progress=lambda stage, done, total: tick(done, total, stage),
         )
     for name, rows in found.tables().items():
         directory.write_table(f"{name}.parquet", rows)

@@ -9,7 +9,7 @@ import time
 from contextlib import contextmanager
 from operator import itemgetter
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rich import box
 from rich.console import Console
@@ -68,8 +68,15 @@ def give_up_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+class Tick(Protocol):
+    """Updates the progress; ``stage`` names the part of the work that the numbers are of."""
+
+    def __call__(self, done: int, total: int, stage: str = "", /) -> None:
+        """Shows the number of completed parts of the work, and the total."""
+
+
 @contextmanager
-def progress(title: str, *, percent: bool = False) -> Iterator[Callable[[int, int], None]]:
+def progress(title: str, *, percent: bool = False) -> Iterator[Tick]:
     """Shows progress on the error stream; yields the function that updates it.
 
     Without a terminal it prints a line after two seconds, then at increasing intervals. With
@@ -89,14 +96,29 @@ def progress(title: str, *, percent: bool = False) -> Iterator[Callable[[int, in
     )
     with bar:
         task = bar.add_task(title, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+        def update(done: int, total: int, stage: str = "", /) -> None:
+            named = f"{title}, {stage}" if stage else title
+            bar.update(task, completed=done, total=total, description=named)
+
+        yield update
 
 
 @contextmanager
-def _lines(title: str, percent: bool) -> Iterator[Callable[[int, int], None]]:
+def _lines(title: str, percent: bool) -> Iterator[Tick]:
     """Prints progress as lines, each after 1.5 times the elapsed time."""
-    known: list[tuple[int, int]] = []
+    # Completed and total work, stage and its first time.
+    known: list[tuple[int, int, str, float]] = []
     ended, begun_s = Event(), time.monotonic()
+
+    def update(done: int, total: int, stage: str = "", /) -> None:
+        if not stage:
+            since_s = begun_s
+        elif known and known[-1][2] == stage:
+            since_s = known[-1][3]
+        else:
+            since_s = time.monotonic()
+        known.append((done, total, stage, since_s))
 
     def tell() -> None:
         wait_s = FIRST_LINE_S
@@ -104,17 +126,19 @@ def _lines(title: str, percent: bool) -> Iterator[Callable[[int, int], None]]:
             passed_s = time.monotonic() - begun_s
             line = f"{title}: {passed_s:.0f} s"
             if known and known[-1][1]:
-                done, total = known[-1]
-                left_s = f", about {passed_s * (total - done) / done:.0f} s left" if done else ""
+                done, total, stage, since_s = known[-1]
+                left_s = (time.monotonic() - since_s) * (total - done) / done if done else 0.0
+                left = f", about {left_s:.0f} s left" if done else ""
                 share = f"{100 * done // total} %" if percent else f"{done:,} of {total:,}"
-                line = f"{title}: {share}, {passed_s:.0f} s{left_s}"
+                named = f"{title}, {stage}" if stage else title
+                line = f"{named}: {share}, {passed_s:.0f} s{left}"
             errors.print(line, soft_wrap=True)
             wait_s = min(0.5 * passed_s, MOST_SILENT_S)
 
     thread = Thread(target=tell, daemon=True)
     thread.start()
     try:
-        yield lambda done, total: known.append((done, total))
+        yield update
     finally:
         ended.set()
         thread.join()

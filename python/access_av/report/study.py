@@ -117,9 +117,19 @@ def _tiles(study: Study) -> list[tuple[str, str]]:
     if lost_runs := study.nominal.lost_runs:
         made.insert(0, (f"{lost_runs} of {study.nominal.runs}", "drives LOST"))
     if study.point is not None:
-        made.append((joules(economy.trip_j(study.point).central), "a trip, above idle"))
+        made.append(
+            (
+                joules(economy.trip_j(study.point).central),
+                "a trip at the recommended point, above idle",
+            )
+        )
     if study.day is not None:
-        made.append((f"{digits(study.day.trips_wh.central)} Wh", "a fleet’s day, above idle"))
+        made.append(
+            (
+                f"{digits(study.day.trips_wh.central)} Wh",
+                "the fleet’s day at that point, above idle",
+            )
+        )
     if study.nominal.ok_share is not None:
         made.append((f"{study.nominal.ok_share:.1%}", "of the time in state ok"))
     return made
@@ -161,7 +171,7 @@ def _verdict(study: Study) -> str:
         "Every value with a standard deviation is drawn for each drive. “Good enough”: the whole "
         "95 % interval of the share of time within the error meets the target; “not good enough”: "
         "the whole interval misses it; “probably”: only the estimate meets or misses it. All "
-        "targets are met if each one is. "
+        "targets are met if each one is. “Above”: the drives are too few for an upper end. "
         f"Poor line of sight: channel model “{channel}” of TR 38.901.",
         table(head, rows, numbers=range(3, 7)) + _integrity(study, written),
     )
@@ -250,10 +260,10 @@ def _places(study: Study) -> str:
             "Along the road": f"{place['along_m']:.0f} m",
             "Target": badge("kept", "yes") if place["passes"] else badge("missed", "no"),
             f"{study.percent:g} % within": f"{place['target_error_m']:.3f} m",
-            "half within": f"{place['median_error_m']:.3f} m",
-            "level": "–" if place["level_m"] is None else f"{place['level_m']:.2f} m",
-            "reliable": f"{place['reliable_share']:.0%}",
-            "least RMS": f"{place['bound_m']:.3f} m",
+            "median error": f"{place['median_error_m']:.3f} m",
+            "protection level": "–" if place["level_m"] is None else f"{place['level_m']:.2f} m",
+            "state ok": f"{place['reliable_share']:.0%}",
+            "minimum RMS": f"{place['bound_m']:.3f} m",
             "dilution": "–"
             if (it := place["along_road_error_per_degree_m"]) is None
             else f"{it:.2f} m",
@@ -303,11 +313,11 @@ def _remedies(study: Study) -> str:
     cheapest = measured.cheapest
     best = min(measured.every, key=lambda it: it.error.value)
     text = (
-        f"Cheapest of the simulated measures that meets all targets: {cheapest.name} "
+        f"Cheapest of the simulated measures: {cheapest.name}, {cheapest.judgement.words} "
         f"({cheapest.error.value:.2f} m, {ends(cheapest.cost)} {study.prices.currency})."
         if cheapest is not None
-        else f"None of the simulated measures meets all targets; the most effective one is "
-        f"{best.name}, {best.error.value:.2f} m."
+        else "None of the simulated measures meets, or probably meets, all targets; the most "
+        f"effective one is {best.name}, {best.error.value:.2f} m."
     )
     return section(
         "What reduces the error?",

@@ -74,7 +74,7 @@ def road_map(study: Study) -> Spec:
             ("along_m:Q", "along the road / m", ".0f"),
             ("target_error_m:Q", f"{study.percent:g} % within / m"),
             ("level_m:Q", "protection level / m"),
-            ("reliable_share:Q", "reliable", ".0%"),
+            ("reliable_share:Q", "state ok", ".0%"),
             ("best_snr_db:Q", "SNR of the strongest / dB", ".0f"),
         ),
     )
@@ -160,7 +160,7 @@ def along_road(study: Study) -> Spec:
         "target_error_m": f"{study.percent:g}th percentile of the error",
         "median_error_m": "median error",
         "level_m": "median protection level",
-        "bound_m": "least RMS error",
+        "bound_m": "minimum RMS error",
     }
     lines = line_chart(
         lines_of(study.places, "along_m", names, "error_m"),
@@ -213,7 +213,7 @@ def ways_to_operate(study: Study) -> Spec:
 
     The numbers are those of :func:`access_av.report.study_parts.numbered`.
     """
-    kinds = ["recommended", "no other point is better in both", "another is better"]
+    kinds = ["recommended", "Pareto front of the candidates", "other points"]
     rows = pl.DataFrame(
         [
             {

@@ -9,6 +9,7 @@ from access_av.report.parts import badge, code, figure, folded, records, section
 from access_av.report.study_parts import (
     digits,
     ends,
+    in_points,
     joules_range,
     lost,
     numbered,
@@ -20,12 +21,21 @@ from access_av.run.assumptions import energy_boundary
 from access_av.settings import as_dict
 from access_av.study import economy
 from access_av.study.operate import MATTERS_SHARE
-from access_av.study.study_result import as_toml
+from access_av.study.points import OK_MARGIN
+from access_av.study.study_result import as_toml, rule
 from access_av.verdicts import Agreement
 
 if TYPE_CHECKING:
     from access_av.study.points import Point
     from access_av.study.study_result import Study
+
+# Condition of the badge "equivalent" of a rival.
+EQUIVALENT = (
+    "Equivalent points fulfil three conditions. Error: the 95 % interval of the difference "
+    "contains 0. State ok: the share of time differs by at most "
+    f"{100.0 * OK_MARGIN:g} percentage point, or the interval of the difference contains 0. Energy "
+    f"of the fleet’s day, idle included: it differs by less than {MATTERS_SHARE:.0%}."
+)
 
 
 def operation_section(study: Study) -> str:
@@ -39,8 +49,8 @@ def operation_section(study: Study) -> str:
         f"Recommended: {point.name}. {study.percent:g} % of the errors are within "
         f"{found.value:.3f} m ({found.interval} m, {point.driven.runs} drives with two seeds); a "
         f"trip takes {joules_range(economy.trip_j(point))}, the fleet’s day "
-        f"{ends(day.trips_wh)} Wh. Boundary: {boundary}; low to high.{_availability(study, point)} "
-        f"{_agreement(study)}"
+        f"{ends(day.trips_wh)} Wh (low … central … high; energy {boundary}).{_availability(point)} "
+        f"{' '.join(rule(point))} {_agreement(study)}"
     )
     keys = [
         {"Key": code(key), "Value": code(as_toml(value))} for key, value in point.settings.items()
@@ -55,21 +65,22 @@ def operation_section(study: Study) -> str:
         + _composition(study, point, day)
         + figure(
             "ways",
-            "Each power mode of each operation; dashed: the target. The numbers are those of the "
-            "table of all points.",
+            "Each power mode of each operation; dashed: the target. Candidates: the simulated "
+            "points with two seeds that are not less often in state ok. The numbers are those of "
+            "the table of all points.",
         )
         + _numbered(study)
         + _points(study, point),
     )
 
 
-def _availability(study: Study, point: Point) -> str:
+def _availability(point: Point) -> str:
     """Returns the share of the time in state ``ok``, compared with the vehicle's own operation."""
-    if point.driven.ok_share is None or study.nominal.ok_share is None:
+    if point.driven.ok_share is None or point.ok_delta is None:
         return ""
     return (
-        f" State ok: {point.driven.ok_share:.1%} of the time, with the operation of the vehicle "
-        f"file {study.nominal.ok_share:.1%}; the recommendation does not consider this share."
+        f" State ok: {point.driven.ok_share:.1%} of the time; recommended point minus the "
+        f"vehicle’s own operation in pairs of drives: {in_points(point.ok_delta)}."
     )
 
 
@@ -81,9 +92,8 @@ def _agreement(study: Study) -> str:
             return "Two seeds recommend the same point."
         case Agreement.EQUIVALENT:
             return (
-                f"Single seeds recommend {named}, the drives of both seeds the point above. These "
-                "points are equivalent: the 95 % interval of the error difference contains "
-                f"0, and the energy of the fleet’s day differs by less than {MATTERS_SHARE:.0%}."
+                f"Single seeds recommend {named}, the drives of both seeds together the point "
+                "above. These points are equivalent."
             )
         case Agreement.UNDECIDED:
             return (
@@ -109,6 +119,7 @@ def _rivals(study: Study) -> str:
                 if it.day_share is None
                 else f"{100.0 * it.day_share:+.2g} %",
                 "state ok": ok(it.point.driven),
+                "difference of state ok": "–" if it.ok_delta is None else in_points(it.ok_delta),
                 "": badge("equivalent", "fit")
                 if it.is_equivalent
                 else badge(judged.words, judged.badge),
@@ -118,9 +129,7 @@ def _rivals(study: Study) -> str:
         return ""
     return (
         "<h3>Rivals of the recommended point</h3><p>Differences: rival − recommended, in pairs of "
-        "drives. Equivalent: the interval of the error difference contains 0, and the energy of "
-        f"the fleet’s day, idle included, differs by less than {MATTERS_SHARE:.0%}.</p>"
-        + records(rows, numbers=range(2, 8))
+        f"drives. {EQUIVALENT}</p>" + records(rows, numbers=range(2, 9))
     )
 
 
@@ -200,11 +209,12 @@ def _points(study: Study, point: Point) -> str:
 
 def _way(study: Study, it: Point) -> dict[str, str]:
     found = it.driven.percentile(study.percent)
-    label = (
-        badge("recommended", "yes")
-        if it is study.point
-        else badge(it.judgement.words, it.judgement.badge)
-    )
+    if it is study.point:
+        label = badge("recommended", "yes")
+    elif it.judgement.holds and not it.is_available:
+        label = badge("less often ok", "no")
+    else:
+        label = badge(it.judgement.words, it.judgement.badge)
     sample = "two seeds" if it.simulated and it.driven.name != it.operation.name else "screened"
     return {
         "Operation": small(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from access_av.report.parts import badge, folded, records
+from access_av.tables.numbers import unsigned_zero
 from access_av.verdicts import NotOk
 
 if TYPE_CHECKING:
@@ -42,6 +43,18 @@ def reliability_rows(drives: Iterable[Runs]) -> list[dict[str, str]]:
 def ok(driven: Runs) -> str:
     """Returns the share of the time in state ``ok`` as text."""
     return "–" if driven.ok_share is None else f"{driven.ok_share:.1%}"
+
+
+def in_points(delta: tuple[float, float, float]) -> str:
+    """Returns a difference of shares with its 95 % interval in percentage points, as text.
+
+    Examples
+    --------
+    >>> in_points((-0.021, -0.05, 0.012))
+    '-2.1 points (-5.0 to +1.2)'
+    """
+    middle, low, high = (unsigned_zero(f"{100.0 * it:+.1f}") for it in delta)
+    return f"{middle} points ({low} to {high})"
 
 
 def count(number: int, what: str) -> str:

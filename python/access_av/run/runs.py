@@ -13,6 +13,7 @@ from access_av.run.pairs import ErrorSamples
 from access_av.run.simulation import simulate
 from access_av.settings import platform_name, ssb_period_s
 from access_av.statistics.integrity import Integrity
+from access_av.statistics.paired import paired_mean
 from access_av.verdicts import NotOk
 
 if TYPE_CHECKING:
@@ -82,6 +83,15 @@ class Runs(ErrorSamples):
     def ok_share(self) -> float | None:
         """Share of the time in state ``ok``; ``None`` without an integrity monitor."""
         return None if self.state_shares is None else float(self.state_shares["ok"])
+
+    def ok_delta(self, baseline: Runs) -> tuple[float, float, float] | None:
+        """Returns the paired difference of the share of time in state ``ok`` to the baseline's.
+
+        Variant minus baseline, and the ends of the 95 % interval; ``None`` without a monitor.
+        """
+        if self.integrity is None or baseline.integrity is None:
+            return None
+        return paired_mean(self.integrity.ok_shares, baseline.integrity.ok_shares)
 
     @property
     def not_ok_shares(self) -> Mapping[NotOk, float] | None:

@@ -84,6 +84,12 @@ class Integrity:
         """Returns the share of the epochs in state ``ok``."""
         return self.state_shares["ok"]
 
+    @property
+    def ok_shares(self) -> NDArray[np.float64]:
+        """Returns the share of the epochs of each run in state ``ok``, shape (runs,)."""
+        counts = np.stack([self.by_run[state] for state in STATES])
+        return np.asarray(self.by_run["ok"] / counts.sum(axis=0), dtype=np.float64)
+
     @classmethod
     def of(cls, trajectories: pl.DataFrame) -> Integrity | None:
         """Evaluates a table of trajectories; ``None`` if no step has a protection level."""

@@ -13,8 +13,8 @@ from access_av.run.service_levels import INDEPENDENT_S
 from access_av.run.simulation import simulate
 from access_av.settings import as_dict
 from access_av.study import economy
-from access_av.study.measures import MOST_SETS, measures
-from access_av.study.operate import likely_blocks, operate
+from access_av.study.measures import measures
+from access_av.study.operate import operate
 from access_av.study.places import by_place, radio_head_sides, worst_places
 from access_av.study.remedies import remedies
 from access_av.study.study_result import Study
@@ -43,7 +43,7 @@ def study_plant(
     seed: int = 1,
     threads: int | None = None,
     force_remedies: bool = False,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
 ) -> Study:
     """Evaluates a plant's localization: verdict, positions with large errors, remedies, cost.
 
@@ -61,7 +61,8 @@ def study_plant(
     force_remedies
         Whether to simulate measures even if all targets are met.
     progress
-        Called as ``progress(done, total)`` with numbers of runs.
+        Called as ``progress(stage, done, total)`` with numbers of runs of the present stage. Their
+        total is known when the stage begins; the results of a stage determine the later ones.
 
     Raises
     ------
@@ -93,14 +94,15 @@ def study_plant(
     usual = _runs(scenario) if runs is None else runs
     full = min(2 * usual, max(usual, _sure(scenario, percent))) if runs is None else runs
     pairs, few, fewest = (min(full, max(2, round(share * usual))) for share in SHARES)
-    # Completed runs, planned runs in total, and planned runs of later parts.
-    done, planned, after = 0, 0, 0
+    # Present stage, its completed runs, and the number of its runs.
+    stage, done, total = "", 0, 0
     known: dict[tuple[str, int], Runs] = {}
 
-    def plan(left: int) -> None:
-        """Sets the number of remaining runs of the current part of the study, for the progress."""
-        nonlocal planned
-        planned = done + left + after
+    def begin(name: str, runs_of_stage: int) -> None:
+        nonlocal stage, done, total
+        stage, done, total = name, 0, runs_of_stage
+        if progress is not None and total:
+            progress(stage, done, total)
 
     def driven(name: str, variant: _core.Scenario, count: int, of_seed: int = seed) -> Runs:
         """Simulates a scenario, or returns earlier runs of equal scenario and seed."""
@@ -108,33 +110,28 @@ def study_plant(
 
         def tell(now: int, _: int) -> None:
             if progress is not None:
-                progress(done + now, max(planned, done + count))
+                progress(stage, done + now, total)
 
         key = (variant.to_toml(), of_seed)
         if key not in known or known[key].runs < count:
             known[key] = drive(name, variant, count, of_seed, threads, tell)
+        else:
+            tell(count, count)
         done += count
         return known[key].first(count).named(name)
 
-    # Nominal channel, then poor line of sight, operations and measures.
-    of_operations = few * likely_blocks(scenario)
-    after = fewest + of_operations
-    plan(full)
+    begin("nominal channel", full)
     nominal = driven(UNCHANGED, scenario, full)
     needs_measures = force_remedies or not targets.judgement(nominal).holds
     changes = remedies(scenario, fleet["vehicles"]) if needs_measures else []
-    of_measures = pairs * (len(changes) + MOST_SETS) if changes else 0
-    after = of_operations + of_measures
-    plan(fewest)
+    begin("poor line of sight", fewest)
     poor_los = driven("poor line of sight", plant.poor_scenario(), fewest)
-    after = of_measures
-    recommendation = operate(plant, targets, nominal, few, seed, driven, plan)
+    recommendation = operate(plant, targets, nominal, few, seed, driven, begin)
     prices = economy.Prices.of(plant)
-    after = 0
     measured = None
     if changes:
         before = nominal.first(pairs)
-        measured = measures(scenario, changes, before, targets, prices, seed, driven, plan)
+        measured = measures(scenario, changes, before, targets, prices, seed, driven, begin)
     places = by_place(nominal, percent, targets.each[0].error_m)
     point = recommendation.point
     return Study(

@@ -11,13 +11,13 @@ from access_av.economics.carbon import Range
 from access_av.verdicts import Effect, Judgement
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from access_av import _core
     from access_av.run.runs import Runs
     from access_av.statistics.percentiles import Percentile
     from access_av.study.economy import Prices
-    from access_av.study.operate import Simulate
+    from access_av.study.operate import Begin, Simulate
     from access_av.study.remedies import Remedy
     from access_av.study.targets import Targets
 
@@ -116,7 +116,7 @@ def measures(
     prices: Prices,
     seed: int,
     simulate: Simulate,
-    plan: Callable[[int], None],
+    begin: Begin,
 ) -> Measures:
     """Simulates measures in the environments of ``before``.
 
@@ -124,8 +124,8 @@ def measures(
     ----------
     before
         Runs without any measure; each measure gets an equal number.
-    plan
-        Called with the number of remaining runs.
+    begin
+        Called at the beginning of each stage.
     """
     runs = before.runs
 
@@ -149,18 +149,15 @@ def measures(
             cost=cost,
         )
 
-    single = []
-    for number, remedy in enumerate(changes):
-        plan(runs * (len(changes) - number + MOST_SETS))
-        single.append(measure((remedy,)))
+    begin("measures", runs * len(changes))
+    single = [measure((it,)) for it in changes]
     found = Measures(before, sorted(single, key=lambda it: it.delta_m[0]), [])
     chosen = _sets(found, targets)
-    for number, remedies in enumerate(chosen):
-        plan(runs * (len(chosen) - number))
+    begin("sets of measures", runs * len(chosen))
+    for remedies in chosen:
         found.sets.append(measure(remedies))
         if found.sets[-1].judgement.holds:
             break
-    plan(0)
     return found
 
 

@@ -9,6 +9,7 @@ from access_av.run.runs import Runs
 from access_av.study import economy
 from access_av.study.points import (
     MODE_KEY,
+    OK_MARGIN,
     Operation,
     Point,
     front,
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
     # Simulation function: name, scenario, number of runs, seed.
     Simulate = Callable[[str, _core.Scenario, int, int], Runs]
+    # Begins a stage of the study: name, number of its runs.
+    Begin = Callable[[str, int], None]
 
 # Operations that are simulated in every power mode with two seeds: the one that screening
 # recommends, the vehicle's own, and their rivals.
@@ -53,6 +56,9 @@ class Rival:
     delta_m
         Paired difference of the error to that of the recommended point, and the ends of its 95 %
         interval; percentile of the target of the whole trip.
+    ok_delta
+        Paired difference of the share of time in state ``ok``, as ``delta_m``; ``None`` without a
+        monitor.
     delta_j
         Energy of a trip minus that of the recommended point, at the central values.
     day_share
@@ -62,21 +68,28 @@ class Rival:
 
     point: Point
     delta_m: tuple[float, float, float]
+    ok_delta: tuple[float, float, float] | None
     delta_j: float
     day_share: float | None
 
     @property
     def is_equivalent(self) -> bool:
-        """Whether neither the difference in error nor that in energy matters.
+        """Whether no difference in error, in the share of time ``ok`` and in energy matters.
 
-        The 95 % interval of the error difference contains 0, and the energy differs by less than
+        The 95 % interval of the error difference contains 0; that of the share of time contains 0
+        or the share differs by at most :data:`OK_MARGIN`; the energy differs by less than
         :data:`MATTERS_SHARE` of the fleet's day.
         """
         _, low, high = self.delta_m
         same_energy = self.delta_j == 0.0 or (
             self.day_share is not None and abs(self.day_share) < MATTERS_SHARE
         )
-        return low <= 0.0 <= high and same_energy
+        same_ok = (
+            self.ok_delta is None
+            or abs(self.ok_delta[0]) <= OK_MARGIN
+            or self.ok_delta[1] <= 0.0 <= self.ok_delta[2]
+        )
+        return low <= 0.0 <= high and same_ok and same_energy
 
 
 @dataclass(frozen=True)
@@ -88,7 +101,8 @@ class Recommendation:
     points
         All points; the finalists, which are simulated in every power mode, come first.
     front
-        Indices of the finalists that no other one exceeds in energy and error.
+        Indices of the available finalists that no other available one exceeds in energy and
+        error.
     chosen
         Index of the recommended point; ``None`` without a figure of energy.
     rivals
@@ -133,15 +147,6 @@ class _Finalist:
         modes = [it.number for it in self.modes]
         return own if own in modes else modes[0]
 
-    def points(self, blocks: list[Runs], targets: Targets) -> list[Point]:
-        driven = Runs.joined(blocks)
-        return points(driven, self.operation, self.modes, targets, simulated=True)
-
-
-def likely_blocks(scenario: _core.Scenario) -> int:
-    """Number of blocks of runs of :func:`operate` if one block per seed is enough."""
-    return len(operations(scenario)) + 2 * MOST_FINALISTS * len(mode_groups(scenario))
-
 
 def operate(
     plant: _core.Plant,
@@ -150,9 +155,9 @@ def operate(
     runs: int,
     seed: int,
     simulate: Simulate,
-    plan: Callable[[int], None],
+    begin: Begin,
 ) -> Recommendation:
-    """Finds the operating point with the least energy that meets the targets.
+    """Finds the available operating point with the least energy that meets the targets.
 
     Every operation is screened in the vehicle's own power mode. The recommended one and its rivals
     are then simulated in every power mode, with two seeds, until both recommend the same point or
@@ -162,12 +167,12 @@ def operate(
     ----------
     runs
         Runs of each operation, power mode and block.
-    plan
-        Called with the number of remaining runs.
+    begin
+        Called at the beginning of each stage.
     """
     scenario = plant.scenario()
     own = own_mode(scenario)
-    screened = _screened(scenario, targets, nominal, runs, seed, simulate, plan)
+    screened = _screened(scenario, targets, nominal, runs, seed, simulate, begin)
     finalists = [
         _Finalist(it, modes, changed, [])
         for it in _finalists(screened)
@@ -176,11 +181,13 @@ def operate(
     ]
     found = Recommendation(screened, front(screened), None, [], ())
     for block in range(MOST_BLOCKS):
-        for number, it in enumerate(finalists):
+        begin(
+            "best operations" if block == 0 else "best operations again", 2 * runs * len(finalists)
+        )
+        for it in finalists:
             label = f"{it.operation.name}, mode {it.modes[0].number}"
             in_mode = it.scenario.with_overrides({MODE_KEY: it.driven_mode(own)})
             for which in range(2):
-                plan(runs * (2 * (len(finalists) - number) - which))
                 seed_of_block = seed + (2 * block + which) * SEED_STEP
                 it.blocks.append(simulate(label, in_mode, runs, seed_of_block))
         found = _recommendation(plant, targets, screened, finalists)
@@ -193,11 +200,24 @@ def _recommendation(
     plant: _core.Plant, targets: Targets, screened: list[Point], finalists: list[_Finalist]
 ) -> Recommendation:
     """Returns the recommendation from the drives of all seeds, and those from each seed."""
-    by_seed = [
-        [one for it in finalists for one in it.points(it.blocks[which::2], targets)]
-        for which in range(2)
-    ]
-    pooled = [one for it in finalists for one in it.points(it.blocks, targets)]
+    own = own_mode(plant.scenario())
+
+    def points_of(blocks: slice) -> list[Point]:
+        driven = [Runs.joined(it.blocks[blocks]) for it in finalists]
+        own_runs = [
+            one
+            for it, one in zip(finalists, driven, strict=True)
+            if not it.operation.settings and it.driven_mode(own) == own
+        ]
+        baseline = own_runs[0] if own_runs else None
+        return [
+            point
+            for it, one in zip(finalists, driven, strict=True)
+            for point in points(one, it.operation, it.modes, targets, baseline, simulated=True)
+        ]
+
+    by_seed = [points_of(slice(which, None, 2)) for which in range(2)]
+    pooled = points_of(slice(None))
     known = {one.operation.name for one in pooled}
     every = [*pooled, *(it for it in screened if it.operation.name not in known)]
     chosen = recommended(pooled)
@@ -218,18 +238,17 @@ def _screened(
     runs: int,
     seed: int,
     simulate: Simulate,
-    plan: Callable[[int], None],
+    begin: Begin,
 ) -> list[Point]:
     """Simulates every operation in the vehicle's power mode; returns the energies in all modes."""
-    found = []
-    blocks = likely_blocks(scenario)
-    for number, it in enumerate(operations(scenario)):
-        plan(runs * (blocks - number))
+    found, every, baseline = [], operations(scenario), nominal.first(runs)
+    begin("operations", runs * (len(every) - 1))
+    for it in every:
         changed = scenario.with_overrides(dict(it.settings)) if it.settings else scenario
-        driven = simulate(it.name, changed, runs, seed) if it.settings else nominal.first(runs)
+        driven = simulate(it.name, changed, runs, seed) if it.settings else baseline
         for modes in mode_groups(changed):
             own = own_mode(changed) in [mode.number for mode in modes]
-            found += points(driven, it, modes, targets, simulated=own)
+            found += points(driven, it, modes, targets, baseline, simulated=own)
     return found
 
 
@@ -243,14 +262,15 @@ def _finalists(screened: list[Point]) -> list[Operation]:
     for it in sorted(screened, key=lambda one: one.energy_j):
         cheapest.setdefault(it.operation.name, it)
     others = [it for it in cheapest.values() if it.operation.name != best.operation.name]
-    possible = [it for it in others if it.judgement is not Judgement.MISSED]
+    available = [it for it in others if it.is_available]
+    possible = [it for it in available if it.judgement is not Judgement.MISSED]
     if best.judgement.holds:
         # Operations with less energy may meet the targets; those with more are needed if this one
         # does not.
         rivals = [it for it in possible if it.energy_j <= best.energy_j][::-1]
         rivals += [it for it in possible if it.energy_j > best.energy_j]
     else:
-        rivals = sorted(others, key=lambda it: it.error_m)
+        rivals = sorted(available, key=lambda it: it.error_m)
     own = screened[0].operation
     named = [best.operation, *([] if own == best.operation else [own])]
     named += [it.operation for it in rivals if it.operation not in named]
@@ -274,7 +294,8 @@ def _rivals(
         day_wh = _day_wh(plant, it)
         share = None if best_wh is None or day_wh is None else (day_wh - best_wh) / best_wh
         delta_m = it.driven.delta_m(best.driven, percent)
-        found.append(Rival(it, delta_m, it.energy_j - best.energy_j, share))
+        ok_delta = it.driven.ok_delta(best.driven)
+        found.append(Rival(it, delta_m, ok_delta, it.energy_j - best.energy_j, share))
     return found
 
 

@@ -26,6 +26,9 @@ FIXED_MS = (200.0, 500.0, 1000.0)
 # Estimators that process raw snapshots are simulated without known pilots.
 METHODS = ("root-music", "esprit", "music")
 MODE_KEY = "vehicle.platform.mode"
+# A share of the time in state `ok` that is lower by at most this difference counts as equal: the
+# shares of one operation in power modes with nearly equal wake-ups differ by as much.
+OK_MARGIN = 0.01
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,9 @@ class Point:
         Percentile of the horizontal error that the target of the whole trip names.
     judgement
         Whether the drives meet all targets.
+    ok_delta
+        Paired difference of the share of time in state ``ok`` to the vehicle's own operation and
+        mode, and the ends of its 95 % interval; ``None`` if that operation was not simulated.
     """
 
     driven: Runs
@@ -73,6 +79,16 @@ class Point:
     idle_w: Mapping[str, float] | None
     error_m: float
     judgement: Judgement
+    ok_delta: tuple[float, float, float] | None
+
+    @property
+    def is_available(self) -> bool:
+        """Whether its share of time in state ``ok`` is not below that of the vehicle's operation.
+
+        The estimate decides, because a few pairs of runs rarely show a difference with 95 %
+        confidence. Differences up to :data:`OK_MARGIN` do not count.
+        """
+        return self.ok_delta is None or self.ok_delta[0] >= -OK_MARGIN
 
     @property
     def name(self) -> str:
@@ -163,12 +179,17 @@ def points(
     operation: Operation,
     modes: Sequence[PowerMode],
     targets: Targets,
+    baseline: Runs | None,
     *,
     simulated: bool,
 ) -> list[Point]:
-    """Returns the operating points of an operation in power modes with identical runs."""
+    """Returns the operating points of an operation in power modes with identical runs.
+
+    ``baseline``: paired runs of the vehicle's own operation and mode.
+    """
     error_m = driven.percentile(targets.each[0].percent).value
     judgement = targets.judgement(driven)
+    ok_delta = None if baseline is None else driven.ok_delta(baseline)
     platform = Platform.load(platform_name(driven.scenario.vehicle))
     found = []
     for mode in modes:
@@ -187,6 +208,7 @@ def points(
                 idle_w=idle_w(platform, mode.number),
                 error_m=error_m,
                 judgement=judgement,
+                ok_delta=ok_delta,
             )
         )
     return found
@@ -205,19 +227,20 @@ def idle_w(platform: Platform, number: int) -> dict[str, float] | None:
 
 
 def front(found: Sequence[Point]) -> list[int]:
-    """Returns the indices of the Pareto front of energy and error, by energy."""
-    if not found:
-        return []
-    energy_j = np.array([point.energy_j for point in found])
-    error_m = np.array([point.error_m for point in found])
-    return [int(place) for place in pareto_front(energy_j, error_m) if np.isfinite(error_m[place])]
+    """Returns the indices of the available points' Pareto front of energy and error, by energy."""
+    kept = [place for place, point in enumerate(found) if point.is_available]
+    on_front = pareto_front(
+        [found[place].energy_j for place in kept], [found[place].error_m for place in kept]
+    )
+    return [kept[it] for it in on_front if np.isfinite(found[kept[it]].error_m)]
 
 
 def recommended(found: Sequence[Point]) -> int | None:
     """Returns the index of the front's point with the least energy that meets all targets.
 
-    Points that meet the targets with 95 % confidence are preferred to those that probably meet
-    them. If no point does, it is the most accurate one of the front.
+    All points of the front are available, see :attr:`Point.is_available`. Points that meet the
+    targets with 95 % confidence are preferred to those that probably meet them. If no point does,
+    it is the most accurate one of the front.
     """
     on_front = front(found)
     if not on_front:

@@ -65,8 +65,8 @@ def _remember(vehicle: Mapping[str, Any]) -> Remedy | None:
         return None
     what = (
         "odometer scale kept from the last trip: standard deviation "
-        "{100.0 * REMEMBERED_SCALE_STD:g} % instead of "
-        "{100.0 * vehicle['odometer']['scale_std']:g} %"
+        f"{100.0 * REMEMBERED_SCALE_STD:g} % instead of "
+        f"{100.0 * vehicle['odometer']['scale_std']:g} %"
     )
     settings = {"vehicle.odometer.scale_std": REMEMBERED_SCALE_STD}
     return Remedy("remember the odometer’s scale", what, settings, "vehicle_settings", 1)

@@ -10,8 +10,10 @@ import polars as pl
 
 from access_av.settings import as_dict
 from access_av.study import economy
+from access_av.study.points import OK_MARGIN
 from access_av.study.targets import table as targets_table
 from access_av.tables.result import Origin, Result, origin
+from access_av.verdicts import Judgement
 
 if TYPE_CHECKING:
     from access_av import _core
@@ -25,7 +27,6 @@ if TYPE_CHECKING:
     from access_av.study.points import Point
     from access_av.study.targets import TargetResult, Targets
     from access_av.study.unverified import Unverified
-    from access_av.verdicts import Judgement
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,18 +253,33 @@ def recommended_toml(study: Study) -> str | None:
     """The recommended operating point as a scenario for ``access-av run``.
 
     ``None`` without a recommendation. The scenario is a trip of the plant with the keys of the
-    point; they are named at its top.
+    point; the rule of the recommendation and the keys are named at its top.
     """
     point = study.point
     if point is None:
         return None
     scenario = study.plant.scenario().with_overrides(point.settings)
     keys = "".join(f"#   {key} = {as_toml(value)}\n" for key, value in point.settings.items())
+    rules = "".join(f"# {it}\n" for it in rule(point))
     return (
         f"# Recommended operating point of plant {study.plant.name}: {point.name}.\n"
-        f"# Keys that select it:\n{keys}"
+        f"{rules}# Keys that select it:\n{keys}"
         f"# Simulate it: access-av run recommended.toml\n\n{scenario.to_toml()}"
     )
+
+
+def rule(point: Point) -> list[str]:
+    """Returns the rule that selected a recommended point, as sentences."""
+    selected = {
+        Judgement.MET: "the point with the least energy that meets all targets",
+        Judgement.PROBABLY_MET: "the point with the least energy that probably meets all targets, "
+        "because none meets them with 95 % confidence",
+    }.get(point.judgement, "the most accurate point, because none meets all targets")
+    return [
+        "Candidates: points whose share of time in state ok is at most "
+        f"{100.0 * OK_MARGIN:g} percentage point below that of the vehicle's own operation.",
+        f"Recommended of their Pareto front of energy and error: {selected}.",
+    ]
 
 
 def as_toml(value: object) -> str:
@@ -304,6 +320,8 @@ def _recommendation(study: Study) -> dict[str, Any]:
             "runs": point.driven.runs,
             "error_m": point.error_m,
             **_percentile(point.driven.percentile(study.percent)),
+            "ok_share": point.driven.ok_share,
+            **_ok_delta(point.ok_delta),
             "judged": point.judgement.value,
             "trip_j": vars(economy.trip_j(point)),
             "idle_w": point.idle_w and dict(point.idle_w),
@@ -328,11 +346,17 @@ def _rival(it: Rival) -> dict[str, Any]:
         "delta_m": delta_m,
         "delta_low_m": low_m,
         "delta_high_m": high_m,
+        **_ok_delta(it.ok_delta),
         "delta_j": it.delta_j,
         "day_share": it.day_share,
         "is_equivalent": it.is_equivalent,
         "judged": it.point.judgement.value,
     }
+
+
+def _ok_delta(delta: tuple[float, float, float] | None) -> dict[str, float | None]:
+    keys = ("ok_delta", "ok_delta_low", "ok_delta_high")
+    return dict(zip(keys, delta or (None,) * 3, strict=True))
 
 
 def _figures(study: Study, driven: Runs) -> dict[str, Any]:
