@@ -95,6 +95,8 @@ def tables(tmp_path_factory: pytest.TempPathFactory) -> Tables:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("access_av.tables.results_directory.RESULTS", folder)
         patch.setattr(study, "UNKNOWNS", SIZE)
+        # The effects of other assumptions take a third of the time and are another section.
+        patch.setattr(study.chosen_otherwise, "effects", lambda *_, **__: [])
         paper_results.run(
             ["gate"],
             runs=1,

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 def test_the_same_seed_gives_the_same_study_of_a_plant_and_of_its_file(tmp_path: Path) -> None:
     plant = Plant.from_toml(LAST_METRES)
     (tmp_path / "short.toml").write_text(plant.to_toml(), "utf-8")
-    found = study_plant(plant, runs=2, seed=3, threads=1)
+    told: list[tuple[str, int, int]] = []
+    found = study_plant(plant, runs=2, seed=3, threads=1, progress=lambda *it: told.append(it))
     first = found.summary()
     again = study_plant(tmp_path / "short.toml", runs=2, seed=3, threads=2).summary()
     assert first == again
@@ -32,6 +33,17 @@ def test_the_same_seed_gives_the_same_study_of_a_plant_and_of_its_file(tmp_path:
     errors_m[0] = 40.0
     lost = replace(found, nominal=replace(found.nominal, errors_m=errors_m))
     assert ": LOST in 1 of 2 drives; 90 % of the position errors are within 40.00 m" in lost.verdict
+    # The total of a stage is known at its beginning and reached, but for sets of measures, which
+    # end when one meets the targets.
+    stages = list(dict.fromkeys(stage for stage, _, _ in told))
+    assert stages[:3] == ["nominal channel", "poor line of sight", "operations"]
+    for stage in stages:
+        mine = [(done, total) for name, done, total in told if name == stage]
+        done = [it for it, _ in mine]
+        assert {total for _, total in mine} == {mine[0][1]}
+        assert done[0] == 0
+        assert done == sorted(done)
+        assert stage == "sets of measures" or done[-1] == mine[0][1]
 
 
 def test_modes_with_different_wake_ups_are_simulated_separately() -> None:
@@ -87,8 +99,13 @@ def test_an_error_is_explained_by_the_road_section_where_it_arose() -> None:
 
 
 @pytest.mark.parametrize("name", Plant.names())
-def test_each_shipped_plant_gets_a_recommended_point_of_the_pareto_front(name: str) -> None:
+def test_each_shipped_plant_gets_a_recommended_point_of_the_pareto_front(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Uses the last section of the road; `benches/shipped_plants.py` simulates the whole road."""
+    # The study of the short plant simulates all estimators and finalists.
+    monkeypatch.setattr("access_av.study.points.METHODS", ("root-music",))
+    monkeypatch.setattr("access_av.study.operate.MOST_FINALISTS", 2)
     plant = Plant.load(name)
     road_m = along_route(plant.scenario())["along_m"].max()
     assert isinstance(road_m, float)
