@@ -112,14 +112,14 @@ def _rivals(study: Study) -> str:
                 "Rival": it.point.name,
                 "Lost drives": lost(it.point.driven),
                 f"{study.percent:g} % within": f"{it.point.error_m:.3f} m",
-                "error difference": f"{delta:+.3f} m",
-                "interval": f"{low:+.3f} to {high:+.3f} m",
+                "error difference": small(f"{delta:+.3f} m", f"{low:+.3f} to {high:+.3f} m"),
                 "energy difference, a trip": f"{it.delta_j:+.3g} J",
                 "of the fleet’s day": "–"
                 if it.day_share is None
                 else f"{100.0 * it.day_share:+.2g} %",
-                "state ok": ok(it.point.driven),
-                "difference of state ok": "–" if it.ok_delta is None else in_points(it.ok_delta),
+                "state ok": ok(it.point.driven)
+                if it.ok_delta is None
+                else small(ok(it.point.driven), in_points(it.ok_delta)),
                 "": badge("equivalent", "fit")
                 if it.is_equivalent
                 else badge(judged.words, judged.badge),
@@ -129,7 +129,7 @@ def _rivals(study: Study) -> str:
         return ""
     return (
         "<h3>Rivals of the recommended point</h3><p>Differences: rival − recommended, in pairs of "
-        f"drives. {EQUIVALENT}</p>" + records(rows, numbers=range(2, 9))
+        f"drives. {EQUIVALENT}</p>" + records(rows, numbers=range(2, 7))
     )
 
 
