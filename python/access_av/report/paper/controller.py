@@ -11,7 +11,7 @@ import polars as pl
 from access_av.paper import summary
 from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, colours, finish
 from access_av.report.parts import badge, figure, folded, records
-from access_av.tables.numbers import number
+from access_av.tables.numbers import number, unsigned_zero
 
 if TYPE_CHECKING:
     from access_av.paper.study import Study
@@ -111,7 +111,8 @@ def ours(study: Study) -> str:
 
 
 def _signed(value: float, low: float, high: float) -> str:
-    return f"{value:+.3f} ({low:+.3f} … {high:+.3f})"
+    middle, least, most = (unsigned_zero(f"{it:+.3f}") for it in (value, low, high))
+    return f"{middle} ({least} … {most})"
 
 
 def _gain_chart(study: Study) -> Spec:

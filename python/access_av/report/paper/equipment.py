@@ -82,8 +82,8 @@ def carbon_section(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
     ]
     values.append(("Embodied", "–", span(units.embodied_kg), span(box.embodied_kg), "–"))
     head = (
-        "Grid", "gCO2e/kWh", f"{UNITS_NOT_BUILT} roadside units, use / kg",
-        "Onboard computer, use / kg",
+        "Grid", "gCO2e/kWh", f"{UNITS_NOT_BUILT} roadside units, use over their life / kg",
+        "Onboard computer, use over its life / kg",
         f"Saved by {FLEET} vehicles in a year, mode {mode} / kg",
     )  # fmt: skip
     sources = {"Roadside units": units.source, "Onboard computer": box.source,
