@@ -9,7 +9,10 @@
 //! [`MultipathBias`](super::multipath_bias::MultipathBias); this module weights the jump
 //! hypotheses of an angle by Bayes' rule.
 
+use std::f64::consts::TAU;
+
 use crate::gaussian::Innovation;
+use crate::geometry::wrap_angle;
 
 /// Number of levels of the bias.
 pub(super) const LEVELS: usize = 4;
@@ -21,6 +24,11 @@ pub(super) const VARIANCES: [f64; LEVELS] = [0.02 * 0.02, 0.1 * 0.1, 0.3 * 0.3, 
 const LARGE: usize = 2;
 /// Squared bias above which a bias is large (rad²).
 pub const MAX_VARIANCE: f64 = VARIANCES[LARGE];
+
+/// Level of an almost unknown direction. A new bias of this level has a uniform distribution, so that
+/// its angle determines the bias and contains no information about the state. A Gaussian would favour
+/// a wrong position for which the bias is smaller.
+const UNKNOWN: usize = LEVELS - 1;
 
 /// Correlation distance of the bias (m).
 pub(super) const VALUE_M: f64 = 1.0;
@@ -154,7 +162,8 @@ impl JumpProcess {
         let predicted_levels = self.predicted_levels(travelled_m);
         let stays = kept(travelled_m);
         let repetition = share(travelled_m).recip();
-        let (kept_residual, redrawn_residual) = (seen.residual - value_rad, seen.residual);
+        let (kept_residual, redrawn_residual) =
+            (wrap_angle(seen.residual - value_rad), seen.residual);
         let mut weights = [[0.0; LEVELS]; 2];
         // Inverse of the variance of an angle, and the share of a bias that is drawn again in this
         // variance.
@@ -170,12 +179,21 @@ impl JumpProcess {
                     variance: seen.variance + variance + value,
                     ..*seen
                 };
-                weights[hypothesis][level] = share * predicted_levels[level] * once.density();
-                inverse[hypothesis][level] =
-                    (seen.variance + variance + value * repetition).recip();
+                let (density, information) = if (hypothesis, level) == (1, UNKNOWN) {
+                    (TAU.recip(), 0.0)
+                } else {
+                    let repeated = seen.variance + variance + value * repetition;
+                    (once.density(), repeated.recip())
+                };
+                weights[hypothesis][level] = share * predicted_levels[level] * density;
+                inverse[hypothesis][level] = information;
             }
-            of_value[level] = value * inverse[1][level];
-            left[level] = value - value * of_value[level];
+            (of_value[level], left[level]) = if level == UNKNOWN {
+                (1.0, seen.variance + value)
+            } else {
+                let of_value = value * inverse[1][level];
+                (of_value, value - value * of_value)
+            };
         }
         let [kept, redrawn] = [0, 1].map(|hypothesis| weights[hypothesis].iter().sum::<f64>());
         let density = kept + redrawn;
@@ -244,6 +262,35 @@ impl JumpProcess {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Returns the hypotheses of an angle with the innovation `residual` for a bias that was last
+    /// `value_rad`, if its direction is almost unknown.
+    fn of_reflection(residual: f64, value_rad: f64, travelled_m: f64) -> JumpHypotheses {
+        let process = JumpProcess {
+            levels: [0.0, 0.0, 0.0, 1.0],
+            ..JumpProcess::new(0.75)
+        };
+        let seen = Innovation {
+            residual,
+            variance: 0.01,
+            measurement_variance: 0.01,
+        };
+        process.jump_hypotheses(travelled_m, &seen, value_rad, 0.01)
+    }
+
+    #[test]
+    fn a_bias_beyond_half_a_turn_is_retained() {
+        let (before, after) = (of_reflection(3.1, 3.1, 0.1), of_reflection(-3.1, 3.1, 0.1));
+        assert!((after.density / before.density - 1.0).abs() < 0.01);
+        assert!((after.kept.residual - (TAU - 6.2)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_new_bias_of_unknown_direction_favours_no_position() {
+        // After 5 m, the level is unchanged with a probability of 0.8 and the bias almost certainly new.
+        let ratio = of_reflection(1.5, 0.0, 5.0).density / of_reflection(3.0, 0.0, 5.0).density;
+        assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+    }
 
     #[test]
     fn an_almost_forgotten_bias_has_finite_moments() {
