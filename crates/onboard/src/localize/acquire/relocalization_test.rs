@@ -6,7 +6,7 @@ use std::cmp::Ordering;
 use super::gaussian_sum::GaussianSum;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::Ekf;
-use crate::localize::modes::{CERTAIN, log_likelihood, log_likelihood_as_stated};
+use crate::localize::modes::{CERTAIN, EVENT_S, log_likelihood, log_likelihood_as_stated};
 use crate::localize::output::PoseEstimate;
 use crate::observation::{AngleMeasurement, OdometrySample};
 use crate::radio_head::RadioHead;
@@ -20,9 +20,8 @@ const MIN_DRIVEN_M: f64 = 0.5;
 /// the angle over this distance.
 const INDEPENDENT_M: f64 = 10.0;
 
-/// Maximum duration of a search with angles and without a result (s). The error of a wrong start
-/// lasts for about this duration.
-pub(super) const PATIENCE_S: f64 = 20.0;
+/// Maximum duration of a search with angles and without a result (s).
+pub(super) const PATIENCE_S: f64 = EVENT_S;
 
 /// Maximum interval between angles that counts as time with angles (s).
 const SILENCE_S: f64 = 1.0;
@@ -101,7 +100,7 @@ impl RelocalizationTest {
             wrong_start: settings
                 .fault_probability
                 .of_radio_head(given.is_with_bias()),
-            epochs: (PATIENCE_S / settings.error_correlation_s).max(1.0),
+            epochs: (EVENT_S / settings.error_correlation_s).max(1.0),
             confirmed_at: (risk / (1.0 - risk)).ln(),
             ..Self::new(search, given, false)
         }

@@ -206,6 +206,11 @@ impl Ekf {
         self.config.set_noise_scale(ratio);
     }
 
+    /// Returns the usual interval of the odometry (s).
+    pub(in crate::localize) const fn sample_interval_s(&self) -> f64 {
+        self.sample_interval.usual_s()
+    }
+
     /// Returns the distance driven since the start (m).
     pub const fn driven_m(&self) -> f64 {
         self.driven_m

@@ -177,7 +177,7 @@ impl Ekf {
 
     /// Returns the change of the speed due to the start or end of a bend, whose inner side is
     /// shorter.
-    fn bend_mps(&self, speed_mps: f64, duration_s: f64) -> f64 {
+    pub(in crate::localize) fn bend_mps(&self, speed_mps: f64, duration_s: f64) -> f64 {
         let Some(map) = &self.map else {
             return 0.0;
         };

@@ -27,6 +27,10 @@ use crate::settings::{FaultProbability, IntegritySettings};
 /// Maximum probability of the error exceeding the level under a fault, however rare the fault is.
 const MAX_PROBABILITY_UNDER_FAULT: f64 = 0.49;
 
+/// Duration of an error that begins with an event, until the angles refute it (s): a wrong start, or
+/// slip. It counts once against the integrity risk.
+pub(in crate::localize) const EVENT_S: f64 = 20.0;
+
 /// Minimum number of radio heads that separate the bias of one of them from the position.
 const MIN_SEPARABLE: usize = 3;
 
@@ -86,6 +90,18 @@ impl ModeFilter {
         self.ratio.odds(self.prior)
     }
 
+    /// Returns the posterior odds of the mode at one independent epoch: a fault with an onset is one
+    /// error for [`EVENT_S`].
+    fn odds_per_epoch(&self, settings: &IntegritySettings) -> f64 {
+        let epochs = (EVENT_S / settings.error_correlation_s).max(1.0);
+        let epochs = if self.mode.onset.is_some() {
+            epochs
+        } else {
+            1.0
+        };
+        self.ratio.odds(self.prior / epochs)
+    }
+
     /// Predicts with an odometry sample, after the nominal filter. If the fault may begin at this
     /// sample, previous evidence against the mode is removed.
     fn odometry(&mut self, nominal: &Ekf, sample: &OdometrySample) {
@@ -95,7 +111,15 @@ impl ModeFilter {
         };
         let was_at_rest = std::mem::replace(&mut self.at_rest, sample.speed_mps == 0.0);
         let sets_off = was_at_rest && !self.at_rest;
+        // The nominal position determines whether a bend explains the jump, because the angles may
+        // contradict that of the mode.
+        let bend_mps = nominal.bend_mps(sample.speed_mps, nominal.sample_interval_s());
         let jump = self.ekf.speed_jump();
+        let jump = if jump * sample.speed_mps.abs() > bend_mps {
+            jump
+        } else {
+            0.0
+        };
         if !(sets_off || jump > 0.0) {
             return;
         }
@@ -293,9 +317,10 @@ impl Bank {
     /// that is correct under it: the modes with their posterior probabilities, and faults of one or
     /// two radio heads, weighted by the probability that no fault mode holds.
     pub fn hypotheses(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
-        let total = 1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>();
+        let odds = |it: &ModeFilter| it.odds_per_epoch(&self.settings);
+        let total = 1.0 + self.modes.iter().map(odds).sum::<f64>();
         let faults = (self.modes.iter()).filter(|it| it.mode.is_fault);
-        let fault_free = 1.0 - faults.map(ModeFilter::odds).sum::<f64>() / total;
+        let fault_free = 1.0 - faults.map(odds).sum::<f64>() / total;
         let heads = (self.subsets.iter())
             .filter(|subset| !subset.without.iter().any(|&it| self.is_faulty(it)))
             .map(move |subset| {
@@ -312,8 +337,9 @@ impl Bank {
     /// Returns the nominal mode and all other modes, each with its posterior probability and its
     /// filter.
     pub fn mixture(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
-        let total = 1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>();
-        let modes = self.modes.iter().map(|it| (it.odds(), &it.ekf));
+        let odds = |it: &ModeFilter| it.odds_per_epoch(&self.settings);
+        let total = 1.0 + self.modes.iter().map(odds).sum::<f64>();
+        let modes = (self.modes.iter()).map(move |it| (odds(it), &it.ekf));
         let odds = std::iter::once((1.0, &self.nominal)).chain(modes);
         odds.map(move |(odds, ekf)| (odds / total, ekf))
     }
@@ -565,6 +591,7 @@ mod tests {
     use super::*;
     use crate::geometry::Pose;
     use crate::localize::ekf::EkfConfig;
+    use crate::localize::ekf::state::ALONG;
     use crate::localize::output::InitialPose;
     use crate::observation::MeasurementKind;
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
@@ -641,6 +668,58 @@ mod tests {
             alone.update(&heads[head], measured);
         });
         (bank, alone)
+    }
+
+    /// Returns the odds of slip after a jump of the speed by 0.1 m/s. The filters of all modes are
+    /// 100 m before a bend, the nominal one `ahead_m` after them.
+    fn slip_odds_after_a_jump(ahead_m: f64) -> f64 {
+        let site = Site::from_library("yard", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+        let heads = RadioHead::received_by(&site, &vehicle);
+        let road = site.build_road().unwrap().unwrap();
+        let is_bend = |along_m: &f64| road.curvature_per_m(*along_m).abs() > 0.05;
+        let bend_m = (0..1000).map(f64::from).find(is_bend).unwrap();
+        let start = InitialPose {
+            pose: road.pose(bend_m - 100.0),
+            position_std_m: 0.3,
+            heading_std_rad: 0.01,
+        };
+        let config = EkfConfig::new(&site, &vehicle);
+        let ekf = Ekf::new(config, Some(Arc::new(road)), &heads, &start);
+        let mut bank = Bank::new(&ekf, &heads, &IntegritySettings::default(), 0.0);
+        let mut belief = *bank.nominal.belief();
+        belief.mean[ALONG] += ahead_m;
+        bank.nominal.set_belief(&belief);
+        for step in 0..10 {
+            let speed_mps = if step == 9 { 4.1 } else { 4.0 };
+            bank.odometry(&OdometrySample {
+                time_s: 0.02 * f64::from(step),
+                distance_m: 0.08 * f64::from(step),
+                speed_mps,
+                yaw_rate_radps: None,
+            });
+        }
+        bank.mode(SelectedHypothesis::WheelSlip).unwrap().0
+    }
+
+    #[test]
+    fn a_bend_at_the_nominal_position_explains_a_jump_of_the_speed() {
+        assert!(slip_odds_after_a_jump(0.0) > 0.1);
+        assert!(slip_odds_after_a_jump(100.0) < 2e-3);
+    }
+
+    #[test]
+    fn slip_counts_once_for_the_duration_of_its_error() {
+        let (ekf, heads) = ekf();
+        let settings = IntegritySettings::default();
+        let bank = Bank::new(&ekf, &heads, &settings, 0.0);
+        let of_slip = (bank.modes.iter())
+            .position(|it| it.mode.id == SelectedHypothesis::WheelSlip)
+            .unwrap();
+        let shares: Vec<f64> = bank.mixture().map(|(probability, _)| probability).collect();
+        let epochs = EVENT_S / settings.error_correlation_s;
+        let odds = shares[of_slip + 1] / shares[0];
+        assert!((odds * epochs / bank.modes[of_slip].prior - 1.0).abs() < 2e-3);
     }
 
     #[test]
