@@ -9,7 +9,7 @@ import statistics
 import sys
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,6 +35,8 @@ BEFORE_S = 8.0
 RECORDED = "drive"
 # Nice value of the campaign with `--first`.
 FIRST_NICE = -10
+# Nodes at once that process samples, for each core: one uses up to 0.6 of a core.
+SAMPLE_NODES_PER_CORE = 1.5
 
 
 def run_one(name: str, seed: int, repetition: int, scratch: Path, before_s: float) -> Verdict:
@@ -60,9 +62,14 @@ def run_all(
     scratch: Path,
     before_s: float = BEFORE_S,
 ) -> list[Verdict]:
-    """Runs all repetitions of all faults, several nodes at once."""
+    """Runs all repetitions of all faults, several nodes at once.
+
+    The cores limit the number of nodes that process samples; other nodes run next to them.
+    """
     if any(it.uses_samples for it in faults):
         samples.record(scratch / RECORDED)
+    heavy = {it.name for it in faults if it.uses_samples}
+    most_heavy = max(1, int(SAMPLE_NODES_PER_CORE * (os.cpu_count() or 1)))
     # A process of its own for each run, because one interpreter is too slow to keep all times.
     with ProcessPoolExecutor(at_once, get_context("spawn")) as pool:
         cases = [
@@ -72,9 +79,20 @@ def run_all(
         ]
         # Long runs first, because the last ones decide when the campaign ends.
         cases.sort(key=lambda it: -next(f.lasts_s for f in faults if f.name == it[0]))
-        futures = [pool.submit(run_one, *case, scratch, before_s) for case in cases]
-        order = [it.name for it in faults]
-        verdicts = [it.result() for it in futures]
+        running: dict[Future[Verdict], str] = {}
+        verdicts: list[Verdict] = []
+        while cases or running:
+            number_heavy = sum(name in heavy for name in running.values())
+            startable = (it for it in cases if it[0] not in heavy or number_heavy < most_heavy)
+            case = next(startable, None) if len(running) < at_once else None
+            if case is not None:
+                cases.remove(case)
+                running[pool.submit(run_one, *case, scratch, before_s)] = case[0]
+                continue
+            for done in wait(running, return_when=FIRST_COMPLETED).done:
+                del running[done]
+                verdicts.append(done.result())
+    order = [it.name for it in faults]
     return sorted(verdicts, key=lambda it: order.index(it.fault))
 
 

@@ -70,6 +70,8 @@ class Fault:
     # Whether a report is required, and the maximum time until then (s).
     reported: bool = True
     report_s: float = 2.0
+    # Drive time before the fault beyond that of the campaign (s).
+    further_s: float = 0.0
     # Width of the interval from which the begin is drawn (s).
     spread_s: float = 1.0
     # Minimum number of repetitions, as a multiple of the campaign's.

@@ -61,15 +61,16 @@ FAULTS = (
         reported=False,
         shortfall="recovery: the scale is estimated again only slowly after the fault",
     ),
-    # The fault begins at most 4 m before or after the begin of a bend.
+    # The fault begins at most 5 m before or after the begin of a bend. Without the further drive
+    # time, the state is not `ok` there in one of ten runs without a fault.
     Fault(
         "yaw rate with the wrong sign in a bend",
         "",
         lasts_s=6.0,
         change=changes.yaw_rate(lambda it: -it),
         reported=False,
-        starts_at_m=92.0,
-        shortfall="recovery: the heading is wrong until a search ends",
+        starts_at_m=86.0,
+        further_s=4.0,
     ),
     Fault(
         "yaw rate stuck at 0.3 rad/s",
@@ -90,7 +91,6 @@ FAULTS = (
         "angle|odomet",
         lasts_s=6.0,
         change=changes.stuck_angles,
-        shortfall="report after 2.5 to 2.8 s instead of 2 s; never `ok` beyond the level",
     ),
     Fault(
         "NaN as the sigma of every second angle",

@@ -68,7 +68,7 @@ class Run:
         folder.mkdir(parents=True)
         named = zlib.crc32(fault.name.encode())
         self.random = np.random.default_rng([seed, named, repetition])
-        begin_s = before_s + float(self.random.uniform(0.0, fault.spread_s))
+        begin_s = before_s + fault.further_s + float(self.random.uniform(0.0, fault.spread_s))
         self.window = Window(begin_s, begin_s + fault.lasts_s)
         self.duration_s = self.window.end_s + AFTER_S
         stop_s = (begin_s, self.window.end_s) if fault.stands else None
