@@ -86,8 +86,10 @@ impl Clocks {
         let last_s = self.angles.last_s();
         let is_late = |last_s: f64| (0.0..=MAX_ANGLE_DELAY_S).contains(&(last_s - time_s));
         let is_of_burst = |last_s: f64| (time_s - last_s).abs() < BURST_S;
-        if self.arrival_s.is_none() || last_s.is_some_and(|it| is_late(it) || is_of_burst(it)) {
+        if self.arrival_s.is_none() || last_s.is_some_and(is_of_burst) {
             TimeCheck::range(time_s)?;
+        } else if last_s.is_some_and(is_late) {
+            self.step = self.angles.late(time_s, self.arrival_s)?.or(self.step);
         } else if let Some(step) = self.angles.next(time_s, self.arrival_s, false)? {
             self.step = Some(step);
         }

@@ -414,6 +414,11 @@ impl Live {
         self.outcomes.pop_front()
     }
 
+    /// Returns the site.
+    pub(super) const fn site(&self) -> &Site {
+        &self.site
+    }
+
     /// Returns the vehicle's settings.
     pub(super) const fn vehicle(&self) -> &Vehicle {
         &self.vehicle

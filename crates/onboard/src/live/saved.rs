@@ -6,10 +6,11 @@ use super::error::LiveError;
 use super::feed::Live;
 use super::outcome::HeadStatus;
 use super::status::State;
-use crate::geometry::Pose;
+use crate::geometry::{Pose, wrap_angle};
 use crate::localize::PoseEstimate;
 use crate::localize::ekf::{EstimatedConstant, EstimatedConstants};
 use crate::observation::OdometrySample;
+use crate::road::Road;
 use crate::settings::Vehicle;
 
 /// Protection level in standard deviations: at 10⁻⁷ a horizontal error exceeds 5.3 of them.
@@ -33,6 +34,11 @@ const STANDING_STD_RAD: f64 = 0.02;
 /// Standard deviation of the yaw change per distance, in rad/m: half the curvature of a bend with a
 /// radius of 3 m.
 const TURN_STD_RAD_PER_M: f64 = 0.17;
+
+/// Maximum angle in radians between the heading of a vehicle and the road that it follows, and standard deviation of
+/// this angle after the motion.
+const MAX_FROM_ROAD_RAD: f64 = 0.3;
+const FROM_ROAD_STD_RAD: f64 = 0.05;
 
 /// Factor for the estimated standard deviations of a calibration, because it ages and is correlated
 /// with the pose.
@@ -122,6 +128,36 @@ impl SavedState {
         })
     }
 
+    /// Returns pose and motion if the vehicle has followed the road by the counted distance; `None` if it was not on the
+    /// road, or if the distance is unknown. On the road, the position across the road remains known.
+    fn along_road(&self, by: &Resumption, road: &Road) -> Option<(Pose, Resumption)> {
+        let driven_m = by.driven_m?;
+        let before = road.project(self.pose.point());
+        let is_on_road = before.lateral_m.abs() <= 0.5 * road.width_m() + self.position_std_m;
+        let from_road_rad =
+            wrap_angle(self.pose.heading_rad - road.pose(before.along_m).heading_rad);
+        // The road is driven in both directions.
+        let direction = from_road_rad.cos().signum();
+        if !(is_on_road && from_road_rad.sin().abs() <= MAX_FROM_ROAD_RAD.sin()) {
+            return None;
+        }
+        let after = road.pose(before.along_m + direction * driven_m);
+        let pose = Pose {
+            heading_rad: after.heading_rad + from_road_rad,
+            ..after.offset_left(before.lateral_m)
+        };
+        let growth_m = STANDING_STD_M.hypot(COUNTER_STD * driven_m);
+        let motion = Resumption {
+            position_std_m: self.position_std_m.hypot(growth_m).min(by.position_std_m),
+            heading_std_rad: self
+                .heading_std_rad
+                .hypot(FROM_ROAD_STD_RAD)
+                .min(by.heading_std_rad),
+            ..*by
+        };
+        Some((pose, motion))
+    }
+
     /// Returns the pose after the motion: along an arc of the last yaw rate, by the counted
     /// distance. Without a counted distance, half the distance at the last speed is assumed.
     fn moved(&self, by: &Resumption) -> Pose {
@@ -209,11 +245,14 @@ impl Live {
         let Some(by) = saved.resumption(elapsed_s.max(0.0), sample, top_speed_mps) else {
             return Ok(None);
         };
+        let road = (self.site().build_road()?).filter(|_| self.vehicle().follows_road());
+        let (pose, by) = (road.and_then(|road| saved.along_road(&by, &road)))
+            .unwrap_or_else(|| (saved.moved(&by), by));
         let mut vehicle = calibrated(self.vehicle(), saved);
         vehicle.start.known = true;
         vehicle.start.position_std_m = by.position_std_m;
         vehicle.start.heading_std_rad = by.heading_std_rad;
-        self.begin_at(&vehicle, saved.moved(&by))?;
+        self.begin_at(&vehicle, pose)?;
         for &pci in &saved.excluded {
             // The radio head may have been removed from the site.
             if let Err(error) = self.exclude(pci)
@@ -268,6 +307,7 @@ fn calibrated(vehicle: &Vehicle, saved: &SavedState) -> Vehicle {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Point;
 
     fn saved(distance_m: Option<f64>) -> SavedState {
         SavedState {
@@ -327,6 +367,44 @@ mod tests {
         let chord_m = moved.point().distance_m(state.pose.point());
         assert!((chord_m - 3.0).abs() < 0.02, "{chord_m}");
         assert!((moved.heading_rad - 0.2).abs() < 1e-12);
+    }
+
+    /// The vehicle enters a bend of 8 m radius at 20 m after the state was saved.
+    #[test]
+    fn the_pose_follows_the_road_by_the_counted_distance() {
+        let corners =
+            [(0.0, 0.0), (28.0, 0.0), (28.0, 40.0)].map(|(x_m, y_m)| Point::new(x_m, y_m));
+        let road = Road::from_polyline(&corners, 8.0, 4.0).unwrap();
+        let state = SavedState {
+            pose: Pose {
+                x_m: 19.0,
+                y_m: 0.3,
+                heading_rad: 0.02,
+            },
+            ..saved(Some(50.0))
+        };
+        let by = state.resumption(2.0, &odometry(55.0), 4.0).unwrap();
+        let (pose, on_road) = state.along_road(&by, &road).unwrap();
+        let expected = road.pose(24.0);
+        let aside_m = pose.point().distance_m(expected.point());
+        assert!((aside_m - 0.3).abs() < 0.01, "{aside_m}");
+        assert!((pose.heading_rad - expected.heading_rad - 0.02).abs() < 1e-9);
+        // 5 % of 5 m in addition to 0.2 m, instead of a bend of 3 m radius in either direction.
+        assert!(
+            on_road.position_std_m < 0.35 && by.position_std_m > 2.0,
+            "{on_road:?}"
+        );
+        // The vehicle may drive on the road in the opposite direction, but not across it.
+        let turned = |by_rad: f64| SavedState {
+            pose: Pose {
+                heading_rad: state.pose.heading_rad + by_rad,
+                ..state.pose
+            },
+            ..state.clone()
+        };
+        let (back, _) = turned(std::f64::consts::PI).along_road(&by, &road).unwrap();
+        assert!((back.x_m - 14.0).abs() < 0.01, "{back:?}");
+        assert_eq!(turned(1.0).along_road(&by, &road), None);
     }
 
     #[test]

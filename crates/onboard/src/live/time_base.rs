@@ -1,6 +1,6 @@
 //! Clock of a source, converted to the time of the pipeline, which never decreases.
 
-use super::time_check::{TimeCheck, TimeDefect, TimeVerdict};
+use super::time_check::{MAX_LEAD_S, TimeCheck, TimeDefect, TimeVerdict};
 
 /// Detected and compensated step of a source's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,12 +59,34 @@ impl TimeBase {
         arrival_s: Option<f64>,
         is_copy: bool,
     ) -> Result<Option<ClockStep>, TimeDefect> {
-        match self.check.next(time_s, arrival_s, is_copy)? {
-            TimeVerdict::Continues => Ok(None),
-            TimeVerdict::NewBase { elapsed_s, step_s } => {
-                self.offset_s += step_s;
-                Ok(Some(ClockStep { step_s, elapsed_s }))
-            }
-        }
+        // A clock that was set back may be corrected, so that it leads by that step.
+        let max_lead_s = if self.offset_s < 0.0 {
+            MAX_LEAD_S.min(0.5 * self.offset_s.abs())
+        } else {
+            MAX_LEAD_S
+        };
+        let verdict = self.check.next(time_s, arrival_s, is_copy, max_lead_s)?;
+        Ok(self.follow(verdict))
+    }
+
+    /// Processes a time that may be late, like [`TimeCheck::late`], and compensates a step of the clock.
+    ///
+    /// # Errors
+    /// Cause of a rejection.
+    pub fn late(
+        &mut self,
+        time_s: f64,
+        arrival_s: Option<f64>,
+    ) -> Result<Option<ClockStep>, TimeDefect> {
+        let verdict = self.check.late(time_s, arrival_s)?;
+        Ok(self.follow(verdict))
+    }
+
+    fn follow(&mut self, verdict: TimeVerdict) -> Option<ClockStep> {
+        let TimeVerdict::NewBase { elapsed_s, step_s } = verdict else {
+            return None;
+        };
+        self.offset_s += step_s;
+        Some(ClockStep { step_s, elapsed_s })
     }
 }

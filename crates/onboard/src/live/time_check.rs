@@ -24,6 +24,11 @@ const RUN_S: f64 = 0.2;
 /// It permits jitter of the transport.
 const JITTER_S: f64 = 0.1;
 
+/// Minimum duration and maximum jitter of a run of late messages after which their clock was set back, in seconds.
+/// Angles of a slow estimator are late, too, but angles of other radio heads interrupt the run.
+const LATE_RUN_S: f64 = 0.1;
+const LATE_JITTER_S: f64 = 0.05;
+
 /// Maximum time between two messages of a run without arrival times, in seconds.
 const MAX_SPACING_S: f64 = 1.0;
 
@@ -196,12 +201,15 @@ impl Run {
     }
 
     fn is_time_base(&self) -> bool {
+        self.count >= RUN && self.is_regular(RUN_S, JITTER_S).unwrap_or(true)
+    }
+
+    /// Whether the messages arrived over a minimum duration, in the intervals of their stamps, both in seconds; `None`
+    /// without arrival times.
+    fn is_regular(&self, min_s: f64, jitter_s: f64) -> Option<bool> {
         let lasted_s = self.last.time_s - self.first.time_s;
-        self.count >= RUN
-            && self
-                .last
-                .waited_s(&self.first)
-                .is_none_or(|waited_s| waited_s >= RUN_S && (lasted_s - waited_s).abs() <= JITTER_S)
+        let waited_s = self.last.waited_s(&self.first)?;
+        Some(waited_s >= min_s && (lasted_s - waited_s).abs() <= jitter_s)
     }
 
     /// Returns the mean time between two messages, in seconds.
@@ -257,7 +265,7 @@ impl TimeCheck {
 
     /// Validates the stamp of the next message; `arrival_s` is the time of its arrival by a monotonic clock, in
     /// seconds, and `is_copy` whether it equals the previous message in all values. Without arrival times a step
-    /// ahead counts as a gap.
+    /// ahead counts as a gap. `max_lead_s` is the maximum lead over the expected time in seconds.
     ///
     /// # Errors
     /// The cause of a rejection. The reference then remains the last accepted message.
@@ -266,6 +274,7 @@ impl TimeCheck {
         time_s: f64,
         arrival_s: Option<f64>,
         is_copy: bool,
+        max_lead_s: f64,
     ) -> Result<TimeVerdict, TimeDefect> {
         Self::range(time_s)?;
         let stamp = Stamp { time_s, arrival_s };
@@ -282,7 +291,7 @@ impl TimeCheck {
             TimeDefect::Backward { time_s, by_s }
         } else {
             match self.lead_over_expected_s(&stamp, &last) {
-                Some(by_s) if by_s > MAX_LEAD_S => TimeDefect::Future { time_s, by_s },
+                Some(by_s) if by_s > max_lead_s => TimeDefect::Future { time_s, by_s },
                 _ => {
                     self.accept(stamp);
                     return Ok(TimeVerdict::Continues);
@@ -293,13 +302,7 @@ impl TimeCheck {
         let run = self.run.map_or(Run::from(stamp), |run| run.and(stamp));
         self.run = Some(run);
         if run.is_time_base() {
-            let step_s = self.step_s(&run, &last);
-            // Jitter cannot make the time go back.
-            let elapsed_s = (ahead_s - step_s).max(MIN_ELAPSED_S);
-            let step_s = ahead_s - elapsed_s;
-            self.lead_s = None;
-            self.accept(stamp);
-            return Ok(TimeVerdict::NewBase { elapsed_s, step_s });
+            return Ok(self.accept_base(&run, &last));
         }
         // One stamp may have any ratio. A unit is reported after three consecutive rejected stamps
         // that are inconsistent with each other.
@@ -311,6 +314,36 @@ impl TimeCheck {
             unit,
             ratio,
         }))
+    }
+
+    /// Processes a stamp that is earlier than that of the last accepted message and is accepted as late. If all messages
+    /// are late for 0.1 s, their clock has been set back.
+    ///
+    /// # Errors
+    /// The cause of a rejection by [`range`](Self::range).
+    pub fn late(&mut self, time_s: f64, arrival_s: Option<f64>) -> Result<TimeVerdict, TimeDefect> {
+        Self::range(time_s)?;
+        let stamp = Stamp { time_s, arrival_s };
+        let run = self.run.map_or(Run::from(stamp), |run| run.and(stamp));
+        self.run = Some(run);
+        let is_regular = run.is_regular(LATE_RUN_S, LATE_JITTER_S).unwrap_or(false);
+        Ok(match self.last {
+            Some(last) if run.count >= RUN && is_regular => self.accept_base(&run, &last),
+            _ => TimeVerdict::Continues,
+        })
+    }
+
+    /// Accepts the time base of a run.
+    fn accept_base(&mut self, run: &Run, last: &Stamp) -> TimeVerdict {
+        let ahead_s = run.last.time_s - last.time_s;
+        // Jitter cannot make the time go back.
+        let elapsed_s = (ahead_s - self.step_s(run, last)).max(MIN_ELAPSED_S);
+        self.lead_s = run.lead_s;
+        self.accept(run.last);
+        TimeVerdict::NewBase {
+            elapsed_s,
+            step_s: ahead_s - elapsed_s,
+        }
     }
 
     /// Returns the lead of a stamp, in seconds, over its expected time: the later of the last stamp
@@ -356,7 +389,7 @@ mod tests {
         let mut check = TimeCheck::default();
         for number in 0..50 {
             let arrival_s = f64::from(number) * PERIOD_S;
-            let verdict = check.next(epoch_s + arrival_s, Some(arrival_s), false);
+            let verdict = check.next(epoch_s + arrival_s, Some(arrival_s), false, MAX_LEAD_S);
             assert_eq!(verdict, Ok(TimeVerdict::Continues));
         }
         check
@@ -374,9 +407,11 @@ mod tests {
             (-1e300, "time out of range"),
         ] {
             let mut check = warm(0.0);
-            let error = check.next(time_s, Some(1.0), false).unwrap_err();
+            let error = check
+                .next(time_s, Some(1.0), false, MAX_LEAD_S)
+                .unwrap_err();
             assert_eq!(error.name(), name, "{time_s}: {error}");
-            let good = check.next(1.02, Some(1.02), false);
+            let good = check.next(1.02, Some(1.02), false, MAX_LEAD_S);
             assert_eq!(good, Ok(TimeVerdict::Continues));
         }
     }
@@ -385,7 +420,7 @@ mod tests {
     fn a_repeated_message_never_becomes_the_time_base() {
         let mut check = warm(0.0);
         for number in 50..5000 {
-            let error = check.next(0.98, Some(f64::from(number) * PERIOD_S), true);
+            let error = check.next(0.98, Some(f64::from(number) * PERIOD_S), true, MAX_LEAD_S);
             assert!(matches!(
                 error,
                 Err(TimeDefect::Repeated { is_copy: true, .. })
@@ -401,7 +436,7 @@ mod tests {
             loop {
                 rejected += 1;
                 let arrival_s = 0.98 + f64::from(rejected) * period_s;
-                match check.next(arrival_s + step_s, Some(arrival_s), false) {
+                match check.next(arrival_s + step_s, Some(arrival_s), false, MAX_LEAD_S) {
                     Err(error) => assert!(matches!(
                         error,
                         TimeDefect::Backward { .. } | TimeDefect::Future { .. }
@@ -429,25 +464,25 @@ mod tests {
         for number in 50..400 {
             let time_s = f64::from(number) * PERIOD_S;
             if number % 10 != 0 {
-                let verdict = check.next(time_s, Some(time_s.max(4.0)), false);
+                let verdict = check.next(time_s, Some(time_s.max(4.0)), false, MAX_LEAD_S);
                 assert_eq!(verdict, Ok(TimeVerdict::Continues), "{number}");
             }
         }
         // After a backlog with most messages lost, one step is longer than a second.
         let mut check = warm(0.0);
-        assert!(check.next(1.0, Some(6.0), false).is_ok());
-        assert!(check.next(5.0, Some(6.0), false).is_ok());
+        assert!(check.next(1.0, Some(6.0), false, MAX_LEAD_S).is_ok());
+        assert!(check.next(5.0, Some(6.0), false, MAX_LEAD_S).is_ok());
     }
 
     #[test]
     fn a_backlog_that_is_sent_again_is_rejected_until_it_is_over() {
         let mut check = warm(0.0);
         for number in 20..50 {
-            let verdict = check.next(f64::from(number) * PERIOD_S, Some(1.0), false);
+            let verdict = check.next(f64::from(number) * PERIOD_S, Some(1.0), false, MAX_LEAD_S);
             assert!(verdict.is_err(), "{number}");
         }
         assert_eq!(
-            check.next(1.0, Some(1.0), false),
+            check.next(1.0, Some(1.0), false, MAX_LEAD_S),
             Ok(TimeVerdict::Continues)
         );
     }
@@ -455,12 +490,12 @@ mod tests {
     #[test]
     fn a_gap_of_messages_is_not_reported_as_a_clock_step() {
         let mut check = warm(0.0);
-        let verdict = check.next(8.98, Some(9.01), false);
+        let verdict = check.next(8.98, Some(9.01), false, MAX_LEAD_S);
         assert_eq!(verdict, Ok(TimeVerdict::Continues));
         // Without arrival times, a step ahead cannot be distinguished from a gap, and is accepted.
         let mut check = TimeCheck::default();
         for time_s in [0.0, 0.02, 500.0] {
-            assert!(check.next(time_s, None, false).is_ok());
+            assert!(check.next(time_s, None, false, MAX_LEAD_S).is_ok());
         }
     }
 
@@ -470,16 +505,16 @@ mod tests {
         for number in 0..100 {
             assert!(
                 check
-                    .next(f64::from(number) * PERIOD_S, None, false)
+                    .next(f64::from(number) * PERIOD_S, None, false, MAX_LEAD_S)
                     .is_ok()
             );
         }
         for number in 0..RUN - 1 {
-            let verdict = check.next(f64::from(number) * PERIOD_S, None, false);
+            let verdict = check.next(f64::from(number) * PERIOD_S, None, false, MAX_LEAD_S);
             assert!(verdict.is_err(), "{number}");
         }
         let time_s = f64::from(RUN - 1) * PERIOD_S;
-        let verdict = check.next(time_s, None, false);
+        let verdict = check.next(time_s, None, false, MAX_LEAD_S);
         let Ok(TimeVerdict::NewBase { elapsed_s, .. }) = verdict else {
             panic!("{verdict:?}");
         };
@@ -496,7 +531,7 @@ mod tests {
                 for number in 0..500 {
                     let arrival_s = f64::from(number) * PERIOD_S;
                     let time_s = (epoch_s + arrival_s) * unit.per_second();
-                    match check.next(time_s, Some(arrival_s), false) {
+                    match check.next(time_s, Some(arrival_s), false, MAX_LEAD_S) {
                         Ok(verdict) => assert_eq!((number, verdict), (0, TimeVerdict::Continues)),
                         Err(error) => named |= error.to_string().contains(&unit.to_string()),
                     }
@@ -510,15 +545,56 @@ mod tests {
     fn leading_zeros_are_rejected_until_the_clock_is_set() {
         let mut check = TimeCheck::default();
         for number in 0..20 {
-            let verdict = check.next(0.0, Some(f64::from(number) * PERIOD_S), true);
+            let verdict = check.next(0.0, Some(f64::from(number) * PERIOD_S), true, MAX_LEAD_S);
             assert_eq!(verdict.is_ok(), number == 0);
         }
         let accepted = (20..40).find(|number| {
             let arrival_s = f64::from(*number) * PERIOD_S;
             check
-                .next(1.7e9 + arrival_s, Some(arrival_s), false)
+                .next(1.7e9 + arrival_s, Some(arrival_s), false, MAX_LEAD_S)
                 .is_ok()
         });
         assert!(accepted.is_some());
+    }
+
+    /// Angles of six radio heads at 25 Hz, each 6 ms after its measurement, whose clock is back by 0.2 s from 2 s to 4 s.
+    #[test]
+    fn a_clock_that_is_set_back_by_less_than_a_second_is_compensated_until_it_is_corrected() {
+        use super::super::clocks::Clocks;
+        let mut clocks = Clocks::default();
+        let (mut accepted, mut wrong_s) = (0, Vec::new());
+        for number in 0..900 {
+            let true_s = 0.04 * f64::from(number / 6) + 3e-4 * f64::from(number % 6);
+            clocks.arrival_s = Some(true_s + 0.006);
+            let is_back = (2.0..4.0).contains(&true_s);
+            let by_s = if is_back { -0.2 } else { 0.0 };
+            if let Ok(time_s) = clocks.accept_burst("angle", true_s + by_s, None) {
+                accepted += 1;
+                if (time_s - true_s).abs() > 0.01 {
+                    wrong_s.push(true_s);
+                }
+            }
+        }
+        // The angles of the first 0.12 s are used with a wrong time, and those of 0.2 s are rejected at the correction.
+        let is_before = |true_s: &f64| (2.0..2.13).contains(true_s);
+        assert!(wrong_s.iter().all(is_before), "{wrong_s:?}");
+        assert!(accepted >= 900 - 6 * 6, "{accepted}");
+    }
+
+    /// The angles of one radio head are always 0.15 s late.
+    #[test]
+    fn late_angles_between_angles_in_time_are_no_clock_step() {
+        let mut check = TimeCheck::default();
+        for number in 0..200 {
+            let arrival_s = 0.02 * f64::from(number);
+            let is_late = number % 2 == 1;
+            let time_s = if is_late { arrival_s - 0.15 } else { arrival_s };
+            let verdict = if is_late {
+                check.late(time_s, Some(arrival_s))
+            } else {
+                check.next(time_s, Some(arrival_s), false, MAX_LEAD_S)
+            };
+            assert_eq!(verdict, Ok(TimeVerdict::Continues), "{number}");
+        }
     }
 }
