@@ -411,7 +411,10 @@ impl Pipeline {
                     SsbInput::Angle(measured) => self.collect(ssb, Some(measured)),
                 }
             }
-            let are_right = |monitors: &Monitors| !monitors.faults().has_channel();
+            if let Some(monitors) = &mut self.monitors {
+                monitors.repetitions(time_s, &self.burst);
+            }
+            let are_right = |monitors: &Monitors| !monitors.faults().withholds_angles();
             if self.monitors.as_deref().is_none_or(are_right) {
                 self.localizer.update(&mut self.burst)?;
                 self.localizer.update_ranges(&mut self.ranges)?;
@@ -422,7 +425,7 @@ impl Pipeline {
                 }
                 self.monitor_angles(time_s)?;
             } else {
-                // The angles of a faulty array would displace the pose; dead reckoning without
+                // The angles of a faulty array or source would displace the pose; dead reckoning without
                 // angles does not.
                 self.follow_monitors()?;
             }
@@ -475,9 +478,15 @@ impl Pipeline {
         }
     }
 
-    /// Whether a monitor requests the burst at `time_s`.
+    /// Whether a monitor requests the burst at `time_s`. A vehicle that has left its lane may have a wrong yaw rate,
+    /// which only angles show.
     fn is_wanted(&self, time_s: f64) -> bool {
-        (self.monitors.as_ref()).is_some_and(|monitors| monitors.requests_burst(time_s))
+        let has_left_lane = || {
+            let ekf = self.localizer.localizer().ekf();
+            ekf.is_some_and(Ekf::has_left_lane)
+        };
+        (self.monitors.as_ref())
+            .is_some_and(|monitors| monitors.requests_burst(time_s) || has_left_lane())
     }
 
     /// Passes the angles of the burst at `time_s` to the monitors.

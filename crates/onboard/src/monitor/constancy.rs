@@ -1,27 +1,18 @@
 //! Odometry that repeats exactly although the odometer has noise.
 //!
-//! A sample is repeated if the speed and the step of the distance do not change. The rate of repetitions is estimated
-//! while the vehicle moves. Under independent repetitions, a run of `n` has the probability `rateⁿ`. An odometer without
-//! noise, or with a coarse resolution, repeats often and is never suspicious. A suspicion alone is not a fault: it starts
-//! a [test by the angles](crate::localize::modes::OdometryTest).
+//! A sample is repeated if the speed and the step of the distance do not change. A suspicion alone is not a fault: it
+//! starts a [test by the angles](crate::localize::modes::OdometryTest).
 
+use super::repetition::Repetitions;
 use crate::observation::OdometrySample;
 
 /// Minimum speed in m/s. Slower wheels may repeat their speed because of the resolution.
 const MOVING_MPS: f64 = 0.1;
 /// Maximum interval between two samples in seconds; a longer one interrupts the run.
 const MAX_S: f64 = 0.5;
-/// Minimum number of samples in motion from which the repetition rate is estimated.
-const MIN_SAMPLES: u32 = 50;
-/// Number of samples at which all counts are halved.
-const MAX_SAMPLES: u32 = 400;
 /// Minimum fraction of samples at which the change alternates its sign. Independent noise has two
 /// thirds; a smooth motion has almost none.
 const ALTERNATING_SHARE: f64 = 0.2;
-/// Negative logarithm of the probability of a suspicious run without a fault: 1e-6.
-const EVIDENCE: f64 = 13.8;
-/// Minimum number of repetitions of a suspicious run.
-const MIN_RUN: u32 = 5;
 /// Maximum duration of a run in seconds; a longer run is normal, because a source without noise has
 /// replaced the odometer.
 const MAX_RUN_S: f64 = 60.0;
@@ -37,15 +28,10 @@ pub struct Constancy {
     last_step_m: f64,
     /// Last changes of the speed and of the step of the distance, other than zero, in m/s and m.
     last_changes: [f64; 2],
-    samples: u32,
-    repeated: u32,
+    repetitions: Repetitions,
     alternating: u32,
-    /// Number of repetitions in the current run.
-    run: u32,
     /// Time of the first repetition of the current run, in seconds.
     run_since_s: f64,
-    /// Whether the current run belongs to a fault, so that it does not change the estimated rate.
-    is_fault: bool,
 }
 
 impl Constancy {
@@ -57,7 +43,8 @@ impl Constancy {
         let duration_s = sample.time_s - last.time_s;
         let is_moving = sample.speed_mps.abs() >= MOVING_MPS && last.speed_mps.abs() >= MOVING_MPS;
         if !is_moving || duration_s > MAX_S {
-            (self.run, self.is_fault, self.last_changes) = (0, false, [0.0; 2]);
+            self.repetitions.interrupt();
+            self.last_changes = [0.0; 2];
             return;
         }
         let step_m = sample.distance_m - last.distance_m;
@@ -69,17 +56,16 @@ impl Constancy {
             changes[1] = 0.0;
         }
         if changes == [0.0; 2] {
-            if self.run == 0 {
+            if self.repetitions.run() == 0 {
                 self.run_since_s = sample.time_s;
             }
-            self.run += 1;
+            self.repetitions.repeat();
             if sample.time_s - self.run_since_s > MAX_RUN_S {
-                self.count_run();
+                self.alternating >>= self.repetitions.count_run();
             }
             return;
         }
-        self.count_run();
-        self.samples += 1;
+        self.alternating >>= self.repetitions.change();
         let mut alternates = false;
         for (last, change) in self.last_changes.iter_mut().zip(changes) {
             if change != 0.0 {
@@ -90,32 +76,16 @@ impl Constancy {
         self.alternating += u32::from(alternates);
     }
 
-    /// Adds the current run to the counts, and begins a new one.
-    fn count_run(&mut self) {
-        let run = std::mem::take(&mut self.run);
-        if !std::mem::take(&mut self.is_fault) {
-            self.samples = self.samples.saturating_add(run);
-            self.repeated = self.repeated.saturating_add(run);
-        }
-        while self.samples >= MAX_SAMPLES {
-            self.samples /= 2;
-            self.repeated /= 2;
-            self.alternating /= 2;
-        }
-    }
-
     /// Whether the current run is improbable for the odometer.
     pub fn is_suspicious(&self) -> bool {
-        let samples = f64::from(self.samples);
-        let has_noise = self.samples >= MIN_SAMPLES
-            && f64::from(self.alternating) >= ALTERNATING_SHARE * samples;
-        let rate = f64::from(self.repeated + 1) / (samples + 2.0);
-        has_noise && self.run >= MIN_RUN && -f64::from(self.run) * rate.ln() >= EVIDENCE
+        let samples = f64::from(self.repetitions.samples());
+        f64::from(self.alternating) >= ALTERNATING_SHARE * samples
+            && self.repetitions.is_suspicious()
     }
 
     /// Marks the current run as that of a fault.
     pub const fn mark_fault(&mut self) {
-        self.is_fault = self.run > 0;
+        self.repetitions.mark_fault();
     }
 }
 

@@ -175,9 +175,9 @@ impl Fallback {
         let before = before
             .as_deref()
             .and_then(Localizer::ekf)
-            .or(localizer.ekf())?;
-        let constants = *before.belief();
-        localizer.end_free_motion(&specified, &constants);
+            .or(localizer.ekf())?
+            .clone();
+        localizer.end_free_motion(&specified, &before);
         Some(localizer)
     }
 }

@@ -17,6 +17,10 @@ pub enum Fault {
     OdometryReversed,
     /// Distance and speed of the odometry contradict each other.
     OdometryContradictory,
+    /// The yaw rate has the wrong sign.
+    YawRateReversed,
+    /// The angles of all radio heads repeat exactly although the vehicle moves.
+    AnglesStuck,
     /// A receive channel has no signal.
     DeadChannel {
         /// Number of the channel, from 0.
@@ -48,6 +52,8 @@ pub enum Fault {
 pub enum FaultSource {
     /// The odometry.
     Odometry,
+    /// The angles of all radio heads.
+    Angles,
     /// A receive channel, by its number from 0.
     Channel(u8),
     /// A radio head, by its PCI.
@@ -61,6 +67,8 @@ impl Fault {
             Self::OdometryFrozen => "odometry_frozen",
             Self::OdometryReversed => "odometry_reversed",
             Self::OdometryContradictory => "odometry_contradictory",
+            Self::YawRateReversed => "yaw_rate_reversed",
+            Self::AnglesStuck => "angles_stuck",
             Self::DeadChannel { .. } => "dead_channel",
             Self::InvertedChannel { .. } => "inverted_channel",
             Self::ExchangedChannels { .. } => "exchanged_channels",
@@ -71,9 +79,11 @@ impl Fault {
     /// Returns the component of the fault; for exchanged channels, the first channel.
     pub const fn source(self) -> FaultSource {
         match self {
-            Self::OdometryFrozen | Self::OdometryReversed | Self::OdometryContradictory => {
-                FaultSource::Odometry
-            }
+            Self::OdometryFrozen
+            | Self::OdometryReversed
+            | Self::OdometryContradictory
+            | Self::YawRateReversed => FaultSource::Odometry,
+            Self::AnglesStuck => FaultSource::Angles,
             Self::DeadChannel { channel } | Self::InvertedChannel { channel } => {
                 FaultSource::Channel(channel)
             }
@@ -84,14 +94,14 @@ impl Fault {
         }
     }
 
-    /// Returns the channel numbers or the PCI, for metrics; empty for the odometry.
+    /// Returns the channel numbers or the PCI, for metrics; empty for odometry and angles.
     pub fn subject(self) -> String {
         match self {
             Self::ExchangedChannels {
                 channels: [first, second],
             } => format!("{first}-{second}"),
             other => match other.source() {
-                FaultSource::Odometry => String::new(),
+                FaultSource::Odometry | FaultSource::Angles => String::new(),
                 FaultSource::Channel(channel) => channel.to_string(),
                 FaultSource::RadioHead(pci) => pci.to_string(),
             },
@@ -102,6 +112,7 @@ impl Fault {
     pub const fn what_to_do(self) -> &'static str {
         match self.source() {
             FaultSource::Odometry => "stop; check the odometer and the source of the odometry",
+            FaultSource::Angles => "stop; check the receiver and the source of the angles",
             FaultSource::Channel(_) => {
                 "stop; check the cables from the antennas to the receiver, and samples.stream.antennas"
             }
@@ -124,6 +135,10 @@ impl fmt::Display for Fault {
                     f,
                     "distance and speed of the odometry contradict each other"
                 )
+            }
+            Self::YawRateReversed => write!(f, "the yaw rate has the wrong sign"),
+            Self::AnglesStuck => {
+                write!(f, "the angles repeat exactly although the vehicle moves")
             }
             Self::DeadChannel { channel } => write!(f, "receive channel {channel} has no signal"),
             Self::InvertedChannel { channel } => {
@@ -177,16 +192,21 @@ impl ActiveFaults {
         faults.find(|it| it.source() == FaultSource::Odometry)
     }
 
-    /// Whether the odometry or a receive channel is faulty, so that every burst must be received.
+    /// Whether the odometry, the angles or a receive channel are faulty, so that every burst must be received.
     pub fn has_of_vehicle(&self) -> bool {
         self.iter()
             .any(|it| !matches!(it.fault.source(), FaultSource::RadioHead(_)))
     }
 
-    /// Whether a receive channel is faulty, so that the localizer receives no angles.
-    pub fn has_channel(&self) -> bool {
-        self.iter()
-            .any(|it| matches!(it.fault.source(), FaultSource::Channel(_)))
+    /// Whether the angles or a receive channel are faulty, so that the localizer receives no angles.
+    pub fn withholds_angles(&self) -> bool {
+        let is_of_angles = |it: &ActiveFault| {
+            matches!(
+                it.fault.source(),
+                FaultSource::Angles | FaultSource::Channel(_)
+            )
+        };
+        self.iter().any(is_of_angles)
     }
 
     /// Whether a fault makes every angle wrong: inverted or exchanged channels.

@@ -11,6 +11,8 @@ mod directions;
 mod fallback;
 mod fault;
 mod motion;
+mod repetition;
+mod stuck;
 
 pub use channels::ChannelMonitor;
 pub use confirmation::Confirmation;
@@ -20,6 +22,7 @@ pub use directions::DirectionMonitor;
 pub use fallback::Fallback;
 pub use fault::{ActiveFault, ActiveFaults, Fault, FaultSource};
 pub use motion::MotionMonitor;
+pub use stuck::StuckAngles;
 
 use crate::expected_angle::ExpectedAngle;
 use crate::geometry::Pose;
@@ -45,6 +48,7 @@ pub struct Monitors {
     constancy: Constancy,
     /// Test of a suspicious odometry.
     test: Option<Box<OdometryTest>>,
+    stuck: StuckAngles,
     channels: ChannelMonitor,
     directions: DirectionMonitor,
     /// Confirmation of a given pose. Until it is confirmed, every burst is received.
@@ -65,6 +69,7 @@ impl Monitors {
             motion: MotionMonitor::new(ExpectedAngle::new(vehicle), heads),
             constancy: Constancy::default(),
             test: None,
+            stuck: StuckAngles::new(heads),
             channels: ChannelMonitor::new(site, vehicle, heads),
             directions: DirectionMonitor::new(site, vehicle, heads),
             confirmation: Confirmation::new(false, heads),
@@ -133,7 +138,13 @@ impl Monitors {
             self.faults.end(Fault::OdometryContradictory);
         }
         if self.is_without_odometry {
-            self.fallback.odometry(sample)
+            // On a road, a wrong yaw rate would displace the pose to where the road turns like it.
+            let has_yaw_rate = !self.faults.contains(Fault::YawRateReversed);
+            let followed = self.fallback.odometry(sample);
+            OdometrySample {
+                yaw_rate_radps: followed.yaw_rate_radps.filter(|_| has_yaw_rate),
+                ..followed
+            }
         } else {
             *sample
         }
@@ -166,6 +177,15 @@ impl Monitors {
         (self.directions).ssb(observation, self.distance_m, &mut change);
     }
 
+    /// Compares the angles of a burst at `time_s` with the previous ones, before the localizer uses them.
+    pub fn repetitions(&mut self, time_s: f64, updates: &[AngleUpdate]) {
+        if self.stuck.angles(updates, self.distance_m) {
+            self.faults.begin(Fault::AnglesStuck, time_s);
+        } else {
+            self.faults.end(Fault::AnglesStuck);
+        }
+    }
+
     /// Processes the angles of a burst at `time_s`. `pose` is the pose at the newer of odometry and
     /// burst, or `None` during a search. `ekf` is the filter of the localizer, if the pose is
     /// known.
@@ -183,7 +203,11 @@ impl Monitors {
             }
         }
         let found = (self.motion.angles(updates, pose)).or_else(|| self.test(updates, ekf));
-        let by_angles = [Fault::OdometryFrozen, Fault::OdometryReversed];
+        let by_angles = [
+            Fault::OdometryFrozen,
+            Fault::OdometryReversed,
+            Fault::YawRateReversed,
+        ];
         match (self.faults.of_odometry(), found) {
             (None, Some(fault)) => {
                 self.faults.begin(fault, time_s);

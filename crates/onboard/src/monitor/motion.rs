@@ -8,9 +8,9 @@
 //! * A stop or reversal beyond the friction of tyres is a fault immediately.
 //! * Standstill: the squared change of the residual has a χ² distribution. The sum over all radio
 //!   heads except the largest is tested, so that one obstructed radio head causes no alarm.
-//! * Motion: the likelihood of the odometry is compared with that of a standing vehicle and of
-//!   reversed motion, by a cumulative sum for each radio head (Page 1954). The sum over all radio
-//!   heads except the largest is tested.
+//! * Motion: the likelihood of the odometry is compared with that of a standing vehicle, of reversed
+//!   motion and of a reversed yaw rate, by a cumulative sum for each radio head (Page 1954). The sum
+//!   over all radio heads except the largest is tested.
 
 use crate::expected_angle::ExpectedAngle;
 use crate::geometry::{Pose, wrap_angle};
@@ -71,6 +71,13 @@ const CONFIRMED_S: f64 = 1.5;
 /// Number of confirming angles after which a fault can end.
 const CONFIRMED_ANGLES: u32 = 4;
 
+/// Faults that the odometry is compared with in motion.
+const FAULTS: [Fault; 3] = [
+    Fault::OdometryFrozen,
+    Fault::OdometryReversed,
+    Fault::YawRateReversed,
+];
+
 /// Reference angle of one radio head.
 #[derive(Debug, Clone, Copy)]
 struct Reference {
@@ -81,8 +88,8 @@ struct Reference {
     yaw_rad: f64,
     residual_rad: f64,
     variance: f64,
-    /// Evidence of a standing vehicle and of reversed motion.
-    evidence: [f64; 2],
+    /// Evidence of each of [`FAULTS`].
+    evidence: [f64; FAULTS.len()],
     /// Time of the first jump of the angle at standstill, in seconds.
     jumped_s: Option<f64>,
     /// Number of jumps of the angle at standstill.
@@ -248,7 +255,6 @@ impl MotionMonitor {
         if self.suspicions >= CONFIRMATIONS {
             return Some(Fault::OdometryFrozen);
         }
-        let faults = [Fault::OdometryFrozen, Fault::OdometryReversed];
         let exceeds = |which: usize| {
             let evidence = self
                 .references
@@ -261,7 +267,7 @@ impl MotionMonitor {
             sum - largest > evidence_threshold(heads - 1.0)
         };
         (0..)
-            .zip(faults)
+            .zip(FAULTS)
             .find_map(|(which, fault)| exceeds(which).then_some(fault))
     }
 
@@ -285,9 +291,11 @@ impl MotionMonitor {
             return;
         };
         let moved_m = seen.distance_m - reference.distance_m;
-        let turned_rad = match self.last.and_then(|it| it.yaw_rate_radps) {
-            Some(_) => seen.yaw_rad - reference.yaw_rad,
-            None => wrap_angle(seen.pose.heading_rad - reference.pose.heading_rad),
+        let has_yaw_rate = self.last.is_some_and(|it| it.yaw_rate_radps.is_some());
+        let turned_rad = if has_yaw_rate {
+            seen.yaw_rad - reference.yaw_rad
+        } else {
+            wrap_angle(seen.pose.heading_rad - reference.pose.heading_rad)
         };
         let age_s = seen.time_s - reference.time_s;
         let stands = moved_m.abs() <= STANDING_M && turned_rad.abs() <= STANDING_RAD;
@@ -321,14 +329,22 @@ impl MotionMonitor {
                 next.jumped_s.get_or_insert(seen.time_s);
             }
             burst.jumps = next.jumps;
-            next.evidence = [0.0; 2];
+            next.evidence = Default::default();
             if age_s > STANDING_AGE_S {
                 (has_served, next.jumps) = (true, 0);
             }
         } else if has_pose {
             let variance = seen.variance + reference.variance + 2.0 * MOVING_SIGMA_RAD.powi(2);
             let expected_rad = change_rad(moved_m, turned_rad);
-            let others_rad = [change_rad(0.0, 0.0), change_rad(-moved_m, turned_rad)];
+            let others_rad = [
+                change_rad(0.0, 0.0),
+                change_rad(-moved_m, turned_rad),
+                if has_yaw_rate {
+                    change_rad(moved_m, -turned_rad)
+                } else {
+                    expected_rad
+                },
+            ];
             let apart = others_rad.map(|it| wrap_angle(it - expected_rad).powi(2) / variance);
             let is_distinct = apart.iter().any(|it| *it >= DISTINCT);
             has_served = is_distinct || age_s > MOVING_AGE_S;
@@ -374,7 +390,7 @@ impl MotionMonitor {
                 seen.value_rad,
             ),
             variance: seen.variance,
-            evidence: [0.0; 2],
+            evidence: Default::default(),
             jumped_s: None,
             jumps: 0,
             is_stale: false,
@@ -435,6 +451,8 @@ fn chi_squared(freedom: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::localize::{AngleMeasurement, UpdateReason, UpdateResult};
+    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
 
     #[test]
     fn thresholds_of_sums_are_quantiles_of_the_gamma_distribution() {
@@ -451,6 +469,78 @@ mod tests {
                 (threshold / quantile - 1.0).abs() < 0.06,
                 "{sums}: {threshold}"
             );
+        }
+    }
+
+    /// Drives with 2 m/s through a bend with a radius of 8 m. Returns the time (s) and the fault of the first report, for
+    /// the reported yaw rate (rad/s) as a function of the time and of the true one.
+    fn first_report(reported: impl Fn(f64, f64) -> f64) -> Option<(f64, Fault)> {
+        let site = Site::from_library("yard", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("tugger", &Shipped).unwrap();
+        let heads = RadioHead::received_by(&site, &vehicle);
+        let expected_angle = ExpectedAngle::new(&vehicle);
+        let mut monitor = MotionMonitor::new(expected_angle.clone(), heads.len());
+        let mut pose = Pose::default();
+        for step in 0..500_u32 {
+            let time_s = 0.02 * f64::from(step);
+            let yaw_rate_radps = if time_s > 2.0 { 0.25 } else { 0.0 };
+            let sample = OdometrySample {
+                time_s,
+                distance_m: 2.0 * time_s,
+                speed_mps: 2.0,
+                yaw_rate_radps: Some(reported(time_s, yaw_rate_radps)),
+            };
+            monitor.odometry(&sample);
+            let updates: Vec<AngleUpdate> = (heads.iter().enumerate())
+                .map(|(number, &head)| {
+                    let residual_rad =
+                        expected_angle.residual_rad(MeasurementKind::Angle, pose, &head, 0.0);
+                    // Deterministic noise of 0.02 rad.
+                    let noise_rad = 0.03 * f64::from(7 * step + 3 * number as u32).sin();
+                    AngleUpdate {
+                        number,
+                        head,
+                        measured: AngleMeasurement {
+                            kind: MeasurementKind::Angle,
+                            time_s,
+                            phase_rad: noise_rad - residual_rad,
+                            phase_sigma_rad: 0.02,
+                            angle_rad: f64::NAN,
+                            snr_db: 20.0,
+                            resolved: true,
+                        },
+                        verdict: UpdateResult::unused(UpdateReason::Unusable),
+                    }
+                })
+                .collect();
+            if let Some(fault) = monitor.angles(&updates, Some(pose)) {
+                return Some((time_s, fault));
+            }
+            pose = pose.along_chord(0.04, 0.02 * yaw_rate_radps);
+        }
+        None
+    }
+
+    #[test]
+    fn a_reversed_yaw_rate_is_reported_within_a_second_of_the_bend() {
+        let (time_s, fault) = first_report(|_, rate| -rate).unwrap();
+        assert_eq!(fault, Fault::YawRateReversed);
+        assert!(time_s > 2.0 && time_s < 3.0, "{time_s}");
+        // Reversed within the bend.
+        let within = |time_s: f64, rate: f64| if time_s > 5.0 { -rate } else { rate };
+        let (time_s, fault) = first_report(within).unwrap();
+        assert_eq!(fault, Fault::YawRateReversed);
+        assert!(time_s > 5.0 && time_s < 6.0, "{time_s}");
+    }
+
+    #[test]
+    fn a_yaw_rate_with_a_scale_error_or_a_bias_is_not_reversed() {
+        for reported in [
+            |_: f64, rate: f64| rate,
+            |_, rate| 0.8 * rate,
+            |_, rate| rate + 0.02,
+        ] {
+            assert_eq!(first_report(reported), None);
         }
     }
 }

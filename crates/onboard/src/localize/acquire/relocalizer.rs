@@ -26,7 +26,6 @@ use crate::BoxError;
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::RadialQuantile;
 use crate::geometry::{Area, Pose};
-use crate::localize::ekf::state::Belief;
 use crate::localize::ekf::{Ekf, EkfConfig, FreeMotion};
 use crate::localize::integrity::IntegrityMonitor;
 use crate::localize::localizer::{Localizer, Recovered, copy_into};
@@ -269,9 +268,9 @@ impl Relocalizer {
         self.is_without_odometry = true;
     }
 
-    /// Continues with odometry that was at fault, with the specified noise, and with the constants of the odometry from
-    /// the filter `before`.
-    pub(crate) fn end_free_motion(&mut self, specified: &EkfConfig, before: &Belief) {
+    /// Continues with odometry that was at fault, with the specified noise, and with the constants and the speed
+    /// noise of the odometry from the filter `before`.
+    pub(crate) fn end_free_motion(&mut self, specified: &EkfConfig, before: &Ekf) {
         self.change_motion(|ekf| ekf.end_free_motion(specified, before));
         self.is_without_odometry = false;
         if self.drive_config.road.is_none() {

@@ -59,11 +59,12 @@ impl Ekf {
         self.forget_odometry();
     }
 
-    /// Ends a motion without odometry: with the specified noise, and with the constants of the odometry from `before`.
-    pub(in crate::localize) fn end_free_motion(&mut self, specified: &EkfConfig, before: &Belief) {
+    /// Ends a motion without odometry: with the specified noise, and with the constants and the speed noise of the
+    /// odometry from `before`. Without this noise, its first samples would be jumps of the speed, as of wheel slip.
+    pub(in crate::localize) fn end_free_motion(&mut self, specified: &EkfConfig, before: &Self) {
         self.config.noise = specified.noise;
         self.config.yaw_noise_rad_per_sqrt_s = specified.yaw_noise_rad_per_sqrt_s;
-        replace(&mut self.belief, before, &ODOMETRY);
+        replace(&mut self.belief, &before.belief, &ODOMETRY);
         self.bias.decorrelate_states(&ODOMETRY);
         let covariance = &mut self.belief.covariance;
         let mut raise = |state: usize, std: f64| {
@@ -75,6 +76,7 @@ impl Ekf {
             raise(HEADING, MIN_STD_RAD);
         }
         self.forget_odometry();
+        self.speed_jumps = before.speed_jumps;
     }
 
     /// Forgets the samples of the odometry, because the next one is of another origin.
@@ -119,12 +121,12 @@ mod tests {
         }
         let specified = *ekf.config();
         let mut kept = Vec::new();
-        let mut before = *ekf.belief();
+        let mut before = ekf.clone();
         for step in 1..=300 {
             let time_s = 0.1 * f64::from(step);
             let truth = road.pose(4.0 * time_s);
             if step == 200 {
-                before = *ekf.belief();
+                before = ekf.clone();
                 kept.push(ekf.clone());
                 ekf.begin_free_motion(&FreeMotion {
                     start: InitialPose {

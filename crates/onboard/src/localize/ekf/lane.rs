@@ -45,6 +45,11 @@ impl Ekf {
         }
     }
 
+    /// Whether the vehicle has left its lane on a known road: it turned off, or its yaw rate is wrong.
+    pub(crate) fn has_left_lane(&self) -> bool {
+        self.map.is_some() && self.off_map.is_none() && !self.is_in_lane()
+    }
+
     /// Whether the vehicle may be in its lane, with the probability that is required for the use of
     /// an angle.
     fn is_in_lane(&self) -> bool {

@@ -219,12 +219,11 @@ impl Bank {
     }
 
     /// Changes the motion model of every filter, because the odometry is at fault or is right again. The hypotheses of the
-    /// odometry restart.
+    /// odometry and the filters without single radio heads restart: without odometry, some of these filters lose the
+    /// vehicle, so that the protection level stayed high after the fault.
     pub fn change_motion(&mut self, change: impl Fn(&mut Ekf)) {
         change(&mut self.nominal);
-        for subset in self.subsets.iter_mut() {
-            change(&mut subset.ekf);
-        }
+        self.subsets = Subsets::new(self.heads.len());
         for it in &mut self.modes {
             if it.mode.is_of_odometry {
                 let faults = &self.settings.fault_probability;
