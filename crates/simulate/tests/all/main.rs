@@ -19,6 +19,7 @@ mod gap;
 mod integrity;
 mod iq_fidelity;
 mod late;
+mod late_signals;
 mod live;
 mod locate;
 mod measurement_trace;
