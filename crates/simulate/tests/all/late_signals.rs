@@ -93,5 +93,6 @@ fn late_signals_and_poor_clocks_displace_no_pose_beyond_its_level() {
     // error.
     for record in &faulty[..2] {
         assert!(rms_m(record) < 1.1 * rms_m(&angles));
+        assert_eq!(ok_and_beyond(record)[0], ok_and_beyond(&angles)[0]);
     }
 }

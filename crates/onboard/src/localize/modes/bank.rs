@@ -166,6 +166,8 @@ clone_in_place! {
         /// Prior probability of a fault of each radio head.
         head_prior: f64,
         pub(super) subsets: Subsets,
+        /// Whether angles were used, which test the radio heads instead of their ranges.
+        pub(super) has_angles: bool,
     }
 }
 
@@ -190,6 +192,7 @@ impl Bank {
         Self {
             settings: *settings,
             subsets: Subsets::new(count),
+            has_angles: false,
             faulty: vec![false; count],
             disagreed_s: vec![f64::NEG_INFINITY; count],
             lost_s: now_s,
@@ -411,6 +414,12 @@ impl Bank {
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateResult {
         let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
         let number = self.heads.iter().position(is_it);
+        if !self.has_angles {
+            self.has_angles = true;
+            for subset in self.subsets.iter_mut() {
+                subset.range_tests = [HeadTest::default(); 2];
+            }
+        }
         if let Some(number) = number {
             self.update_subsets(number, head, measured);
         }

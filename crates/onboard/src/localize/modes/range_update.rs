@@ -40,9 +40,13 @@ impl Bank {
                 let Ok(predicted) = subset.ekf.predict_range(head, measured) else {
                     continue;
                 };
-                for (mine, test) in subset.without.iter().zip(&mut subset.range_tests) {
-                    if *mine == number {
-                        test.push(&predicted.independent_innovation());
+                // The offset of a radio head includes a blocked first path, and a clock step affects all radio
+                // heads: angles are the better test.
+                if !self.has_angles {
+                    for (mine, test) in subset.without.iter().zip(&mut subset.range_tests) {
+                        if *mine == number {
+                            test.push(&predicted.independent_innovation());
+                        }
                     }
                 }
                 subset.ekf.note_range(&predicted);
