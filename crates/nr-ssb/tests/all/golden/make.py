@@ -2,7 +2,8 @@
 
 TS 38.211 (sequences, mapping), 38.212 (payload, CRC, polar code, rate matching), 38.213 (cases),
 38.104 (raster). Bit by bit and slow: nothing is shared with the crate, nor copied from elsewhere.
-`python make.py --check DIR` compares it with vectors of other encoders (`sequences.npz`, `pbch.npz`).
+`python make.py --check DIR` compares it with vectors of other encoders (`sequences.npz`,
+`pbch.npz`).
 """
 
 import sys
