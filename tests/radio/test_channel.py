@@ -183,7 +183,7 @@ def test_bad_tables_are_refused(tmp_path: Path, access_av: Callable[..., Finishe
     departing = good.with_columns(azimuth_rad=pl.col("azimuth_rad") + np.pi)
     assert "directions of arrival" in refused(departing)
     in_ns = good.with_columns(delay_s=1e9 * pl.col("delay_s"))
-    assert "it is in seconds" in refused(in_ns)
+    assert "it must be in seconds" in refused(in_ns)
     in_db = good.with_columns(gain_re=pl.lit(-80.0), gain_im=pl.lit(0.0))
     assert "an amplitude between isotropic antennas" in refused(in_db)
     assert "no radio head pci=1.5" in refused(good.with_columns(pci=pl.col("pci") + 0.5))
