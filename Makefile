@@ -101,7 +101,8 @@ lint: .venv/installed-test ## Check formats, lints and types of both languages
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/mypy & types=$$!; $(BIN)/stubtest access_av._core && wait $$types
+	$(BIN)/mypy
+	$(BIN)/stubtest access_av._core
 
 docs: .venv/installed-docs ## Build the documentation site target/docs/site/index.html; warnings are errors
 	$(BIN)/access-av file columns --markdown > docs/columns.md
