@@ -146,6 +146,9 @@ def main() -> int:
     parser.add_argument("--nodes", type=int, default=1, help="nodes at once [1]")
     parser.add_argument("--faults", action="store_true", help="one drive per hour has a fault")
     arguments = parser.parse_args()
+    if not Path(arguments.node).is_file():
+        command = "cargo build --release --bin access-av-node"
+        parser.error(f"--node: {arguments.node} does not exist; build it with `{command}`")
     hours = arguments.hours / arguments.nodes
     with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(arguments.nodes) as pool:
         folder = Path(scratch)
