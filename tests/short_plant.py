@@ -12,7 +12,9 @@ vehicle = "tugger"
 [site]
 name = "short"
 [site.road]
-segments = [{ length_m = 20.0 }, { radius_m = 6.0, turn_deg = 90.0 }, { length_m = 6.0 }]
+segments = [
+  { length_m = 20.0 }, { radius_m = 6.0, turn_rad = 1.5707963267948966 }, { length_m = 6.0 },
+]
 [[site.radio_heads]]
 name = "a <b>bold</b> mast"
 position_m = [10.0, 20.0, 8.0]

@@ -156,8 +156,7 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
     # Radio.
     "power in milliwatts": ({"site.radio_heads[0].eirp_dbm": 100.0}, "eirp_dbm", "100 mW are 20.0"),
     "hardly any power": ({"site.radio_heads[0].eirp_dbm": -90.0}, "radio_heads[0]", "dBm"),
-    "noise figure": ({"vehicle.receiver.noise_figure_db": 35.0}, "noise_figure_db", "in dB"),
-    "temperature in degrees": ({"vehicle.receiver.temperature_k": 20.0}, "temperature_k", "293"),
+    "noise figure": ({"vehicle.receiver.noise_figure_db": 35.0}, "noise_figure_db", "35 K is 0.5"),
     "gain with the amplifier's": ({"vehicle.array.rx_gain_dbi": 45.0}, "rx_gain_dbi", "amplifier"),
     "bandwidth in GHz": ({"vehicle.receiver.bandwidth_mhz": 0.02}, "bandwidth_mhz", "20"),
     "spacing of FR1 at 28 GHz": ({"site.carrier_mhz": 28000.0}, "subcarrier_spacing_khz", "120"),

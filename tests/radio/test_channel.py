@@ -84,7 +84,7 @@ def test_a_traced_line_of_sight_is_that_of_the_geometry(tmp_path: Path) -> None:
         f"{text}[channel]\nshadowing_std_db = 0.0\n", str(HALL / "scenario.toml")
     )
     drawn = {
-        "truth.sample_errors": False,
+        "truth.std_factor": 0.0,
         "vehicle.lane_keeping": {"rms_m": 0.0, "wavelength_m": 60.0},
     }
     for fidelity in ("snapshots", "iq"):

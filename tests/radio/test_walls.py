@@ -57,7 +57,7 @@ def test_no_angle_is_estimated_through_a_wall(walled: Scenario) -> None:
 
 def test_the_channel_behind_a_wall_has_no_direct_wave() -> None:
     """A vehicle without the wall in its site receives the radio head weakly, and has errors."""
-    nominal = {"truth.sample_errors": False, "site.rician_k_db": 60.0}
+    nominal = {"truth.std_factor": 0.0, "site.rician_k_db": 60.0}
     open_air = trip(**nominal)
     behind = trip(**nominal, **{"truth.site.walls": [WALL]})
     assert behind.resolved() != open_air.resolved()

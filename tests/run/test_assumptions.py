@@ -43,7 +43,7 @@ def test_shipped_plants_are_monitored_and_without_exact_values(name: str) -> Non
             {f"site.radio_heads[{head}].position_std_m": 0.0 for head in range(4)},
             "site.radio_heads",
         ),
-        ({"truth.sample_errors": False}, "truth.sample_errors"),
+        ({"truth.std_factor": 0.0}, "truth.std_factor"),
         ({"vehicle.platform.name": "jetson-agx-xavier"}, "vehicle.platform"),
     ],
 )

@@ -60,7 +60,7 @@ def test_a_hidden_radio_head_that_fits_the_other_road_side_causes_a_warning(
         (('target = "0.2 m 90 %"', 'target = "0.2 90 %"'), "0.3 m 99 %"),
         (('vehicle = "tugger"', 'vehicle = "tuger"'), "tugger"),
         (("at_m = 12.0", "at_m = 1200.0"), "motion.stops[0].at_m"),
-        (("turn_deg = 90.0", "turn_deg = 90.0, turn_rad = 1.5"), "turn_deg"),
+        (("turn_rad = 1.5707963267948966", "turn_deg = 90.0"), "turn_deg"),
         (("hours_per_day = 16.0", "hours_per_day = 25.0"), "fleet.hours_per_day"),
         (("vehicles = 6", "vehicles = 0"), "fleet.vehicles"),
         (("lidar = 3000.0", "lidar = -3000.0"), "prices.lidar"),

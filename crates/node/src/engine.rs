@@ -346,7 +346,7 @@ impl Engine {
             }
             Ok(OdometryResult::YawRateRefused { radps }) => {
                 let text = format!(
-                    "yaw_rate_radps is {radps:.4e}, above vehicle.top_yaw_rate_radps; it is not used; check its unit"
+                    "yaw_rate_radps is {radps:.4e}, above the maximum; it is not used; check its unit"
                 );
                 self.event(Level::Warn, "odometry", text);
             }

@@ -8,6 +8,9 @@ use crate::settings::{Site, Vehicle};
 /// Boltzmann's constant in J/K (SI, exact).
 const BOLTZMANN_J_PER_K: f64 = 1.380_649e-23;
 
+/// Standard noise temperature in kelvin, to which noise figures refer (ITU-R P.372).
+const NOISE_TEMPERATURE_K: f64 = 290.0;
+
 /// Link budget, without the properties of a radio head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkBudget {
@@ -20,7 +23,7 @@ impl LinkBudget {
     /// Returns the link budget between a site's cells and a vehicle.
     pub fn new(site: &Site, vehicle: &Vehicle) -> Self {
         let receiver = &vehicle.receiver;
-        let noise_w = BOLTZMANN_J_PER_K * receiver.temperature_k * receiver.bandwidth_mhz * 1e6;
+        let noise_w = BOLTZMANN_J_PER_K * NOISE_TEMPERATURE_K * receiver.bandwidth_mhz * 1e6;
         Self {
             wavelength_m: site.wavelength_m(),
             rx_gain_dbi: vehicle.array.rx_gain_dbi,

@@ -97,6 +97,10 @@ mod _core {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add(
+            "ERROR_CORRELATION_S",
+            onboard::settings::ERROR_CORRELATION_S,
+        )?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -109,7 +109,7 @@ impl World {
             site: self.site.clone(),
             vehicle: physical_properties(&scenario.vehicle),
             truth: TruthSettings {
-                std_factor: scenario.truth.factor(),
+                std_factor: scenario.truth.std_factor,
                 ..TruthSettings::default()
             },
             ..scenario.clone()
@@ -123,7 +123,7 @@ impl World {
     /// Draws the truth of the run that `streams` belongs to. Each value gets an error with its
     /// standard deviation.
     pub fn draw(&self, streams: Streams) -> Truth {
-        let factor = self.scenario.truth.factor();
+        let factor = self.scenario.truth.std_factor;
         let (mut site, mut vehicle) = (self.site.clone(), self.vehicle.clone());
         for (index, head) in site.radio_heads.iter_mut().enumerate() {
             let mut rng = streams.generator(Purpose::Survey, index);

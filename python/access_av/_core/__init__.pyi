@@ -12,6 +12,7 @@ from access_av._core import interrupt as interrupt
 from access_av._core import nr as nr
 
 __all__ = [
+    "ERROR_CORRELATION_S",
     "Bound",
     "Live",
     "LiveEnergy",
@@ -49,6 +50,9 @@ __all__ = [
     "simulate",
     "synthesize",
 ]
+
+ERROR_CORRELATION_S: Final[float]
+"""Correlation time of the position error, in seconds, of the integrity monitor."""
 
 __version__: str
 

@@ -154,8 +154,6 @@ class Profile:
                 if each.energy_j is not None
             },
         }
-        if mode.memory_mhz is not None:
-            settings["memory_mhz"] = mode.memory_mhz
         if chain.energy_j is not None and chain.idle is not None:
             core_w = chain.energy_j.scaled(1.0 / chain.timing.median_s)
             settings["core_power_w"] = _figure(core_w, f"{source}: {self.sensors}", "marginal")

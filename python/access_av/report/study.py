@@ -6,6 +6,7 @@ import math
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from access_av._core import ERROR_CORRELATION_S
 from access_av.report import study_charts as charts
 from access_av.report.page import VERSION, sheet
 from access_av.report.parts import (
@@ -184,12 +185,10 @@ def _integrity(study: Study, written: Mapping[str, Any]) -> str:
     limit = f"alert limit {study.alert_limit_m:g} m"
     limit += f" (twice the target’s {study.error_m:g} m)" if follows else " (set in the vehicle)"
     risk = integrity.get("risk_per_hour")
-    correlation_s = integrity.get("error_correlation_s")
     settings = [limit]
     if risk is not None:
         settings.append(f"integrity risk {risk:g} per hour")
-    if correlation_s is not None:
-        settings.append(f"error correlation {correlation_s:g} s")
+    settings.append(f"error correlation {ERROR_CORRELATION_S:g} s")
     drives = [study.nominal.named("nominal"), study.poor_los, *(it.driven for it in study.remedies)]
     of_points = {it.driven.name: it.driven for it in study.points}
     drives += [it for name, it in of_points.items() if name != study.nominal.name]

@@ -29,7 +29,7 @@ def optimistic_assumptions(scenario: _core.Scenario) -> list[str]:
     heads = site["radio_heads"]
     monitored = vehicle.get("integrity", {"enabled": True})["enabled"]
     odometer_errors = [it for key, it in odometer.items() if "noise" in key or key == "scale_std"]
-    sampled = as_dict(scenario).get("truth", {}).get("sample_errors")
+    std_factor = as_dict(scenario).get("truth", {}).get("std_factor")
     many = f"angles of {len(heads)} radio heads, assumed exact by dead reckoning"
     found = [
         (many, not tracks and len(heads) > 1),
@@ -51,7 +51,7 @@ def optimistic_assumptions(scenario: _core.Scenario) -> list[str]:
             "exact positions of the radio heads (site.radio_heads.all.position_std_m)",
             not any(head["position_std_m"] for head in heads),
         ),
-        ("truth equal to the nominal model (truth.sample_errors)", sampled is False),
+        ("truth equal to the nominal model (truth.std_factor)", std_factor == 0.0),
         (
             "no energy, because the platform has no value for the method (vehicle.platform.name)",
             energy_boundary(scenario) is None,

@@ -68,7 +68,7 @@ class Case:
         if found is None or alarms is None:
             raise InputError(f"{self.scenario.name}: no step has a protection level")
         error_m = self.trajectories.select(horizontal_error_m()).to_series()
-        risk = ObtainedRisk.of(self.trajectories, _settings(self.scenario)["error_correlation_s"])
+        risk = ObtainedRisk.of(self.trajectories, _core.ERROR_CORRELATION_S)
         return {
             "variant": self.variant,
             "mismatch": self.mismatch,

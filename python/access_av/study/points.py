@@ -163,7 +163,7 @@ def mode_groups(scenario: _core.Scenario) -> list[list[PowerMode]]:
         resolved = as_dict(vehicle.resolved(platform.core))
         del resolved["platform"]["mode"]
         wake_up = resolved["wake_up"]
-        asks = wake_up["policy"] == "uncertainty" and wake_up.get("wake_up_cost") is None
+        asks = wake_up["policy"] == "uncertainty"
         cost = round(parts[1] / parts[0], 9) if asks and parts[0] > 0.0 else None
         found.setdefault(json.dumps([resolved, cost], sort_keys=True), []).append(mode)
     return list(found.values())

@@ -27,12 +27,6 @@ const ROWS: &[Usual] = &[
         write: |it| format!("write m/s²: {it} km/h in a second are {:.2}", it / 3.6),
     },
     Usual {
-        key: "top_yaw_rate_radps",
-        within: [0.01, 12.0],
-        why: "more than two turns per second",
-        write: as_degrees,
-    },
-    Usual {
         key: "lane_keeping.rms_m",
         within: [0.0, 3.0],
         why: "larger than the width of a lane",
@@ -109,13 +103,10 @@ const ROWS: &[Usual] = &[
         key: "receiver.noise_figure_db",
         within: [0.0, 20.0],
         why: "the noise figure of a receiver is 2 to 12 dB",
-        write: |_| "write the noise figure in dB; kelvin are temperature_k".to_owned(),
-    },
-    Usual {
-        key: "receiver.temperature_k",
-        within: [150.0, 400.0],
-        why: "not an antenna noise temperature outdoors or in a hall",
-        write: |it| format!("write kelvin: {it} °C are {}", rounded(it + 273.0)),
+        write: |it| {
+            let db = 10.0 * (1.0 + it / 290.0).log10();
+            format!("write the noise figure in dB: a noise temperature of {it} K is {db:.1}")
+        },
     },
     Usual {
         key: "receiver.bandwidth_mhz",

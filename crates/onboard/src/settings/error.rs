@@ -57,6 +57,16 @@ pub enum SettingsError {
         /// Path of the new key.
         new: String,
     },
+    /// The key was removed.
+    #[error("{file}: `{key}` was removed in version 0.2.0: {instead}")]
+    RemovedKey {
+        /// Path of the file.
+        file: String,
+        /// Path of the removed key.
+        key: String,
+        /// Replacement of the key.
+        instead: String,
+    },
     /// A key is missing, or its value has the wrong type.
     #[error("{file}: `{key}`: {message}")]
     Shape {
@@ -99,6 +109,7 @@ impl SettingsError {
         }
         if let Self::UnknownKey { file, key, .. }
         | Self::RenamedKey { file, key, .. }
+        | Self::RemovedKey { file, key, .. }
         | Self::Shape { file, key, .. }
         | Self::Value { file, key, .. } = &mut self
         {

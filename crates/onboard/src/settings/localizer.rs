@@ -52,15 +52,6 @@ pub struct TrackerSettings {
     /// Correlation length of the curvature, in metres.
     #[schemars(range(min = 1e-3, max = 1e6))]
     pub curvature_correlation_m: f64,
-    /// Random walk of the odometer scale, per square root of metre driven; 0 means a constant
-    /// scale. Default: 0.03 for a differential drive without specified scale deviation and noise,
-    /// otherwise 0.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub odometer_scale_walk_per_sqrt_m: f64,
-    /// False-rejection probability: a correct angle is rejected as an outlier with this
-    /// probability.
-    #[schemars(range(min = 1e-12, max = 0.5))]
-    pub outlier_probability: f64,
 }
 
 impl Default for TrackerSettings {
@@ -71,8 +62,6 @@ impl Default for TrackerSettings {
             // yard.
             curvature_rms_per_m: 0.05,
             curvature_correlation_m: 15.0,
-            odometer_scale_walk_per_sqrt_m: 0.0,
-            outlier_probability: 1e-4,
         }
     }
 }

@@ -37,7 +37,7 @@ pub use array_shape::{ArrayShape, MeasuredShape};
 pub use check::Check;
 pub use error::SettingsError;
 pub use figure::{Boundary, Extent, Figure, Provenance, Quantity};
-pub use integrity::{FaultProbability, IntegritySettings};
+pub use integrity::{ERROR_CORRELATION_S, FaultProbability, IntegritySettings};
 pub use localizer::{DeadReckoningSettings, HeadingBetween, LocalizerSettings, TrackerSettings};
 pub use odometry::{DriveKind, GyroscopeSettings, LaneKeepingSettings, OdometerSettings};
 pub use overlay::merge_table;

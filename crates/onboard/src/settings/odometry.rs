@@ -95,6 +95,9 @@ pub struct GyroscopeSettings {
     pub bias_walk_radps_per_sqrt_s: f64,
 }
 
+/// Damping ratio of the lateral oscillation: a driver or controller that corrects slowly.
+const LANE_KEEPING_DAMPING: f64 = 0.1;
+
 /// `[lane_keeping]`: lateral deviation of the vehicle from the centre of the road.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -105,9 +108,6 @@ pub struct LaneKeepingSettings {
     /// Typical wavelength along the road, in metres.
     #[schemars(range(min = 0.1, max = 10_000.0))]
     pub wavelength_m: f64,
-    /// Damping ratio of the lateral oscillation.
-    #[schemars(range(min = 0.01, max = 0.99))]
-    pub damping: f64,
 }
 
 impl Default for LaneKeepingSettings {
@@ -115,7 +115,6 @@ impl Default for LaneKeepingSettings {
         Self {
             rms_m: 0.0,
             wavelength_m: 60.0,
-            damping: 0.1,
         }
     }
 }
@@ -126,7 +125,7 @@ impl LaneKeepingSettings {
         LaneKeeping {
             rms_m: self.rms_m,
             wavelength_m: self.wavelength_m,
-            damping: self.damping,
+            damping: LANE_KEEPING_DAMPING,
         }
     }
 }

@@ -114,12 +114,6 @@ pub struct PowerMode {
     /// Number of CPU cores online.
     #[schemars(range(min = 1, max = 4096))]
     pub cores: u32,
-    /// Memory clock in MHz. Default: the board's maximum.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub memory_mhz: Option<f64>,
-    /// CPU frequency in MHz as printed in the paper, if it differs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub paper_cpu_mhz: Option<f64>,
     /// Idle power of the board in this mode, in watts. Default: that of the platform.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub idle_power_w: Option<Figure>,

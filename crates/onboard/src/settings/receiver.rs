@@ -9,12 +9,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReceiverSettings {
-    /// Noise figure in dB.
+    /// Noise figure in dB, relative to the noise at 290 K.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub noise_figure_db: f64,
-    /// Noise temperature in kelvin.
-    #[schemars(range(min = 1.0, max = 10_000.0))]
-    pub temperature_k: f64,
     /// Bandwidth of one snapshot in MHz.
     #[schemars(range(min = 1e-3, max = 2000.0))]
     pub bandwidth_mhz: f64,
@@ -65,7 +62,6 @@ impl Default for ReceiverSettings {
     fn default() -> Self {
         Self {
             noise_figure_db: 5.0,
-            temperature_k: 290.0,
             bandwidth_mhz: 3.6,
             pilots: Pilots::Ssb,
             snapshots: 20,

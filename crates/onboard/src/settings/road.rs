@@ -67,9 +67,6 @@ struct WrittenSegment {
     /// Heading change over this length in radians; positive to the left.
     #[schemars(range(min = -100.0, max = 100.0))]
     turn_rad: Option<f64>,
-    /// Heading change over this length in degrees; positive to the left.
-    #[schemars(range(min = -5000.0, max = 5000.0))]
-    turn_deg: Option<f64>,
     /// Whether the segment was surveyed [true]. The geometry of an unsurveyed segment is a guess,
     /// such as the chord between surveyed segments, and must be straight. The tracker does not use
     /// it as a constraint; a simulated vehicle follows it.
@@ -81,10 +78,7 @@ impl TryFrom<WrittenSegment> for SegmentSettings {
     type Error = &'static str;
 
     fn try_from(written: WrittenSegment) -> Result<Self, &'static str> {
-        let turn_rad = match (written.turn_rad, written.turn_deg) {
-            (Some(_), Some(_)) => return Err("only one of `turn_rad` and `turn_deg` is allowed"),
-            (turn_rad, turn_deg) => turn_rad.or(turn_deg.map(f64::to_radians)).unwrap_or(0.0),
-        };
+        let turn_rad = written.turn_rad.unwrap_or(0.0);
         let length_m = match (written.length_m, written.radius_m) {
             (Some(length_m), None) => length_m,
             (None, Some(radius_m)) if radius_m >= 0.01 && turn_rad != 0.0 => {
@@ -92,7 +86,7 @@ impl TryFrom<WrittenSegment> for SegmentSettings {
             }
             (None, Some(_)) => {
                 return Err(
-                    "a bend needs a `radius_m` of 0.01 m or more and a `turn_deg` that is not 0",
+                    "a bend needs a `radius_m` of 0.01 m or more and a `turn_rad` that is not 0",
                 );
             }
             _ => return Err("one of `length_m` and, of a bend, `radius_m` is needed"),
@@ -236,16 +230,15 @@ mod tests {
 
     #[test]
     fn a_bend_is_given_by_radius_and_angle_or_by_its_length() {
-        let bend = read("radius_m = 25.0\nturn_deg = -60.0").unwrap();
+        let bend = read("radius_m = 25.0\nturn_rad = -1.0471975511965976").unwrap();
         let same = read("length_m = 26.179938779914945\nturn_rad = -1.0471975511965976").unwrap();
         assert!((bend.length_m - same.length_m).abs() < 1e-12);
         assert!((bend.turn_rad - same.turn_rad).abs() < 1e-12);
         for wrong in [
-            "turn_deg = 60.0",
+            "turn_rad = 1.0",
             "radius_m = 25.0",
-            "radius_m = -25.0\nturn_deg = 60.0",
+            "radius_m = -25.0\nturn_rad = 1.0",
             "radius_m = 25.0\nlength_m = 3.0",
-            "length_m = 3.0\nturn_deg = 60.0\nturn_rad = 1.0",
         ] {
             assert!(read(wrong).unwrap_err().contains('`'), "{wrong}");
         }

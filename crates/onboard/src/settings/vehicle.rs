@@ -36,11 +36,6 @@ pub struct Vehicle {
     #[serde(default = "gentle")]
     #[schemars(range(min = 0.01, max = 20.0))]
     pub acceleration_mps2: f64,
-    /// Maximum yaw rate in rad/s, unless the lane keeping specifies one. Larger measured yaw rates
-    /// are rejected.
-    #[serde(default = "half_a_turn")]
-    #[schemars(range(min = 0.01, max = 100.0))]
-    pub top_yaw_rate_radps: f64,
     /// Lane keeping of the vehicle.
     #[serde(default)]
     pub lane_keeping: LaneKeepingSettings,
@@ -84,10 +79,6 @@ pub struct Vehicle {
 
 const fn default_top_speed_kmh() -> f64 {
     15.0
-}
-
-const fn half_a_turn() -> f64 {
-    4.0
 }
 
 const fn gentle() -> f64 {

@@ -269,11 +269,6 @@ pub struct UncertaintySettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub base_ms: Option<f64>,
-    /// Energy of a wake-up before its first angle (receiver on-time and burst reception), in units
-    /// of one estimate. Default: computed from the platform, or 0.5 if the platform has no values.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 0.0, max = 1e9))]
-    pub wake_up_cost: Option<f64>,
     /// Minimum reduction of the position variance, in m², for which a wake-up with one angle is
     /// made before the target requires it. It also applies where the target cannot be reached. A
     /// wake-up with several angles needs a reduction in proportion to its energy.
@@ -293,7 +288,6 @@ impl Default for UncertaintySettings {
             target_error_m: 0.3,
             confidence: 0.9,
             base_ms: None,
-            wake_up_cost: None,
             min_variance_reduction_m2: 1.5e-4,
             snr_headroom_db: None,
         }

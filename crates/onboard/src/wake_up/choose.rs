@@ -10,7 +10,7 @@ use super::uncertainty::UncertaintyDriven;
 use crate::energy::EnergyModel;
 use crate::settings::{
     Check, Extent, FixedSettings, PidSettings, Platform, SettingsError, Site, TriggerSettings,
-    UncertaintySettings, Vehicle, WakeUpSettings,
+    Vehicle, WakeUpSettings,
 };
 
 /// Energy of a wake-up before its first angle, in units of one estimate, for a platform without
@@ -72,7 +72,7 @@ pub fn built_in(
             Box::new(Gated::new(due, settings.snr_set_point, latest_s))
         }
         WakeUpSettings::Uncertainty(settings) => {
-            let cost = wake_up_cost(&settings, vehicle, platform)?;
+            let cost = wake_up_cost(vehicle, platform)?;
             Box::new(UncertaintyDriven::new(&settings, cost, site, vehicle))
         }
     })
@@ -84,29 +84,14 @@ pub fn built_in(
 /// Those of [`built_in`].
 pub fn resolve(vehicle: &Vehicle, platform: &Platform) -> Result<Vehicle, SettingsError> {
     let mut resolved = platform.resolve(vehicle)?;
-    match &mut resolved.wake_up {
-        Some(WakeUpSettings::Uncertainty(settings)) => {
-            settings.wake_up_cost = Some(wake_up_cost(settings, vehicle, platform)?);
-        }
-        Some(policy) => {
-            if let Some(pid) = policy.pid_mut() {
-                pid.t_max_ms = Some(pid.t_max_s(vehicle.top_speed_mps()) * 1e3);
-            }
-        }
-        None => {}
+    if let Some(pid) = (resolved.wake_up.as_mut()).and_then(WakeUpSettings::pid_mut) {
+        pid.t_max_ms = Some(pid.t_max_s(vehicle.top_speed_mps()) * 1e3);
     }
     Ok(resolved)
 }
 
 /// Returns the energy of a wake-up before its first angle, in units of one estimate.
-fn wake_up_cost(
-    settings: &UncertaintySettings,
-    vehicle: &Vehicle,
-    platform: &Platform,
-) -> Result<f64, SettingsError> {
-    if let Some(stated) = settings.wake_up_cost {
-        return Ok(stated);
-    }
+fn wake_up_cost(vehicle: &Vehicle, platform: &Platform) -> Result<f64, SettingsError> {
     let model = EnergyModel::new(vehicle, platform, Extent::Value)?;
     let known = model.and_then(|model| model.listening_in_aoa_estimates());
     Ok(known.unwrap_or(UNKNOWN_WAKE_UP_COST))

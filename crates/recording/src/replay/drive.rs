@@ -357,7 +357,7 @@ impl<'a> Replay<'a> {
                     at_s,
                     format!(
                         "odometry at {at_s} s: a yaw rate of {} rad/s is impossible, it was not \
-                         used; check its unit, or vehicle.top_yaw_rate_radps",
+                         used; check its unit",
                         number(radps)
                     ),
                 ),

@@ -23,6 +23,14 @@ use crate::random::{Purpose, Streams};
 use crate::scenario::{IqSettings, Scenario};
 use crate::world::{Faults, VehicleState};
 
+/// Standard deviation of the frequency error of a radio head's oscillator, in parts per million;
+/// TS 38.104 (6.5.1) allows an error of 0.05.
+const HEAD_OSCILLATOR_PPM: f64 = 0.02;
+
+/// Full scale of the A/D converter relative to the RMS value of the strongest symbol, in dB: the
+/// peak-to-average ratio of an OFDM signal.
+const ADC_HEADROOM_DB: f64 = 12.0;
+
 /// FFT size at the base sample rate.
 const FFT_SIZE: usize = 256;
 /// Samples before the first SSB and after the last SSB of a burst.
@@ -103,7 +111,7 @@ impl IqAir {
             .map(|index| {
                 let first = oscillator_of(&site.radio_heads, index);
                 let mut rng = streams.generator(Purpose::HeadOscillator, first);
-                1e-6 * settings.head_oscillator_ppm * rng.sample::<f64, _>(StandardNormal)
+                1e-6 * HEAD_OSCILLATOR_PPM * rng.sample::<f64, _>(StandardNormal)
             })
             .collect();
         let numerology = Numerology::new(spacing, FFT_SIZE)?;
@@ -319,7 +327,7 @@ impl IqAir {
             .fold(f64::MIN_POSITIVE, f64::max);
         // I and Q each have half of the power.
         let rms = (0.5 * strongest).sqrt();
-        let scale = 10f64.powf(-0.05 * self.settings.adc_headroom_db) / rms;
+        let scale = 10f64.powf(-0.05 * ADC_HEADROOM_DB) / rms;
         let steps = f64::from(1u32 << (self.settings.adc_bits - 1));
         let convert =
             |part: f64| ((part * scale * steps).round().clamp(-steps, steps - 1.0) / steps) as f32;

@@ -16,16 +16,9 @@ pub struct IqSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -60.0, max = 60.0))]
     pub oscillator_error_ppm: Option<f64>,
-    /// Standard deviation of the frequency error of each radio head's oscillator in parts per
-    /// million (TS 38.104 allows an error of 0.05).
-    #[schemars(range(min = 0.0, max = 0.2))]
-    pub head_oscillator_ppm: f64,
     /// Resolution of the A/D converter in bits, for each of I and Q.
     #[schemars(range(min = 1, max = 24))]
     pub adc_bits: u8,
-    /// Full scale of the A/D converter relative to the RMS value of the strongest symbol, in dB.
-    #[schemars(range(min = -20.0, max = 60.0))]
-    pub adc_headroom_db: f64,
     /// Standard deviation of the phase error of each receive channel in radians, drawn once per
     /// run.
     #[schemars(range(min = 0.0, max = 6.3))]
@@ -44,9 +37,7 @@ impl Default for IqSettings {
         Self {
             oscillator_ppm: 0.5,
             oscillator_error_ppm: None,
-            head_oscillator_ppm: 0.02,
             adc_bits: 12,
-            adc_headroom_db: 12.0,
             channel_phase_rad: 0.0,
             channel_gain_db: 0.0,
             clock_error_scale: 1.0,

@@ -101,33 +101,21 @@ pub struct Prices {
     /// Price of the LiDAR of a vehicle, for comparison.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lidar: Option<Price>,
-    /// Electrical power of a LiDAR in watts.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub lidar_power_w: Option<Price>,
     /// Price of a roadside unit, for comparison.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roadside_unit: Option<Price>,
     /// Maintenance cost of a roadside unit per year.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roadside_unit_yearly: Option<Price>,
-    /// Electrical power of a roadside unit in watts.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub roadside_unit_power_w: Option<Price>,
     /// Price of an ultra-wideband (UWB) anchor with its installation, for comparison.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uwb_anchor: Option<Price>,
     /// Length of road for each UWB anchor in metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uwb_anchor_spacing_m: Option<Price>,
-    /// Electrical power of a UWB anchor in watts.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub uwb_anchor_power_w: Option<Price>,
     /// Price of the UWB tag of a vehicle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uwb_tag: Option<Price>,
-    /// Electrical power of a UWB tag in watts.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub uwb_tag_power_w: Option<Price>,
     /// Price of an additional radio head with its mast.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radio_head: Option<Price>,
@@ -444,7 +432,6 @@ mod tests {
             ("electricity_per_kwh = 25.0", "25 cents are 0.25"),
             ("grid_g_per_kwh = 0.381", "0.381 kg are 381"),
             ("lidar = 4.0", "4 thousand are 4000"),
-            ("uwb_tag_power_w = 300.0", "300 mW are 0.3"),
         ] {
             let text = BENDS.replace("[fleet]", &format!("[prices]\n{price}\n[fleet]"));
             let plant = Plant::from_toml(&text, "mine.toml", &Shipped).unwrap();

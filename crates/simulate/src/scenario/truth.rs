@@ -14,10 +14,8 @@ use toml::{Table, Value};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TruthSettings {
-    /// Whether random errors are sampled from the standard deviations. Otherwise, all values are
-    /// nominal except those in `[truth]`.
-    pub sample_errors: bool,
-    /// Factor for all standard deviations of the drawn errors.
+    /// Factor for all standard deviations of the drawn errors. With 0, all values are nominal
+    /// except those in `[truth]`.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub std_factor: f64,
     /// True values of the site: `road`, `radio_heads`, `rician_k_db`, `walls`.
@@ -34,7 +32,6 @@ pub struct TruthSettings {
 impl Default for TruthSettings {
     fn default() -> Self {
         Self {
-            sample_errors: true,
             std_factor: 1.0,
             site: Table::new(),
             vehicle: Table::new(),
@@ -89,15 +86,6 @@ impl TruthSettings {
             depart(site, &self.site, &SITE_FACTS, check)?,
             depart(vehicle, &self.vehicle, &VEHICLE_FACTS, check)?,
         ))
-    }
-
-    /// Returns the factor of the standard deviations.
-    pub const fn factor(&self) -> f64 {
-        if self.sample_errors {
-            self.std_factor
-        } else {
-            0.0
-        }
     }
 }
 

@@ -104,30 +104,6 @@ const FACTORS: &[Usual] = &[
         why: "UWB anchors stand 5 to 50 m apart",
         write: as_millimetres,
     },
-    Usual {
-        key: "prices.lidar_power_w.value",
-        within: [0.5, 200.0],
-        why: "LiDARs draw 2 to 60 W",
-        write: as_watts,
-    },
-    Usual {
-        key: "prices.roadside_unit_power_w.value",
-        within: [0.5, 2000.0],
-        why: "roadside units draw 5 to 200 W",
-        write: as_watts,
-    },
-    Usual {
-        key: "prices.uwb_anchor_power_w.value",
-        within: [0.05, 50.0],
-        why: "UWB anchors draw 0.5 to 10 W",
-        write: as_watts,
-    },
-    Usual {
-        key: "prices.uwb_tag_power_w.value",
-        within: [0.0005, 20.0],
-        why: "UWB tags draw 0.01 to 2 W",
-        write: as_watts,
-    },
 ];
 
 fn as_money(value: f64) -> String {
@@ -135,13 +111,5 @@ fn as_money(value: f64) -> String {
         "write whole units of the currency: {value} thousand are {}, {value} cents are {}",
         rounded(value * 1000.0),
         rounded(value / 100.0)
-    )
-}
-
-fn as_watts(value: f64) -> String {
-    format!(
-        "write watts: {value} kW are {}, {value} mW are {}",
-        rounded(value * 1000.0),
-        rounded(value / 1000.0)
     )
 }

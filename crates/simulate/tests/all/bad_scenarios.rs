@@ -146,11 +146,6 @@ fn numbers_must_be_finite_and_in_range() {
         ),
         ("pci = 1", "pci = 1008", "site.radio_heads[0].pci"),
         (
-            "temperature_k = 290.0",
-            "temperature_k = 0",
-            "vehicle.receiver.temperature_k",
-        ),
-        (
             "shadowing_std_db = 3.0",
             "shadowing_std_db = -3",
             "channel.shadowing_std_db",

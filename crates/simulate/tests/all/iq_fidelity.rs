@@ -233,7 +233,6 @@ fn several_cells_with_blind_snapshots_and_poor_hardware_are_located() {
         ("site.ssb.subcarrier_spacing_khz", Value::from(30.0)),
         ("iq.oscillator_ppm", Value::from(1.0)),
         ("iq.adc_bits", Value::from(4)),
-        ("iq.adc_headroom_db", Value::from(6.0)),
     ];
     let scenario = scenario("iq", 30.0, &more);
     let record = drive(&scenario, 4);

@@ -152,7 +152,7 @@ fn seeds_and_runs_determine_the_draws() {
 }
 
 #[test]
-fn std_factor_scales_all_deviations_and_sample_errors_false_removes_them() {
+fn std_factor_scales_all_deviations_and_zero_removes_them() {
     let once = uncertain(&[]);
     let thrice = uncertain(&[("truth.std_factor", 3.0.into())]);
     let by = |scenario: &Scenario| departures(scenario, &draw(scenario, 1));
@@ -162,7 +162,7 @@ fn std_factor_scales_all_deviations_and_sample_errors_false_removes_them() {
             "{name}: {once} {thrice}"
         );
     }
-    let none = uncertain(&[("truth.sample_errors", false.into())]);
+    let none = uncertain(&[("truth.std_factor", 0.0.into())]);
     let truth = draw(&none, 1);
     assert_eq!((&truth.site, &truth.vehicle), (&none.site, &none.vehicle));
     assert_eq!(truth.given_start, truth.path.at(0.0).pose);
@@ -220,7 +220,7 @@ fn a_true_value_with_a_standard_deviation_is_drawn_around_the_value() {
 #[test]
 fn deviations_change_the_simulated_signals() {
     let exact = [
-        ("truth.sample_errors", Value::from(false)),
+        ("truth.std_factor", 0.0.into()),
         ("truth.vehicle.odometer.scale", 1.1.into()),
         ("truth.vehicle.odometer.noise_m_per_sqrt_m", 0.0.into()),
         ("truth.vehicle.lane_keeping.rms_m", 0.0.into()),
@@ -302,10 +302,10 @@ fn invalid_deviations_are_rejected() {
     for (name, key, value, rejected_key, allowed) in [
         (
             "yard",
-            "truth.sample_error",
-            Value::from(false),
-            "truth.sample_error",
-            "did you mean `sample_errors`?",
+            "truth.std_facto",
+            Value::from(0.0),
+            "truth.std_facto",
+            "did you mean `std_factor`?",
         ),
         (
             "yard",

@@ -135,7 +135,6 @@ fn on_demand(target_error_m: f64, latency_ms: f64, runs: u64) -> Vec<RunRecord> 
     let settings = UncertaintySettings {
         target_error_m,
         min_variance_reduction_m2: NEVER_WORTH_IT_M2,
-        wake_up_cost: Some(0.5),
         ..UncertaintySettings::default()
     };
     driven_by(settings, latency_ms, runs)

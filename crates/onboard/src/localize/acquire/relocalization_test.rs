@@ -10,7 +10,7 @@ use crate::localize::modes::{CERTAIN, EVENT_S, log_likelihood, log_likelihood_as
 use crate::localize::output::PoseEstimate;
 use crate::observation::{AngleMeasurement, OdometrySample};
 use crate::radio_head::RadioHead;
-use crate::settings::IntegritySettings;
+use crate::settings::{ERROR_CORRELATION_S, IntegritySettings};
 
 /// Minimum distance driven before a result of the search is accepted (m): at standstill, the same
 /// errors repeat.
@@ -100,7 +100,7 @@ impl RelocalizationTest {
             wrong_start: settings
                 .fault_probability
                 .of_radio_head(given.is_with_bias()),
-            epochs: (EVENT_S / settings.error_correlation_s).max(1.0),
+            epochs: EVENT_S / ERROR_CORRELATION_S,
             confirmed_at: (risk / (1.0 - risk)).ln(),
             ..Self::new(search, given, false)
         }

@@ -196,6 +196,13 @@ const DIFFERENTIAL: Usual = Usual {
     multipath_bias_probability: 0.0,
 };
 
+/// Probability that a correct angle is rejected as an outlier: one angle in 10 000, a few minutes
+/// at 50 angles per second.
+const OUTLIER_PROBABILITY: f64 = 1e-4;
+
+/// Maximum yaw rate in rad/s: 230 degrees per second, above that of factory vehicles.
+const TOP_YAW_RATE_RADPS: f64 = 4.0;
+
 impl EkfConfig {
     /// Creates the configuration of a vehicle at a site.
     pub fn new(site: &Site, vehicle: &Vehicle) -> Self {
@@ -237,10 +244,10 @@ impl EkfConfig {
         // A data sheet with scale and noise is complete; one of them alone does not make the rest
         // exact.
         let is_specified = odometer.scale_std > 0.0 && odometer.noise_m_per_sqrt_m > 0.0;
-        let walk: fn(&Usual) -> f64 = if is_specified {
-            |_| 0.0
+        let scale_walk = if is_specified {
+            0.0
         } else {
-            |it| it.scale_per_sqrt_m
+            usual.scale_per_sqrt_m
         };
         // If the track is wider than specified, the measured heading change is smaller than the
         // true one.
@@ -274,7 +281,7 @@ impl EkfConfig {
             },
             rician_k: 10f64.powf(0.1 * site.rician_k_db),
             wrong_lobe: None,
-            outlier_probability: settings.outlier_probability,
+            outlier_probability: OUTLIER_PROBABILITY,
             measured_noise_scale: None,
             lane_keeping,
             path_bend: PathBend {
@@ -289,7 +296,7 @@ impl EkfConfig {
                 odometer_m_per_sqrt_s: or_usual(odometer.noise_m_per_sqrt_s, |it| {
                     it.odometer_m_per_sqrt_s
                 }),
-                scale_per_sqrt_m: or_usual(settings.odometer_scale_walk_per_sqrt_m, walk),
+                scale_per_sqrt_m: scale_walk,
                 yaw_bias_radps_per_sqrt_s: gyroscope
                     .map_or(0.0, |it| it.bias_walk_radps_per_sqrt_s),
                 mounting_rad_per_sqrt_m: array.mounting_drift_rad_per_sqrt_m,
@@ -307,14 +314,13 @@ impl EkfConfig {
             phase_std_rad: array.phase_std_rad.unwrap_or(0.0),
             unstated_array_std_rad: unstated,
             datum_std_m: 0.0,
-            gate: normal_quantile(0.5 * settings.outlier_probability).powi(2),
+            gate: normal_quantile(0.5 * OUTLIER_PROBABILITY).powi(2),
             acceleration_mps2: 2.0 * vehicle.acceleration_mps2,
             slip_acceleration_mps2: 10.0 * vehicle.acceleration_mps2,
             may_slip: false,
             speed_noise_mps: odometer.speed_noise_mps,
-            // A fast oscillation of the lane keeping is possible even if a lower maximum yaw rate
-            // is configured.
-            top_yaw_rate_radps: (vehicle.top_yaw_rate_radps)
+            // A fast oscillation of the lane keeping can exceed the usual maximum.
+            top_yaw_rate_radps: TOP_YAW_RATE_RADPS
                 .max(SIGMAS_OF_SWING * keeping.pull_per_m() * vehicle.top_speed_mps()),
             yaw_noise_rad_per_sqrt_m: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_m),
             yaw_noise_rad_per_sqrt_rad: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_rad),

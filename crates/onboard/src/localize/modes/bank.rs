@@ -22,7 +22,7 @@ use crate::localize::output::{OdometryResult, SelectedHypothesis, UpdateReason, 
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
-use crate::settings::{FaultProbability, IntegritySettings};
+use crate::settings::{ERROR_CORRELATION_S, FaultProbability, IntegritySettings};
 
 /// Maximum probability of the error exceeding the level under a fault, however rare the fault is.
 const MAX_PROBABILITY_UNDER_FAULT: f64 = 0.49;
@@ -92,10 +92,9 @@ impl ModeFilter {
 
     /// Returns the posterior odds of the mode at one independent epoch: a fault with an onset is one
     /// error for [`EVENT_S`].
-    fn odds_per_epoch(&self, settings: &IntegritySettings) -> f64 {
-        let epochs = (EVENT_S / settings.error_correlation_s).max(1.0);
+    fn odds_per_epoch(&self) -> f64 {
         let epochs = if self.mode.onset.is_some() {
-            epochs
+            EVENT_S / ERROR_CORRELATION_S
         } else {
             1.0
         };
@@ -319,7 +318,7 @@ impl Bank {
     /// that is correct under it: the modes with their posterior probabilities, and faults of one or
     /// two radio heads, weighted by the probability that no fault mode holds.
     pub fn hypotheses(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
-        let odds = |it: &ModeFilter| it.odds_per_epoch(&self.settings);
+        let odds = ModeFilter::odds_per_epoch;
         let total = 1.0 + self.modes.iter().map(odds).sum::<f64>();
         let faults = (self.modes.iter()).filter(|it| it.mode.is_fault);
         let fault_free = 1.0 - faults.map(odds).sum::<f64>() / total;
@@ -339,7 +338,7 @@ impl Bank {
     /// Returns the nominal mode and all other modes, each with its posterior probability and its
     /// filter.
     pub fn mixture(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
-        let odds = |it: &ModeFilter| it.odds_per_epoch(&self.settings);
+        let odds = ModeFilter::odds_per_epoch;
         let total = 1.0 + self.modes.iter().map(odds).sum::<f64>();
         let modes = (self.modes.iter()).map(move |it| (odds(it), &it.ekf));
         let odds = std::iter::once((1.0, &self.nominal)).chain(modes);
@@ -725,7 +724,7 @@ mod tests {
             .position(|it| it.mode.id == SelectedHypothesis::WheelSlip)
             .unwrap();
         let shares: Vec<f64> = bank.mixture().map(|(probability, _)| probability).collect();
-        let epochs = EVENT_S / settings.error_correlation_s;
+        let epochs = EVENT_S / ERROR_CORRELATION_S;
         let odds = shares[of_slip + 1] / shares[0];
         assert!((odds * epochs / bank.modes[of_slip].prior - 1.0).abs() < 2e-3);
     }
