@@ -32,8 +32,9 @@ def anees(name: str, runs: int, changes: Mapping[str, object] = MappingProxyType
 
 
 def test_the_localizer_is_consistent_with_errors_of_the_specified_deviations() -> None:
-    # The interval of 500 runs is 0.90 to 0.96; that of 60 runs is about three times as wide.
-    assert 0.8 < anees("yard", 60) < 1.15
+    # Independent runs determine the interval, not their length: the last third of the trip. The
+    # interval of 500 whole runs is 0.90 to 0.96; that of 60 runs is about three times as wide.
+    assert 0.8 < anees("yard", 60, {"motion.start_at_m": 800.0}) < 1.15
 
 
 @pytest.mark.parametrize("name", ["yard-array-off", "yard-heads-off"])

@@ -7,9 +7,11 @@ import re
 import sys
 import warnings
 from contextlib import contextmanager
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+import typer.main
 from typer import Option
 from typer.core import TyperGroup
 
@@ -145,6 +147,12 @@ for _name, _panel, _help, _modules in _GROUPS:
     app.add_typer(_group, name=_name, cls=_Commands, rich_help_panel=_panel)
 
 
+@cache
+def _command() -> Any:
+    """Returns all commands. Their construction takes ten times as long as a short command."""
+    return typer.main.get_command(app)
+
+
 def main() -> None:
     """Runs the command line; reports invalid input as one message with exit code 2."""
     write_what_can_be_written()
@@ -152,7 +160,7 @@ def main() -> None:
     warnings.simplefilter("ignore", ImplausibleSettingsWarning)
     try:
         try:
-            app()
+            _command()()
         finally:
             sys.stdout.flush()
     except (SettingsError, RecordingError, InputError, OSError) as error:

@@ -20,7 +20,6 @@ from access_av._core import brief
 from access_av.report import shown
 from access_av.report.shown import Badge
 from access_av.signal.methods import label
-from access_av.signal.recorded_angles import mean_absolute_error_deg
 from access_av.tables.numbers import unsigned_zero, value_text
 
 if TYPE_CHECKING:
@@ -391,6 +390,9 @@ def show_bursts(bursts: Sequence[BurstAngle]) -> None:
             burst.doubt or "–",
         )
     console.print(made)
+    # Imported here, because it imports NumPy.
+    from access_av.signal.recorded_angles import mean_absolute_error_deg
+
     error_deg = mean_absolute_error_deg(bursts)
     if error_deg is not None:
         console.print(f"Mean absolute error {error_deg:.2f}° over {len(bursts)} bursts.")

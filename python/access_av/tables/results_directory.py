@@ -20,8 +20,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-import numpy as np
-
 from access_av import interrupt
 from access_av.errors import InputError
 from access_av.tables.inputs import inputs
@@ -237,6 +235,8 @@ def tum_trajectory(
     >>> tum_trajectory([0.02], [1.0], [2.0], [0.0])
     '0.020000000 1.000000 2.000000 0.000000 0.000000000 0.000000000 0.000000000 1.000000000\n'
     """
+    import numpy as np  # here, because its import takes a sixth of the start of a command
+
     half = np.asarray(heading_rad, dtype=float) / 2.0
     columns = np.broadcast_arrays(
         np.asarray(time_s, dtype=float),
