@@ -225,7 +225,7 @@ def test_a_wrong_heading_is_reported_and_corrected(
 def test_the_mistake_causes_a_remark(tmp_path: Path, kind: str) -> None:
     spoil, says = REMARKED[kind]
     # If no angle fits, the search is long.
-    spoilt = robot({"all of the angle in degrees": 15.0}.get(kind, 90.0))
+    spoilt = robot({"all of the angle in degrees": 3.0}.get(kind, 90.0))
     spoil(spoilt)
     drive = spoilt.locate(tmp_path)
     assert any(says in remark for remark in drive.remarks), drive.remarks
