@@ -4,6 +4,8 @@ offsets."""
 from __future__ import annotations
 
 import sys
+from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,6 +32,11 @@ def test_the_textbook_filter_is_consistent() -> None:
     assert 0.6 < np.mean(nees) / 2 < 1.5
 
 
+@cache
+def located_in_time(road: bool) -> dict[str, Any]:
+    return dict(locate(Case("late", "in time", {}, road), 101, []))
+
+
 @pytest.mark.parametrize("road", [False, True])
 @pytest.mark.parametrize("late_s", [0.3, 1.0, -0.3])
 def test_a_time_offset_of_the_angles_is_estimated_reported_and_corrected(
@@ -38,7 +45,7 @@ def test_a_time_offset_of_the_angles_is_estimated_reported_and_corrected(
     located = locate(Case("late", "late", {"late_s": late_s}, road), 101, [])
     assert located["exit_named"]
     assert abs(located["late_s"] - late_s) < 3.0 * ANGLE_TIME_OFFSET_STD_S[road]
-    in_time = locate(Case("late", "in time", {}, road), 101, [])
+    in_time = located_in_time(road)
     assert not in_time["exit_named"]
     assert in_time["late_s"] == 0.0
     assert located["square"] < 1.3**2 * in_time["square"]

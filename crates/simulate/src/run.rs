@@ -63,6 +63,14 @@ impl Simulation {
         self
     }
 
+    /// Ends the runs at a time in seconds, or at the destination if that is earlier.
+    #[must_use]
+    pub fn until(mut self, end_s: f64) -> Self {
+        let steps = (end_s / self.scenario().site.ssb.period_s()).ceil() as usize;
+        self.steps = self.steps.min(steps.saturating_add(1));
+        self
+    }
+
     /// Returns the environment.
     pub(crate) const fn world(&self) -> &World {
         &self.world

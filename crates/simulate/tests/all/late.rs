@@ -30,7 +30,7 @@ struct Drive {
 impl Drive {
     fn new(mut scenario: Scenario, until_s: f64) -> Self {
         scenario.vehicle.wake_up = Some(WakeUpSettings::EVERY_SSB);
-        let (odometry, angles, record) = common::logs(&scenario, 6);
+        let (odometry, angles, record) = common::logs_until(&scenario, 6, until_s);
         let same_burst = |a: &LoggedAngle, b: &LoggedAngle| a.ssb.time_s == b.ssb.time_s;
         let bursts = angles.angles.chunk_by(same_burst).map(<[_]>::to_vec);
         let mut odometry = odometry.samples;

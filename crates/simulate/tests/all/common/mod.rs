@@ -80,7 +80,17 @@ pub fn campaign(scenario: &Scenario, seed: u64, runs: usize) -> Campaign {
 
 /// Returns the odometry and angle logs of a run.
 pub fn logs(scenario: &Scenario, seed: u64) -> (OdometryLog, AngleLog, RunRecord) {
-    let record = run(scenario, seed, 0);
+    logs_until(scenario, seed, f64::INFINITY)
+}
+
+/// Returns the odometry and angle logs of the beginning of a run, until a time in seconds.
+pub fn logs_until(
+    scenario: &Scenario,
+    seed: u64,
+    end_s: f64,
+) -> (OdometryLog, AngleLog, RunRecord) {
+    let simulation = simulation(scenario).until(end_s);
+    let record = simulation.run(seed, 0, NONE).unwrap();
     let mut truth = World::new(scenario).unwrap().draw(Streams::new(seed, 0));
     let times = record.steps.iter().map(|step| step.time_s);
     let odometry = OdometryLog {
