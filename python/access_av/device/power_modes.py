@@ -22,13 +22,12 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @dataclass(frozen=True)
 class Mode:
-    """A power mode; clocks in MHz, ``None`` if the memory has no separate limit."""
+    """A power mode; its clock in MHz."""
 
     number: int
     name: str
     cpu_mhz: float
     cores: int
-    memory_mhz: float | None = None
 
 
 class ModeError(InputError):
@@ -139,9 +138,8 @@ def parse_nvpmodel(text: str, most_mhz: float) -> list[Mode]:
     >>> parse_nvpmodel('''< POWER_MODEL ID=2 NAME=MODE_15W >
     ... CPU_ONLINE CORE_0 1
     ... CPU_ONLINE CORE_1 0
-    ... CPU_DENVER_0 MAX_FREQ 1200000
-    ... EMC MAX_FREQ 1331200000''', most_mhz=2265.6)
-    [Mode(number=2, name='MODE_15W', cpu_mhz=1200.0, cores=1, memory_mhz=1331.2)]
+    ... CPU_DENVER_0 MAX_FREQ 1200000''', most_mhz=2265.6)
+    [Mode(number=2, name='MODE_15W', cpu_mhz=1200.0, cores=1)]
     """
     modes = []
     for block in re.split(r"<\s*POWER_MODEL\s+", text)[1:]:
@@ -150,15 +148,12 @@ def parse_nvpmodel(text: str, most_mhz: float) -> list[Mode]:
             continue
         limits_khz = [int(value) for value in re.findall(r"^CPU\S* MAX_FREQ (-?\d+)", block, re.M)]
         online = re.findall(r"^CPU_ONLINE CORE_\d+ 1\s*$", block, re.M)
-        memory = re.search(r"^EMC MAX_FREQ (\d+)", block, re.M)
-        memory_mhz = int(memory[1]) * 1e-6 if memory and int(memory[1]) > 0 else None
         modes.append(
             Mode(
                 number=int(head[1]),
                 name=head[2],
                 cpu_mhz=max(limits_khz) * 1e-3 if limits_khz and -1 not in limits_khz else most_mhz,
                 cores=max(len(online), 1),
-                memory_mhz=memory_mhz,
             )
         )
     return modes
