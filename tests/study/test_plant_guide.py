@@ -22,6 +22,8 @@ GUIDE = (ROOT / "docs" / "plant.md").read_text(encoding="utf-8")
 FEW = ("--runs", "2")
 SHORT = (
     ("length_m = 200.0", "length_m = 20.0"),
+    ("radius_m = 25.0", "radius_m = 8.0"),
+    ("radius_m = 30.0", "radius_m = 8.0"),
     ("length_m = 180.0", "length_m = 5.0"),
     (
         "length_m = 162.4",
