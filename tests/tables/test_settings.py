@@ -11,8 +11,13 @@ from access_av import _core
 from access_av.settings import as_dict, platform_name, ssb_period_s
 from conftest import ROOT
 
+# Maximum number of distinct names of keys in all kinds of settings files.
+MOST_KEYS = 254
 
-@pytest.mark.parametrize("kind", ["Site", "Vehicle", "Scenario", "Plant", "Platform"])
+KINDS = ("Site", "Vehicle", "Scenario", "Plant", "Platform")
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_dictionaries_have_the_keys_of_the_schema(kind: str) -> None:
     of = getattr(_core, kind)
     schema = json.loads(of.schema_json())
@@ -38,3 +43,16 @@ def test_only_one_module_reads_settings_as_json() -> None:
     package = ROOT / "python/access_av"
     readers = [it for it in package.rglob("*.py") if ".to_json()" in it.read_text("utf-8")]
     assert readers == [package / "settings.py"]
+
+
+def test_settings_have_few_names() -> None:
+    schemas = [json.loads(getattr(_core, kind).schema_json()) for kind in KINDS]
+    tables = [it for schema in schemas for it in (schema, *schema["$defs"].values())]
+    alternatives = [it for table in tables for it in table.get("oneOf", [table])]
+    keys = {
+        key
+        for table in alternatives
+        for key, value in table.get("properties", {}).items()
+        if "const" not in value
+    }
+    assert len(keys) <= MOST_KEYS
