@@ -163,6 +163,8 @@ impl Propagation for RicianPropagation {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::LazyLock;
+
     use onboard::geometry::{Point, Pose};
     use onboard::road::{Road, Segment};
     use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
@@ -171,6 +173,10 @@ mod tests {
     use crate::random::Streams;
 
     const ELEMENTS: usize = 4;
+
+    /// Vehicle of all runs. Reading it takes longer than a run.
+    static VEHICLE: LazyLock<Vehicle> =
+        LazyLock::new(|| Vehicle::from_library("paper", &Shipped).unwrap());
 
     fn site(k_db: f64) -> Site {
         let mut site = Site::from_library("paper", &Shipped).unwrap();
@@ -184,7 +190,6 @@ mod tests {
         delay_spread_ns: f64,
         streams: Streams,
     ) -> RicianPropagation {
-        let vehicle = Vehicle::from_library("paper", &Shipped).unwrap();
         let settings = ChannelSettings {
             scatter,
             delay_spread_ns,
@@ -198,7 +203,7 @@ mod tests {
         let road = Road::from_segments(Pose::default(), &[segment], 5.0).unwrap();
         let link = Link {
             site,
-            vehicle: &vehicle,
+            vehicle: &VEHICLE,
             road: &road,
             duration_s: 10.0,
             head: 0,
@@ -220,7 +225,7 @@ mod tests {
     }
 
     fn row() -> Antennas {
-        Antennas::new(&Vehicle::from_library("paper", &Shipped).unwrap().array)
+        Antennas::new(&VEHICLE.array)
     }
 
     /// Returns the antenna gains at the carrier frequency.

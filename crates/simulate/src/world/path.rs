@@ -175,8 +175,9 @@ mod tests {
     fn wander_has_the_specified_rms() {
         let squares: f64 = (0..400)
             .map(|run| {
+                let vehicle = wandering(run);
                 (0..80)
-                    .map(|t| wandering(run).at(f64::from(t)).lateral_m.powi(2))
+                    .map(|t| vehicle.at(f64::from(t)).lateral_m.powi(2))
                     .sum::<f64>()
             })
             .sum();
