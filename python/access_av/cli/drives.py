@@ -158,8 +158,8 @@ def locate(
     locate the drive again, compare the errors with --truth, and write compared.parquet.
 
     Exit code 0: located. 2: unusable input. 3: not reliable (never found, unavailable for more than
-    a fifth of the time or at the end, or displaced by more than 0.5 m by a reported fault of the
-    input); the message names the input to check.
+    a fifth of the time or at the end, displaced by more than 0.5 m by a reported fault of the
+    input, or moved by ranges in frequent jumps); the message names the input to check.
     """
     from access_av.drives import recorded as drives
     from access_av.drives.recorded import Drive
@@ -360,7 +360,7 @@ def _show(drive: Drive, numbers: dict[str, float]) -> None:
 
 
 def _unreliable(drive: Drive) -> str:
-    from access_av.drives.recorded import MAX_UNAVAILABLE
+    from access_av.drives.recorded import JUMP_M, MAX_UNAVAILABLE
 
     if _lost(drive):
         happened = "the vehicle was never found. Give --start, or a longer drive. "
@@ -371,15 +371,25 @@ def _unreliable(drive: Drive) -> str:
         happened = (
             f"for {drive.lost_share:.0%} of the time{at_end} the angles contradicted the position. "
         )
+    elif drive.jumps_repeatedly:
+        happened = f"the position jumped {drive.jumps} times by more than {JUMP_M} m. "
     else:
         happened = ""
-    check = (
-        " ".join(f"{suspicion}." for suspicion in drive.suspicions)
-        if drive.suspicions
-        else "Check, in this order: start pose, array.mounting_rad (sign, mirrored array), "
-        "positions and PCIs of the radio heads, drive (road or differential), "
-        "yaw_rate_radps (unit, sign), phase_rad against angle_rad, the clocks, odometer.scale."
-    )
+    if drive.suspicions:
+        check = " ".join(f"{suspicion}." for suspicion in drive.suspicions)
+    elif drive.angles.is_empty() and not drive.ranges.is_empty():
+        check = (
+            "Check, in this order: start pose, positions (order x, y, height) and PCIs of the "
+            "radio heads, yaw_rate_radps (unit, sign), the clocks of ranges and odometry, "
+            "range_m (unit; distance, not the way there and back), ranging.sigma_m, "
+            "odometer.scale."
+        )
+    else:
+        check = (
+            "Check, in this order: start pose, array.mounting_rad (sign, mirrored array), "
+            "positions and PCIs of the radio heads, drive (road or differential), "
+            "yaw_rate_radps (unit, sign), phase_rad against angle_rad, the clocks, odometer.scale."
+        )
     return f"not reliable: {happened}{check}"
 
 

@@ -32,6 +32,18 @@ MIN_COMPARED = 0.5
 # Maximum unavailable share of a reliable drive.
 MAX_UNAVAILABLE = 0.2
 
+# Minimum correction of the position in one step that counts as a jump, in metres. It equals the
+# displacement by which a reported fault makes a drive unreliable.
+JUMP_M = 0.5
+
+# Minimum distance driven per jump of a reliable drive with ranges, in metres. A lawn mower jumps 5
+# times in 1859 m; wrong yaw rates and exchanged coordinates cause a jump at least every 6 m.
+JUMP_SPACING_M = 20.0
+
+# Number of jumps that are permitted over any distance: one corrects a wrong start pose, and one a
+# first correction that was ambiguous.
+PERMITTED_JUMPS = 2
+
 # Wrong time units, in units per second.
 TIME_UNITS = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 
@@ -223,14 +235,37 @@ class Drive:
         return float(known.select(unavailable.mean()).item())
 
     @property
+    def jumps(self) -> int:
+        """Returns the number of corrections of the position by more than 0.5 m in one step."""
+        moved_m = (pl.col("x_m").diff() ** 2 + pl.col("y_m").diff() ** 2).sqrt()
+        driven_m = pl.col("speed_mps").abs() * pl.col("time_s").diff()
+        known = self.poses.filter(~pl.col("searching"))
+        return int(known.select((moved_m - driven_m > JUMP_M).sum()).item())
+
+    @property
+    def jumps_repeatedly(self) -> bool:
+        """Returns whether the position jumped more than twice and more than once per 20 m driven.
+
+        Only for drives with ranges and no angles, because the diagnosis of wrong inputs needs
+        angles.
+        """
+        has_ranges_only = self.angles.is_empty() and not self.ranges.is_empty()
+        if not has_ranges_only:
+            return False
+        driven_m = pl.col("speed_mps").abs() * pl.col("time_s").diff()
+        permitted = float(self.poses.select(driven_m.sum()).item()) / JUMP_SPACING_M
+        return self.jumps > max(PERMITTED_JUMPS, permitted)
+
+    @property
     def is_reliable(self) -> bool:
         """Returns whether the drive is reliable.
 
         The vehicle was found, its position was available for four fifths of the time and at the
-        end, and no reported fault of the input displaced it by more than 0.5 m.
+        end, no reported fault of the input displaced it by more than 0.5 m, and ranges without
+        angles did not move it in jumps.
         """
         is_lost = self._core.is_lost_for_long or self.unavailable_share > MAX_UNAVAILABLE
-        return not (is_lost or self.suspicions)
+        return not (is_lost or self.jumps_repeatedly or self.suspicions)
 
     def write_mcap(self, path: str | Path) -> None:
         """Writes poses, verdicts and diagnostics as MCAP (ROS 2); no poses while searching."""
