@@ -106,8 +106,7 @@ class Recommendation:
     chosen
         Index of the recommended point; ``None`` without a figure of energy.
     rivals
-        The other finalists, in the mode of least energy, and the recommended operation in the
-        other power modes.
+        The finalists in every power mode, except the recommended point.
     by_seed
         The points that the two seeds recommend by themselves.
     """
@@ -222,7 +221,7 @@ def _recommendation(
     every = [*pooled, *(it for it in screened if it.operation.name not in known)]
     chosen = recommended(pooled)
     named = tuple(name for it in by_seed if (name := _name(it)) is not None)
-    rivals = [] if chosen is None else _rivals(plant, targets, pooled, pooled[chosen], named)
+    rivals = [] if chosen is None else _rivals(plant, targets, pooled, pooled[chosen])
     return Recommendation(every, front(pooled), chosen, rivals, named)
 
 
@@ -277,20 +276,14 @@ def _finalists(screened: list[Point]) -> list[Operation]:
     return named[:MOST_FINALISTS]
 
 
-def _rivals(
-    plant: _core.Plant, targets: Targets, pooled: list[Point], best: Point, named: tuple[str, ...]
-) -> list[Rival]:
-    """Returns finalists in their best mode, other modes, and choices of single seeds."""
+def _rivals(plant: _core.Plant, targets: Targets, pooled: list[Point], best: Point) -> list[Rival]:
+    """Returns the finalists in every power mode, except the recommended point."""
     percent = targets.each[0].percent
     best_wh = _day_wh(plant, best)
-    seen = {best.name}
     found: list[Rival] = []
     for it in sorted(pooled, key=lambda one: one.energy_j):
-        is_first = all(one.point.operation.name != it.operation.name for one in found)
-        is_other_mode = it.operation.name == best.operation.name
-        if it.name in seen or not (is_first or is_other_mode or it.name in named):
+        if it.name == best.name:
             continue
-        seen.add(it.name)
         day_wh = _day_wh(plant, it)
         share = None if best_wh is None or day_wh is None else (day_wh - best_wh) / best_wh
         delta_m = it.driven.delta_m(best.driven, percent)
