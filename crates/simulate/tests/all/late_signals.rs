@@ -61,9 +61,10 @@ fn late_signals_and_poor_clocks_displace_no_pose_beyond_its_level() {
             "[{{ from_s = {FROM_S:?}, until_s = 100.0, what = {{ {fault} }} }}]"
         ))
     };
-    let faults: [&[(&str, Value)]; 3] = [
+    let faults: [&[(&str, Value)]; 4] = [
         &[("faults", late("", 100.0))],
         &[("faults", late(", radio_head = 1", 66.7))],
+        &[("iq.clock_error_scale", Value::from(3.0))],
         &[("iq.clock_error_scale", Value::from(10.0))],
     ];
     let describe = |name: &str, record: &RunRecord| {
@@ -91,7 +92,7 @@ fn late_signals_and_poor_clocks_displace_no_pose_beyond_its_level() {
     }
     // The clock of the vehicle is estimated with the specified random walk. One that is ten times worse increases the
     // error.
-    for record in &faulty[..2] {
+    for record in &faulty[..3] {
         assert!(rms_m(record) < 1.1 * rms_m(&angles));
         assert_eq!(ok_and_beyond(record)[0], ok_and_beyond(&angles)[0]);
     }
