@@ -9,7 +9,7 @@ use crate::settings::{Site, Vehicle};
 const BOLTZMANN_J_PER_K: f64 = 1.380_649e-23;
 
 /// Standard noise temperature in kelvin, to which noise figures refer (ITU-R P.372).
-const NOISE_TEMPERATURE_K: f64 = 290.0;
+pub(crate) const NOISE_TEMPERATURE_K: f64 = 290.0;
 
 /// Link budget, without the properties of a radio head.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -377,7 +377,7 @@ def _unreliable(drive: Drive) -> str:
         happened = ""
     if drive.suspicions:
         check = " ".join(f"{suspicion}." for suspicion in drive.suspicions)
-    elif drive.angles.is_empty() and not drive.ranges.is_empty():
+    elif drive.has_ranges_only:
         check = (
             "Check, in this order: start pose, positions (order x, y, height) and PCIs of the "
             "radio heads, yaw_rate_radps (unit, sign), the clocks of ranges and odometry, "

@@ -44,6 +44,9 @@ JUMP_SPACING_M = 20.0
 # first correction that was ambiguous.
 PERMITTED_JUMPS = 2
 
+# Distance driven since the previous odometry sample, in metres.
+STEP_M = pl.col("speed_mps").abs() * pl.col("time_s").diff()
+
 # Wrong time units, in units per second.
 TIME_UNITS = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 
@@ -235,12 +238,16 @@ class Drive:
         return float(known.select(unavailable.mean()).item())
 
     @property
+    def has_ranges_only(self) -> bool:
+        """Returns whether the drive has ranges and no angles."""
+        return self.angles.is_empty() and not self.ranges.is_empty()
+
+    @property
     def jumps(self) -> int:
         """Returns the number of corrections of the position by more than 0.5 m in one step."""
         moved_m = (pl.col("x_m").diff() ** 2 + pl.col("y_m").diff() ** 2).sqrt()
-        driven_m = pl.col("speed_mps").abs() * pl.col("time_s").diff()
         known = self.poses.filter(~pl.col("searching"))
-        return int(known.select((moved_m - driven_m > JUMP_M).sum()).item())
+        return int(known.select((moved_m - STEP_M > JUMP_M).sum()).item())
 
     @property
     def jumps_repeatedly(self) -> bool:
@@ -249,11 +256,9 @@ class Drive:
         Only for drives with ranges and no angles, because the diagnosis of wrong inputs needs
         angles.
         """
-        has_ranges_only = self.angles.is_empty() and not self.ranges.is_empty()
-        if not has_ranges_only:
+        if not self.has_ranges_only:
             return False
-        driven_m = pl.col("speed_mps").abs() * pl.col("time_s").diff()
-        permitted = float(self.poses.select(driven_m.sum()).item()) / JUMP_SPACING_M
+        permitted = float(self.poses.select(STEP_M.sum()).item()) / JUMP_SPACING_M
         return self.jumps > max(PERMITTED_JUMPS, permitted)
 
     @property
@@ -526,7 +531,7 @@ def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:
     if known.height < drive.poses.height and not known.is_empty():
         numbers["found_s"] = float(known["time_s"][0] - drive.poses["time_s"][0])
         steps = drive.poses.select("time_s", "speed_mps").with_columns(
-            driven_m=(pl.col("time_s").diff().fill_null(0.0) * pl.col("speed_mps").abs()).cum_sum()
+            driven_m=STEP_M.fill_null(0.0).cum_sum()
         )
         numbers["found_m"] = float(steps.filter(time_s=known["time_s"][0])["driven_m"][0])
     if truth is not None and not known.is_empty():

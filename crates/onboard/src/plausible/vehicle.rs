@@ -7,6 +7,7 @@ use super::usual::{
     unusual,
 };
 use super::warning::Warning;
+use crate::link_budget::NOISE_TEMPERATURE_K;
 use crate::settings::Vehicle;
 
 const TYRES: &str = "no tyre grips better than 1 g";
@@ -104,7 +105,7 @@ const ROWS: &[Usual] = &[
         within: [0.0, 20.0],
         why: "the noise figure of a receiver is 2 to 12 dB",
         write: |it| {
-            let db = 10.0 * (1.0 + it / 290.0).log10();
+            let db = 10.0 * (1.0 + it / NOISE_TEMPERATURE_K).log10();
             format!("write the noise figure in dB: a noise temperature of {it} K is {db:.1}")
         },
     },

@@ -6,11 +6,13 @@ use std::cmp::Ordering;
 use super::gaussian_sum::GaussianSum;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::Ekf;
-use crate::localize::modes::{CERTAIN, EVENT_S, log_likelihood, log_likelihood_as_stated};
+use crate::localize::modes::{
+    CERTAIN, EVENT_EPOCHS, EVENT_S, log_likelihood, log_likelihood_as_stated,
+};
 use crate::localize::output::PoseEstimate;
 use crate::observation::{AngleMeasurement, OdometrySample};
 use crate::radio_head::RadioHead;
-use crate::settings::{ERROR_CORRELATION_S, IntegritySettings};
+use crate::settings::IntegritySettings;
 
 /// Minimum distance driven before a result of the search is accepted (m): at standstill, the same
 /// errors repeat.
@@ -44,8 +46,6 @@ clone_in_place! {
         /// Prior probability that the given start is wrong, and that the vehicle is anywhere in the
         /// area of the radio heads. It equals the prior probability of a radio head fault.
         wrong_start: f64,
-        /// Number of independent epochs for which the error of a wrong start lasts.
-        epochs: f64,
         /// Log odds of other starts below which the given start is confirmed: the log odds of the
         /// integrity risk.
         confirmed_at: f64,
@@ -79,7 +79,6 @@ impl RelocalizationTest {
             refutes: false,
             may_explain_contradictions,
             wrong_start: 0.0,
-            epochs: 1.0,
             confirmed_at: f64::NEG_INFINITY,
             of_filter: 0.0,
             since_m: ekf.driven_m(),
@@ -100,7 +99,6 @@ impl RelocalizationTest {
             wrong_start: settings
                 .fault_probability
                 .of_radio_head(given.is_with_bias()),
-            epochs: EVENT_S / ERROR_CORRELATION_S,
             confirmed_at: (risk / (1.0 - risk)).ln(),
             ..Self::new(search, given, false)
         }
@@ -115,7 +113,7 @@ impl RelocalizationTest {
     /// start is one error for several epochs, and counts once against the integrity risk.
     pub fn other_starts(&self, time_s: f64) -> impl Iterator<Item = (f64, PoseEstimate)> {
         let odds = self.log_odds().exp();
-        let probability = odds / (1.0 + odds) / self.epochs;
+        let probability = odds / (1.0 + odds) / EVENT_EPOCHS;
         let components = self.search.components(time_s);
         components.map(move |(weight, pose)| (probability * weight, pose))
     }

@@ -29,8 +29,6 @@ pub struct EkfConfig {
     /// Probability that the angle is arbitrary because scatter makes another lobe the maximum;
     /// `None` if the gate rejects more angles anyway.
     pub wrong_lobe: Option<f64>,
-    /// Fraction of correct angles that the gate rejects.
-    pub outlier_probability: f64,
     /// Ratio of the measured variance of the angles to the specified one, if it is used.
     pub measured_noise_scale: Option<f64>,
     /// Lane keeping model, with a map.
@@ -281,7 +279,6 @@ impl EkfConfig {
             },
             rician_k: 10f64.powf(0.1 * site.rician_k_db),
             wrong_lobe: None,
-            outlier_probability: OUTLIER_PROBABILITY,
             measured_noise_scale: None,
             lane_keeping,
             path_bend: PathBend {
@@ -355,7 +352,7 @@ impl EkfConfig {
         self.measured_noise_scale = ratio;
         let rician_k = self.rician_k / self.noise_scale();
         let wrong_lobe = (self.array.measurand).wrong_lobe_probability(rician_k);
-        self.wrong_lobe = Some(wrong_lobe).filter(|&it| it > self.outlier_probability);
+        self.wrong_lobe = Some(wrong_lobe).filter(|&it| it > OUTLIER_PROBABILITY);
     }
 
     /// Returns the maximum ratio of the variance: that of scatter as strong as the direct wave (a

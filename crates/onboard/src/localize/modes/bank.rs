@@ -31,6 +31,9 @@ const MAX_PROBABILITY_UNDER_FAULT: f64 = 0.49;
 /// slip. It counts once against the integrity risk.
 pub(in crate::localize) const EVENT_S: f64 = 20.0;
 
+/// Number of independent epochs for which the error of an event lasts.
+pub(in crate::localize) const EVENT_EPOCHS: f64 = EVENT_S / ERROR_CORRELATION_S;
+
 /// Minimum number of radio heads that separate the bias of one of them from the position.
 const MIN_SEPARABLE: usize = 3;
 
@@ -94,7 +97,7 @@ impl ModeFilter {
     /// error for [`EVENT_S`].
     fn odds_per_epoch(&self) -> f64 {
         let epochs = if self.mode.onset.is_some() {
-            EVENT_S / ERROR_CORRELATION_S
+            EVENT_EPOCHS
         } else {
             1.0
         };
@@ -724,9 +727,8 @@ mod tests {
             .position(|it| it.mode.id == SelectedHypothesis::WheelSlip)
             .unwrap();
         let shares: Vec<f64> = bank.mixture().map(|(probability, _)| probability).collect();
-        let epochs = EVENT_S / ERROR_CORRELATION_S;
         let odds = shares[of_slip + 1] / shares[0];
-        assert!((odds * epochs / bank.modes[of_slip].prior - 1.0).abs() < 2e-3);
+        assert!((odds * EVENT_EPOCHS / bank.modes[of_slip].prior - 1.0).abs() < 2e-3);
     }
 
     #[test]

@@ -9,7 +9,7 @@ mod range_update;
 mod subsets;
 mod table;
 
-pub(in crate::localize) use bank::{Bank, EVENT_S};
+pub(in crate::localize) use bank::{Bank, EVENT_EPOCHS, EVENT_S};
 pub(in crate::localize) use likelihood::{
     CERTAIN, log_likelihood, log_likelihood_as_stated, range_density,
 };
