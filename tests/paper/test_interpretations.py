@@ -144,8 +144,8 @@ def test_an_explicit_contradiction_is_refused() -> None:
     changes = {"vehicle.wake_up.trigger.base_ms": 300.0}
     with pytest.raises(SettingsError, match=r"wake_up\.trigger\.position_uncertainty_m"):
         Scenario.load("paper").with_overrides(changes)
-    late = {"vehicle.wake_up.latest_ms": 100.0, "vehicle.wake_up.trigger.base_ms": 150.0}
-    with pytest.raises(SettingsError, match=r"wake_up\.latest_ms"):
+    late = {"vehicle.wake_up.t_max_ms": 100.0, "vehicle.wake_up.trigger.base_ms": 150.0}
+    with pytest.raises(SettingsError, match=r"wake_up\.t_max_ms"):
         Scenario.load("paper").with_overrides(late)
 
 

@@ -138,11 +138,11 @@ def _gated(
     Candidates are multiples of the SSB period. The number of estimates decreases with the constant.
     """
     period_ms = paper_numbers()["wake_up"]["ssb_period_ms"]
-    latest_ms = interpretation.wake_up.get("latest_ms", np.inf)
+    t_max_ms = interpretation.wake_up.get("t_max_ms", np.inf)
     wanted = float(drives.aoa_estimates[0])
     best_ms, best = base_ms, None
     constant_ms = base_ms
-    while constant_ms <= latest_ms:
+    while constant_ms <= t_max_ms:
         scenario = interpretation.scenario.with_overrides(
             {
                 "vehicle.estimator.method": "music",

@@ -91,7 +91,7 @@ def load(name_or_path: str) -> Interpretation:
 
     Examples
     --------
-    >>> load("gate-t-max").wake_up["latest_ms"]
+    >>> load("gate-t-max").wake_up["t_max_ms"]
     240.0
     """
     index = shipped("paper", "interpretations", "index.toml")

@@ -115,7 +115,7 @@ def controller_changes(point: Mapping[str, Any], world: Mapping[str, Any]) -> di
         "weight_velocity": WEIGHT_VELOCITY * point.get("velocity", 1.0),
     }
     gate = point.get("gate", "none")
-    bound = {"latest_ms": 240.0} if gate == "within t_max" else {}
+    bound = {"t_max_ms": 240.0} if gate == "within t_max" else {}
     gated = {"policy": "gated", "snr_set_point": set_point, "trigger": pid, **bound}
     return {
         "vehicle.wake_up": pid if gate == "none" else gated,

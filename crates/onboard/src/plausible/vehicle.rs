@@ -248,12 +248,6 @@ const ROWS: &[Usual] = &[
         write: as_milliseconds,
     },
     Usual {
-        key: "wake_up.latest_ms",
-        within: [1.0, 3.6e6],
-        why: "the minimum SSB period is 5 ms",
-        write: as_milliseconds,
-    },
-    Usual {
         key: "wake_up.target_error_m",
         within: [0.005, 50.0],
         why: "not a plausible target for the position error",

@@ -187,7 +187,7 @@ pub struct GatedSettings {
     /// Maximum time between two estimates in ms, whatever the SNR. Default: unbounded.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 3.6e6))]
-    pub latest_ms: Option<f64>,
+    pub t_max_ms: Option<f64>,
     /// Trigger: condition that makes an estimate due.
     pub trigger: TriggerSettings,
 }
@@ -196,7 +196,7 @@ impl Default for GatedSettings {
     fn default() -> Self {
         Self {
             snr_set_point: SnrSetPoint::Expected { offset_db: 3.0 },
-            latest_ms: None,
+            t_max_ms: None,
             trigger: TriggerSettings::Pid(PidSettings::default()),
         }
     }
@@ -354,12 +354,12 @@ impl WakeUpSettings {
                     }
                 };
                 let base_ms = base_ms.unwrap_or(0.0);
-                let latest_ms = gated.latest_ms.unwrap_or(f64::INFINITY);
+                let t_max_ms = gated.t_max_ms.unwrap_or(f64::INFINITY);
                 let allowed = format!("it must not be below {base}, {base_ms}");
                 check.that(
-                    latest_ms >= base_ms,
-                    "wake_up.latest_ms",
-                    latest_ms,
+                    t_max_ms >= base_ms,
+                    "wake_up.t_max_ms",
+                    t_max_ms,
                     &allowed,
                 )
             }

@@ -59,13 +59,13 @@ pub fn built_in(
                     interval_s(due.base_ms)?,
                 ),
             };
-            let latest_s = match settings.latest_ms {
-                Some(latest_ms) => {
+            let latest_s = match settings.t_max_ms {
+                Some(t_max_ms) => {
                     let (file, base_ms) = (&vehicle.name, shortest_s * 1e3);
                     let allowed = format!("it must not be below {BASE}, {base_ms} ms");
-                    let good = latest_ms >= base_ms - 1e-9;
-                    Check { file }.that(good, "wake_up.latest_ms", latest_ms, &allowed)?;
-                    latest_ms * 1e-3
+                    let good = t_max_ms >= base_ms - 1e-9;
+                    Check { file }.that(good, "wake_up.t_max_ms", t_max_ms, &allowed)?;
+                    t_max_ms * 1e-3
                 }
                 None => f64::INFINITY,
             };
