@@ -148,7 +148,7 @@ def _fault(random: Random, heads: int) -> dict[str, Any]:
                 },
                 {"kind": "moved-head", "radio_head": head, "by_m": [random.uniform(-9, 9), 3.0]},
                 {"kind": "odometer-slip", "ratio": random.uniform(0.5, 1.5)},
-                {"kind": "stuck-antenna", "antenna": 1},
+                {"kind": "stuck-antenna", "antennas": [1]},
             )
         ),
     }

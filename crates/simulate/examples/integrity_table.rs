@@ -67,7 +67,7 @@ fn cases() -> Result<Vec<(&'static str, Scenario)>> {
         ("slip", alone(FaultKind::OdometerSlip { ratio: 1.2 })),
         (
             "stuck antenna",
-            alone(FaultKind::StuckAntenna { antenna: 1 }),
+            alone(FaultKind::StuckAntenna { antennas: [1] }),
         ),
         ("all, one by one", shipped.clone()),
     ];

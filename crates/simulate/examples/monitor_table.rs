@@ -34,8 +34,8 @@ fn main() {
         FaultKind::OdometerFrozen,
         FaultKind::OdometerReversed,
         FaultKind::OdometerHeld,
-        FaultKind::DeadAntenna { antenna: 2 },
-        FaultKind::InvertedAntenna { antenna: 1 },
+        FaultKind::DeadAntenna { antennas: [2] },
+        FaultKind::InvertedAntenna { antennas: [1] },
         FaultKind::ExchangedAntennas { antennas: [1, 3] },
     ];
     println!(

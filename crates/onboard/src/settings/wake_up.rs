@@ -356,12 +356,7 @@ impl WakeUpSettings {
                 let base_ms = base_ms.unwrap_or(0.0);
                 let t_max_ms = gated.t_max_ms.unwrap_or(f64::INFINITY);
                 let allowed = format!("it must not be below {base}, {base_ms}");
-                check.that(
-                    t_max_ms >= base_ms,
-                    "wake_up.t_max_ms",
-                    t_max_ms,
-                    &allowed,
-                )
+                check.that(t_max_ms >= base_ms, "wake_up.t_max_ms", t_max_ms, &allowed)
             }
             Self::Fixed(_) | Self::Uncertainty(_) => Ok(()),
         }

@@ -57,17 +57,17 @@ pub enum FaultKind {
     /// The signal of an antenna is independent of the field.
     StuckAntenna {
         /// Number of the antenna, from 0.
-        antenna: usize,
+        antennas: [usize; 1],
     },
     /// An antenna has no signal.
     DeadAntenna {
         /// Number of the antenna, from 0.
-        antenna: usize,
+        antennas: [usize; 1],
     },
     /// An antenna's signal has the wrong sign.
     InvertedAntenna {
         /// Number of the antenna, from 0.
-        antenna: usize,
+        antennas: [usize; 1],
     },
     /// The signals of two antennas are exchanged.
     ExchangedAntennas {
@@ -128,13 +128,15 @@ impl FaultSettings {
             self.until_s,
             "must be greater than `from_s`",
         )?;
-        let has_antenna = |name: &str, antenna: usize| {
-            check.that(
-                antenna < usize::from(elements),
-                &key(name),
-                antenna,
-                &format!("the array has {elements} antennas with numbers from 0"),
-            )
+        let has_antennas = |antennas: &[usize]| {
+            antennas.iter().enumerate().try_for_each(|(at, &antenna)| {
+                check.that(
+                    antenna < usize::from(elements),
+                    &key(&format!("what.antennas[{at}]")),
+                    antenna,
+                    &format!("the array has {elements} antennas with numbers from 0"),
+                )
+            })
         };
         match self.what {
             FaultKind::NonLineOfSight { radio_head, .. }
@@ -149,9 +151,9 @@ impl FaultSettings {
                 radio_head,
                 &format!("the site has {heads} radio heads with numbers from 0"),
             ),
-            FaultKind::StuckAntenna { antenna }
-            | FaultKind::DeadAntenna { antenna }
-            | FaultKind::InvertedAntenna { antenna } => has_antenna("what.antenna", antenna),
+            FaultKind::StuckAntenna { antennas }
+            | FaultKind::DeadAntenna { antennas }
+            | FaultKind::InvertedAntenna { antennas } => has_antennas(&antennas),
             FaultKind::ExchangedAntennas {
                 antennas: [first, second],
             } => {
@@ -161,8 +163,7 @@ impl FaultSettings {
                     format!("[{first}, {second}]"),
                     "the antennas must differ",
                 )?;
-                has_antenna("what.antennas[0]", first)?;
-                has_antenna("what.antennas[1]", second)
+                has_antennas(&[first, second])
             }
             FaultKind::LateArrival {
                 radio_head: None, ..

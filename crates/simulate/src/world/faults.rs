@@ -81,17 +81,23 @@ impl Faults {
                     let towards = |head| array.line_of_sight(vehicle, head).towards;
                     (array.antennas()).redirect(towards(head), towards(&moved), gains);
                 }
-                FaultKind::StuckAntenna { antenna } => {
+                FaultKind::StuckAntenna {
+                    antennas: [antenna],
+                } => {
                     if let Some(gain) = gains.get_mut(antenna) {
                         *gain = Complex64::new(gain.norm(), 0.0);
                     }
                 }
-                FaultKind::DeadAntenna { antenna } => {
+                FaultKind::DeadAntenna {
+                    antennas: [antenna],
+                } => {
                     if let Some(gain) = gains.get_mut(antenna) {
                         *gain = Complex64::ZERO;
                     }
                 }
-                FaultKind::InvertedAntenna { antenna } => {
+                FaultKind::InvertedAntenna {
+                    antennas: [antenna],
+                } => {
                     if let Some(gain) = gains.get_mut(antenna) {
                         *gain = -*gain;
                     }

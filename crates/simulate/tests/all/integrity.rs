@@ -133,7 +133,7 @@ fn a_moved_radio_head_is_bounded_or_reported_in_time() {
 /// protection level bounds the error, or the state reports it.
 #[test]
 fn a_stuck_antenna_is_bounded_or_reported() {
-    let stuck = fault(25.0, 60.0, FaultKind::StuckAntenna { antenna: 1 });
+    let stuck = fault(25.0, 60.0, FaultKind::StuckAntenna { antennas: [1] });
     for record in drives(&scenario(vec![stuck]), SEED, 3) {
         let during = record
             .steps

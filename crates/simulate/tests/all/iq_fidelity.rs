@@ -195,7 +195,7 @@ fn faults_have_equal_effects_on_samples_and_snapshots() {
     for what in [
         "{ kind = \"non-line-of-sight\", radio_head = 0, bias_rad = 0.6 }",
         "{ kind = \"moved-head\", radio_head = 0, by_m = [25.0, 0.0] }",
-        "{ kind = \"stuck-antenna\", antenna = 2 }",
+        "{ kind = \"stuck-antenna\", antennas = [2] }",
     ] {
         let of = |fidelity| {
             let more = [

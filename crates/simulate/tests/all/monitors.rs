@@ -208,11 +208,11 @@ fn odometry_held_at_its_speed_is_detected_while_the_vehicle_brakes() {
 fn faults_of_the_channels_are_detected_within_twenty_ssbs() {
     for (what, expected) in [
         (
-            FaultKind::DeadAntenna { antenna: 2 },
+            FaultKind::DeadAntenna { antennas: [2] },
             Fault::DeadChannel { channel: 2 },
         ),
         (
-            FaultKind::InvertedAntenna { antenna: 1 },
+            FaultKind::InvertedAntenna { antennas: [1] },
             Fault::InvertedChannel { channel: 1 },
         ),
         (
