@@ -147,7 +147,7 @@ def _fault(random: Random, heads: int) -> dict[str, Any]:
                     "bias_rad": random.uniform(-1, 1),
                 },
                 {"kind": "moved-head", "radio_head": head, "by_m": [random.uniform(-9, 9), 3.0]},
-                {"kind": "odometer-slip", "ratio": random.uniform(0.5, 1.5)},
+                {"kind": "odometer-slip", "scale": random.uniform(0.5, 1.5)},
                 {"kind": "stuck-antenna", "antennas": [1]},
             )
         ),

@@ -150,7 +150,7 @@ fn with_fault(
         "slip" => set(
             "faults",
             Value::Array(vec![whole(
-                "kind = \"odometer-slip\", ratio = 1.02".into(),
+                "kind = \"odometer-slip\", scale = 1.02".into(),
             )?]),
         ),
         "clock" => set(

@@ -64,7 +64,7 @@ fn cases() -> Result<Vec<(&'static str, Scenario)>> {
         ("moved head, 25 m", elsewhere(0, [25.0, 0.0])),
         ("  by 3 m", elsewhere(2, [3.0, 0.0])),
         ("spoofed from 300 m", elsewhere(1, [-200.0, 250.0])),
-        ("slip", alone(FaultKind::OdometerSlip { ratio: 1.2 })),
+        ("slip", alone(FaultKind::OdometerSlip { scale: 1.2 })),
         (
             "stuck antenna",
             alone(FaultKind::StuckAntenna { antennas: [1] }),

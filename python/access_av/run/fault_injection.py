@@ -81,7 +81,7 @@ def mismatches(scenario: _core.Scenario) -> dict[str, Overrides]:
             "truth.vehicle.odometer.scale": odometer["scale"] + 3.0 * odometer["scale_std"]
         },
         "odometer slips 2 %": {
-            "faults": [whole_drive({"kind": "odometer-slip", "ratio": 1.02})],
+            "faults": [whole_drive({"kind": "odometer-slip", "scale": 1.02})],
         },
         "all heads 2 m off": moved(len(heads)),
         "two heads 2 m off": moved(2),
@@ -205,7 +205,7 @@ def _growing_slip(scale: float) -> Iterable[Overrides]:
     steps = 30
     ends = [*np.linspace(0.0, GROWS_S, steps + 1)[1:-1].tolist(), LONGEST_S]
     for step, (from_s, until_s) in enumerate(zip([0.0, *ends], ends, strict=False), 1):
-        what = {"kind": "odometer-slip", "ratio": 1.0 + scale * step / steps}
+        what = {"kind": "odometer-slip", "scale": 1.0 + scale * step / steps}
         yield {"from_s": from_s, "until_s": until_s, "what": what}
 
 

@@ -42,9 +42,9 @@ pub enum FaultKind {
     },
     /// The wheels slip, which gives a scale error of the odometer.
     OdometerSlip {
-        /// Measured distance divided by true distance.
+        /// Scale factor: distance measured per distance driven.
         #[schemars(range(min = 0.0, max = 10.0))]
-        ratio: f64,
+        scale: f64,
     },
     /// The odometry repeats the values of its last sample before the fault.
     OdometerFrozen,

@@ -155,16 +155,16 @@ impl Faults {
     fn slipped(&mut self, mut sample: OdometrySample) -> OdometrySample {
         let moved_m = sample.distance_m - self.distance_m;
         self.distance_m = sample.distance_m;
-        let ratio: f64 = (self.at(sample.time_s))
+        let scale: f64 = (self.at(sample.time_s))
             .map(|fault| match fault {
-                FaultKind::OdometerSlip { ratio } => ratio,
+                FaultKind::OdometerSlip { scale } => scale,
                 FaultKind::OdometerReversed => -1.0,
                 _ => 1.0,
             })
             .product();
-        self.slipped_m += (ratio - 1.0) * moved_m;
+        self.slipped_m += (scale - 1.0) * moved_m;
         sample.distance_m += self.slipped_m;
-        sample.speed_mps *= ratio;
+        sample.speed_mps *= scale;
         sample
     }
 }
