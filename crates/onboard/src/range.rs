@@ -179,7 +179,7 @@ impl RangeModel {
             clock_std_m: of_clock(settings.clock_offset_std_ns),
             clock_wander_m_per_sqrt_s: of_clock(settings.clock_wander_ns_per_sqrt_s),
             // A drift of 1 ppb is 1 ns/s.
-            drift_std_mps: of_clock(settings.clock_drift_std_ppb),
+            drift_std_mps: of_clock(settings.clock_frequency_std_ppb),
             drift_walk_mps_per_sqrt_s: of_clock(settings.clock_drift_walk_ppb_per_sqrt_s),
             wavelength_m,
             uses_range_rate: is_one_way && settings.range_rate,

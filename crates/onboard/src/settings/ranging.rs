@@ -41,7 +41,7 @@ pub struct RangingSettings {
     /// One-way delays: standard deviation of the vehicle clock's relative frequency error, in parts
     /// per billion.
     #[schemars(range(min = 0.0, max = 1e5))]
-    pub clock_drift_std_ppb: f64,
+    pub clock_frequency_std_ppb: f64,
     /// One-way delays: random walk of the vehicle clock's frequency error, in ppb/√s.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub clock_drift_walk_ppb_per_sqrt_s: f64,
@@ -77,7 +77,7 @@ impl Default for RangingSettings {
             offset_walk_m_per_sqrt_m: 0.01,
             clock_offset_std_ns: 1e6,
             clock_wander_ns_per_sqrt_s: 1.0,
-            clock_drift_std_ppb: 2000.0,
+            clock_frequency_std_ppb: 2000.0,
             clock_drift_walk_ppb_per_sqrt_s: 1.0,
             range_rate: true,
             carrier_phase: false,

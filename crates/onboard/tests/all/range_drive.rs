@@ -141,7 +141,7 @@ pub fn setup(heads: usize, model: &Model) -> (EkfConfig, Vec<RadioHead>) {
          [gyroscope]\nnoise_rad_per_sqrt_s = {gyroscope_noise}\nbias_std_radps = {bias_std_radps}\n\
          [ranging]\nkind = \"one-way\"\nsigma_m = {sigma_m:?}\noffset_std_m = {OFFSET_STD_M:?}\n\
          offset_walk_m_per_sqrt_m = {offset_walk:?}\nclock_offset_std_ns = {CLOCK_STD_NS:?}\n\
-         clock_drift_std_ppb = {DRIFT_STD_PPB:?}\nclock_wander_ns_per_sqrt_s = {wander_ns}\n\
+         clock_frequency_std_ppb = {DRIFT_STD_PPB:?}\nclock_wander_ns_per_sqrt_s = {wander_ns}\n\
          clock_drift_walk_ppb_per_sqrt_s = {drift_walk_ppb}\n\
          position_m = [{forward_m:?}, {left_m:?}, 1.0]\nrange_rate = {rate}\ncarrier_phase = {phase}\n"
     );
