@@ -116,12 +116,6 @@ const ROWS: &[Usual] = &[
         write: |it| format!("specify MHz: {it} GHz are {}", rounded(it * 1000.0)),
     },
     Usual {
-        key: "receiver.correlated_noise_std_rad",
-        within: [0.0, 1.0],
-        why: "an angle with this error contains no information",
-        write: as_degrees,
-    },
-    Usual {
         key: "odometer.scale",
         within: [0.8, 1.25],
         why: "wear and load change the wheel radius by a few percent",

@@ -32,9 +32,6 @@ pub struct ReceiverSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 0.5))]
     pub angle_time_offset_std_s: Option<f64>,
-    /// Standard deviation of the time-correlated part of the electrical angle's error, in radians.
-    #[schemars(range(min = 0.0, max = 3.2))]
-    pub correlated_noise_std_rad: f64,
     /// Maximum fraction of an angle's variance that is time-correlated; the actual fraction is
     /// estimated while driving. Default: 0.25 for logged angles, 0 for angles of the receiver,
     /// whose variance is that of thermal noise.
@@ -68,7 +65,6 @@ impl Default for ReceiverSettings {
             snr_noise_db: 0.0,
             angle_time_offset_s: 0.0,
             angle_time_offset_std_s: None,
-            correlated_noise_std_rad: 0.0,
             correlated_noise_fraction: None,
             multipath_bias_probability: None,
             noise_correlation_time_s: 1.0,

@@ -102,8 +102,6 @@ const FORGETTING_TURN_RAD: f64 = 0.5;
 /// first-order Gauss–Markov process over time and distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CorrelatedNoise {
-    /// Stationary standard deviation (rad).
-    pub std_rad: f64,
     /// Maximum time-correlated fraction of each angle's own variance.
     pub share: f64,
     /// Whether this fraction is estimated while driving. It is constant where likelihoods are
@@ -132,13 +130,13 @@ impl CorrelatedNoise {
     /// `(1 + ρ)/(1 − ρ) = coth Δ/2` times the variance of independent ones.
     pub fn variance(&self, sigma_rad: f64, elapsed_s: f64, moved: (f64, f64)) -> f64 {
         let own = sigma_rad * sigma_rad;
-        let (stays, shared) = (self.std_rad * self.std_rad, self.share * own);
-        if stays + shared == 0.0 {
+        let shared = self.share * own;
+        if shared == 0.0 {
             return own;
         }
         let steps = self.steps(elapsed_s, moved);
         // At equal times there is no new information, but the variance must remain finite.
-        own - shared + (stays + shared) / (0.5 * steps.max(1e-4)).tanh()
+        own - shared + shared / (0.5 * steps.max(1e-4)).tanh()
     }
 }
 
@@ -325,7 +323,6 @@ impl EkfConfig {
                 .angle_time_offset_std_s
                 .unwrap_or(usual.angle_time_offset_std_s),
             correlated_noise: CorrelatedNoise {
-                std_rad: receiver.correlated_noise_std_rad,
                 share: receiver.correlated_noise_fraction.unwrap_or(0.0),
                 is_found: true,
                 correlation_s: receiver.noise_correlation_time_s,

@@ -2,7 +2,6 @@
 //! angles, and smoothed poses.
 
 use super::angle_model::{AngleModel, locate};
-use super::config::CorrelatedNoise;
 use super::filter::Ekf;
 use super::motion::{Reading, Step};
 use super::predict::MAX_STEPS;
@@ -78,17 +77,14 @@ impl Ekf {
             variance,
             measurement_variance,
         } = predicted.innovation;
-        let bias = self.correlated_noise();
-        let unbiased = CorrelatedNoise {
-            std_rad: 0.0,
-            ..bias
-        };
         let (sigma, (travelled_m, _)) = (predicted.own_variance.sqrt(), predicted.moved);
         let (aperture, direction_cosine) = (predicted.aperture, predicted.direction_cosine);
-        let noise = unbiased.variance(sigma, predicted.elapsed_s, predicted.moved)
+        let noise = self
+            .correlated_noise()
+            .variance(sigma, predicted.elapsed_s, predicted.moved)
             + (self.config).scatter_variance(travelled_m, aperture, direction_cosine);
         // An error that is common to many angles counts once.
-        let lasting = self.systematic_variance(&predicted);
+        let lasting = predicted.systematic_variance();
         Some(ExcludedInnovation {
             innovation: Innovation {
                 residual,

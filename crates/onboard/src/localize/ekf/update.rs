@@ -74,6 +74,12 @@ impl PredictedMeasurement {
     pub fn information_fraction(&self) -> f64 {
         bias::independent(self.moved.0.abs())
     }
+
+    /// Returns the variance of an angle's systematic errors: surveys, odometry since its newest sample, second-order
+    /// terms (rad²).
+    pub fn systematic_variance(&self) -> f64 {
+        self.survey_variance + self.coasted_variance + self.bend_variance
+    }
 }
 
 impl Ekf {
@@ -169,16 +175,6 @@ impl Ekf {
             predicted.direction_cosine,
         );
         predicted.own_variance + scatter
-    }
-
-    /// Returns the variance of an angle's systematic errors: surveys, specified correlated noise,
-    /// odometry since its newest sample, second-order terms (rad²).
-    pub(in crate::localize) fn systematic_variance(&self, predicted: &PredictedMeasurement) -> f64 {
-        let bias = self.config.correlated_noise.std_rad;
-        predicted.survey_variance
-            + bias * bias
-            + predicted.coasted_variance
-            + predicted.bend_variance
     }
 
     /// Returns the model of a radio head for a state, at the reception time of the angle.

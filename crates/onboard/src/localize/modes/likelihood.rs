@@ -174,7 +174,7 @@ pub(in crate::localize) fn range_density(predicted: &PredictedRange) -> f64 {
 /// Returns the variance (rad²) of an angle without the state covariance, for the first angle of a
 /// radio head.
 fn first_variance(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
-    ekf.first_variance(predicted) + ekf.systematic_variance(predicted)
+    ekf.first_variance(predicted) + predicted.systematic_variance()
 }
 
 /// Returns the fraction of an angle that is independent of the previous one of its radio head. A
