@@ -170,18 +170,6 @@ const ROWS: &[Usual] = &[
         write: |it| format!("write rad/√s: {it} °/√h are {:.1e}", it.to_radians() / 60.0),
     },
     Usual {
-        key: "gyroscope.noise_rad_per_sqrt_m",
-        within: [0.0, 0.5],
-        why: "the heading would be unknown after a few metres",
-        write: as_degrees,
-    },
-    Usual {
-        key: "gyroscope.noise_rad_per_sqrt_rad",
-        within: [0.0, 0.7],
-        why: "the heading would be unknown after one turn",
-        write: as_degrees,
-    },
-    Usual {
         key: "gyroscope.bias_radps",
         within: [-0.2, 0.2],
         why: "the bias of any gyroscope is below 0.1 rad/s",

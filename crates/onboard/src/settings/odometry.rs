@@ -78,12 +78,6 @@ pub struct GyroscopeSettings {
     /// Angle random walk in rad/√s.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub noise_rad_per_sqrt_s: f64,
-    /// Random walk of the heading with distance, in rad/√m: wheels of unequal grip.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub noise_rad_per_sqrt_m: f64,
-    /// Random walk of the heading with the yaw change, in rad/√rad: wheels that slip while turning.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub noise_rad_per_sqrt_rad: f64,
     /// Constant bias in rad/s.
     #[schemars(range(min = -10.0, max = 10.0))]
     pub bias_radps: f64,

@@ -307,8 +307,6 @@ fn a_gyroscope_reduces_the_error_as_predicted() {
         let mut with = without.clone();
         with.vehicle.gyroscope = Some(GyroscopeSettings {
             noise_rad_per_sqrt_s: 1e-3,
-            noise_rad_per_sqrt_m: 0.0,
-            noise_rad_per_sqrt_rad: 0.0,
             bias_radps: 0.0,
             bias_std_radps: 1e-3,
             bias_walk_radps_per_sqrt_s: 0.0,

@@ -75,11 +75,6 @@ pub struct EkfConfig {
     pub speed_noise_mps: f64,
     /// Maximum yaw rate of a sample, and of the lane keeping (rad/s).
     pub top_yaw_rate_radps: f64,
-    /// Random walk of the heading due to the yaw rate sensor, per distance (rad/√m) and per heading
-    /// change (rad/√rad).
-    pub yaw_noise_rad_per_sqrt_m: f64,
-    /// See `yaw_noise_rad_per_sqrt_m`.
-    pub yaw_noise_rad_per_sqrt_rad: f64,
     /// Standard deviation of the angles' time offset (s); 0 means exact times.
     pub angle_time_offset_std_s: f64,
     /// Specified time-correlated noise of the angles.
@@ -317,8 +312,6 @@ impl EkfConfig {
             // A fast oscillation of the lane keeping can exceed the usual maximum.
             top_yaw_rate_radps: TOP_YAW_RATE_RADPS
                 .max(SIGMAS_OF_SWING * keeping.pull_per_m() * vehicle.top_speed_mps()),
-            yaw_noise_rad_per_sqrt_m: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_m),
-            yaw_noise_rad_per_sqrt_rad: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_rad),
             angle_time_offset_std_s: receiver
                 .angle_time_offset_std_s
                 .unwrap_or(usual.angle_time_offset_std_s),

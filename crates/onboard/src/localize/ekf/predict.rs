@@ -100,7 +100,7 @@ impl Ekf {
             self.advance(reading.share(lost_s / duration_s), lost_s, guessed);
         }
         let yaw = rate.map(|rate| {
-            let mut yaw = self.yaw(rate, covered.read_m, covered_s);
+            let mut yaw = self.yaw(rate, covered_s);
             let change_rad = (before.unwrap_or(rate) - rate) * covered_s;
             if refused.is_some() {
                 yaw.variance += (REFUSED_RADPS * covered_s).powi(2);
@@ -196,16 +196,12 @@ impl Ekf {
     }
 
     /// Returns the yaw rate measurement of a step.
-    fn yaw(&self, rate_radps: f64, reading_m: f64, duration_s: f64) -> Yaw {
-        let config = &self.config;
-        let turn_rad = rate_radps * duration_s;
+    fn yaw(&self, rate_radps: f64, duration_s: f64) -> Yaw {
         Yaw {
-            turn_rad,
+            turn_rad: rate_radps * duration_s,
             duration_s,
             is_measured: true,
-            variance: config.yaw_noise_rad_per_sqrt_s.powi(2) * duration_s
-                + config.yaw_noise_rad_per_sqrt_m.powi(2) * reading_m.abs()
-                + config.yaw_noise_rad_per_sqrt_rad.powi(2) * turn_rad.abs(),
+            variance: self.config.yaw_noise_rad_per_sqrt_s.powi(2) * duration_s,
         }
     }
 
