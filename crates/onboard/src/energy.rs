@@ -9,6 +9,9 @@ use crate::settings::{
     Boundary, Extent, Figure, Platform, PowerMode, Provenance, SettingsError, Vehicle,
 };
 
+/// Duration of an SSB burst, which is transmitted within half a frame (TS 38.213, 4.1), in ms.
+const BURST_MS: f64 = 5.0;
+
 /// Energy model of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnergyModel {
@@ -132,7 +135,7 @@ impl EnergyModel {
             .settling_ms
             .as_ref()
             .map_or(0.0, |it| it.at(extent));
-        let on_s = (settling_ms + receiver.on_time_ms) * 1e-3;
+        let on_s = (settling_ms + BURST_MS) * 1e-3;
         let radio_j = radio.map_or(0.0, |it| it.at(extent) * on_s * scale(it.boundary));
         let cpu = platform.cpu.as_ref().filter(|_| receiver.counted);
         let burst_s = cpu.map_or(0.0, |cpu| {
@@ -281,7 +284,7 @@ mod tests {
             .unwrap();
         let energy = model(&counted, Extent::Value).run_energy(0, 100, 10.0);
         let receiver = &counted.receiver;
-        let on_ms = receiver.on_time_ms + receiver.settling_ms.as_ref().unwrap().value;
+        let on_ms = BURST_MS + receiver.settling_ms.as_ref().unwrap().value;
         let radio_j = 100.0 * on_ms * 1e-3 * receiver.power_w.as_ref().unwrap().value;
         assert!((energy.listening_j - radio_j).abs() < 1e-9, "{energy:?}");
         assert_eq!(energy.idle_j, 0.0);
@@ -307,7 +310,6 @@ mod tests {
         power_w = { value = 4.0, provenance = "assumed", source = "test", boundary = "soc-rails" }
         [receiver]
         counted = true
-        on_time_ms = 5.0
         settling_ms = { value = 5.0, low = 1.0, high = 15.0, provenance = "assumed", source = "test" }
         power_w = { value = 1.0, low = 0.5, high = 2.0, provenance = "assumed", source = "test", boundary = "marginal" }
         [cpu]

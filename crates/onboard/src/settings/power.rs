@@ -20,31 +20,17 @@ pub struct IdleSettings {
 }
 
 /// `[receiver]`: power of the receiver.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReceiverPower {
     /// Whether the receiver's power is part of a run's energy.
     pub counted: bool,
-    /// Receiver on-time for one SSB burst, in ms.
-    #[schemars(range(min = 0.0, max = 1000.0))]
-    pub on_time_ms: f64,
-    /// Receiver on-time before the burst, until oscillator and gain have settled, in ms.
+    /// Receiver on-time before a burst of 5 ms, until oscillator and gain have settled, in ms.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub settling_ms: Option<Quantity>,
     /// Power of the receiver in watts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub power_w: Option<Figure>,
-}
-
-impl Default for ReceiverPower {
-    fn default() -> Self {
-        Self {
-            counted: false,
-            on_time_ms: 5.0,
-            settling_ms: None,
-            power_w: None,
-        }
-    }
 }
 
 /// `[cpu]`: an estimate takes a number of cycles at the mode's clock frequency, at the power of one
