@@ -158,7 +158,6 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
     "hardly any power": ({"site.radio_heads[0].eirp_dbm": -90.0}, "radio_heads[0]", "dBm"),
     "noise figure": ({"vehicle.receiver.noise_figure_db": 35.0}, "noise_figure_db", "35 K is 0.5"),
     "gain with the amplifier's": ({"vehicle.array.rx_gain_dbi": 45.0}, "rx_gain_dbi", "amplifier"),
-    "bandwidth in GHz": ({"vehicle.receiver.bandwidth_mhz": 0.02}, "bandwidth_mhz", "20"),
     "spacing of FR1 at 28 GHz": ({"site.carrier_mhz": 28000.0}, "subcarrier_spacing_khz", "120"),
     "spacing of FR2 at 3.5 GHz": (
         {"site.ssb.subcarrier_spacing_khz": 120.0}, "subcarrier_spacing_khz", "15 or 30"),
@@ -273,7 +272,7 @@ UNLIKE = {
         eirp_dbm = 45.0
         """,
         """
-        receiver = { bandwidth_mhz = 28.8, noise_figure_db = 10.0 }
+        receiver = { noise_figure_db = 10.0 }
         array = { rx_gain_dbi = 12.0 }
         """,
         "",

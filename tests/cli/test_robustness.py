@@ -144,7 +144,7 @@ def test_invalid_start_times_are_rejected(access_av: Cli, drive: Path, start_s: 
         ("site.road.start.y_m", -1e308),
         ("site.radio_heads[0].position_m", [1e200, 0.0, 0.0]),
         ("vehicle.array.position_m", [0.0, 1e30, 0.0]),
-        ("vehicle.receiver.bandwidth_mhz", 1e-308),
+        ("vehicle.receiver.noise_figure_db", 1e308),
         ("vehicle.odometer.scale_std", 1e6),
         ("site.road.segments[0].turn_rad", -1e308),
         ("vehicle.array.elements", 2**40),

@@ -23,7 +23,7 @@ impl LinkBudget {
     /// Returns the link budget between a site's cells and a vehicle.
     pub fn new(site: &Site, vehicle: &Vehicle) -> Self {
         let receiver = &vehicle.receiver;
-        let noise_w = BOLTZMANN_J_PER_K * NOISE_TEMPERATURE_K * receiver.bandwidth_mhz * 1e6;
+        let noise_w = BOLTZMANN_J_PER_K * NOISE_TEMPERATURE_K * site.ssb.bandwidth_hz();
         Self {
             wavelength_m: site.wavelength_m(),
             rx_gain_dbi: vehicle.array.rx_gain_dbi,

@@ -110,12 +110,6 @@ const ROWS: &[Usual] = &[
         },
     },
     Usual {
-        key: "receiver.bandwidth_mhz",
-        within: [0.1, 1000.0],
-        why: "an SSB of 240 subcarriers is 3.6 to 57.6 MHz wide",
-        write: |it| format!("specify MHz: {it} GHz are {}", rounded(it * 1000.0)),
-    },
-    Usual {
         key: "odometer.scale",
         within: [0.8, 1.25],
         why: "wear and load change the wheel radius by a few percent",

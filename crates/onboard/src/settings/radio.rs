@@ -117,4 +117,9 @@ impl SsbSettings {
     pub fn period_s(&self) -> f64 {
         self.period_ms * 1e-3
     }
+
+    /// Returns the bandwidth of an SSB, 240 subcarriers, in hertz (TS 38.211, 7.4.3.1).
+    pub fn bandwidth_hz(&self) -> f64 {
+        240.0 * self.subcarrier_spacing_khz * 1e3
+    }
 }

@@ -12,9 +12,6 @@ pub struct ReceiverSettings {
     /// Noise figure in dB, relative to the noise at 290 K.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub noise_figure_db: f64,
-    /// Bandwidth of one snapshot in MHz.
-    #[schemars(range(min = 1e-3, max = 2000.0))]
-    pub bandwidth_mhz: f64,
     /// Part of the transmitted signal that the receiver knows.
     pub pilots: Pilots,
     /// Number of snapshots of each SSB if `pilots` is "blind".
@@ -59,7 +56,6 @@ impl Default for ReceiverSettings {
     fn default() -> Self {
         Self {
             noise_figure_db: 5.0,
-            bandwidth_mhz: 3.6,
             pilots: Pilots::Ssb,
             snapshots: 20,
             snr_noise_db: 0.0,
