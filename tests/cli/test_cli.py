@@ -226,7 +226,7 @@ PID = '[vehicle]\nextends = "paper"\n[vehicle.wake_up.trigger]\nbase_ms = 300.0\
         (SCENARIO + HEAD.replace("[205.0, 100.0,", "[0.0, 0.0,"), ["site.radio_heads[0]"]),
         (
             SCENARIO.replace('vehicle = "paper"\n', "") + HEAD + PID,
-            ["vehicle.wake_up.trigger.position_uncertainty_m", "t_max of 240.0 ms"],
+            ["vehicle.wake_up.trigger.target_error_m", "t_max of 240.0 ms"],
         ),
         (SCENARIO + HEAD + "[truth.vehicle.array]\nmountin_rad = 1\n",
          ["truth.vehicle.array.mountin_rad", "mounting_rad"]),

@@ -142,7 +142,7 @@ def test_a_contradictory_interpretation_is_reported_and_the_others_are_evaluated
 
 def test_an_explicit_contradiction_is_refused() -> None:
     changes = {"vehicle.wake_up.trigger.base_ms": 300.0}
-    with pytest.raises(SettingsError, match=r"wake_up\.trigger\.position_uncertainty_m"):
+    with pytest.raises(SettingsError, match=r"wake_up\.trigger\.target_error_m"):
         Scenario.load("paper").with_overrides(changes)
     late = {"vehicle.wake_up.t_max_ms": 100.0, "vehicle.wake_up.trigger.base_ms": 150.0}
     with pytest.raises(SettingsError, match=r"wake_up\.t_max_ms"):
@@ -151,10 +151,10 @@ def test_an_explicit_contradiction_is_refused() -> None:
 
 def test_t_max_follows_from_the_position_uncertainty_unless_it_is_stated() -> None:
     gate = interpretations.load("gate")
-    assert gate.wake_up["trigger"]["position_uncertainty_m"] == 1.0
+    assert gate.wake_up["trigger"]["target_error_m"] == 1.0
     assert gate.t_max_s == pytest.approx(0.24, abs=1e-12), "1 m at 15 km/h"
     for changes, t_max_s in (
-        ({"position_uncertainty_m": 2.0}, 0.48),
+        ({"target_error_m": 2.0}, 0.48),
         ({"t_max_ms": 300.0}, 0.3),
     ):
         paths = {f"vehicle.wake_up.trigger.{key}": value for key, value in changes.items()}

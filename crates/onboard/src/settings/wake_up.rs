@@ -76,13 +76,13 @@ pub struct PidSettings {
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub base_ms: Option<f64>,
     /// Maximum wake-up time in ms. Default: time in which the vehicle drives
-    /// `position_uncertainty_m` at top speed.
+    /// `target_error_m` at top speed.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub t_max_ms: Option<f64>,
-    /// Bound on the position uncertainty between two estimates in metres; x̃_max of the paper.
+    /// Target position error between two estimates in metres; x̃_max of the paper.
     #[schemars(range(min = 1e-3, max = 1e4))]
-    pub position_uncertainty_m: f64,
+    pub target_error_m: f64,
     /// SSB that is used if an estimate becomes due between two SSBs.
     #[serde(skip_serializing_if = "SsbSelection::is_first_after")]
     pub ssb_selection: SsbSelection,
@@ -123,7 +123,7 @@ impl Default for PidSettings {
         Self {
             base_ms: None,
             t_max_ms: None,
-            position_uncertainty_m: 1.0,
+            target_error_m: 1.0,
             ssb_selection: SsbSelection::FirstAfter,
             kp: 0.75,
             ki: 0.08,
@@ -145,7 +145,7 @@ impl PidSettings {
     /// t_max.
     pub fn t_max_s(&self, top_speed_mps: f64) -> f64 {
         let stated_s = self.t_max_ms.map(|ms| ms * 1e-3);
-        stated_s.unwrap_or(self.position_uncertainty_m / top_speed_mps)
+        stated_s.unwrap_or(self.target_error_m / top_speed_mps)
     }
 
     /// Returns an error if the maximum wake-up time is below the minimum, whose key is `base`.
@@ -164,8 +164,8 @@ impl PidSettings {
         let (key, value, what) = match self.t_max_ms {
             Some(t_max_ms) => ("t_max_ms", t_max_ms, "it".to_owned()),
             None => (
-                "position_uncertainty_m",
-                self.position_uncertainty_m,
+                "target_error_m",
+                self.target_error_m,
                 format!(
                     "at the top speed it gives a t_max of {:.1} ms, which",
                     t_max_s * 1e3

@@ -39,7 +39,7 @@ fn misspelt_keys_get_the_nearest_known_key() {
     );
     let nearest = "did you mean `t_max_ms`?";
     assert_message(
-        with_line("position_uncertainty_m = 1.0", "tmax_ms = 240.0"),
+        with_line("target_error_m = 1.0", "tmax_ms = 240.0"),
         "vehicle.wake_up.trigger.tmax_ms",
         nearest,
     );
@@ -195,11 +195,11 @@ fn a_bend_in_an_unsurveyed_segment_is_rejected() {
 
 #[test]
 fn contradictions_are_reported_with_both_sides() {
-    let bound = "position_uncertainty_m = 1.0";
+    let bound = "target_error_m = 1.0";
     let outcome = with_line(bound, "base_ms = 250.0\nt_max_ms = 240.0");
     assert_message(outcome, "vehicle.wake_up.trigger.t_max_ms", "base_ms, 250");
-    let outcome = with_line(bound, "base_ms = 250.0\nposition_uncertainty_m = 1.0");
-    let key = "vehicle.wake_up.trigger.position_uncertainty_m";
+    let outcome = with_line(bound, "base_ms = 250.0\ntarget_error_m = 1.0");
+    let key = "vehicle.wake_up.trigger.target_error_m";
     assert_message(outcome, key, "t_max of 240.0 ms");
     let outcome = with_line("pilots = \"blind\"", "pilots = \"pss+sss\"");
     assert_message(outcome, "vehicle.estimator.method", "receiver.pilots");
@@ -215,7 +215,7 @@ fn contradictions_are_reported_with_both_sides() {
 
 #[test]
 fn base_time_of_the_platform_limits_the_interval() {
-    let scenario = with_line("position_uncertainty_m = 1.0", "t_max_ms = 60.0").unwrap();
+    let scenario = with_line("target_error_m = 1.0", "t_max_ms = 60.0").unwrap();
     let simulation = Simulation::on_its_platform(&scenario).map(drop);
     let message = simulation.unwrap_err().to_string();
     assert!(
