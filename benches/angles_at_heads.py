@@ -110,7 +110,7 @@ def convert(source: Path, out: Path, seed: int) -> tuple[float, float, float]:
         heads.append(
             f'[[radio_heads]]\nname = "{point["ap"]}"\npci = {number}\n'
             f"position_m = [{point['x_m']}, {point['y_m']}, 0.0]\n"
-            f"array = {{ azimuth_rad = {point['yaw_rad']} }}\n"
+            f"array = {{ mounting_rad = {point['yaw_rad']} }}\n"
         )
     pl.concat(angles).sort("time_s").write_csv(out / "angles.csv")
     (out / "site.toml").write_text('name = "lab"\ncarrier_mhz = 5200.0\n' + "".join(heads))

@@ -30,7 +30,7 @@ class RobotSeenByHeads(Robot):
     def site(self) -> str:
         heads = (
             f"[[radio_heads]]\npci = {pci}\nposition_m = [{x}, {y}, 0.0]\n"
-            + (f"array = {{ azimuth_rad = {AZIMUTH_RAD[pci]} }}\n" if self.with_arrays else "")
+            + (f"array = {{ mounting_rad = {AZIMUTH_RAD[pci]} }}\n" if self.with_arrays else "")
             for pci, (x, y) in self.heads_m.items()
         )
         return 'name = "hall"\n' + "".join(heads)
@@ -89,7 +89,7 @@ def test_angles_of_heads_without_an_array_are_reported_and_not_used(tmp_path: Pa
     assert not found.angles["accepted"].any()
     remarks = "\n".join(found.remarks)
     assert "measured at the radio head (at_head is 1)" in remarks
-    assert "radio_heads[0].array.azimuth_rad" in remarks
+    assert "radio_heads[0].array.mounting_rad" in remarks
 
 
 def test_angles_of_vehicle_and_heads_are_used_together(tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ impl ExpectedAngle {
         let [forward_m, left_m, up_m] = self.position_m;
         let array = pose.point_at(forward_m, left_m);
         if kind.is_at_head() {
-            let axis_rad = head.array.map_or(f64::NAN, |own| own.azimuth_rad);
+            let axis_rad = head.array.map_or(f64::NAN, |own| own.mounting_rad);
             return wrap_angle(value_rad - head.position.bearing_rad(array) + axis_rad);
         }
         let ground_m = array.distance_m(head.position);

@@ -9,7 +9,7 @@
 //! `at_head` is 1 for an angle that was measured by the array of the radio head, and 0 (default) for
 //! an angle that was measured on the vehicle. For an angle measured at the radio head, `angle_rad`
 //! and `phase_rad` are both the azimuth of the vehicle in the frame of the radio head's array, whose
-//! direction is `radio_heads.array.azimuth_rad` of the site.
+//! direction is `radio_heads.array.mounting_rad` of the site.
 
 use std::collections::BTreeMap;
 use std::fmt;

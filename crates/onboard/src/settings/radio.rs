@@ -73,11 +73,11 @@ pub struct RadioHeadSettings {
 pub struct HeadArraySettings {
     /// Direction of azimuth 0 of the array, counter-clockwise from +x of the map, in radians.
     #[schemars(range(min = -6.3, max = 6.3))]
-    pub azimuth_rad: f64,
-    /// Standard deviation of `azimuth_rad`, in radians.
+    pub mounting_rad: f64,
+    /// Standard deviation of `mounting_rad`, in radians.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 3.2))]
-    pub azimuth_std_rad: f64,
+    pub mounting_std_rad: f64,
 }
 
 impl RadioHeadSettings {

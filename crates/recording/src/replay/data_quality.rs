@@ -154,7 +154,7 @@ fn without_array<'a>(
             format!(
                 "{count} angles of pci {}, ssb_index {} were measured at the radio head (at_head is 1), but \
                  the site does not define the direction of its array; they are not used; add \
-                 radio_heads[{number}].array.azimuth_rad to the site",
+                 radio_heads[{number}].array.mounting_rad to the site",
                 head.pci, head.ssb_index
             )
         })

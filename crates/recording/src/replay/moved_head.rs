@@ -55,7 +55,7 @@ pub fn triangulate(drive: &Drive<'_>, head: HeadId, path: &[Option<Pose>]) -> Op
             let (measured, pose) = (with_phase(angle, &measurand).measured, (*pose)?);
             let axis_rad = match measured.kind {
                 MeasurementKind::Angle => pose.heading_rad + array.mounting_rad,
-                MeasurementKind::AngleAtHead => settings.array?.azimuth_rad,
+                MeasurementKind::AngleAtHead => settings.array?.mounting_rad,
             };
             Some(Sighted {
                 kind: measured.kind,

@@ -308,12 +308,12 @@ impl AngleModel {
         let sight = LineOfSight::new(head, pose, frame, mean, array)?;
         let position_variance = head.position_std_m.powi(2) + array.position_std_m.powi(2);
         Some(Self {
-            phase_rad: sight.bearing_rad + std::f64::consts::PI - own.azimuth_rad,
+            phase_rad: sight.bearing_rad + std::f64::consts::PI - own.mounting_rad,
             row: sight.bearing_row,
             range_m: sight.range_m,
             direction_cosine: sight.along * sight.cos_elevation(),
             survey_variance: position_variance / sight.ground_m.powi(2)
-                + own.azimuth_std_rad.powi(2),
+                + own.mounting_std_rad.powi(2),
             aperture: f64::INFINITY,
             turn: sight.bearing_row,
             position_rows: sight.position_rows,
@@ -456,8 +456,8 @@ mod tests {
             ..ARRAY
         };
         let own = HeadArraySettings {
-            azimuth_rad: 0.7,
-            azimuth_std_rad: 0.02,
+            mounting_rad: 0.7,
+            mounting_std_rad: 0.02,
         };
         let head = RadioHead {
             array: Some(own),
