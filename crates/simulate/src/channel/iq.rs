@@ -100,8 +100,7 @@ impl IqAir {
         let settings = scenario.iq;
         let mut hardware = streams.generator(Purpose::ReceiverHardware, 0);
         let mut normal = || hardware.sample::<f64, _>(StandardNormal);
-        let drawn_ppm = settings.oscillator_ppm * normal();
-        let oscillator = 1e-6 * settings.oscillator_error_ppm.unwrap_or(drawn_ppm);
+        let oscillator = 1e-6 * (settings.oscillator_ppm * normal());
         let channel_gains = (0..elements).map(|_| {
             let gain = 10f64.powf(0.05 * settings.channel_gain_db * normal());
             Complex64::from_polar(gain, settings.channel_phase_rad * normal())

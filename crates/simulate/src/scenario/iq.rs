@@ -11,11 +11,6 @@ pub struct IqSettings {
     /// drawn once per run. The error affects the carrier frequency and the sample clock.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub oscillator_ppm: f64,
-    /// Frequency error of the receiver's oscillator in parts per million, instead of a random one;
-    /// positive is too fast.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = -60.0, max = 60.0))]
-    pub oscillator_error_ppm: Option<f64>,
     /// Resolution of the A/D converter in bits, for each of I and Q.
     #[schemars(range(min = 1, max = 24))]
     pub adc_bits: u8,
@@ -36,7 +31,6 @@ impl Default for IqSettings {
     fn default() -> Self {
         Self {
             oscillator_ppm: 0.5,
-            oscillator_error_ppm: None,
             adc_bits: 12,
             channel_phase_rad: 0.0,
             channel_gain_db: 0.0,
