@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 # Between the straight of 200 m and the first radio head, at (60, 25).
-WALL = {"points_m": [[40.0, 10.0], [80.0, 10.0]]}
+WALL = {"polyline_m": [[40.0, 10.0], [80.0, 10.0]]}
 GATE_PCI = 21
 
 
@@ -105,18 +105,18 @@ def test_invalid_walls_are_rejected() -> None:
         return [f"{it.key}: {it.why}" for it in found]
 
     assert not said(WALL)
-    across = {"points_m": [[100.0, -10.0], [100.0, 10.0]]}
-    assert said(WALL, across) == ["walls[1].points_m: it crosses the road at 100 m along the road"]
+    across = {"polyline_m": [[100.0, -10.0], [100.0, 10.0]]}
+    assert said(WALL, across) == ["walls[1].polyline_m: it crosses the road at 100 m along the road"]
     x_m, y_m, _ = site["radio_heads"][0]["position_m"]
     ring = [
         [x_m + dx_m, y_m + dy_m] for dx_m, dy_m in ((-5, -5), (5, -5), (5, 5), (-5, 5), (-5, -5))
     ]
     assert any(
         "radio_heads[0].position_m: walls hide the road from it" in it
-        for it in said({"points_m": ring})
+        for it in said({"polyline_m": ring})
     )
     for wall, key in (
-        ({"points_m": [[0.0, 0.0]]}, r"walls\[0\].points_m"),
+        ({"polyline_m": [[0.0, 0.0]]}, r"walls\[0\].polyline_m"),
         ({**WALL, "loss_db": -3.0}, r"walls\[0\].loss_db"),
         ({**WALL, "height_m": 3.0}, "height_m"),
     ):

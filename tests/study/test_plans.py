@@ -66,7 +66,7 @@ def test_drawings_give_equal_plants_or_report_omitted_entities(
         assert np.hypot(*(its[0] - truth[0])) < SAME_M, "driven from the first point"
     found = np.array([it["position_m"] for it in site["radio_heads"]])
     assert found == pytest.approx(np.array(HEADS), abs=SAME_M)
-    walls = [np.array(it["points_m"]) for it in site["walls"]]
+    walls = [np.array(it["polyline_m"]) for it in site["walls"]]
     assert [len(it) for it in walls] == [2, 2]
     assert apart_m(walls[0], WALL[:2]) < SAME_M
     assert apart_m(walls[1], WALL[1:]) < SAME_M

@@ -146,7 +146,7 @@ def test_a_drawing_gives_the_same_road(
     )
     assert walled.code == 0, walled.err
     straight, bent = (
-        np.array(it["points_m"]) for it in json.loads(Site.load(str(site)).to_json())["walls"]
+        np.array(it["polyline_m"]) for it in json.loads(Site.load(str(site)).to_json())["walls"]
     )
     assert straight == pytest.approx(np.array([[90.0, 10.0], [150.0, 10.0], [150.0, 40.0]]))
     assert np.hypot(*(bent - [90.0, 20.0]).T) == pytest.approx(np.full(len(bent), 10.0), abs=SAME_M)
@@ -279,7 +279,7 @@ def test_exported_and_imported_walls_are_equal(
 ) -> None:
     corners = [[float(x_m), 12.0] for x_m in range(90, 240)]  # more than a table may have
     walled = bends.with_overrides(
-        {"walls": [{"points_m": corners[:100]}, {"points_m": corners[99:]}]}
+        {"walls": [{"polyline_m": corners[:100]}, {"polyline_m": corners[99:]}]}
     )
     file, again = tmp_path / "site.geojson", tmp_path / "again.toml"
     (tmp_path / "site.toml").write_text(walled.to_toml(), "utf-8")
@@ -294,7 +294,7 @@ def test_exported_and_imported_walls_are_equal(
     )
     assert done.code == 0, done.err
     walls = json.loads(Site.load(str(again)).to_json())["walls"]
-    found = np.concatenate([walls[0]["points_m"], walls[1]["points_m"][1:]])
+    found = np.concatenate([walls[0]["polyline_m"], walls[1]["polyline_m"][1:]])
     assert found == pytest.approx(np.array(corners), abs=1e-3)
     only_a_road = tmp_path / "road.geojson"
     only_a_road.write_text(json.dumps(ROAD), "utf-8")

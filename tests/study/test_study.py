@@ -80,7 +80,7 @@ def places_of(dilution_m: list[float | None], visible: list[int]) -> pl.DataFram
 
 
 def test_an_error_is_explained_by_the_road_section_where_it_arose() -> None:
-    wall = 'name = "hall 3"\npoints_m = [[100.0, 5.0], [140.0, 5.0]]'
+    wall = 'name = "hall 3"\npolyline_m = [[100.0, 5.0], [140.0, 5.0]]'
     text = PLANT.replace("[[targets]]", f"[[site.walls]]\n{wall}\n[[targets]]", 1)
     plant = Plant.from_toml(text.replace("[10.0, 20.0, 8.0]", "[120.0, 20.0, 8.0]"))
     hidden = [100 <= at < 140 for at in range(300)]

@@ -47,7 +47,7 @@ def test_a_hidden_radio_head_that_fits_the_other_road_side_causes_a_warning(
     ends_m: tuple[float, float], is_doubtful: bool
 ) -> None:
     """Radio head `gate` of `bends`, 25 m to the left of a straight of 200 m, behind a long wall."""
-    walls = [{"name": "hall", "points_m": [[at_m, 10.0] for at_m in ends_m]}]
+    walls = [{"name": "hall", "polyline_m": [[at_m, 10.0] for at_m in ends_m]}]
     warnings = Plant.load("bends").with_overrides({"site.walls": walls}).warnings()
     assert any("[60.0, -25.0, 8]" in str(it) for it in warnings) is is_doubtful
 

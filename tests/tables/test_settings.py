@@ -12,7 +12,7 @@ from access_av.settings import as_dict, platform_name, ssb_period_s
 from conftest import ROOT
 
 # Maximum number of distinct names of keys in all kinds of settings files.
-MOST_KEYS = 241
+MOST_KEYS = 240
 
 KINDS = ("Site", "Vehicle", "Scenario", "Plant", "Platform")
 

@@ -30,14 +30,16 @@ impl Walls {
     pub fn new(site: &Site) -> Self {
         let segments = site.walls.iter().flat_map(|wall| {
             let loss_db = wall.loss_db.unwrap_or_else(|| concrete_db(site));
-            wall.points_m.windows(2).filter_map(move |ends| match ends {
-                &[from, to] => Some(Segment {
-                    from: from.into(),
-                    to: to.into(),
-                    loss_db,
-                }),
-                _ => None,
-            })
+            wall.polyline_m
+                .windows(2)
+                .filter_map(move |ends| match ends {
+                    &[from, to] => Some(Segment {
+                        from: from.into(),
+                        to: to.into(),
+                        loss_db,
+                    }),
+                    _ => None,
+                })
         });
         Self {
             segments: segments.collect(),
@@ -94,10 +96,10 @@ mod tests {
         assert_eq!(Walls::new(&site).seen(&head, behind), Some(head));
 
         site.rician_k_db = 10.0;
-        let points_m = vec![[-5.0, 0.0], [5.0, 0.0], [5.0, -20.0]];
+        let polyline_m = vec![[-5.0, 0.0], [5.0, 0.0], [5.0, -20.0]];
         let wall = |loss_db| WallSettings {
             name: String::new(),
-            points_m: points_m.clone(),
+            polyline_m: polyline_m.clone(),
             loss_db,
         };
         site.walls = vec![wall(None)];

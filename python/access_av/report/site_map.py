@@ -111,5 +111,5 @@ def walls_of(site: _core.Site) -> list[dict[str, float]]:
     return [
         {"x_m": x_m, "y_m": y_m, "x2_m": x2_m, "y2_m": y2_m}
         for wall in as_dict(site).get("walls", ())
-        for (x_m, y_m), (x2_m, y2_m) in pairwise(wall["points_m"])
+        for (x_m, y_m), (x2_m, y2_m) in pairwise(wall["polyline_m"])
     ]

@@ -176,7 +176,7 @@ def of_site(site: _core.Site) -> Drawn:
         for one in settings["radio_heads"]
         for x_m, y_m, z_m in [one["position_m"]]
     ]
-    walls = [[(x_m, y_m) for x_m, y_m in it["points_m"]] for it in settings.get("walls", ())]
+    walls = [[(x_m, y_m) for x_m, y_m in it["polyline_m"]] for it in settings.get("walls", ())]
     if settings.get("road") is None:
         return Drawn(heads=heads, walls_m=walls)
     scenario = _core.Scenario.from_toml('name = "road"\nsite = "yard"\nvehicle = "tugger"\n')

@@ -125,7 +125,7 @@ def _walls(drawn: Drawn, prefix: str) -> str:
         for first in range(0, len(wall) - 1, WALL_POINTS - 1):
             corners = wall[first : first + WALL_POINTS]
             points = ", ".join(f"[{x_m:.4f}, {y_m:.4f}]" for x_m, y_m in corners)
-            made += f"\n[[{prefix}walls]] # loss_db: that of concrete\npoints_m = [{points}]\n"
+            made += f"\n[[{prefix}walls]] # loss_db: that of concrete\npolyline_m = [{points}]\n"
     return made
 
 

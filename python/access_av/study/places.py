@@ -231,7 +231,7 @@ def hiding(row: Mapping[str, Any], plant: Mapping[str, Any]) -> str:
             for index, wall in enumerate(plant["site"].get("walls", []), start=1)
             if any(
                 _cross(ends, corners)
-                for corners in zip(wall["points_m"][:-1], wall["points_m"][1:], strict=True)
+                for corners in zip(wall["polyline_m"][:-1], wall["polyline_m"][1:], strict=True)
             )
         )
         if walls:

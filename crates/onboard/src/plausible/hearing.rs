@@ -140,7 +140,7 @@ impl Air {
             key: format!("radio_heads[{number}].position_m"),
             value: format!("[{}, {}]", head.position.x_m, head.position.y_m),
             why: format!("walls block its line of sight everywhere {where_}"),
-            write: "specify its position and the walls' points_m in one frame; omit doors"
+            write: "specify its position and the walls' polyline_m in one frame; omit doors"
                 .to_owned(),
         });
         let far = heads().filter_map(|(head, number)| {

@@ -276,7 +276,10 @@ fn other_side(site: &Site, road: &Road) -> Vec<Warning> {
     }
     let route: Vec<(f64, Point)> = steps_along(road, STEP_M, MAX_STEPS).collect();
     let is_hidden = |from: Point, to: Point| {
-        let mut walls = site.walls.iter().flat_map(|wall| wall.points_m.windows(2));
+        let mut walls = site
+            .walls
+            .iter()
+            .flat_map(|wall| wall.polyline_m.windows(2));
         walls.any(|ends| cross([from, to], [ends[0].into(), ends[1].into()]))
     };
     // Returns the fraction of the road around the distance `about_m` that walls hide from a
@@ -342,10 +345,10 @@ fn across(site: &Site, road: &Road) -> Vec<Warning> {
     let walls = site.walls.iter().enumerate();
     walls
         .filter_map(|(index, wall)| {
-            let along_m = wall.points_m.windows(2).find_map(blocked_m)?;
+            let along_m = wall.polyline_m.windows(2).find_map(blocked_m)?;
             Some(Warning {
-                key: format!("walls[{index}].points_m"),
-                value: format!("a wall of {} points", wall.points_m.len()),
+                key: format!("walls[{index}].polyline_m"),
+                value: format!("a wall of {} points", wall.polyline_m.len()),
                 why: format!("it crosses the road at {along_m:.0} m along the road"),
                 write: "specify it in the frame of the road, and as two walls with a gap at a door"
                     .to_owned(),
