@@ -90,9 +90,7 @@ fn late_signals_and_poor_clocks_displace_no_pose_beyond_its_level() {
         assert!((rms_m(record) - rms_m(&usual)).abs() > 1e-6);
         assert!(record.accepted_ranges > usual.accepted_ranges / 2);
     }
-    // The clock of the vehicle is estimated with the specified random walk. One that is ten times worse increases the
-    // error.
-    for record in &faulty[..3] {
+    for record in &faulty {
         assert!(rms_m(record) < 1.1 * rms_m(&angles));
         assert_eq!(ok_and_beyond(record)[0], ok_and_beyond(&angles)[0]);
     }

@@ -140,13 +140,15 @@ impl MultipathBias {
         [mean, self.covariance(place, place)]
     }
 
-    /// Predicts the range states over a distance and a duration.
+    /// Predicts the range states over a distance and a duration. The variance of the clocks' random
+    /// walk is the specified one times `clock_ratio`.
     pub fn advance_ranges(
         &mut self,
         model: &RangeModel,
         heads: &(impl Iterator<Item = RadioHead> + Clone),
         travelled_m: f64,
         duration_s: f64,
+        clock_ratio: f64,
     ) {
         let count = self.heads.len();
         let (clock, drift) = (self.biases + CLOCK, self.biases + DRIFT);
@@ -173,7 +175,8 @@ impl MultipathBias {
                 }
             }
             let walk = model.drift_walk_mps_per_sqrt_s.powi(2) * duration_s;
-            let wander = model.clock_wander_m_per_sqrt_s.powi(2) * duration_s;
+            let walked_s = clock_ratio * duration_s;
+            let wander = model.clock_wander_m_per_sqrt_s.powi(2) * walked_s;
             self.add_to(CLOCK, CLOCK, wander + walk * duration_s * duration_s / 3.0);
             self.add_to(CLOCK, DRIFT, 0.5 * walk * duration_s);
             self.add_to(DRIFT, CLOCK, 0.5 * walk * duration_s);
@@ -187,11 +190,7 @@ impl MultipathBias {
                 for column in states.clone() {
                     self.add_of_clocks(heads, wander, |one, other, covariance| {
                         let place = |of: &HeadState, index| of.number(index, number, model);
-                        (
-                            place(row, one),
-                            place(column, other),
-                            covariance * duration_s,
-                        )
+                        (place(row, one), place(column, other), covariance * walked_s)
                     });
                 }
             }

@@ -81,6 +81,10 @@ clone_in_place! {
         pub(super) white: WhiteNoiseFraction,
         /// Noise of the ranges relative to the specified one.
         pub(super) range_noise: RangeNoise,
+        /// Random walk of the clocks relative to the specified one.
+        pub(super) clock_noise: RangeNoise,
+        /// Time of the last used delay, which determined the vehicle's clock (s).
+        pub(super) last_delay_s: f64,
         /// Whether a carrier phase has determined the common phase offset since the newest odometry.
         pub(super) knows_common_phase: bool,
     }
@@ -122,6 +126,8 @@ impl Ekf {
             unread_m: 0.0,
             white: WhiteNoiseFraction::new(config.correlated_noise.share),
             range_noise: RangeNoise::STATED,
+            clock_noise: RangeNoise::STATED,
+            last_delay_s: f64::NEG_INFINITY,
             knows_common_phase: false,
         };
         ekf.update_off_map();

@@ -96,6 +96,7 @@ impl Ekf {
     pub(in crate::localize) const fn copy_noise_state(&mut self, other: &Self) {
         self.white = other.white;
         self.range_noise = other.range_noise;
+        self.clock_noise = other.clock_noise;
     }
 
     /// Returns a copy that expects the specified noise of the angles.

@@ -23,6 +23,8 @@ pub(in crate::localize) struct PredictedRange {
     pub(super) terms: RangeTerms,
     /// Specified variance of the measurement's own noise.
     pub(super) stated_variance: f64,
+    /// Time of the measurement (s).
+    pub(super) time_s: f64,
     /// Fraction of the measurement that is independent of the previous one of its radio head.
     pub information_fraction: f64,
     /// Distance driven at the measurement (m).
@@ -45,11 +47,15 @@ pub(super) struct Sighted<'a> {
     pub pose: Pose,
     pub frame: RoadFrame,
     pub sight: LineOfSight,
+    /// Time of the measurement (s).
+    pub time_s: f64,
     /// Time since the newest odometry (s).
     pub lag_s: f64,
     /// Distance driven at the measurement (m), and since the last used range of the radio head.
     pub place_m: f64,
     pub travelled_m: f64,
+    /// Variance of the clocks' random walk relative to the specified one.
+    pub clock_ratio: f64,
     ahead_variance: f64,
     ahead: Option<Step>,
 }
@@ -114,7 +120,9 @@ impl Ekf {
             pose,
             frame,
             sight,
+            time_s: measured.time_s,
             lag_s,
+            clock_ratio: self.clock_noise.ratio(),
             place_m,
             travelled_m: (place_m - head.last_range_m).abs(),
             ahead_variance,
@@ -165,6 +173,7 @@ impl Ekf {
             row,
             terms,
             stated_variance,
+            time_s: seen.time_s,
             information_fraction: 1.0,
             place_m: seen.place_m,
             is_new_sequence: false,
@@ -208,6 +217,7 @@ impl Sighted<'_> {
         let [_, head_wander] = model.head_clock(&self.head.clock);
         let wander = model.clock_wander_m_per_sqrt_s.powi(2) + head_wander.powi(2);
         // The clock drift has a random walk during the lag.
-        wander * lag_s + model.drift_walk_mps_per_sqrt_s.powi(2) * lag_s.powi(3) / 3.0
+        self.clock_ratio * wander * lag_s
+            + model.drift_walk_mps_per_sqrt_s.powi(2) * lag_s.powi(3) / 3.0
     }
 }

@@ -61,7 +61,7 @@ impl Ekf {
         // The random walk of both clocks within the interval is noise of the rate.
         let [_, head_wander] = seen.model.head_clock(&seen.head.clock);
         let wander = seen.model.clock_wander_m_per_sqrt_s.powi(2) + head_wander.powi(2);
-        let walked = wander / measured_s.max(MIN_INTERVAL_S);
+        let walked = seen.clock_ratio * wander / measured_s.max(MIN_INTERVAL_S);
         // The radio heads of a burst have a common speed error.
         let shared = self.heads.len().max(1) as f64;
         let model_variance = (cos_elevation * cosine).powi(2) * shared * speed_variance

@@ -73,6 +73,9 @@ impl Ekf {
             return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
         }
         self.note_range(&predicted);
+        if predicted.quantity == RangeQuantity::Range {
+            self.last_delay_s = predicted.time_s;
+        }
         self.bias.update_with_range(
             &mut self.belief,
             &predicted.row,
@@ -95,15 +98,13 @@ impl Ekf {
 
     /// Estimates the noise of the ranges with an innovation, and counts successive outliers.
     fn monitor_range(&mut self, predicted: &PredictedRange, is_outlier: bool) {
-        let seen = predicted.innovation;
-        let known = seen.variance - seen.measurement_variance;
-        let model =
-            seen.measurement_variance - self.range_noise.ratio() * predicted.stated_variance;
-        self.range_noise.see(
-            seen.residual,
-            (known + model).max(0.0),
-            predicted.stated_variance,
-        );
+        self.range_noise
+            .see(&predicted.innovation, predicted.stated_variance);
+        let model = self.config.ranging.as_ref();
+        let wander = model.map_or(0.0, |model| model.clock_wander_m_per_sqrt_s);
+        let since_s = (predicted.time_s - self.last_delay_s).max(0.0);
+        self.clock_noise
+            .see(&predicted.innovation, wander * wander * since_s);
         if is_outlier {
             self.reject_range(predicted);
         } else if let Some(head) = self.heads.get_mut(predicted.index) {
@@ -147,8 +148,9 @@ impl Ekf {
         self.knows_common_phase = false;
         if let Some(model) = &self.config.ranging {
             let heads = self.heads.iter().map(|head| head.known);
+            let clock_ratio = self.clock_noise.ratio();
             self.bias
-                .advance_ranges(model, &heads, travelled_m, duration_s);
+                .advance_ranges(model, &heads, travelled_m, duration_s, clock_ratio);
         }
     }
 
