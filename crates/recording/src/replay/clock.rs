@@ -1,6 +1,6 @@
-//! Time offset between the clocks of angles and odometry, estimated before the drive is located.
+//! Time offset between the clocks of angles or ranges and odometry, estimated before the drive is located.
 //!
-//! A plain filter predicts the angles for each assumed time offset. The likelihood of its
+//! A plain filter predicts the measurements for each assumed time offset. The likelihood of its
 //! innovations is the likelihood of the offset (Schweppe, IEEE Trans. IT 11(1), 1965). It is
 //! searched on a grid and then by golden section (Kiefer, Proc. AMS 4, 1953). Start position, start
 //! heading and odometer scale are estimated together with the offset, because they are confounded
@@ -8,13 +8,17 @@
 //! at constant speed, late angles resemble those of an earlier position.
 
 use onboard::localize::ekf::EkfConfig;
-use onboard::settings::LocalizerSettings;
+use onboard::radio_head::RadioHead;
+use onboard::settings::{LocalizerSettings, Site, Vehicle};
 
-use super::diagnosis::{is_understood, spread};
+use super::diagnosis::{MAX_REJECTED_FRACTION, is_understood, spread};
 use super::error::ReplayError;
 use super::evidence::{Evidence, screened};
 use super::hypotheses::Drive;
+use super::innovations::plain_filter;
 use crate::angle_log::LoggedAngle;
+use crate::odometry::OdometryLog;
+use crate::range_log::LoggedRange;
 
 /// Maximum time offset of the search in either direction (s); buffers and drivers are assumed to
 /// delay by at most one second.
@@ -92,16 +96,10 @@ pub fn angle_time_offset(given: &Drive<'_>) -> Result<Option<AngleTimeOffset>, R
         .angles
         .to_mut()
         .retain(|it| it.measured.time_s - first_s < SPAN_S);
-    let config = EkfConfig::new(&given.site, vehicle);
-    let filter_std_s = config.angle_time_offset_std_s;
-    let scale_std = config.odometer_scale_std;
+    let filter_std_s = EkfConfig::new(&given.site, vehicle).angle_time_offset_std_s;
     // The offset is searched for, so that it must not be a filter state as well.
     given.vehicle.to_mut().receiver.angle_time_offset_std_s = Some(0.0);
-    let start = &mut given.vehicle.to_mut().start;
-    start.position_std_m = start.position_std_m.max(DOUBTED_START_STD_M);
-    start.heading_std_rad = start.heading_std_rad.max(DOUBTED_HEADING_STD_RAD);
-    let odometer = &mut given.vehicle.to_mut().odometer;
-    odometer.scale_std = DOUBTED_SCALE_STDS * scale_std;
+    doubt(&given.site, given.vehicle.to_mut());
     let of = |late_s: f64| {
         let mut corrected = given.clone();
         corrected.vehicle.to_mut().receiver.angle_time_offset_s += late_s;
@@ -110,26 +108,9 @@ pub fn angle_time_offset(given: &Drive<'_>) -> Result<Option<AngleTimeOffset>, R
     let log_likelihood =
         |of: Option<Evidence>| of.map_or(f64::NEG_INFINITY, |it| it.relative_log_likelihood);
     let mut likelihood = |late_s: f64| Ok(log_likelihood(of(late_s)?));
-    let mut best = (0.0, likelihood(0.0)?);
-    let in_time = best.1;
-    let steps = (MAX_S / GRID_S) as i32;
-    for step in (-steps..=steps).filter(|step| *step != 0) {
-        let late_s = GRID_S * f64::from(step);
-        let tried = (late_s, likelihood(late_s)?);
-        if tried.1 > best.1 {
-            best = tried;
-        }
-    }
-    // A likelihood that rises to the end of the search range has no maximum within it: on a straight
-    // road from standstill, an earlier time is a shorter distance with fewer independent angles.
-    if best.0.abs() >= MAX_S {
+    let Some((found_s, in_time)) = most_probable(&mut likelihood)? else {
         return Ok(None);
-    }
-    let around_s = [best.0 - GRID_S, best.0 + GRID_S];
-    let found_s = highest(around_s, &mut likelihood)?;
-    if found_s.abs() < MIN_ANGLE_TIME_OFFSET_S {
-        return Ok(None);
-    }
+    };
     let Some(at_best) = of(found_s)?.filter(is_understood) else {
         return Ok(None);
     };
@@ -154,6 +135,89 @@ pub fn angle_time_offset(given: &Drive<'_>) -> Result<Option<AngleTimeOffset>, R
         left_std_s,
         candidate_s: found_s,
     }))
+}
+
+/// Returns the time offset of ranges (s) if it is relevant, explains the ranges, and is significant.
+///
+/// # Errors
+/// [`ReplayError::Settings`] if the road cannot be built.
+pub fn range_time_offset(
+    site: &Site,
+    vehicle: &Vehicle,
+    odometry: &OdometryLog,
+    ranges: &[LoggedRange],
+) -> Result<Option<f64>, ReplayError> {
+    let mut vehicle = vehicle.clone();
+    doubt(site, &mut vehicle);
+    let heads = RadioHead::received_by(site, &vehicle);
+    let first_s = ranges.first().map_or(0.0, |it| it.measured.time_s);
+    // All offsets are compared by the same ranges.
+    let is_compared = |it: &&LoggedRange| {
+        let time_s = it.measured.time_s;
+        time_s - first_s < SPAN_S
+            && odometry.covers(time_s - MAX_S)
+            && odometry.covers(time_s + MAX_S)
+    };
+    let ranges: Vec<LoggedRange> = ranges.iter().filter(is_compared).copied().collect();
+    let of = |late_s: f64| -> Result<(f64, bool), ReplayError> {
+        let mut ekf = plain_filter(site, &vehicle)?;
+        let mut samples = odometry.samples.iter().peekable();
+        let (mut log_likelihood, mut rejected) = (0.0, 0);
+        for logged in &ranges {
+            let mut measured = logged.measured;
+            measured.time_s -= late_s;
+            while let Some(sample) = samples.next_if(|it| it.time_s <= measured.time_s) {
+                ekf.odometry(sample);
+            }
+            let sends = |head: &&RadioHead| head.sends(logged.pci, logged.ssb_index);
+            if let Some(head) = heads.iter().find(sends) {
+                log_likelihood += ekf.range_log_likelihood(head, &measured);
+                rejected += usize::from(!ekf.update_range(head, &measured).accepted);
+            }
+        }
+        let is_understood = (rejected as f64) < MAX_REJECTED_FRACTION * ranges.len() as f64;
+        Ok((log_likelihood, is_understood))
+    };
+    let Some((found_s, in_time)) = most_probable(&mut |late_s| Ok(of(late_s)?.0))? else {
+        return Ok(None);
+    };
+    let (at_best, is_understood) = of(found_s)?;
+    let is_significant = at_best - in_time > CORRECTION_LOG_ODDS;
+    Ok((is_understood && is_significant).then_some(found_s))
+}
+
+/// Increases the standard deviations of start and odometer scale, which are estimated together with
+/// the time offset.
+fn doubt(site: &Site, vehicle: &mut Vehicle) {
+    let scale_std = EkfConfig::new(site, vehicle).odometer_scale_std;
+    vehicle.odometer.scale_std = DOUBTED_SCALE_STDS * scale_std;
+    let start = &mut vehicle.start;
+    start.position_std_m = start.position_std_m.max(DOUBTED_START_STD_M);
+    start.heading_std_rad = start.heading_std_rad.max(DOUBTED_HEADING_STD_RAD);
+}
+
+/// Returns the most probable time offset, and the log-likelihood without one. `None` if the offset
+/// is at the end of the search range, or irrelevant.
+fn most_probable(
+    likelihood: &mut impl FnMut(f64) -> Result<f64, ReplayError>,
+) -> Result<Option<(f64, f64)>, ReplayError> {
+    let mut best = (0.0, likelihood(0.0)?);
+    let in_time = best.1;
+    let steps = (MAX_S / GRID_S) as i32;
+    for step in (-steps..=steps).filter(|step| *step != 0) {
+        let late_s = GRID_S * f64::from(step);
+        let tried = (late_s, likelihood(late_s)?);
+        if tried.1 > best.1 {
+            best = tried;
+        }
+    }
+    // A likelihood that rises to the end of the search range has no maximum within it: on a straight
+    // road from standstill, an earlier time is a shorter distance with fewer independent angles.
+    if best.0.abs() >= MAX_S {
+        return Ok(None);
+    }
+    let found_s = highest([best.0 - GRID_S, best.0 + GRID_S], likelihood)?;
+    Ok((found_s.abs() >= MIN_ANGLE_TIME_OFFSET_S).then_some((found_s, in_time)))
 }
 
 /// Returns the angles with earlier time stamps, by `late_s` seconds.

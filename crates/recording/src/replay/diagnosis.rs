@@ -40,8 +40,8 @@ const LOG_ODDS: f64 = 13.8;
 /// reported.
 const AS_LIKELY: f64 = 5.0;
 
-/// Maximum fraction of rejected angles of a correctly configured drive.
-const MAX_REJECTED_FRACTION: f64 = 0.2;
+/// Maximum fraction of rejected angles or ranges of a correctly configured drive.
+pub const MAX_REJECTED_FRACTION: f64 = 0.2;
 
 /// Maximum fraction of a radio head's angles beyond three standard deviations from the prediction.
 /// Correlated errors are estimated while driving, so that no angle is rejected because of them.

@@ -114,7 +114,7 @@ impl<'a> Replay<'a> {
             let verdict = (self.onboard).range(range.pci, range.ssb_index, &range.measured);
             let verdict = verdict.map_err(ReplayError::Custom)?;
             self.drive.ranges.push(LocatedRange { range, verdict });
-            self.remark_on_loss(range.measured.time_s);
+            self.remark_on_loss("ranges", range.measured.time_s);
         }
         Ok(())
     }
@@ -143,7 +143,7 @@ impl<'a> Replay<'a> {
                 verdict: it.verdict,
             });
             self.drive.ranges.extend(ranges);
-            self.remark_on_loss(time_s);
+            self.remark_on_loss("angles", time_s);
             self.remark_on_faults(time_s);
             ssbs = later;
         }
@@ -195,24 +195,24 @@ impl<'a> Replay<'a> {
         }
     }
 
-    fn remark_on_loss(&mut self, time_s: f64) {
+    fn remark_on_loss(&mut self, what: &str, time_s: f64) {
         let (is_lost, recovered) = (self.onboard.is_lost(), self.onboard.recovered());
         if is_lost && !self.was_lost {
             let text = format!(
-                "angles at {time_s:.1} s: they contradict the position, which is unavailable; a \
+                "{what} at {time_s:.1} s: they contradict the position, which is unavailable; a \
                  search has started"
             );
             self.remark(time_s, text);
         }
         if let Some(how) = recovered.filter(|_| recovered != self.recovered) {
             let text = format!(
-                "angles at {time_s:.1} s: position found again, {:.2} m and {:.2} rad from the \
+                "{what} at {time_s:.1} s: position found again, {:.2} m and {:.2} rad from the \
                  previous estimate",
                 how.moved_m, how.turned_rad
             );
             self.remark(time_s, text);
         } else if self.was_lost && !is_lost {
-            let text = format!("angles at {time_s:.1} s: they agree with the position again");
+            let text = format!("{what} at {time_s:.1} s: they agree with the position again");
             self.remark(time_s, text);
         }
         (self.was_lost, self.recovered) = (is_lost, recovered);

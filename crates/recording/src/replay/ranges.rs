@@ -6,6 +6,7 @@ use onboard::radio_head::RadioHead;
 use onboard::range::RangeModel;
 use onboard::settings::{Check, LocalizerSettings, RangingKind, RangingSettings, Site, Vehicle};
 
+use super::clock::range_time_offset;
 use super::drive::Replay;
 use super::error::ReplayError;
 use super::located::{Diagnosis, LocatedDrive, LocatedRange};
@@ -62,11 +63,24 @@ pub fn locate_ranges(
             ranges_s: [first_s, last_s],
         });
     }
+    let late_s = range_time_offset(site, &vehicle, odometry, &log.ranges)?;
+    let mut ranges = log.ranges.clone();
+    for range in &mut ranges {
+        range.measured.time_s -= late_s.unwrap_or(0.0);
+    }
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     for (time_s, text) in &log.remarks {
         replay.remark(*time_s, text.clone());
     }
-    replay.with_ranges(&log.ranges);
+    if let Some(late_s) = late_s {
+        let text = format!(
+            "by the odometry's clock, the ranges are {:.0} ms late; this is compensated; check the \
+             clocks of ranges and odometry",
+            1e3 * late_s
+        );
+        replay.remark(first_s, text);
+    }
+    replay.with_ranges(&ranges);
     replay.process_remaining_odometry()?;
     let mut texts = inconsistent(site, replay.located());
     texts.extend(displaced(site, &vehicle, &replay));

@@ -320,6 +320,34 @@ fn a_start_with_the_opposite_heading_is_found_again() {
     assert!(all.beyond < 1e-2 * all.count);
 }
 
+fn reports_time_offset(located: &LocatedDrive) -> bool {
+    (located.remarks.iter()).any(|it| it.text.contains("the ranges are"))
+}
+
+#[test]
+fn ranges_of_a_late_clock_are_shifted() {
+    let Some(folder) = data() else {
+        return;
+    };
+    let mut plaza = Plaza::read(&folder, "plaza-late");
+    let in_time = plaza.log.clone();
+    for late_s in [0.0, 1.0, -0.5, 0.2] {
+        plaza.log = in_time.clone();
+        for range in &mut plaza.log.ranges {
+            range.measured.time_s += late_s;
+        }
+        let drive = plaza.locate(0.0);
+        let it = plaza.compare(&drive, f64::NEG_INFINITY);
+        it.print(&format!("late by {late_s} s"));
+        for remark in &drive.remarks {
+            println!("{}", remark.text);
+        }
+        assert_eq!(reports_time_offset(&drive), late_s != 0.0, "{late_s}");
+        assert!(it.rms_m() < 0.5);
+        assert!(it.beyond < 1e-2 * it.count);
+    }
+}
+
 /// Locates a drive past three anchors, of which the second has a cable of 20 m and `settings`.
 fn drive_with_a_long_cable(name: &str, settings: &str) -> LocatedDrive {
     let heads = [[-20.0, 12.0], [20.0, -10.0], [60.0, 14.0]];

@@ -8,6 +8,7 @@ use crate::localize::ekf::{Ekf, PredictedMeasurement, PredictedRange};
 use crate::localize::output::UpdateReason;
 use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
+use crate::range::RangeMeasurement;
 
 impl Ekf {
     /// Returns the log-likelihood of an angle, minus that of an exactly predicted angle with its own
@@ -15,6 +16,12 @@ impl Ekf {
     /// travel are then weighted by their independent fraction.
     pub fn relative_log_likelihood(&self, head: &RadioHead, measured: &AngleMeasurement) -> f64 {
         log_likelihood(self, &self.predict_measurement(head, measured))
+    }
+
+    /// Returns the log-likelihood of a range in metres; 0 if the range is unusable.
+    pub fn range_log_likelihood(&self, head: &RadioHead, measured: &RangeMeasurement) -> f64 {
+        let predicted = self.predict_range(head, measured);
+        predicted.map_or(0.0, |it| range_density(&it).ln())
     }
 }
 
