@@ -121,6 +121,9 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
     "one head in another frame": (
         {"site.radio_heads[1].position_m": [52600.0, -30.0, 8.0]},
         "radio_heads[1]", "one local frame"),
+    "one head far away": (
+        {"site.radio_heads[1].position_m": [-900.0, -30.0, 8.0]},
+        "radio_heads[1]", "one local frame"),
     "road far from all heads": ({"motion.path": PATH_AWAY}, "radio_heads[0]", "one local frame"),
     "road in degrees": (
         {"site.road": {"polyline_m": [[8.68, 50.11], [8.685, 50.11], [8.686, 50.113]]}},

@@ -18,11 +18,14 @@ const FOR_A_PLACE: usize = 3;
 const MAX_PLACES: f64 = 400.0;
 /// Minimum distance between examined positions along a road (m).
 const STEP_M: f64 = 5.0;
+/// Maximum distance of a radio head from the examined positions (m): distance between the sites of
+/// urban macro cells (TR 38.901, 7.2).
+const MAX_DISTANCE_M: f64 = 500.0;
 /// Minimum distance of a vehicle from a radio head (m).
 const NEAREST_M: f64 = 10.0;
 
-/// Returns warnings for radio heads that are received nowhere along the road. Without a road, the
-/// positions of the other radio heads are examined.
+/// Returns warnings for radio heads that are received nowhere along the road, or are far from it.
+/// Without a road, the positions of the other radio heads are examined.
 pub(super) fn without_reception(
     site: &Site,
     vehicle: &Vehicle,
@@ -150,13 +153,21 @@ impl Air {
                 .reduce(f64::min)?
                 .max(NEAREST_M);
             let snr_db = self.budget.snr_db(head, distance_m);
-            (snr_db < FOUND_DB).then(|| Warning {
-                key: format!("radio_heads[{number}].position_m"),
-                value: format!("[{}, {}]", head.position.x_m, head.position.y_m),
-                why: format!(
+            let why = if snr_db < FOUND_DB {
+                format!(
                     "it is received nowhere {where_}: at the minimum distance of {distance_m:.0} m, its \
                          SNR is {snr_db:.0} dB, and the detection limit of an SSB is {FOUND_DB} dB"
-                ),
+                )
+            } else {
+                format!(
+                    "the minimum distance {where_} is {distance_m:.0} m, and the sites of urban macro \
+                         cells are {MAX_DISTANCE_M} m apart (TR 38.901, 7.2)"
+                )
+            };
+            (snr_db < FOUND_DB || distance_m > MAX_DISTANCE_M).then(|| Warning {
+                key: format!("radio_heads[{number}].position_m"),
+                value: format!("[{}, {}]", head.position.x_m, head.position.y_m),
+                why,
                 write: format!(
                     "specify all positions in metres in one local frame (no degrees, no map grid), or \
                          a sufficient eirp_dbm: now {}",
