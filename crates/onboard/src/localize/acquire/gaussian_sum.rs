@@ -21,6 +21,7 @@ use crate::localize::output::{OdometryResult, UpdateReason, UpdateResult};
 use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+use crate::range::RangeModel;
 use crate::road::Road;
 
 /// Distance between initial hypotheses (m). Within it, an angle is sufficiently linear for the
@@ -136,12 +137,17 @@ clone_in_place! {
         ground: Ground,
         heads: Vec<RadioHead>,
         hypotheses: Vec<Hypothesis>,
+        /// Road and distance along it of each kept hypothesis, while hypotheses are merged: they are
+        /// compared pair by pair, and a filter is large.
+        kept: Vec<(usize, f64)>,
         /// Initial number of hypotheses.
         places: usize,
         /// Whether an uncertain hypothesis is penalised for its uncertainty.
         is_as_stated: bool,
         /// Prior probability of a bias, for the filter of the located vehicle.
         multipath_bias_probability: f64,
+        /// Model of the ranges, for the filter of the located vehicle. The hypotheses use angles only.
+        ranging: Option<RangeModel>,
     }
 }
 
@@ -216,13 +222,18 @@ impl GaussianSum {
 
     fn on(config: &EkfConfig, ground: Ground, heads: &[RadioHead]) -> Self {
         let mut made = Self {
-            config: *config,
+            config: EkfConfig {
+                ranging: None,
+                ..*config
+            },
             ground,
             heads: heads.to_vec(),
             hypotheses: Vec::new(),
+            kept: Vec::new(),
             places: 0,
             is_as_stated: false,
             multipath_bias_probability: config.multipath_bias_probability,
+            ranging: config.ranging,
         };
         made.restart();
         made
@@ -278,6 +289,8 @@ impl GaussianSum {
             }
         }
         self.places = self.hypotheses.len();
+        self.kept.clear();
+        self.kept.reserve(self.places);
     }
 
     /// Predicts every hypothesis.
@@ -349,27 +362,32 @@ impl GaussianSum {
         self.hypotheses
             .retain(|hypothesis| possible(hypothesis) && hypothesis.log_likelihood > best - BEHIND);
         let in_plane = matches!(self.ground, Ground::Plane(_));
-        let mut kept = 0;
+        self.kept.clear();
         for index in 0..self.hypotheses.len() {
             let (better, rest) = self.hypotheses.split_at_mut(index);
             let Some(hypothesis) = rest.first() else {
                 break;
             };
             let (along_m, std_m) = hypothesis.along_m();
-            let met = better.iter_mut().take(kept).find(|other| {
-                if in_plane {
-                    return hypothesis.meets(other);
-                }
-                other.road == hypothesis.road && (other.along_m().0 - along_m).abs() < std_m
-            });
-            if let Some(other) = met {
-                other.absorb(hypothesis);
+            let met = if in_plane {
+                let mut others = better.iter().take(self.kept.len());
+                others.position(|other| hypothesis.meets(other))
             } else {
-                self.hypotheses.swap(kept, index);
-                kept += 1;
+                self.kept.iter().position(|(road, other_m)| {
+                    *road == hypothesis.road && (other_m - along_m).abs() < std_m
+                })
+            };
+            let met = met.and_then(|at| Some((better.get_mut(at)?, self.kept.get_mut(at)?)));
+            if let Some((other, place)) = met {
+                other.absorb(hypothesis);
+                place.1 = other.along_m().0;
+            } else {
+                let place = (hypothesis.road, along_m);
+                self.hypotheses.swap(self.kept.len(), index);
+                self.kept.push(place);
             }
         }
-        self.hypotheses.truncate(kept);
+        self.hypotheses.truncate(self.kept.len());
         if self.hypotheses.is_empty() {
             // The best hypothesis has left the road.
             self.restart();
@@ -462,6 +480,9 @@ impl GaussianSum {
         if !one.ekf.is_with_bias() {
             one.ekf.begin_bias(self.multipath_bias_probability);
         }
+        if let Some(model) = self.ranging {
+            one.ekf.begin_ranging(model);
+        }
         (opposite < MAX_OPPOSITE_ODDS).then_some(one.ekf)
     }
 
@@ -539,14 +560,16 @@ mod tests {
 
     use super::*;
     use crate::observation::MeasurementKind;
-    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
+    use crate::settings::{RangingSettings, Shipped, Site, TomlFile, Vehicle};
 
     /// Drives from `start_m` until located; returns the error in metres and in standard deviations.
     fn search(seed: u64) -> Option<(f64, f64)> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let site = Site::from_library("trip-2", &Shipped).unwrap();
         let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
-        let config = EkfConfig::new(&site, &vehicle);
+        let mut config = EkfConfig::new(&site, &vehicle);
+        let ranging = RangingSettings::default();
+        config.ranging = Some(RangeModel::new(&ranging, &vehicle.array, 0.08));
         let heads = RadioHead::received_by(&site, &vehicle);
         let map = site.build_road().unwrap().unwrap();
         let start_m = rng.random::<f64>() * 200.0;
@@ -578,6 +601,8 @@ mod tests {
                 search.update(head, &measured);
             }
             if let Some(ekf) = search.found() {
+                // Only the filter of the located vehicle uses ranges.
+                assert!(search.config.ranging.is_none() && ekf.range_scale().is_some());
                 let estimate = ekf.pose(time_s);
                 let error_m = estimate.pose.point().distance_m(truth.point());
                 return Some((error_m, error_m / estimate.principal_variances()[0].sqrt()));

@@ -12,6 +12,7 @@ use super::state::{
 use crate::geometry::{Pose, wrap_angle};
 use crate::localize::output::InitialPose;
 use crate::radio_head::RadioHead;
+use crate::range::RangeModel;
 use crate::road::Road;
 
 /// Minimum variance of an exact start, of a micrometre and a microradian: with zero, rounding
@@ -118,6 +119,13 @@ impl Ekf {
         self.config.multipath_bias_probability = probability;
         let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
         self.bias = Self::biases(&self.config, &heads);
+    }
+
+    /// Uses ranges with this model from now on.
+    pub(in crate::localize) fn begin_ranging(&mut self, model: RangeModel) {
+        let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
+        self.config.ranging = Some(model);
+        self.bias.add_ranges(&model, &heads);
     }
 
     /// Removes the assumption of exactness from unspecified constants of the array.
