@@ -25,7 +25,14 @@ ranging = { kind = "two-way", sigma_m = 0.2 }
 """
 
 
-def write_drive(folder: Path, *, yaw_factor: float = 1.0, xy_exchanged: bool = False) -> np.ndarray:
+def write_drive(
+    folder: Path,
+    *,
+    yaw_factor: float = 1.0,
+    xy_exchanged: bool = False,
+    range_factor: float = 1.0,
+    late_s: float = 0.0,
+) -> np.ndarray:
     """Writes one minute of bends with ten ranges per second; returns time, x and y of the truth."""
     rng = np.random.default_rng(5)
     step_s = 0.02
@@ -46,7 +53,7 @@ def write_drive(folder: Path, *, yaw_factor: float = 1.0, xy_exchanged: bool = F
     vehicle_m = np.column_stack([x_m, y_m, np.zeros_like(x_m)])[at]
     range_m = np.linalg.norm(HEADS_M[pci] - vehicle_m, axis=1)
     range_m += 0.15 * rng.standard_normal(at.size)
-    rows = np.column_stack([time_s[at], pci, range_m])
+    rows = np.column_stack([time_s[at] + late_s, pci, range_factor * range_m])
     form = ["%.3f", "%d", "%.4f"]
     np.savetxt(folder / "ranges.csv", rows, form, ",", header="time_s,pci,range_m", comments="")
 
@@ -78,11 +85,30 @@ def test_a_correct_drive_is_reliable_even_with_a_wrong_start_heading(
 
 @pytest.mark.parametrize(
     "mistake",
-    [{"yaw_factor": -1.0}, {"yaw_factor": float(np.degrees(1.0))}, {"xy_exchanged": True}],
-    ids=["clockwise yaw rate", "yaw rate in degrees", "x and y of the site exchanged"],
+    [
+        {"yaw_factor": -1.0},
+        {"yaw_factor": float(np.degrees(1.0))},
+        {"xy_exchanged": True},
+        {"range_factor": 2.0},
+    ],
+    ids=[
+        "clockwise yaw rate",
+        "yaw rate in degrees",
+        "x and y of the site exchanged",
+        "round-trip ranges",
+    ],
 )
 def test_a_drive_that_ranges_contradict_is_not_reliable(
     tmp_path: Path, mistake: dict[str, float | bool]
 ) -> None:
     write_drive(tmp_path, **mistake)  # type: ignore[arg-type]
     assert not locate_in(tmp_path).is_reliable
+
+
+def test_late_ranges_are_shifted(tmp_path: Path) -> None:
+    truth = write_drive(tmp_path, late_s=1.0)
+    drive = locate_in(tmp_path)
+    last = drive.poses.row(-1, named=True)
+    assert drive.is_reliable
+    assert any("the ranges are" in str(remark) for remark in drive.remarks)
+    assert np.hypot(last["x_m"] - truth[-1, 1], last["y_m"] - truth[-1, 2]) < 1.0

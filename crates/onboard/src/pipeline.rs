@@ -713,6 +713,11 @@ impl Pipeline {
         self.localizer.localizer().ekf()?.range_offset(head)
     }
 
+    /// Returns the estimated relative scale error of the ranges; `None` without ranges.
+    pub fn range_scale(&self) -> Option<RangeState> {
+        self.localizer.localizer().ekf()?.range_scale()
+    }
+
     /// Keeps a journal for smoothing from now on, if the localizer is a single filter; the filters
     /// of a bank replace each other. Angles must be in order of time from now on.
     pub fn keep_journal(&mut self) {

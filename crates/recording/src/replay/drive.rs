@@ -274,6 +274,11 @@ impl<'a> Replay<'a> {
         self.onboard.range_offset(pci, ssb_index)
     }
 
+    /// Returns the estimated relative scale error of the ranges at the end of the drive.
+    pub(super) fn range_scale(&self) -> Option<RangeState> {
+        self.onboard.range_scale()
+    }
+
     /// Processes the remaining odometry and returns the located drive.
     ///
     /// # Errors

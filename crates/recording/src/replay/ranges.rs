@@ -84,11 +84,13 @@ pub fn locate_ranges(
     replay.process_remaining_odometry()?;
     let mut texts = inconsistent(site, replay.located());
     texts.extend(displaced(site, &vehicle, &replay));
-    for text in texts {
+    let texts = texts.into_iter().map(|text| (text, true));
+    let of_scale = wrong_scale(&vehicle, &replay).map(|text| (text, false));
+    for (text, is_harmless) in texts.chain(of_scale).collect::<Vec<_>>() {
         replay.diagnose(Diagnosis {
             text,
             is_of_start: false,
-            is_harmless: true,
+            is_harmless,
         });
     }
     replay.finish()
@@ -166,6 +168,21 @@ fn displaced(site: &Site, vehicle: &Vehicle, replay: &Replay<'_>) -> Vec<String>
         }
     }
     texts
+}
+
+/// Returns a text if the scale error of the ranges is larger than specified. The position is not
+/// reliable then, because the ranges before the scale was estimated have displaced it.
+fn wrong_scale(vehicle: &Vehicle, replay: &Replay<'_>) -> Option<String> {
+    let (scale, stated) = (replay.range_scale()?, vehicle.ranging?.scale_std());
+    let is_wrong = scale.mean.abs() > CERTAIN_SIGMAS * (stated + scale.std);
+    is_wrong.then(|| {
+        format!(
+            "the ranges are {:.2} ± {:.2} times the distances, specified as 1.00 ± {stated:.2}; check the \
+             unit of the ranges, whether they are one-way distances, and ranging.scale_std",
+            1.0 + scale.mean,
+            scale.std
+        )
+    })
 }
 
 /// Returns a text for every radio head whose ranges mostly contradict the drive.
