@@ -169,11 +169,3 @@ class LevelResult(Worded):
     REACHED = "reached", "", "yes"
     TOO_FEW_RUNS = "too few runs", "", "fit"
     NOT_REACHED = "not reached", "", "no"
-
-
-class Agreement(Enum):
-    """Whether two seeds recommend one operating point; `study.json` contains the value."""
-
-    AGREED = "agreed"
-    EQUIVALENT = "equivalent"
-    UNDECIDED = "undecided"

@@ -135,7 +135,7 @@ def study(
         console.print(f"Combinations: {combined}.")
     show_compared(comparison)
     if found.point is not None:
-        agreement = found.recommendation.agreement.value
-        console.print(f"Recommended: {found.point.name}; two seeds: {agreement}.")
+        equal = sum(it.is_equivalent for it in found.recommendation.rivals)
+        console.print(f"Recommended: {found.point.name}; equivalent points: {equal}.")
         say(f"Simulate it: access-av run {directory.path / 'recommended.toml'}")
     say(f"Report: {directory.path / 'report.html'}")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from access_av.report.parts import badge, code, figure, folded, records, section, small
 from access_av.report.study_parts import (
+    count,
     digits,
     ends,
     in_points,
@@ -20,10 +21,8 @@ from access_av.report.study_parts import (
 from access_av.run.assumptions import energy_boundary
 from access_av.settings import as_dict
 from access_av.study import economy
-from access_av.study.operate import MATTERS_SHARE
-from access_av.study.points import OK_MARGIN
+from access_av.study.points import MATTERS_SHARE, OK_MARGIN
 from access_av.study.study_result import as_toml, rule
-from access_av.verdicts import Agreement
 
 if TYPE_CHECKING:
     from access_av.study.points import Point
@@ -31,10 +30,11 @@ if TYPE_CHECKING:
 
 # Condition of the badge "equivalent" of a rival.
 EQUIVALENT = (
-    "Equivalent points fulfil three conditions. Error: the 95 % interval of the difference "
-    "contains 0. State ok: the share of time differs by at most "
-    f"{100.0 * OK_MARGIN:g} percentage point, or the interval of the difference contains 0. Energy "
-    f"of the fleet’s day, idle included: it differs by less than {MATTERS_SHARE:.0%}."
+    "Equivalent points have no disadvantage that matters. Accuracy: the point meets the targets "
+    "with an equal or better verdict, or the 95 % interval of the error difference contains 0 or "
+    f"smaller errors. State ok: the share of time is lower by at most {100.0 * OK_MARGIN:g} "
+    "percentage point, or the interval of the difference contains 0 or higher shares. Energy of "
+    f"the fleet’s day, idle included: it is higher by less than {MATTERS_SHARE:.0%}."
 )
 
 
@@ -47,10 +47,10 @@ def operation_section(study: Study) -> str:
     found = point.driven.percentile(study.percent)
     text = (
         f"Recommended: {point.name}. {study.percent:g} % of the errors are within "
-        f"{found.value:.3f} m ({found.interval} m, {point.driven.runs} drives with two seeds); a "
+        f"{found.value:.3f} m ({found.interval} m, {point.driven.runs} drives); a "
         f"trip takes {joules_range(economy.trip_j(point))}, the fleet’s day "
         f"{ends(day.trips_wh)} Wh (low … central … high; energy {boundary}).{_availability(point)} "
-        f"{' '.join(rule(point))} {_agreement(study)}"
+        f"{' '.join(rule(study.recommendation))} {_equivalent(study)}"
     )
     keys = [
         {"Key": code(key), "Value": code(as_toml(value))} for key, value in point.settings.items()
@@ -65,9 +65,8 @@ def operation_section(study: Study) -> str:
         + _composition(study, point, day)
         + figure(
             "ways",
-            "Each power mode of each operation; dashed: the target. Candidates: the simulated "
-            "points with two seeds that are not less often in state ok. The numbers are those of "
-            "the table of all points.",
+            "Each power mode of each operation; dashed: the target. The numbers are those of the "
+            "table of all points.",
         )
         + _numbered(study)
         + _points(study, point),
@@ -84,22 +83,19 @@ def _availability(point: Point) -> str:
     )
 
 
-def _agreement(study: Study) -> str:
-    """Returns whether the seeds agree, as text."""
-    named = " and ".join(f"“{it}”" for it in dict.fromkeys(study.recommendation.by_seed))
-    match study.recommendation.agreement:
-        case Agreement.AGREED:
-            return "Two seeds recommend the same point."
-        case Agreement.EQUIVALENT:
-            return (
-                f"Single seeds recommend {named}, the drives of both seeds together the point "
-                "above. These points are equivalent."
-            )
-        case Agreement.UNDECIDED:
-            return (
-                f"Two seeds recommend {named}: these drives are too few for a decision; --runs "
-                "adds drives."
-            )
+def _equivalent(study: Study) -> str:
+    """Returns the number of operations that are equivalent to the recommended one, as text."""
+    chosen = study.point
+    rivals = [
+        it
+        for it in study.recommendation.rivals
+        if chosen is not None and it.point.operation != chosen.operation
+    ]
+    same = sum(it.is_equivalent for it in rivals)
+    return (
+        f"{same} of {count(len(rivals), 'other operation')} are equivalent to the recommended "
+        "point; --runs adds drives, which distinguish more of them."
+    )
 
 
 def _rivals(study: Study) -> str:
@@ -215,11 +211,10 @@ def _way(study: Study, it: Point) -> dict[str, str]:
         label = badge("less often ok", "no")
     else:
         label = badge(it.judgement.words, it.judgement.badge)
-    sample = "two seeds" if it.simulated and it.driven.name != it.operation.name else "screened"
     return {
         "Operation": small(
             f"{it.operation.method}, {it.operation.wake_up}",
-            f"mode {it.mode} ({it.mode_name}); {it.driven.runs} drives, {sample}",
+            f"mode {it.mode} ({it.mode_name}); {it.driven.runs} drives",
         ),
         "Lost drives": lost(it.driven),
         f"{study.percent:g} % within": f"{found.value:.3f} m",

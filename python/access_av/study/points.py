@@ -23,9 +23,15 @@ if TYPE_CHECKING:
 
 # Intervals of the fixed wake-ups that are simulated next to the vehicle's own wake-up, in ms.
 FIXED_MS = (200.0, 500.0, 1000.0)
-# Estimators that process raw snapshots are simulated without known pilots.
-METHODS = ("root-music", "esprit", "music")
+# Estimators that process raw snapshots are simulated without known pilots. MUSIC has the error of
+# Root-MUSIC.
+METHODS = ("root-music", "esprit")
 MODE_KEY = "vehicle.platform.mode"
+# Name of the vehicle's own operation.
+OWN = "own operation"
+# Relative difference of energies that does not matter: energy meters for billing have this accuracy
+# (IEC 62053-21, class 1).
+MATTERS_SHARE = 0.01
 # A share of the time in state `ok` that is lower by at most this difference counts as equal: the
 # shares of one operation in power modes with nearly equal wake-ups differ by as much.
 OK_MARGIN = 0.01
@@ -54,9 +60,7 @@ class Point:
     Attributes
     ----------
     driven
-        Runs in this mode if ``simulated``, otherwise in the vehicle's mode.
-    simulated
-        Whether the runs use this mode.
+        Runs in this mode or in another one of its group, see :func:`mode_groups`.
     energy
         Energy of a trip by ``low``, ``value`` and ``high``.
     idle_w
@@ -67,14 +71,13 @@ class Point:
         Whether the drives meet all targets.
     ok_delta
         Paired difference of the share of time in state ``ok`` to the vehicle's own operation and
-        mode, and the ends of its 95 % interval; ``None`` if that operation was not simulated.
+        mode, and the ends of its 95 % interval; ``None`` without a monitor.
     """
 
     driven: Runs
     operation: Operation
     mode: int
     mode_name: str
-    simulated: bool
     energy: Mapping[str, Energy]
     idle_w: Mapping[str, float] | None
     error_m: float
@@ -113,7 +116,7 @@ def operations(scenario: _core.Scenario) -> list[Operation]:
     """Returns the operations that a study simulates; that of the vehicle is the first."""
     vehicle = as_dict(scenario.resolved().vehicle)
     method, own = vehicle["estimator"]["method"], in_words(vehicle["wake_up"])
-    found = [Operation("unchanged", method, own, {})]
+    found = [Operation(OWN, method, own, {})]
     period_ms = as_dict(scenario.site)["ssb"]["period_ms"]
     for interval_ms in FIXED_MS:
         wake_up: dict[str, Any] = {"policy": "fixed", "interval_ms": interval_ms}
@@ -146,15 +149,18 @@ def in_words(wake_up: Mapping[str, Any]) -> str:
 
 
 def mode_groups(scenario: _core.Scenario) -> list[list[PowerMode]]:
-    """Returns the power modes of the vehicle's platform, in groups with identical runs.
+    """Returns the power modes of the vehicle's platform, in groups with equal runs.
 
-    A mode affects the runs by default wake-up times, and by the energy of a wake-up relative to an
-    estimate. Modes without a figure for the method are left
-    out, and modes in which an estimate takes longer than the period of the SSBs.
+    A mode affects the runs by default wake-up times, and by the energy c of a wake-up relative to
+    an estimate: the wake-up policy divides the gain of k angles by (c + k)/(c + 1). In a group,
+    this divisor differs by less than :data:`MATTERS_SHARE` for the angles of all radio heads.
+    Modes without a figure for the method are left out, and modes in which an estimate takes longer
+    than the period of the SSBs.
     """
     platform = Platform.load(platform_name(scenario.vehicle))
     period_s = ssb_period_s(scenario.site)
-    found: dict[str, list[PowerMode]] = {}
+    heads = len(as_dict(scenario.site)["radio_heads"])
+    found: list[tuple[str, float, list[PowerMode]]] = []
     for mode in platform.modes:
         vehicle = scenario.with_overrides({MODE_KEY: mode.number}).vehicle
         parts = platform.core.energy_j(vehicle, 1, 1, 1.0)
@@ -162,11 +168,18 @@ def mode_groups(scenario: _core.Scenario) -> list[list[PowerMode]]:
             continue
         resolved = as_dict(vehicle.resolved(platform.core))
         del resolved["platform"]["mode"]
-        wake_up = resolved["wake_up"]
-        asks = wake_up["policy"] == "uncertainty"
-        cost = round(parts[1] / parts[0], 9) if asks and parts[0] > 0.0 else None
-        found.setdefault(json.dumps([resolved, cost], sort_keys=True), []).append(mode)
-    return list(found.values())
+        settings, divisor = json.dumps(resolved, sort_keys=True), 1.0
+        if resolved["wake_up"]["policy"] == "uncertainty" and parts[0] > 0.0:
+            cost = parts[1] / parts[0]
+            divisor = (cost + heads) / (cost + 1.0)
+        for its_settings, its_divisor, group in found:
+            equal = abs(divisor / its_divisor - 1.0) < MATTERS_SHARE
+            if settings == its_settings and equal:
+                group.append(mode)
+                break
+        else:
+            found.append((settings, divisor, [mode]))
+    return [group for _, _, group in found]
 
 
 def own_mode(scenario: _core.Scenario) -> int:
@@ -179,17 +192,15 @@ def points(
     operation: Operation,
     modes: Sequence[PowerMode],
     targets: Targets,
-    baseline: Runs | None,
-    *,
-    simulated: bool,
+    baseline: Runs,
 ) -> list[Point]:
-    """Returns the operating points of an operation in power modes with identical runs.
+    """Returns the operating points of an operation in power modes with equal runs.
 
     ``baseline``: paired runs of the vehicle's own operation and mode.
     """
     error_m = driven.percentile(targets.each[0].percent).value
     judgement = targets.judgement(driven)
-    ok_delta = None if baseline is None else driven.ok_delta(baseline)
+    ok_delta = driven.ok_delta(baseline)
     platform = Platform.load(platform_name(driven.scenario.vehicle))
     found = []
     for mode in modes:
@@ -203,7 +214,6 @@ def points(
                 operation=operation,
                 mode=mode.number,
                 mode_name=mode.name,
-                simulated=simulated,
                 energy=energy,
                 idle_w=idle_w(platform, mode.number),
                 error_m=error_m,
@@ -235,7 +245,7 @@ def front(found: Sequence[Point]) -> list[int]:
     return [kept[it] for it in on_front if np.isfinite(found[kept[it]].error_m)]
 
 
-def recommended(found: Sequence[Point]) -> int | None:
+def best(found: Sequence[Point]) -> int | None:
     """Returns the index of the front's point with the least energy that meets all targets.
 
     All points of the front are available, see :attr:`Point.is_available`. Points that meet the

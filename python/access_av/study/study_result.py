@@ -10,7 +10,7 @@ import polars as pl
 
 from access_av.settings import as_dict
 from access_av.study import economy
-from access_av.study.points import OK_MARGIN
+from access_av.study.points import OK_MARGIN, OWN, own_mode
 from access_av.study.targets import table as targets_table
 from access_av.tables.result import Origin, Result, origin
 from access_av.verdicts import Judgement
@@ -104,7 +104,7 @@ class Study(Result):
 
     @property
     def front(self) -> list[int]:
-        """Indices of the Pareto front of the finalists."""
+        """Indices of the Pareto front of the available points."""
         return self.recommendation.front
 
     @property
@@ -220,7 +220,6 @@ class Study(Result):
                 "method": point.operation.method,
                 "wake_up": point.operation.wake_up,
                 "runs": point.driven.runs,
-                "is_simulated": point.simulated,
                 "target_error_m": point.error_m,
                 "judgement": point.judgement.value,
                 **{
@@ -260,7 +259,7 @@ def recommended_toml(study: Study) -> str | None:
         return None
     scenario = study.plant.scenario().with_overrides(point.settings)
     keys = "".join(f"#   {key} = {as_toml(value)}\n" for key, value in point.settings.items())
-    rules = "".join(f"# {it}\n" for it in rule(point))
+    rules = "".join(f"# {it}\n" for it in rule(study.recommendation))
     return (
         f"# Recommended operating point of plant {study.plant.name}: {point.name}.\n"
         f"{rules}# Keys that select it:\n{keys}"
@@ -268,17 +267,25 @@ def recommended_toml(study: Study) -> str | None:
     )
 
 
-def rule(point: Point) -> list[str]:
-    """Returns the rule that selected a recommended point, as sentences."""
-    selected = {
-        Judgement.MET: "the point with the least energy that meets all targets",
-        Judgement.PROBABLY_MET: "the point with the least energy that probably meets all targets, "
+def rule(recommendation: Recommendation) -> list[str]:
+    """Returns the rule that selected the recommended point, as sentences."""
+    found = recommendation.points
+    if recommendation.best is None or recommendation.chosen is None:
+        return []
+    leader, point = found[recommendation.best], found[recommendation.chosen]
+    criterion = {
+        Judgement.MET: "the least energy of the points that meet all targets",
+        Judgement.PROBABLY_MET: "the least energy of the points that probably meet all targets, "
         "because none meets them with 95 % confidence",
-    }.get(point.judgement, "the most accurate point, because none meets all targets")
+    }.get(leader.judgement, "the smallest error, because no point meets all targets")
+    same = ["operation"] if point.operation.name == OWN else []
+    same += ["power mode"] if point.mode == own_mode(found[0].driven.scenario) else []
+    kept = f"The vehicle keeps its {' and its '.join(same)}, because the difference does not matter"
     return [
         "Candidates: points whose share of time in state ok is at most "
         f"{100.0 * OK_MARGIN:g} percentage point below that of the vehicle's own operation.",
-        f"Recommended of their Pareto front of energy and error: {selected}.",
+        f"Best candidate: {leader.name}, with {criterion}.",
+        *([] if point is leader else [f"{kept}."]),
     ]
 
 
@@ -325,8 +332,7 @@ def _recommendation(study: Study) -> dict[str, Any]:
             "judged": point.judgement.value,
             "trip_j": vars(economy.trip_j(point)),
             "idle_w": point.idle_w and dict(point.idle_w),
-            "agreement": study.recommendation.agreement.value,
-            "by_seed": list(study.recommendation.by_seed),
+            "best": study.points[study.recommendation.best or 0].name,
         },
         "rivals": [_rival(it) for it in study.recommendation.rivals],
         "day": {
