@@ -148,7 +148,10 @@ fn angle_to_pose(bencher: divan::Bencher, (map, estimates_bias): (bool, bool)) {
 #[divan::bench(args = [true, false])]
 fn burst_to_pose(bencher: divan::Bencher, guarded: bool) {
     let (site, mut vehicle) = nominal("trip-4");
-    vehicle.integrity = guarded.then(IntegritySettings::default);
+    vehicle.integrity = Some(IntegritySettings {
+        enabled: guarded,
+        ..IntegritySettings::default()
+    });
     let road = site.build_road().unwrap().unwrap();
     let heads = RadioHead::received_by(&site, &vehicle);
     let mut localizer = onboard::localize::built_in(&site, &vehicle, road.pose(0.0)).unwrap();
