@@ -73,7 +73,8 @@ def heads(*positions_m: list[float]) -> dict[str, object]:
     return {"site.radio_heads": [{**head, "position_m": place} for head, place in at]}
 
 
-FAULT = {"from_s": 60_000.0, "until_s": 68_000.0, "what": {"kind": "stuck-antenna", "antennas": [1]}}
+STUCK = {"kind": "stuck-antenna", "antennas": [1]}
+FAULT = {"from_s": 60_000.0, "until_s": 68_000.0, "what": STUCK}
 PATH_AWAY = {"start": {"x_m": 3e4, "y_m": 4e4}, "segments": [{"length_m": 300.0}]}
 SAME_INDEX = {"site.radio_heads[1].ssb_index": 0, "site.radio_heads[2].ssb_index": 0}
 

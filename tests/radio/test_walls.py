@@ -106,7 +106,8 @@ def test_invalid_walls_are_rejected() -> None:
 
     assert not said(WALL)
     across = {"polyline_m": [[100.0, -10.0], [100.0, 10.0]]}
-    assert said(WALL, across) == ["walls[1].polyline_m: it crosses the road at 100 m along the road"]
+    crosses = "walls[1].polyline_m: it crosses the road at 100 m along the road"
+    assert said(WALL, across) == [crosses]
     x_m, y_m, _ = site["radio_heads"][0]["position_m"]
     ring = [
         [x_m + dx_m, y_m + dy_m] for dx_m, dy_m in ((-5, -5), (5, -5), (5, 5), (-5, 5), (-5, -5))
