@@ -9,6 +9,11 @@ is the negative logarithm of the posterior of the parameters θ, over all angles
 (Schweppe 1965; Ljung, System Identification, 7.4). Gauss–Newton finds its minimum; the derivatives
 of ν are central differences, each a replay of every drive. The road, if any, and the start poses
 define the frame.
+
+Multipath correlates the innovations, so that a sum over all of them counts information repeatedly.
+The sum is divided by tr(H⁻¹J)/p: H is the information about p parameters for independent
+innovations, and J is the sum of g gᵀ over blocks of a drive with gradients g (Pauli, Racugno and
+Ventura, Statistica Sinica 21, 2011). The factor is at least 1.
 """
 
 from __future__ import annotations
@@ -42,6 +47,8 @@ if TYPE_CHECKING:
 # Maximum ratio of posterior and prior standard deviation of a surveyed parameter.
 LEARNT = 0.7
 MOST_ITERATIONS = 20
+# Blocks per drive, each long against the correlation of multipath.
+BLOCKS = 10
 # Convergence: maximum step of a parameter relative to its standard deviation.
 STILL = 0.05
 # Probability that the site plan is displaced against the road.
@@ -311,14 +318,14 @@ class _Problem:
             self.progress(min(self.done, most), most)
         return found
 
-    def misfit(self, values: Numbers, used: list[Flags]) -> float:
+    def misfit(self, values: Numbers, used: list[Flags], inflation: float) -> float:
         """Returns 2 Λ(θ) up to a constant."""
         prior = float(np.sum(((values - self.model.before) / self.model.stds_before) ** 2))
         met = self.meet(values, np.zeros_like(values), used)
-        return prior + sum(_normalised(*each) for each in met)
+        return prior + sum(_normalised(*each) for each in met) / inflation
 
-    def linearised(self, values: Numbers, used: list[Flags]) -> tuple[Numbers, Numbers]:
-        """Returns gradient and Gauss–Newton Hessian (information matrix) of Λ(θ)."""
+    def linearised(self, values: Numbers, used: list[Flags]) -> tuple[Numbers, Numbers, float]:
+        """Returns gradient and Gauss–Newton Hessian of Λ(θ), and the variance inflation."""
         exact = np.zeros_like(values)
         met = self.meet(values, exact, used)
         slopes = []
@@ -327,15 +334,25 @@ class _Problem:
             behind = self.meet(values - step, exact, used)
             both = zip(ahead, behind, strict=True)
             slopes.append([wrapped(a[0] - b[0]) / (2.0 * step.sum()) for a, b in both])
-        information = np.diag(self.model.stds_before**-2.0)
-        gradient = (values - self.model.before) / self.model.stds_before**2
+        prior = np.diag(self.model.stds_before**-2.0)
+        information, squared = np.zeros_like(prior), np.zeros_like(prior)
+        gradient = np.zeros_like(values)
         for index, (residual, variance, counted) in enumerate(met):
             jacobian = np.stack([slope[index] for slope in slopes])
             kept = counted & np.isfinite(jacobian).all(axis=0) & np.isfinite(residual)
             weighted = jacobian[:, kept] / variance[kept]
             information += weighted @ jacobian[:, kept].T
-            gradient += weighted @ residual[kept]
-        return gradient, information
+            gradients = weighted * residual[kept]
+            gradient += gradients.sum(axis=1)
+            for block in np.array_split(gradients, BLOCKS, axis=1):
+                squared += np.outer(block.sum(axis=1), block.sum(axis=1))
+        # Parameters that the drives do not determine count neither in the numerator nor in p.
+        posterior = np.linalg.inv(information + prior)
+        determined = np.trace(posterior @ information)
+        ratio = np.trace(posterior @ squared) / determined if determined > 0.0 else 1.0
+        inflation = max(1.0, float(ratio))
+        gradient = gradient / inflation + prior @ (values - self.model.before)
+        return gradient, information / inflation + prior, inflation
 
 
 def _identify(problem: _Problem) -> Survey:
@@ -346,12 +363,15 @@ def _identify(problem: _Problem) -> Survey:
         iterations += 1
         # Exclude outliers with respect to the present uncertainty.
         used = [each[2] for each in problem.meet(values, stds, None)]
-        gradient, information = problem.linearised(values, used)
+        gradient, information, inflation = problem.linearised(values, used)
         covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
         stds = np.sqrt(np.diag(covariance))
         step = -covariance @ gradient
-        here = problem.misfit(values, used)
-        while problem.misfit(values + step, used) > here and np.max(np.abs(step) / stds) > STILL:
+        here = problem.misfit(values, used, inflation)
+        while (
+            np.max(np.abs(step) / stds) > STILL
+            and problem.misfit(values + step, used, inflation) > here
+        ):
             step = 0.5 * step
         values = values + step
         moved = float(np.max(np.abs(step) / stds))
