@@ -44,7 +44,6 @@ def test_commands_and_python_code_of_the_guide_run(
     # Other tests simulate every operation and set of measures.
     monkeypatch.setattr("access_av.study.points.METHODS", ())
     monkeypatch.setattr("access_av.study.points.FIXED_MS", (500.0,))
-    monkeypatch.setattr("access_av.study.operate.MOST_FINALISTS", 1)
     monkeypatch.setattr("access_av.study.measures.MOST_SETS", 1)
     whole = [block.replace("\\\n", " ") for block in blocks("sh")]
     lines = [shlex.split(line) for block in whole for line in block.splitlines()]
