@@ -158,13 +158,15 @@ impl Air {
                     "it is received nowhere {where_}: at the minimum distance of {distance_m:.0} m, its \
                          SNR is {snr_db:.0} dB, and the detection limit of an SSB is {FOUND_DB} dB"
                 )
-            } else {
+            } else if distance_m > MAX_DISTANCE_M {
                 format!(
                     "the minimum distance {where_} is {distance_m:.0} m, and the sites of urban macro \
                          cells are {MAX_DISTANCE_M} m apart (TR 38.901, 7.2)"
                 )
+            } else {
+                return None;
             };
-            (snr_db < FOUND_DB || distance_m > MAX_DISTANCE_M).then(|| Warning {
+            Some(Warning {
                 key: format!("radio_heads[{number}].position_m"),
                 value: format!("[{}, {}]", head.position.x_m, head.position.y_m),
                 why,

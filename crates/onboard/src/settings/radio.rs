@@ -1,5 +1,6 @@
 //! Radio heads and their SSBs.
 
+use nr_ssb::grid::SUBCARRIERS;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -120,6 +121,6 @@ impl SsbSettings {
 
     /// Returns the bandwidth of an SSB, 240 subcarriers, in hertz (TS 38.211, 7.4.3.1).
     pub fn bandwidth_hz(&self) -> f64 {
-        240.0 * self.subcarrier_spacing_khz * 1e3
+        SUBCARRIERS as f64 * self.subcarrier_spacing_khz * 1e3
     }
 }

@@ -56,17 +56,17 @@ pub enum FaultKind {
     OdometerReversed,
     /// The signal of an antenna is independent of the field.
     StuckAntenna {
-        /// Number of the antenna, from 0.
+        /// List with the number of one antenna, from 0.
         antennas: [usize; 1],
     },
     /// An antenna has no signal.
     DeadAntenna {
-        /// Number of the antenna, from 0.
+        /// List with the number of one antenna, from 0.
         antennas: [usize; 1],
     },
     /// An antenna's signal has the wrong sign.
     InvertedAntenna {
-        /// Number of the antenna, from 0.
+        /// List with the number of one antenna, from 0.
         antennas: [usize; 1],
     },
     /// The signals of two antennas are exchanged.

@@ -3,19 +3,17 @@
 //! The standard deviation in a data sheet holds for other antennas, another height and other
 //! surroundings. A range alone does not show whether its noise is larger, but the innovations do.
 //! The random walk of the vehicle's clock is in the first delay after a time without delays, not in
-//! the other ones. For both, the posterior of the variance ratio over a few levels is updated with the likelihood of each
-//! innovation (Bar-Shalom, Li and Kirubarajan 2001, 11.6.2).
+//! the other ones. For both, the posterior of the variance ratio over a few levels is updated with
+//! the likelihood of each innovation (Bar-Shalom, Li and Kirubarajan 2001, 11.6.2).
 
 use crate::gaussian::Innovation;
 
-/// Exponent of the smallest variance ratio. Ratios are powers of two, so that standard deviations
-/// are 0.5 to 11 times the specified one.
+/// Exponents of the smallest and largest variance ratio. Ratios are powers of two, so that standard
+/// deviations are 0.5 to 11 times the specified one.
 const FIRST_EXPONENT: i32 = -2;
+const LAST_EXPONENT: i32 = 7;
 /// Number of variance ratios.
-const LEVELS: usize = 10;
-
-/// Largest variance ratio.
-const MAX_RATIO: f64 = 128.0;
+const LEVELS: usize = LAST_EXPONENT.abs_diff(FIRST_EXPONENT) as usize + 1;
 
 /// Logarithm of the prior probability of a ratio relative to that of the next one closer to 1.
 const STEP_PRIOR: f64 = -1.0;
@@ -55,7 +53,8 @@ impl RangeNoise {
         }
         let residual = innovation.residual;
         let known = (innovation.variance - self.ratio * stated).max(0.0);
-        if residual * residual > MOST * (known + MAX_RATIO * stated) {
+        let largest = f64::from(LAST_EXPONENT).exp2() * stated;
+        if residual * residual > MOST * (known + largest) {
             return; // an outlier at every level, which is no evidence
         }
         let mut most = f64::NEG_INFINITY;

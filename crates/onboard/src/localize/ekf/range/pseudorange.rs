@@ -55,7 +55,7 @@ pub(super) struct Sighted<'a> {
     pub place_m: f64,
     pub travelled_m: f64,
     /// Variance of the clocks' random walk relative to the specified one.
-    pub clock_ratio: f64,
+    clock_ratio: f64,
     ahead_variance: f64,
     ahead: Option<Step>,
 }
@@ -211,13 +211,17 @@ impl Sighted<'_> {
         (self.ahead.as_ref()).map_or((row, 0.0), |ahead| ahead.seen_before(&row))
     }
 
+    /// Returns the variance of the random walk of both clocks, of vehicle and radio head (m²/s).
+    pub fn clock_walk(&self) -> f64 {
+        let [_, head_wander] = self.model.head_clock(&self.head.clock);
+        let wander = self.model.clock_wander_m_per_sqrt_s.powi(2) + head_wander.powi(2);
+        self.clock_ratio * wander
+    }
+
     /// Returns the variance of the clocks of vehicle and radio head since the newest odometry (m²).
     pub fn clock_variance(&self) -> f64 {
-        let (model, lag_s) = (self.model, self.lag_s);
-        let [_, head_wander] = model.head_clock(&self.head.clock);
-        let wander = model.clock_wander_m_per_sqrt_s.powi(2) + head_wander.powi(2);
         // The clock drift has a random walk during the lag.
-        self.clock_ratio * wander * lag_s
-            + model.drift_walk_mps_per_sqrt_s.powi(2) * lag_s.powi(3) / 3.0
+        let drift_walk = self.model.drift_walk_mps_per_sqrt_s.powi(2);
+        self.clock_walk() * self.lag_s + drift_walk * self.lag_s.powi(3) / 3.0
     }
 }

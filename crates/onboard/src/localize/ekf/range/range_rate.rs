@@ -59,9 +59,7 @@ impl Ekf {
             + (0.5 * self.config.acceleration_mps2 * interval_s).powi(2);
         let drift = seen.model.drift_walk_mps_per_sqrt_s.powi(2) * seen.lag_s;
         // The random walk of both clocks within the interval is noise of the rate.
-        let [_, head_wander] = seen.model.head_clock(&seen.head.clock);
-        let wander = seen.model.clock_wander_m_per_sqrt_s.powi(2) + head_wander.powi(2);
-        let walked = seen.clock_ratio * wander / measured_s.max(MIN_INTERVAL_S);
+        let walked = seen.clock_walk() / measured_s.max(MIN_INTERVAL_S);
         // The radio heads of a burst have a common speed error.
         let shared = self.heads.len().max(1) as f64;
         let model_variance = (cos_elevation * cosine).powi(2) * shared * speed_variance
