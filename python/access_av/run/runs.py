@@ -12,16 +12,16 @@ from access_av.device.platform import Platform
 from access_av.run.pairs import ErrorSamples
 from access_av.run.simulation import simulate
 from access_av.settings import platform_name, ssb_period_s
-from access_av.statistics.integrity import Integrity
 from access_av.statistics.paired import paired_mean
 from access_av.verdicts import NotOk
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
     from access_av import _core
+    from access_av.statistics.integrity import Integrity
 
 # Interval of the stored errors (s): a vehicle moves less than its width in this time.
 KEPT_EVERY_S = 0.1
@@ -127,16 +127,6 @@ class Runs(ErrorSamples):
     def named(self, name: str) -> Runs:
         """Returns the runs under another name of the variant."""
         return replace(self, name=name)
-
-    @classmethod
-    def joined(cls, parts: Sequence[Runs]) -> Runs:
-        """Joins the runs of several seeds of one scenario."""
-        every: dict[str, Any] = {
-            name: np.concatenate([getattr(it, name) for it in parts]) for name in PER_RUN
-        }
-        of_parts = [it.integrity for it in parts if it.integrity is not None]
-        integrity = Integrity.joined(of_parts) if len(of_parts) == len(parts) else None
-        return replace(parts[0], **every, integrity=integrity)
 
     def between(self, first: int, last: int) -> ErrorSamples:
         """Returns the errors of the epochs from ``first`` to before ``last``."""

@@ -13,7 +13,7 @@ from access_av.statistics.consistency import horizontal_error_m
 from access_av.statistics.proportions import clopper_pearson
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -135,15 +135,6 @@ class Integrity:
             run_interval=clopper_pearson(affected, runs),
             by_run=counts,
         )
-
-    @classmethod
-    def joined(cls, parts: Sequence[Integrity]) -> Integrity:
-        """Joins the runs of several results; the ratio of level and error is their mean."""
-        counts = {
-            name: np.concatenate([np.asarray(it.by_run[name]) for it in parts])
-            for name in parts[0].by_run
-        }
-        return cls.of_runs(counts, float(np.mean([it.median_level_over_error for it in parts])))
 
     def first(self, runs: int) -> Integrity:
         """Returns the first ``runs`` runs, with the ratio of level and error of all runs."""

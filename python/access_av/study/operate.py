@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 from access_av.study import economy
@@ -179,12 +180,13 @@ def operate(
 def _chosen(plant: _core.Plant, targets: Targets, found: Sequence[Point], leader: int) -> int:
     """Returns the point with the fewest changes of the vehicle that is equivalent to the best."""
     reference = found[leader]
-    for operation in (OWN, reference.operation.name):
-        for mode in (own_mode(plant.scenario()), reference.mode):
-            for place, it in enumerate(found):
-                is_asked = it.operation.name == operation and it.mode == mode and it.is_available
-                if is_asked and Rival.of(plant, targets, it, reference).is_equivalent:
-                    return place
+    places = {(it.operation.name, it.mode): place for place, it in enumerate(found)}
+    names, modes = (OWN, reference.operation.name), (own_mode(plant.scenario()), reference.mode)
+    for place in map(places.get, product(names, modes)):
+        if place is None or not found[place].is_available:
+            continue
+        if Rival.of(plant, targets, found[place], reference).is_equivalent:
+            return place
     return leader
 
 
