@@ -285,7 +285,9 @@ def test_every_radio_head_is_received_through_sockets(live: Live) -> None:
     heads = live.state["heads"]
     assert [head["pci"] for head in heads] == [11, 12, 13, 14]
     assert all(head["accepted"] >= 3 for head in heads), heads
-    assert live.state["dropped"] == {"blocks": 0, "messages": 0, "records": 0}
+    # At most 0.1 s of samples wait: on a busy computer, blocks of samples are dropped.
+    dropped = live.state["dropped"]
+    assert (dropped["messages"], dropped["records"]) == (0, 0)
     # The samples between the bursts were not processed.
     assert live.state["duty"] < 0.5
     poses = [it for it in live.records if it["type"] == "pose" and it["by"] == "odometry"]

@@ -75,7 +75,7 @@ def study_plant(
     --------
     >>> plant = _core.Plant.load("bends").with_overrides({"motion.start_at_m": 580.0})
     >>> found = study_plant(plant, runs=2)
-    >>> found.point in [found.points[place] for place in found.front]
+    >>> found.point in found.points
     True
     """
     named = plant.name if isinstance(plant, _core.Plant) else str(plant)
