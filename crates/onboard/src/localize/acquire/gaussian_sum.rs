@@ -54,6 +54,10 @@ const MAX_HYPOTHESES: f64 = 4000.0;
 /// away.
 const MIN_WEIGHT: f64 = 0.05;
 
+/// Maximum number of updates of hypotheses for each radio head and second. While many hypotheses
+/// remain, a search uses a part of the angles, so that it needs less than a third of a core.
+const MAX_UPDATES_PER_S: f64 = 10_000.0;
+
 /// Maximum number of hypotheses that the protection level covers one by one.
 const MAX_SEPARATE_HYPOTHESES: usize = 64;
 
@@ -70,7 +74,8 @@ clone_in_place! {
     struct Hypothesis {
         /// Index of the road of the hypothesis; 0 without a road.
         road: usize,
-        ekf: Ekf,
+        /// A filter is large, and hypotheses are sorted.
+        ekf: Box<Ekf>,
         log_likelihood: f64,
     }
 }
@@ -140,6 +145,8 @@ clone_in_place! {
         /// Road and distance along it of each kept hypothesis, while hypotheses are merged: they are
         /// compared pair by pair, and a filter is large.
         kept: Vec<(usize, f64)>,
+        /// Time of the last used angle of each radio head (s).
+        used_s: Vec<f64>,
         /// Initial number of hypotheses.
         places: usize,
         /// Whether an uncertain hypothesis is penalised for its uncertainty.
@@ -230,6 +237,7 @@ impl GaussianSum {
             heads: heads.to_vec(),
             hypotheses: Vec::new(),
             kept: Vec::new(),
+            used_s: vec![f64::NEG_INFINITY; heads.len()],
             places: 0,
             is_as_stated: false,
             multipath_bias_probability: config.multipath_bias_probability,
@@ -250,7 +258,7 @@ impl GaussianSum {
         let (config, heads) = (self.config, &self.heads);
         let hypothesis = |road: usize, map: Option<&Arc<Road>>, start: InitialPose| Hypothesis {
             road,
-            ekf: Ekf::new(config, map.cloned(), heads, &start),
+            ekf: Box::new(Ekf::new(config, map.cloned(), heads, &start)),
             log_likelihood: 0.0,
         };
         match &self.ground {
@@ -301,8 +309,26 @@ impl GaussianSum {
         })
     }
 
+    /// Returns the number of a radio head, from 0.
+    pub(super) fn number_of(&self, head: &RadioHead) -> Option<usize> {
+        let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
+        self.heads.iter().position(is_it)
+    }
+
+    /// Whether an angle of a radio head at `time_s` is used: the interval since its last one is
+    /// proportional to the number of hypotheses.
+    pub(super) fn is_due(&self, head: &RadioHead, time_s: f64) -> bool {
+        let last_s = (self.number_of(head)).and_then(|number| self.used_s.get(number));
+        let interval_s = self.hypotheses.len() as f64 / MAX_UPDATES_PER_S;
+        last_s.is_none_or(|last_s| time_s - last_s >= interval_s)
+    }
+
     /// Updates every hypothesis with an angle. The verdict is that of the most probable one.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateResult {
+        let number = self.number_of(head);
+        if let Some(used_s) = number.and_then(|number| self.used_s.get_mut(number)) {
+            *used_s = measured.time_s;
+        }
         let mut first = UpdateResult::unused(UpdateReason::Unusable);
         let mut is_used = false;
         let log_likelihood = if self.is_as_stated {
@@ -483,7 +509,7 @@ impl GaussianSum {
         if let Some(model) = self.ranging {
             one.ekf.begin_ranging(model);
         }
-        (opposite < MAX_OPPOSITE_ODDS).then_some(one.ekf)
+        (opposite < MAX_OPPOSITE_ODDS).then_some(*one.ekf)
     }
 
     /// Returns the mean over all hypotheses, weighted by their likelihoods, and a covariance that
@@ -609,6 +635,32 @@ mod tests {
             }
         }
         None
+    }
+
+    #[test]
+    fn many_hypotheses_use_a_part_of_the_angles() {
+        let site = Site::from_library("trip-2", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
+        let heads = RadioHead::received_by(&site, &vehicle);
+        let map = site.build_road().unwrap();
+        let config = EkfConfig::new(&site, &vehicle);
+        let mut search = GaussianSum::from_scratch(config, map, true, &heads);
+        assert_eq!(search.left(), 600);
+        let measured = AngleMeasurement {
+            kind: MeasurementKind::Angle,
+            time_s: 0.0,
+            phase_rad: 1.0,
+            phase_sigma_rad: 0.01,
+            angle_rad: f64::NAN,
+            snr_db: 20.0,
+            resolved: true,
+        };
+        search.update(&heads[0], &measured);
+        let hypotheses = search.left();
+        assert!(hypotheses > 1);
+        let interval_s = hypotheses as f64 / MAX_UPDATES_PER_S;
+        assert!(!search.is_due(&heads[0], 0.99 * interval_s));
+        assert!(search.is_due(&heads[0], interval_s) && search.is_due(&heads[1], 0.0));
     }
 
     #[test]

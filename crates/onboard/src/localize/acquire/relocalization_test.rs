@@ -144,8 +144,11 @@ impl RelocalizationTest {
             self.listened_s += silence_s.max(0.0);
         }
         self.received_s = measured.time_s;
-        let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
-        let number = self.search.heads().iter().position(is_it);
+        // Search and filter are compared with the same angles.
+        if !self.search.is_due(head, measured.time_s) {
+            return;
+        }
+        let number = self.search.number_of(head);
         if let Some(last_m) = number.and_then(|number| self.independent_m.get_mut(number)) {
             self.angles = self.angles.saturating_add(1);
             if self.driven_m - *last_m >= INDEPENDENT_M {

@@ -501,6 +501,9 @@ impl Localizer for Relocalizer {
     ) -> Result<UpdateResult, BoxError> {
         let now_s = measured.time_s;
         if let Some(search) = &mut self.search {
+            if !search.is_due(head, now_s) {
+                return Ok(UpdateResult::unused(UpdateReason::Consistent));
+            }
             let verdict = search.update(head, measured);
             if let Some(found) = search.found() {
                 self.track(found, now_s);
