@@ -25,6 +25,7 @@ from access_av.statistics import (
     stanford_counts,
     wilson,
 )
+from access_av.statistics.paired import paired_difference, paired_mean
 
 
 @pytest.mark.parametrize(
@@ -414,3 +415,10 @@ def test_rare_events_have_an_infinite_upper_end() -> None:
     assert percentiles(unknown, [99.0])[0].value == np.inf
     with pytest.raises(ValueError, match="percentile 0"):
         percentiles(errors, [0.0])
+
+
+def test_paired_differences_are_plain_numbers() -> None:
+    errors = np.random.default_rng(1).random((3, 50))
+    found = [*paired_difference(errors, 2.0 * errors, 90.0), *paired_mean(errors[0], errors[1])]
+    # A comparison of NumPy's numbers has a type that JSON does not support.
+    assert {type(it) for it in found} == {float}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,16 +60,13 @@ def paired_difference(
     difference = _less(*(float(_resampled(it, every, percent)[0]) for it in (mine, its)))
     runs = len(mine)
     if runs == 1 or not np.isfinite(difference):
-        return difference, -np.inf, np.inf
+        return difference, -math.inf, math.inf
     drawn = np.random.default_rng(seed).multinomial(runs, np.full(runs, 1.0 / runs), RESAMPLES)
     spread = _resampled(mine, drawn, percent) - _resampled(its, drawn, percent)
     if not np.isfinite(spread).all():
-        return difference, -np.inf, np.inf
-    half = (
-        student_quantile(0.975, runs - 1)
-        * float(np.std(spread, ddof=1))
-        * np.sqrt(runs / (runs - 1))
-    )
+        return difference, -math.inf, math.inf
+    standard_error = float(np.std(spread, ddof=1)) * math.sqrt(runs / (runs - 1))
+    half = student_quantile(0.975, runs - 1) * standard_error
     return difference, difference - half, difference + half
 
 
@@ -86,14 +84,15 @@ def paired_mean(
     """
     known = float(np.isfinite(others).all()), float(np.isfinite(values).all())
     if 0.0 in known:
-        sure = np.inf * (known[0] - known[1]) if known[0] != known[1] else 0.0
+        sure = math.inf * (known[0] - known[1]) if known[0] != known[1] else 0.0
         return sure, sure, sure
     less = values - others
     mean = float(np.mean(less))
     if less.size < 2:
-        return mean, -np.inf, np.inf
-    half = student_quantile(0.975, less.size - 1) * float(np.std(less, ddof=1)) / np.sqrt(less.size)
-    return mean, float(mean - half), float(mean + half)
+        return mean, -math.inf, math.inf
+    standard_error = float(np.std(less, ddof=1)) / math.sqrt(less.size)
+    half = student_quantile(0.975, less.size - 1) * standard_error
+    return mean, mean - half, mean + half
 
 
 def _less(first: float, second: float) -> float:
