@@ -457,9 +457,10 @@ def test_rivals_are_compared_in_pairs_and_equivalence_is_reported(
         assert rival["delta_j"] == pytest.approx(expected["delta_j"])
         assert rival["day_share"] == pytest.approx(expected["day_share"])
         assert rival["is_equivalent"] == expected["is_equivalent"]
-    # All other operations in their cheapest mode, and the recommended one in all other modes.
-    same = pl.col("variant") == chosen["variant"]
-    others = points.filter(~same).sort("energy_j", maintain_order=True).group_by("variant").first()
+    # All other operations in the recommended mode, and the recommended one in all other modes.
+    operation = ["method", "wake_up"]
+    same = pl.all_horizontal(pl.col(key) == chosen[key] for key in operation)
+    others = points.filter(~same, pl.col("mode") == chosen["mode"])
     modes = points.filter(same, ~pl.col("recommended"))
     assert {it["name"] for it in said["rivals"]} == {*others["name"], *modes["name"]}
     assert modes.height == 7

@@ -113,8 +113,8 @@ class Recommendation:
     chosen
         Index of the recommended point; ``None`` without a figure of energy.
     rivals
-        Comparisons with the recommended point: other operations in their mode with the least
-        energy, and the recommended operation in its other modes.
+        Comparisons with the recommended point: other operations in its mode, and its operation in
+        other modes.
     """
 
     points: list[Point]
@@ -191,19 +191,13 @@ def _chosen(plant: _core.Plant, targets: Targets, found: Sequence[Point], leader
 
 
 def _alternatives(found: Sequence[Point], chosen: Point) -> list[Point]:
-    """Returns the other operations in their cheapest mode, and the other modes of the chosen one.
-
-    Modes with different runs are listed separately.
-    """
-    by_energy = sorted(found, key=lambda it: it.energy_j)
-    cheapest: dict[str, Point] = {}
-    for it in by_energy:
-        cheapest.setdefault(it.driven.name, it)
-    return [
+    """Returns the other operations in the chosen mode, and the chosen operation in other modes."""
+    others = [
         it
-        for it in by_energy
-        if it is not chosen and (it.operation == chosen.operation or it is cheapest[it.driven.name])
+        for it in found
+        if it is not chosen and (it.operation == chosen.operation or it.mode == chosen.mode)
     ]
+    return sorted(others, key=lambda it: it.energy_j)
 
 
 def _day_wh(plant: _core.Plant, it: Point) -> float:
