@@ -55,8 +55,9 @@ const MAX_HYPOTHESES: f64 = 4000.0;
 const MIN_WEIGHT: f64 = 0.05;
 
 /// Maximum number of updates of hypotheses for each radio head and second. While many hypotheses
-/// remain, a search uses a part of the angles, so that it needs less than a third of a core.
-const MAX_UPDATES_PER_S: f64 = 10_000.0;
+/// remain, a search uses a part of the angles: with four radio heads and 4 µs for an update, it needs
+/// a third of a processor core.
+const MAX_UPDATES_PER_S: f64 = 20_000.0;
 
 /// Maximum number of hypotheses that the protection level covers one by one.
 const MAX_SEPARATE_HYPOTHESES: usize = 64;
