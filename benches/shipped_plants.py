@@ -114,7 +114,11 @@ def study(name: str, seed: int, runs: int | None, out: Path | None) -> Found:
         and chosen.is_available
         and recommendation.best in found.front
         and Rival.of(
-            found.plant, found.targets, chosen, found.points[recommendation.best]
+            found.plant,
+            found.targets,
+            chosen,
+            found.points[recommendation.best],
+            recommendation.comparisons,
         ).is_equivalent
     )
     shares = (

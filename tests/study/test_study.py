@@ -127,8 +127,8 @@ def test_each_shipped_plant_gets_a_point_equivalent_to_the_best_of_the_front(
     assert recommendation.best in found.front
     assert recommendation.best is not None
     assert found.point is not None
-    best = found.points[recommendation.best]
-    assert Rival.of(found.plant, found.targets, found.point, best).is_equivalent
+    best, comparisons = found.points[recommendation.best], recommendation.comparisons
+    assert Rival.of(found.plant, found.targets, found.point, best, comparisons).is_equivalent
     driven = [found.nominal, found.poor_los, *(it.driven for it in found.remedies)]
     driven += [it.driven for it in found.points]
     assert all(it.scenario.vehicle.alert_limit_m is not None for it in driven)

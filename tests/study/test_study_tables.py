@@ -144,12 +144,17 @@ def ok_shares(results: Path, variant: str) -> Any:
     return (rows["ok_steps"] / rows.select(pl.sum_horizontal(*steps)).to_series()).to_numpy()
 
 
-def difference(values: Any) -> list[float]:
-    """Mean of paired differences and its 95 % interval by Student's t."""
+def quantile(runs: int, comparisons: int) -> float:
+    """Quantile of Student's t for 95 % intervals that hold together, by Bonferroni."""
     from scipy.stats import t
 
+    return float(t.ppf(1.0 - 0.025 / comparisons, runs - 1))
+
+
+def difference(values: Any, comparisons: int = 1) -> list[float]:
+    """Mean of paired differences and its 95 % interval by Student's t."""
     mean, runs = values.mean(), len(values)
-    half = t.ppf(0.975, runs - 1) * values.std(ddof=1) / np.sqrt(runs)
+    half = quantile(runs, comparisons) * values.std(ddof=1) / np.sqrt(runs)
     return [mean, mean - half, mean + half]
 
 
@@ -164,17 +169,21 @@ def operating_points(results: Path) -> pl.DataFrame:
 def compared(results: Path, row: Any, reference: Any) -> dict[str, Any]:
     """Differences of a point to a reference in pairs of drives, and whether it is equivalent."""
     of_both = [errors(results, it["variant"]) for it in (row, reference)]
-    delta = paired_difference(*of_both, 90.0)
+    comparisons = operating_points(results)["variant"].n_unique() - 1
+    delta_m, *ends_m = paired_difference(*of_both, 90.0)
+    runs = len(of_both[0])
+    wider = quantile(runs, comparisons) / quantile(runs, 1)
+    delta = [delta_m, *(delta_m + wider * (it - delta_m) for it in ends_m)]
     delta_j = row["energy_j"] - reference["energy_j"]
     day_wh = [it["energy_j"] * 240 / 3600.0 + it["idle_value_w"] * 96.0 for it in (row, reference)]
     share = (day_wh[0] - day_wh[1]) / day_wh[1]
     shares = [ok_shares(results, it["variant"]) for it in (row, reference)]
-    of_ok = difference(shares[0] - shares[1])
+    of_ok = difference(shares[0] - shares[1], comparisons)
     rank = [ORDER.index(it["judgement"]) for it in (row, reference)]
     is_accurate = (rank[0] <= rank[1] and rank[0] < 2) or delta[1] <= 0.0
     is_ok = of_ok[0] >= -0.01 or of_ok[2] >= 0.0
     return {
-        "delta_m": list(delta),
+        "delta_m": delta,
         "delta_j": delta_j,
         "day_share": share,
         "ok_delta": of_ok,

@@ -112,21 +112,19 @@ def study(
             f"{place.error_m:.2f} m: {place.why}."
         )
     if found.remedies:
-        made = table(
-            [
-                "measure", "lost drives", f"{found.percent:g} % within / m", "difference / m",
-                "interval", "", "targets",
-            ],
-            text=1,
-        )  # fmt: skip
+        # Without this column, the names of the measures have space on a narrow terminal.
+        lost = any(it.driven.lost_runs for it in found.remedies)
+        within = f"{found.percent:g} % within / m"
+        heading = ["measure", within, "change / m", "interval", "", "targets"]
+        made = table([*(["lost drives"] if lost else []), *heading], text=1 + lost)
         for it in found.remedies:
             delta, low, high = it.delta_m
             made.add_row(
+                *([f"{it.driven.lost_runs} of {it.driven.runs}"] if lost else []),
                 it.name,
-                f"{it.driven.lost_runs} of {it.driven.runs}",
                 f"{it.error.value:.3f}",
                 f"{delta:+.3f}",
-                f"{low:+.3f} to {high:+.3f}",
+                f"{low:+.2f} to {high:+.2f}",
                 it.effect.words,
                 it.judgement.words,
             )

@@ -34,7 +34,8 @@ EQUIVALENT = (
     "with an equal or better verdict, or the 95 % interval of the error difference contains 0 or "
     f"smaller errors. State ok: the share of time is lower by at most {100.0 * OK_MARGIN:g} "
     "percentage point, or the interval of the difference contains 0 or higher shares. Energy of "
-    f"the fleet’s day, idle included: it is higher by less than {MATTERS_SHARE:.0%}."
+    f"the fleet’s day, idle included: it is higher by less than {MATTERS_SHARE:.0%}. The intervals "
+    "of all operations hold together with 95 % confidence (Bonferroni)."
 )
 
 

@@ -123,17 +123,20 @@ class ErrorSamples:
         """Number of positions in state ``ok`` whose error exceeds the protection level."""
         return None
 
-    def delta_m(self, baseline: ErrorSamples, percent: float) -> tuple[float, float, float]:
+    def delta_m(
+        self, baseline: ErrorSamples, percent: float, comparisons: int = 1
+    ) -> tuple[float, float, float]:
         """Returns the paired difference of a percentile to that of the baseline, in metres.
 
         Returns
         -------
         tuple of float
             Variant minus baseline, and the ends of the 95 % interval; negative if the variant is
-            more accurate.
+            more accurate. The intervals of a number of ``comparisons`` hold together.
         """
         runs = min(self.runs, baseline.runs)
-        return paired_difference(self.errors_m[:runs], baseline.errors_m[:runs], percent)
+        mine, its = self.errors_m[:runs], baseline.errors_m[:runs]
+        return paired_difference(mine, its, percent, comparisons=comparisons)
 
     def record(self, percent: float, delta_m: tuple[float, float, float] | None) -> dict[str, Any]:
         """Returns a row of the table ``compared`` of :mod:`access_av.columns`."""

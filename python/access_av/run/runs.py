@@ -84,14 +84,16 @@ class Runs(ErrorSamples):
         """Share of the time in state ``ok``; ``None`` without an integrity monitor."""
         return None if self.state_shares is None else float(self.state_shares["ok"])
 
-    def ok_delta(self, baseline: Runs) -> tuple[float, float, float] | None:
+    def ok_delta(self, baseline: Runs, comparisons: int = 1) -> tuple[float, float, float] | None:
         """Returns the paired difference of the share of time in state ``ok`` to the baseline's.
 
-        Variant minus baseline, and the ends of the 95 % interval; ``None`` without a monitor.
+        Variant minus baseline, and the ends of the 95 % interval; ``None`` without a monitor. The
+        intervals of a number of ``comparisons`` hold together.
         """
         if self.integrity is None or baseline.integrity is None:
             return None
-        return paired_mean(self.integrity.ok_shares, baseline.integrity.ok_shares)
+        mine, its = self.integrity.ok_shares, baseline.integrity.ok_shares
+        return paired_mean(mine, its, comparisons=comparisons)
 
     @property
     def not_ok_shares(self) -> Mapping[NotOk, float] | None:

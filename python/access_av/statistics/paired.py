@@ -17,7 +17,7 @@ RESAMPLES = 400
 
 
 def paired_difference(
-    errors: ArrayLike, others: ArrayLike, percent: float, *, seed: int = 0
+    errors: ArrayLike, others: ArrayLike, percent: float, *, comparisons: int = 1, seed: int = 0
 ) -> tuple[float, float, float]:
     """Returns the difference of a percentile, and its 95 % interval over pairs of runs.
 
@@ -32,6 +32,8 @@ def paired_difference(
         Errors of equal runs, each of shape (runs, epochs); infinity is above any bound.
     percent
         The percentile, above 0 and at most 100.
+    comparisons
+        Number of differences whose intervals hold together with 95 % confidence (Bonferroni).
     seed
         Seed of the resamples.
 
@@ -66,16 +68,17 @@ def paired_difference(
     if not np.isfinite(spread).all():
         return difference, -math.inf, math.inf
     standard_error = float(np.std(spread, ddof=1)) * math.sqrt(runs / (runs - 1))
-    half = student_quantile(0.975, runs - 1) * standard_error
+    half = student_quantile(1.0 - 0.025 / comparisons, runs - 1) * standard_error
     return difference, difference - half, difference + half
 
 
 def paired_mean(
-    values: NDArray[np.float64], others: NDArray[np.float64]
+    values: NDArray[np.float64], others: NDArray[np.float64], *, comparisons: int = 1
 ) -> tuple[float, float, float]:
     """Returns the mean difference over pairs of runs, and its 95 % interval by Student's t.
 
-    If only one of the variants has unknown (infinite) values, the difference is infinite.
+    The intervals of a number of ``comparisons`` hold together (Bonferroni). If only one of the
+    variants has unknown (infinite) values, the difference is infinite.
 
     Examples
     --------
@@ -91,7 +94,7 @@ def paired_mean(
     if less.size < 2:
         return mean, -math.inf, math.inf
     standard_error = float(np.std(less, ddof=1)) / math.sqrt(less.size)
-    half = student_quantile(0.975, less.size - 1) * standard_error
+    half = student_quantile(1.0 - 0.025 / comparisons, less.size - 1) * standard_error
     return mean, mean - half, mean + half
 
 

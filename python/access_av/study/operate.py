@@ -48,7 +48,8 @@ class Rival:
         The point with which it is compared.
     delta_m
         Paired difference of the error to that of the reference, and the ends of its 95 %
-        interval; percentile of the target of the whole trip.
+        interval; percentile of the target of the whole trip. The intervals of all operations hold
+        together.
     ok_delta
         Paired difference of the share of time in state ``ok``, as ``delta_m``; ``None`` without a
         monitor.
@@ -67,15 +68,22 @@ class Rival:
     day_share: float
 
     @classmethod
-    def of(cls, plant: _core.Plant, targets: Targets, point: Point, reference: Point) -> Rival:
+    def of(
+        cls,
+        plant: _core.Plant,
+        targets: Targets,
+        point: Point,
+        reference: Point,
+        comparisons: int,
+    ) -> Rival:
         """Compares a point with a reference, in pairs of runs."""
         day_wh = _day_wh(plant, reference)
         more_wh = _day_wh(plant, point) - day_wh
         return cls(
             point=point,
             reference=reference,
-            delta_m=point.driven.delta_m(reference.driven, targets.each[0].percent),
-            ok_delta=point.driven.ok_delta(reference.driven),
+            delta_m=point.driven.delta_m(reference.driven, targets.each[0].percent, comparisons),
+            ok_delta=point.driven.ok_delta(reference.driven, comparisons),
             delta_j=point.energy_j - reference.energy_j,
             day_share=more_wh / day_wh if day_wh else 0.0,
         )
@@ -122,6 +130,11 @@ class Recommendation:
     best: int | None
     chosen: int | None
     rivals: list[Rival]
+
+    @property
+    def comparisons(self) -> int:
+        """Number of operations, simulated separately, that are compared with one."""
+        return _comparisons(self.points)
 
     @property
     def point(self) -> Point | None:
@@ -173,7 +186,8 @@ def operate(
         return Recommendation(found, front(found), None, None, [])
     chosen = _chosen(plant, targets, found, leader)
     others = _alternatives(found, found[chosen])
-    rivals = [Rival.of(plant, targets, it, found[chosen]) for it in others]
+    comparisons = _comparisons(found)
+    rivals = [Rival.of(plant, targets, it, found[chosen], comparisons) for it in others]
     return Recommendation(found, front(found), leader, chosen, rivals)
 
 
@@ -185,9 +199,14 @@ def _chosen(plant: _core.Plant, targets: Targets, found: Sequence[Point], leader
     for place in map(places.get, product(names, modes)):
         if place is None or not found[place].is_available:
             continue
-        if Rival.of(plant, targets, found[place], reference).is_equivalent:
+        rival = Rival.of(plant, targets, found[place], reference, _comparisons(found))
+        if rival.is_equivalent:
             return place
     return leader
+
+
+def _comparisons(found: Sequence[Point]) -> int:
+    return max(1, len({it.driven.name for it in found}) - 1)
 
 
 def _alternatives(found: Sequence[Point], chosen: Point) -> list[Point]:
