@@ -112,7 +112,7 @@ def study(
             f"{place.error_m:.2f} m: {place.why}."
         )
     if found.remedies:
-        # Without this column, the names of the measures have space on a narrow terminal.
+        # Without the column of lost drives, a narrow terminal has space for the measures' names.
         lost = any(it.driven.lost_runs for it in found.remedies)
         within = f"{found.percent:g} % within / m"
         heading = ["measure", within, "change / m", "interval", "", "targets"]
