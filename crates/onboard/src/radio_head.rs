@@ -33,6 +33,13 @@ impl RadioHead {
         self.pci == pci && self.ssb_index == ssb_index
     }
 
+    /// Returns the number, from 0, of the radio head in a list that transmits the same SSB.
+    pub fn number_in(&self, heads: &[Self]) -> Option<usize> {
+        heads
+            .iter()
+            .position(|it| it.sends(self.pci, self.ssb_index))
+    }
+
     /// Returns the distance in metres from a position at a height.
     pub fn distance_m(&self, place: Point, height_m: f64) -> f64 {
         place

@@ -310,23 +310,18 @@ impl GaussianSum {
         })
     }
 
-    /// Returns the number of a radio head, from 0.
-    pub(super) fn number_of(&self, head: &RadioHead) -> Option<usize> {
-        let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
-        self.heads.iter().position(is_it)
-    }
-
     /// Whether an angle of a radio head at `time_s` is used: the interval since its last one is
     /// proportional to the number of hypotheses.
     pub(super) fn is_due(&self, head: &RadioHead, time_s: f64) -> bool {
-        let last_s = (self.number_of(head)).and_then(|number| self.used_s.get(number));
+        let number = head.number_in(&self.heads);
+        let last_s = number.and_then(|number| self.used_s.get(number));
         let interval_s = self.hypotheses.len() as f64 / MAX_UPDATES_PER_S;
         last_s.is_none_or(|last_s| time_s - last_s >= interval_s)
     }
 
     /// Updates every hypothesis with an angle. The verdict is that of the most probable one.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateResult {
-        let number = self.number_of(head);
+        let number = head.number_in(&self.heads);
         if let Some(used_s) = number.and_then(|number| self.used_s.get_mut(number)) {
             *used_s = measured.time_s;
         }

@@ -148,7 +148,7 @@ impl RelocalizationTest {
         if !self.search.is_due(head, measured.time_s) {
             return;
         }
-        let number = self.search.number_of(head);
+        let number = head.number_in(self.search.heads());
         if let Some(last_m) = number.and_then(|number| self.independent_m.get_mut(number)) {
             self.angles = self.angles.saturating_add(1);
             if self.driven_m - *last_m >= INDEPENDENT_M {

@@ -414,8 +414,7 @@ impl Bank {
     /// Updates with an angle: the test of its radio head, and every filter that uses the radio
     /// head.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateResult {
-        let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
-        let number = self.heads.iter().position(is_it);
+        let number = head.number_in(&self.heads);
         if !self.has_angles {
             self.has_angles = true;
             for subset in self.subsets.iter_mut() {

@@ -25,8 +25,7 @@ impl ModeFilter {
 impl Bank {
     /// Updates with a range.
     pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
-        let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
-        if let Some(number) = self.heads.iter().position(is_it) {
+        if let Some(number) = head.number_in(&self.heads) {
             self.watch(number);
             for subset in self.subsets.iter_mut() {
                 if !subset.lacks(number) {
