@@ -502,7 +502,11 @@ impl Localizer for Relocalizer {
         let now_s = measured.time_s;
         if let Some(search) = &mut self.search {
             if !search.is_due(head, now_s) {
-                return Ok(UpdateResult::unused(UpdateReason::Consistent));
+                // Not used is not rejected.
+                return Ok(UpdateResult {
+                    accepted: true,
+                    ..UpdateResult::unused(UpdateReason::Consistent)
+                });
             }
             let verdict = search.update(head, measured);
             if let Some(found) = search.found() {
