@@ -154,6 +154,29 @@ impl Pose {
         }
     }
 
+    /// Returns this pose in the frame of another one: forward and left (m), and heading (rad).
+    #[must_use]
+    pub fn seen_from(self, origin: Self) -> Self {
+        let [east_m, north_m, heading_rad] = origin.offset_of(self);
+        let (sin, cos) = origin.heading_rad.sin_cos();
+        Self {
+            x_m: cos * east_m + sin * north_m,
+            y_m: cos * north_m - sin * east_m,
+            heading_rad,
+        }
+    }
+
+    /// Returns the pose after a motion, which is a pose in the frame of this one.
+    #[must_use]
+    pub fn after(self, motion: Self) -> Self {
+        let Point { x_m, y_m } = self.point_at(motion.x_m, motion.y_m);
+        Self {
+            x_m,
+            y_m,
+            heading_rad: self.heading_rad + motion.heading_rad,
+        }
+    }
+
     /// Returns the point at `forward_m` and `left_m` in the frame of the pose.
     #[must_use]
     pub fn point_at(self, forward_m: f64, left_m: f64) -> Point {
@@ -198,6 +221,24 @@ pub fn wrap_angle(angle_rad: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_motion_is_the_end_seen_from_the_start() {
+        let [start, end] =
+            [(3.0, -2.0, 2.0), (-1.0, 4.0, -2.5)].map(|(x_m, y_m, heading_rad)| Pose {
+                x_m,
+                y_m,
+                heading_rad,
+            });
+        let again = start.after(end.seen_from(start));
+        assert!(again.point().distance_m(end.point()) < 1e-12);
+        assert!(wrap_angle(again.heading_rad - end.heading_rad).abs() < 1e-12);
+        // Three metres forward, then a quarter of a turn to the left.
+        let turned = start.along_chord(3.0, 0.0).along_chord(0.0, 0.5 * PI);
+        let [x_m, y_m, turned_rad] = Pose::default().offset_of(turned.seen_from(start));
+        assert!((x_m - 3.0).abs() < 1e-12 && y_m.abs() < 1e-12);
+        assert!((turned_rad - 0.5 * PI).abs() < 1e-12);
+    }
 
     #[test]
     fn angles_are_wrapped_to_a_half_open_interval() {

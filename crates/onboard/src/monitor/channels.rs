@@ -4,7 +4,8 @@
 //! The best steering vector explains a fraction of the received power. Exchanged or inverted
 //! channels leave a larger residual than the corrected channels. Cumulative sums (Page 1954) over
 //! SSBs compare the residual with that of each hypothesis: one pair of channels exchanged, or one
-//! channel inverted. A dead channel has a small fraction of the power.
+//! channel inverted. The scatter of each radio head is measured as the residual of the best
+//! hypothesis, which a fault does not increase. A dead channel has a small fraction of the power.
 //!
 //! Only SSBs with independent fading count: of another radio head, or after a motion of
 //! [`FADING_M`].
@@ -33,6 +34,8 @@ const MAX_HYPOTHESES: usize = MAX_ANTENNAS * (MAX_ANTENNAS - 1) / 2 + MAX_ANTENN
 /// Fraction of the power in the residual due to calibration errors, in addition to that of the
 /// site's scatter.
 const CALIBRATION: f64 = 0.02;
+/// Weight of the newest SSB in the measured scatter of a radio head.
+const SCATTER_WEIGHT: f64 = 1.0 / 32.0;
 /// Maximum evidence of one SSB for or against a hypothesis, in units of log-likelihood.
 const MAX_EVIDENCE_PER_SSB: f64 = 4.0;
 /// Drift of the sums per SSB, so that hypotheses with the same fit as the nominal channels gain no
@@ -100,6 +103,8 @@ struct Counted {
     ssb_index: u8,
     time_s: f64,
     distance_m: f64,
+    /// Measured fraction of the power in the residual of the best hypothesis.
+    scatter: f64,
 }
 
 /// Monitor of an array's channels.
@@ -107,7 +112,7 @@ struct Counted {
 pub struct ChannelMonitor {
     elements: usize,
     gains: [Complex64; MAX_ELEMENTS],
-    /// Expected fraction of the power in the residual of one direction.
+    /// Expected fraction of the power in the residual of one direction at the site.
     scatter: f64,
     /// Phase factors between neighbouring antennas for each direction; empty for a non-linear
     /// array.
@@ -180,42 +185,44 @@ impl ChannelMonitor {
         let snr_db = noise.map_or(observation.ssb.snr_db, |noise| {
             10.0 * (total / noise).log10()
         });
-        if !(total.is_finite()
-            && snr_db >= MIN_SNR_DB
-            && self.is_independent(observation, distance_m))
-        {
+        if !(total.is_finite() && snr_db >= MIN_SNR_DB) {
             return;
         }
+        let Some(place) = self.independent(observation, distance_m) else {
+            return;
+        };
         self.power(values, total, change);
         if !self.steps.is_empty() && !self.is_dead.contains(&true) {
-            self.fit(values, total, change);
+            self.fit(place, values, total, change);
         }
     }
 
-    /// Whether the fading of an SSB is independent of that of previous SSBs.
-    fn is_independent(&mut self, observation: &SsbObservation, distance_m: f64) -> bool {
+    /// Returns the index of an SSB's radio head; `None` if the fading is not independent of that of
+    /// its previous SSBs.
+    fn independent(&mut self, observation: &SsbObservation, distance_m: f64) -> Option<usize> {
         let ssb = observation.ssb;
-        let now = Counted {
-            pci: ssb.pci,
-            ssb_index: ssb.ssb_index,
-            time_s: ssb.time_s,
-            distance_m,
-        };
-        let is_same = |it: &&mut Counted| (it.pci, it.ssb_index) == (ssb.pci, ssb.ssb_index);
-        if let Some(last) = self.counted.iter_mut().find(is_same) {
-            let moved_m = (distance_m - last.distance_m).abs();
-            let passed_s = (ssb.time_s - last.time_s).abs();
-            let is_independent = moved_m >= FADING_M || passed_s >= FADING_S;
-            if is_independent {
-                *last = now;
+        let is_same = |it: &Counted| (it.pci, it.ssb_index) == (ssb.pci, ssb.ssb_index);
+        let Some(place) = self.counted.iter().position(is_same) else {
+            if self.counted.len() == self.counted.capacity() {
+                return None;
             }
-            return is_independent;
+            self.counted.push(Counted {
+                pci: ssb.pci,
+                ssb_index: ssb.ssb_index,
+                time_s: ssb.time_s,
+                distance_m,
+                scatter: self.scatter,
+            });
+            return Some(self.counted.len() - 1);
+        };
+        let last = self.counted.get_mut(place)?;
+        let moved_m = (distance_m - last.distance_m).abs();
+        let passed_s = (ssb.time_s - last.time_s).abs();
+        let is_independent = moved_m >= FADING_M || passed_s >= FADING_S;
+        if is_independent {
+            (last.time_s, last.distance_m) = (ssb.time_s, distance_m);
         }
-        let has_room = self.counted.len() < self.counted.capacity();
-        if has_room {
-            self.counted.push(now);
-        }
-        has_room
+        is_independent.then_some(place)
     }
 
     /// Compares the power of each channel with the mean of the others.
@@ -245,39 +252,54 @@ impl ChannelMonitor {
         }
     }
 
-    /// Compares the fit of the array response with the fit after the correction of each hypothesis.
-    fn fit(&mut self, values: &[Complex64], total: f64, change: &mut dyn FnMut(Fault, bool)) {
+    /// Compares the fit of the array response with the fit after the correction of each hypothesis,
+    /// for an SSB of the radio head `place`.
+    fn fit(
+        &mut self,
+        place: usize,
+        values: &[Complex64],
+        total: f64,
+        change: &mut dyn FnMut(Fault, bool),
+    ) {
+        let measured = self.counted.get(place).map_or(0.0, |it| it.scatter);
+        let scatter = self.scatter.max(measured);
         let nominal = self.residual(values, total, None);
+        let mut least = nominal;
         if let Some((hypothesis, evidence)) = self.accepted {
             let corrected = self.residual(values, total, Some(hypothesis));
-            let evidence = cumulated(evidence, (corrected - nominal) / self.scatter);
+            least = least.min(corrected);
+            let evidence = cumulated(evidence, (corrected - nominal) / scatter);
             self.accepted = Some((hypothesis, evidence));
             if evidence >= EVIDENCE {
                 self.accepted = None;
                 change(hypothesis.fault(), false);
             }
-            return;
-        }
-        let mut best: Option<(Hypothesis, f64)> = None;
-        for place in 0..self.hypotheses.len() {
-            let Some(&(hypothesis, evidence)) = self.hypotheses.get(place) else {
-                continue;
-            };
-            let corrected = self.residual(values, total, Some(hypothesis));
-            let evidence = cumulated(evidence, (nominal - corrected) / self.scatter);
-            if let Some((_, slot)) = self.hypotheses.get_mut(place) {
-                *slot = evidence;
+        } else {
+            let mut best: Option<(Hypothesis, f64)> = None;
+            for number in 0..self.hypotheses.len() {
+                let Some(&(hypothesis, evidence)) = self.hypotheses.get(number) else {
+                    continue;
+                };
+                let corrected = self.residual(values, total, Some(hypothesis));
+                least = least.min(corrected);
+                let evidence = cumulated(evidence, (nominal - corrected) / scatter);
+                if let Some((_, slot)) = self.hypotheses.get_mut(number) {
+                    *slot = evidence;
+                }
+                if best.is_none_or(|(_, most)| evidence > most) {
+                    best = Some((hypothesis, evidence));
+                }
             }
-            if best.is_none_or(|(_, most)| evidence > most) {
-                best = Some((hypothesis, evidence));
+            if let Some((hypothesis, _)) = best.filter(|(_, evidence)| *evidence >= EVIDENCE) {
+                self.accepted = Some((hypothesis, 0.0));
+                self.hypotheses
+                    .iter_mut()
+                    .for_each(|(_, evidence)| *evidence = 0.0);
+                change(hypothesis.fault(), true);
             }
         }
-        if let Some((hypothesis, _)) = best.filter(|(_, evidence)| *evidence >= EVIDENCE) {
-            self.accepted = Some((hypothesis, 0.0));
-            self.hypotheses
-                .iter_mut()
-                .for_each(|(_, evidence)| *evidence = 0.0);
-            change(hypothesis.fault(), true);
+        if let Some(head) = self.counted.get_mut(place) {
+            head.scatter += SCATTER_WEIGHT * (least - head.scatter);
         }
     }
 
@@ -320,4 +342,65 @@ impl ChannelMonitor {
 fn cumulated(evidence: f64, difference: f64) -> f64 {
     let one = difference.clamp(-MAX_EVIDENCE_PER_SSB, MAX_EVIDENCE_PER_SSB);
     (evidence + one - DRIFT).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    use super::*;
+    use crate::settings::{Shipped, TomlFile};
+
+    /// Receives a radio head over 200 m with a Rician factor `k`, and channel 1 inverted from 100 m
+    /// on if `is_inverted`. Returns the distances (m) of the reports.
+    fn reports(seed: u64, k: f64, is_inverted: bool) -> Vec<f64> {
+        let site = Site::from_library("yard", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("tugger", &Shipped).unwrap();
+        let elements = usize::from(vehicle.array.elements);
+        let mut monitor = ChannelMonitor::new(&site, &vehicle, 1);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut reports = Vec::new();
+        for step in 0..2000 {
+            let distance_m = 0.1 * f64::from(step);
+            let mut observation = SsbObservation::new(elements);
+            observation.ssb.snr_db = 30.0;
+            let std = (0.5 / (1.0 + k)).sqrt();
+            let snapshot: Vec<Complex64> = (0..elements)
+                .map(|antenna| {
+                    let [re, im]: [f64; 2] =
+                        std::array::from_fn(|_| std * rng.sample::<f64, _>(StandardNormal));
+                    let line_of_sight = Complex64::cis(0.01 * distance_m * antenna as f64);
+                    let sign = if is_inverted && distance_m > 100.0 && antenna == 1 {
+                        -1.0
+                    } else {
+                        1.0
+                    };
+                    sign * ((k / (1.0 + k)).sqrt() * line_of_sight + Complex64::new(re, im))
+                })
+                .collect();
+            assert!(observation.push(&snapshot));
+            let change = &mut |_, begins: bool| {
+                if begins {
+                    reports.push(distance_m);
+                }
+            };
+            monitor.ssb(&observation, distance_m, change);
+        }
+        reports
+    }
+
+    #[test]
+    fn scatter_stronger_than_that_of_the_site_is_no_fault_and_hides_none() {
+        for seed in 0..10 {
+            // The site specifies 13 dB.
+            assert!(reports(seed, 1.0, false).is_empty(), "{seed}");
+            let found = reports(seed, 10.0, true);
+            assert!(
+                found.len() == 1 && (100.0..102.0).contains(&found[0]),
+                "{found:?}"
+            );
+        }
+    }
 }

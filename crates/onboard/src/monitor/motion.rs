@@ -1,16 +1,17 @@
 //! Comparison of the odometry's motion with the angles.
 //!
 //! Each radio head has a reference: the residual of one of its angles, and the pose at its time. A
-//! later angle is predicted from the reference with the odometry. If the odometry is correct, the
-//! residual changes by noise only, because the errors of pose, survey and array are common to both
-//! angles.
+//! later angle is predicted from the reference with the path of the odometry. If the odometry is
+//! correct, the residual changes by noise only, because the errors of pose, survey and array are
+//! common to both angles.
 //!
 //! * A stop or reversal beyond the friction of tyres is a fault immediately.
 //! * Standstill: the squared change of the residual has a χ² distribution. The sum over all radio
 //!   heads except the largest is tested, so that one obstructed radio head causes no alarm.
 //! * Motion: the likelihood of the odometry is compared with that of a standing vehicle, of reversed
 //!   motion and of a reversed yaw rate, by a cumulative sum for each radio head (Page 1954). The sum
-//!   over all radio heads except the largest is tested.
+//!   over all radio heads except the largest is tested. The scatter of each radio head is measured.
+//! * A fault ends after a log-likelihood ratio in favour of the odometry without a contradiction.
 
 use crate::expected_angle::ExpectedAngle;
 use crate::geometry::{Pose, wrap_angle};
@@ -34,9 +35,14 @@ const STANDING_RAD: f64 = 0.1;
 /// Standard deviation of an angle at standstill in addition to its noise, in radians, due to
 /// scatterers that move.
 const STANDING_SIGMA_RAD: f64 = 0.02;
-/// Standard deviation of an angle in motion in addition to its noise, in radians, due to changing
-/// multipath.
+/// Minimum standard deviation of an angle in motion in addition to its noise, in radians, due to
+/// changing multipath.
 const MOVING_SIGMA_RAD: f64 = 0.06;
+/// Weight of the newest comparison in the measured scatter of a radio head. A fault is reported after
+/// a few comparisons, and increases the scatter little until then.
+const SCATTER_WEIGHT: f64 = 1.0 / 64.0;
+/// Number of angles as which the minimum scatter counts in the measured one.
+const FIRST_COUNT: f64 = 7.0;
 /// Maximum acceleration due to the friction of tyres, in m/s².
 const FRICTION_MPS2: f64 = 10.0;
 /// Minimum change of the speed that is compared with the maximum acceleration, in m/s. A smaller
@@ -58,8 +64,9 @@ const DRIFT: f64 = 0.25;
 const OUTLIER: f64 = 9.0;
 /// Minimum squared normalised difference between the hypotheses for a comparison.
 const DISTINCT: f64 = 8.0;
-/// Maximum age of a reference in motion, in seconds.
-const MOVING_AGE_S: f64 = 2.0;
+/// Maximum age of a reference in motion, in seconds. The direction of a distant radio head changes
+/// slowly.
+const MOVING_AGE_S: f64 = 5.0;
 /// Maximum age of a reference at standstill, in seconds.
 const STANDING_AGE_S: f64 = 30.0;
 /// Time in seconds after which the only radio head gets a new reference if its angle has jumped.
@@ -68,8 +75,9 @@ const JUMPED_S: f64 = 1.0;
 const SINGLE_JUMPS: u32 = 3;
 /// Duration without a contradicting angle after which a fault can end, in seconds.
 const CONFIRMED_S: f64 = 1.5;
-/// Number of confirming angles after which a fault can end.
-const CONFIRMED_ANGLES: u32 = 4;
+/// Maximum log-likelihood ratio of one angle in favour of the odometry, so that a fault ends after
+/// at least four angles ([`EVIDENCE`]).
+const MAX_CONFIRMATION: f64 = 0.5 * OUTLIER;
 
 /// Faults that the odometry is compared with in motion.
 const FAULTS: [Fault; 3] = [
@@ -84,10 +92,14 @@ struct Reference {
     head: RadioHead,
     time_s: f64,
     pose: Pose,
-    distance_m: f64,
-    yaw_rad: f64,
+    /// Pose on the path of the odometry.
+    path: Pose,
     residual_rad: f64,
     variance: f64,
+    /// Variance of an angle in motion in addition to its noise (rad²).
+    scatter: f64,
+    /// Number of angles from which the scatter was measured.
+    compared: u32,
     /// Evidence of each of [`FAULTS`].
     evidence: [f64; FAULTS.len()],
     /// Time of the first jump of the angle at standstill, in seconds.
@@ -96,6 +108,17 @@ struct Reference {
     jumps: u32,
     /// Whether the next angle replaces the reference.
     is_stale: bool,
+}
+
+impl Reference {
+    /// Updates the scatter with the squared change of the residual of two angles under the best
+    /// hypothesis, which a fault does not increase, minus their own variances (rad²).
+    fn learn(&mut self, excess: f64) {
+        self.compared = self.compared.saturating_add(1);
+        let weight = SCATTER_WEIGHT.max(1.0 / (FIRST_COUNT + f64::from(self.compared)));
+        let learned = self.scatter + weight * (0.5 * excess - self.scatter);
+        self.scatter = learned.max(MOVING_SIGMA_RAD.powi(2));
+    }
 }
 
 /// Angle of a burst with the quantities that are compared.
@@ -108,8 +131,8 @@ struct BurstAngle {
     variance: f64,
     /// Pose of the localizer at the time of the angle.
     pose: Pose,
-    distance_m: f64,
-    yaw_rad: f64,
+    /// Pose on the path of the odometry.
+    path: Pose,
 }
 
 /// Statistics over the radio heads of a burst.
@@ -118,7 +141,8 @@ struct Burst {
     standing: u32,
     sum: f64,
     largest: f64,
-    good: u32,
+    /// Log-likelihood ratio in favour of the odometry.
+    good: f64,
     bad: u32,
     /// Number of jumps of the radio head that was compared last.
     jumps: u32,
@@ -130,15 +154,20 @@ pub struct MotionMonitor {
     expected_angle: ExpectedAngle,
     references: Vec<Reference>,
     last: Option<OdometrySample>,
-    yaw_rad: f64,
+    /// Pose on the path of the odometry, from any start.
+    path: Pose,
+    /// Distance at this pose (m).
+    distance_m: f64,
+    /// Heading of the localizer at the last burst (rad), without a yaw rate.
+    heading_rad: Option<f64>,
     /// Last speed other than zero, without sign, in m/s.
     moving_mps: f64,
     standing_since_s: Option<f64>,
     received_s: f64,
     suspicions: u32,
-    /// Time of the last angle that contradicts the odometry, in seconds, and number of confirming
-    /// angles since then.
-    confirmed: (f64, u32),
+    /// Time of the last angle that contradicts the odometry, in seconds, and log-likelihood ratio in
+    /// favour of the odometry since then.
+    confirmed: (f64, f64),
 }
 
 impl MotionMonitor {
@@ -148,20 +177,25 @@ impl MotionMonitor {
             expected_angle,
             references: Vec::with_capacity(heads),
             last: None,
-            yaw_rad: 0.0,
+            path: Pose::default(),
+            distance_m: 0.0,
+            heading_rad: None,
             moving_mps: MIN_MOVING_MPS,
             standing_since_s: None,
             received_s: f64::NEG_INFINITY,
             suspicions: 0,
-            confirmed: (f64::NEG_INFINITY, 0),
+            confirmed: (f64::NEG_INFINITY, 0.0),
         }
     }
 
-    /// Removes all references, because the pose has changed without motion.
+    /// Replaces all references at their next angles, because the pose has changed without motion.
     pub fn restart(&mut self) {
-        self.references.clear();
+        for reference in &mut self.references {
+            (reference.is_stale, reference.evidence) = (true, Default::default());
+            (reference.jumped_s, reference.jumps) = (None, 0);
+        }
         self.suspicions = 0;
-        self.confirmed = (self.last.map_or(f64::NEG_INFINITY, |it| it.time_s), 0);
+        self.confirmed = (self.last.map_or(f64::NEG_INFINITY, |it| it.time_s), 0.0);
     }
 
     /// Removes the odometry as well, because its time or distance restarts.
@@ -177,7 +211,9 @@ impl MotionMonitor {
     pub fn odometry(&mut self, sample: &OdometrySample) -> Option<Fault> {
         let last = self.last.replace(*sample).unwrap_or(*sample);
         let duration_s = sample.time_s - last.time_s;
-        self.yaw_rad += sample.yaw_rate_radps.unwrap_or(0.0) * duration_s;
+        if let Some(yaw_rate_radps) = sample.yaw_rate_radps {
+            self.advance(sample.distance_m, yaw_rate_radps * duration_s);
+        }
         if sample.speed_mps.abs() > STANDING_MPS {
             self.moving_mps = sample.speed_mps.abs().max(MIN_MOVING_MPS);
         }
@@ -220,6 +256,14 @@ impl MotionMonitor {
     /// odometry and burst; `None` if it is unknown. Returns the detected fault.
     pub fn angles(&mut self, updates: &[AngleUpdate], pose: Option<Pose>) -> Option<Fault> {
         let last = self.last?;
+        if last.yaw_rate_radps.is_none() {
+            let heading_rad = pose.map(|it| it.heading_rad);
+            let before_rad = std::mem::replace(&mut self.heading_rad, heading_rad);
+            let turned_rad = heading_rad
+                .zip(before_rad)
+                .map(|(now, before)| now - before);
+            self.advance(last.distance_m, wrap_angle(turned_rad.unwrap_or(0.0)));
+        }
         let mut burst = Burst::default();
         for update in updates.iter().filter(|it| it.measured.resolved) {
             let measured = &update.measured;
@@ -238,8 +282,7 @@ impl MotionMonitor {
                 value_rad: measured.phase_rad,
                 variance: measured.phase_sigma_rad.powi(2),
                 pose: pose.unwrap_or_default().along_chord(-ahead_m, 0.0),
-                distance_m: last.distance_m - ahead_m,
-                yaw_rad: self.yaw_rad,
+                path: self.path.along_chord(-ahead_m, 0.0),
             };
             self.compare(&seen, pose.is_some(), &mut burst);
         }
@@ -271,10 +314,16 @@ impl MotionMonitor {
             .find_map(|(which, fault)| exceeds(which).then_some(fault))
     }
 
+    /// Extends the path of the odometry to a distance (m), with a change of the heading.
+    fn advance(&mut self, distance_m: f64, turned_rad: f64) {
+        let moved_m = distance_m - std::mem::replace(&mut self.distance_m, distance_m);
+        self.path = self.path.along_chord(moved_m, turned_rad);
+    }
+
     /// Whether the odometry has agreed with the angles long enough to end its fault.
     pub fn is_confirmed(&self, time_s: f64) -> bool {
-        let (since_s, angles) = self.confirmed;
-        time_s - since_s >= CONFIRMED_S && angles >= CONFIRMED_ANGLES
+        let (since_s, evidence) = self.confirmed;
+        time_s - since_s >= CONFIRMED_S && evidence >= EVIDENCE
     }
 
     /// Compares an angle with the reference of its radio head, which is replaced after use.
@@ -290,17 +339,13 @@ impl MotionMonitor {
         let Some(reference) = self.references.get(place).copied() else {
             return;
         };
-        let moved_m = seen.distance_m - reference.distance_m;
         let has_yaw_rate = self.last.is_some_and(|it| it.yaw_rate_radps.is_some());
-        let turned_rad = if has_yaw_rate {
-            seen.yaw_rad - reference.yaw_rad
-        } else {
-            wrap_angle(seen.pose.heading_rad - reference.pose.heading_rad)
-        };
+        let motion = seen.path.seen_from(reference.path);
         let age_s = seen.time_s - reference.time_s;
-        let stands = moved_m.abs() <= STANDING_M && turned_rad.abs() <= STANDING_RAD;
-        let change_rad = |moved_m: f64, turn_rad: f64| {
-            let pose = reference.pose.along_chord(moved_m, turn_rad);
+        let stands = motion.x_m.hypot(motion.y_m) <= STANDING_M
+            && wrap_angle(motion.heading_rad).abs() <= STANDING_RAD;
+        let change_rad = |motion: Pose| {
+            let pose = reference.pose.after(motion);
             let residual_rad =
                 (self.expected_angle).residual_rad(seen.kind, pose, &seen.head, seen.value_rad);
             wrap_angle(residual_rad - reference.residual_rad)
@@ -313,16 +358,19 @@ impl MotionMonitor {
             has_served = true;
         } else if stands && self.standing_since_s.is_some() {
             let variance = seen.variance + reference.variance + 2.0 * STANDING_SIGMA_RAD.powi(2);
-            let change = change_rad(moved_m, turned_rad);
+            let change = change_rad(motion);
             let squared = change.powi(2) / variance;
             // An angle confirms the standstill if a continued motion would have changed it.
-            let driven_rad = change_rad(self.moving_mps * age_s, 0.0);
-            let is_distinct = wrap_angle(driven_rad - change).powi(2) / variance >= DISTINCT;
+            let driven_rad = change_rad(Pose {
+                x_m: self.moving_mps * age_s,
+                ..Pose::default()
+            });
+            let driven = wrap_angle(driven_rad).powi(2) / variance;
             burst.standing += 1;
             burst.sum += squared;
             burst.largest = burst.largest.max(squared);
             if squared < OUTLIER {
-                burst.good += u32::from(is_distinct);
+                burst.good += confirmation(squared, driven);
                 next.jumped_s = None;
             } else {
                 burst.bad += 1;
@@ -334,31 +382,46 @@ impl MotionMonitor {
                 (has_served, next.jumps) = (true, 0);
             }
         } else if has_pose {
-            let variance = seen.variance + reference.variance + 2.0 * MOVING_SIGMA_RAD.powi(2);
-            let expected_rad = change_rad(moved_m, turned_rad);
+            let own = seen.variance + reference.variance;
+            let variance = own + 2.0 * reference.scatter;
+            let expected_rad = change_rad(motion);
+            let [backward, turned] = [
+                Pose {
+                    x_m: -motion.x_m,
+                    y_m: -motion.y_m,
+                    ..motion
+                },
+                Pose {
+                    y_m: -motion.y_m,
+                    heading_rad: -motion.heading_rad,
+                    ..motion
+                },
+            ];
             let others_rad = [
-                change_rad(0.0, 0.0),
-                change_rad(-moved_m, turned_rad),
+                change_rad(Pose::default()),
+                change_rad(backward),
                 if has_yaw_rate {
-                    change_rad(moved_m, -turned_rad)
+                    change_rad(turned)
                 } else {
                     expected_rad
                 },
             ];
             let apart = others_rad.map(|it| wrap_angle(it - expected_rad).powi(2) / variance);
             let is_distinct = apart.iter().any(|it| *it >= DISTINCT);
+            let squared = expected_rad.powi(2) / variance;
             has_served = is_distinct || age_s > MOVING_AGE_S;
             if has_served {
-                let squared = expected_rad.powi(2) / variance;
-                for (evidence, other_rad) in next.evidence.iter_mut().zip(others_rad) {
-                    let other = other_rad.powi(2) / variance;
+                let others = others_rad.map(|it| it.powi(2) / variance);
+                let least = others.into_iter().fold(squared, f64::min);
+                next.learn(least.min(OUTLIER) * variance - own);
+                for (evidence, other) in next.evidence.iter_mut().zip(others) {
                     let ratio = 0.5 * (squared.min(OUTLIER) - other.min(OUTLIER));
                     *evidence = (*evidence + ratio - DRIFT).clamp(0.0, MAX_EVIDENCE);
                 }
                 if squared >= OUTLIER {
                     burst.bad += 1;
-                } else if is_distinct {
-                    burst.good += 1;
+                } else {
+                    burst.good += confirmation(squared, others.into_iter().fold(0.0, f64::max));
                 }
             }
         } else {
@@ -366,6 +429,8 @@ impl MotionMonitor {
         }
         if has_served {
             next = Reference {
+                scatter: next.scatter,
+                compared: next.compared,
                 evidence: next.evidence,
                 jumps: if stands { next.jumps } else { 0 },
                 ..self.reference(seen)
@@ -381,8 +446,7 @@ impl MotionMonitor {
             head: seen.head,
             time_s: seen.time_s,
             pose: seen.pose,
-            distance_m: seen.distance_m,
-            yaw_rad: seen.yaw_rad,
+            path: seen.path,
             residual_rad: self.expected_angle.residual_rad(
                 seen.kind,
                 seen.pose,
@@ -390,6 +454,8 @@ impl MotionMonitor {
                 seen.value_rad,
             ),
             variance: seen.variance,
+            scatter: MOVING_SIGMA_RAD.powi(2),
+            compared: 0,
             evidence: Default::default(),
             jumped_s: None,
             jumps: 0,
@@ -421,13 +487,21 @@ impl MotionMonitor {
     fn update_confirmation(&mut self, burst: &Burst, now_s: f64) {
         // If the odometry reports standstill, a motion of the vehicle first changes the angles of
         // near radio heads.
-        let is_wrong = burst.bad > 1 || (burst.bad == 1 && (burst.good == 0 || burst.standing > 0));
+        let is_wrong =
+            burst.bad > 1 || (burst.bad == 1 && (burst.good <= 0.0 || burst.standing > 0));
         if is_wrong {
-            self.confirmed = (now_s, 0);
+            self.confirmed = (now_s, 0.0);
         } else {
-            self.confirmed.1 += burst.good;
+            self.confirmed.1 = (self.confirmed.1 + burst.good).max(0.0);
         }
     }
+}
+
+/// Returns the log-likelihood ratio in favour of the odometry, with a drift, for the squared
+/// normalised residuals of the odometry and of an alternative.
+fn confirmation(squared: f64, other: f64) -> f64 {
+    let ratio = 0.5 * (other - squared);
+    ratio.clamp(-MAX_CONFIRMATION, MAX_CONFIRMATION) - DRIFT
 }
 
 /// Returns the threshold for the sum of `sums` cumulative sums. The height of an excursion from
@@ -450,6 +524,10 @@ fn chi_squared(freedom: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
     use super::*;
     use crate::localize::{AngleMeasurement, UpdateReason, UpdateResult};
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
@@ -472,38 +550,41 @@ mod tests {
         }
     }
 
-    /// Drives with 2 m/s through a bend with a radius of 8 m. Returns the time (s) and the fault of the first report, for
-    /// the reported yaw rate (rad/s) as a function of the time and of the true one.
-    fn first_report(reported: impl Fn(f64, f64) -> f64) -> Option<(f64, Fault)> {
-        let site = Site::from_library("yard", &Shipped).unwrap();
+    /// Feeds the monitor with a drive at a site at `speed_mps` along `motion`, which returns the true and the
+    /// reported yaw rate (rad/s) at a time (s), and with noise of the angles (rad) as a function of
+    /// the number of the burst and of the radio head. Returns time (s) and fault of the first report.
+    fn first_report_of(
+        (site, speed_mps, duration_s): (&str, f64, f64),
+        motion: impl Fn(f64) -> [f64; 2],
+        noise_rad: impl Fn(u32, u32) -> f64,
+    ) -> Option<(f64, Fault)> {
+        let site = Site::from_library(site, &Shipped).unwrap();
         let vehicle = Vehicle::from_library("tugger", &Shipped).unwrap();
         let heads = RadioHead::received_by(&site, &vehicle);
         let expected_angle = ExpectedAngle::new(&vehicle);
         let mut monitor = MotionMonitor::new(expected_angle.clone(), heads.len());
         let mut pose = Pose::default();
-        for step in 0..500_u32 {
+        for step in 0..(50.0 * duration_s) as u32 {
             let time_s = 0.02 * f64::from(step);
-            let yaw_rate_radps = if time_s > 2.0 { 0.25 } else { 0.0 };
+            let [yaw_rate_radps, reported_radps] = motion(time_s);
             let sample = OdometrySample {
                 time_s,
-                distance_m: 2.0 * time_s,
-                speed_mps: 2.0,
-                yaw_rate_radps: Some(reported(time_s, yaw_rate_radps)),
+                distance_m: speed_mps * time_s,
+                speed_mps,
+                yaw_rate_radps: Some(reported_radps),
             };
             monitor.odometry(&sample);
             let updates: Vec<AngleUpdate> = (heads.iter().enumerate())
                 .map(|(number, &head)| {
                     let residual_rad =
                         expected_angle.residual_rad(MeasurementKind::Angle, pose, &head, 0.0);
-                    // Deterministic noise of 0.02 rad.
-                    let noise_rad = 0.03 * f64::from(7 * step + 3 * number as u32).sin();
                     AngleUpdate {
                         number,
                         head,
                         measured: AngleMeasurement {
                             kind: MeasurementKind::Angle,
                             time_s,
-                            phase_rad: noise_rad - residual_rad,
+                            phase_rad: noise_rad(step, number as u32) - residual_rad,
                             phase_sigma_rad: 0.02,
                             angle_rad: f64::NAN,
                             snr_db: 20.0,
@@ -516,9 +597,37 @@ mod tests {
             if let Some(fault) = monitor.angles(&updates, Some(pose)) {
                 return Some((time_s, fault));
             }
-            pose = pose.along_chord(0.04, 0.02 * yaw_rate_radps);
+            pose = pose.along_chord(0.02 * speed_mps, 0.02 * yaw_rate_radps);
         }
         None
+    }
+
+    /// Drives through a bend with a radius of 8 m. Returns the first report for the reported yaw rate
+    /// (rad/s) as a function of the time and of the true one.
+    fn first_report(reported: impl Fn(f64, f64) -> f64) -> Option<(f64, Fault)> {
+        let motion = |time_s: f64| {
+            let rate = if time_s > 2.0 { 0.25 } else { 0.0 };
+            [rate, reported(time_s, rate)]
+        };
+        // Deterministic noise of 0.02 rad.
+        let noise_rad = |step: u32, head: u32| 0.03 * f64::from(7 * step + 3 * head).sin();
+        first_report_of(("yard", 2.0, 10.0), motion, noise_rad)
+    }
+
+    #[test]
+    fn strong_scatter_is_no_fault() {
+        // As with a Rician factor of 5 dB: independent over some metres.
+        const SIGMA_RAD: f64 = 0.3;
+        let heads = 8;
+        for seed in 0..10 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let scatter: Vec<f64> = (0..heads * 200)
+                .map(|_| SIGMA_RAD * rng.sample::<f64, _>(StandardNormal))
+                .collect();
+            let noise_rad = |step: u32, head: u32| scatter[(heads * (step / 25) + head) as usize];
+            let found = first_report_of(("campus", 5.5, 100.0), |_| [0.0; 2], noise_rad);
+            assert_eq!(found, None, "{seed}");
+        }
     }
 
     #[test]
