@@ -1,10 +1,11 @@
 //! Detection of faults by the monitors in simulated runs.
 
+use onboard::Custom;
 use onboard::localize::IntegrityState;
 use onboard::monitor::Fault;
 use onboard::settings::{Shipped, TomlFile};
 use simulate::scenario::{FaultKind, FaultSettings, MotionSettings, Scenario};
-use simulate::{RunRecord, Step};
+use simulate::{RunRecord, Simulation, Step};
 
 use crate::common::{drives, shipped, value};
 
@@ -124,6 +125,31 @@ fn the_state_is_ok_again_within_ten_seconds_after_a_fault_of_the_odometry() {
 
 /// The vehicle departs while the odometry reports standstill, so that odometry alone does not
 /// reveal the fault.
+#[test]
+fn a_vehicle_that_is_lost_without_odometry_is_located_again() {
+    // Without odometry, the filter does not follow the bend at 92 s.
+    const FROM_S: f64 = 88.0;
+    const UNTIL_S: f64 = 103.0;
+    let fault = FaultSettings {
+        from_s: FROM_S,
+        until_s: UNTIL_S,
+        what: FaultKind::OdometerStopped,
+    };
+    let scenario = Scenario {
+        faults: vec![fault],
+        ..shipped("campus-handover")
+    };
+    let simulation = Simulation::on_its_platform(&scenario).unwrap();
+    let drive = simulation.until(120.0);
+    let run = drive.run(402, 0, &|_| Ok(Custom::default())).unwrap();
+    let end = run.steps.iter().rfind(|it| it.time_s <= UNTIL_S).unwrap();
+    assert!(end.error_m() > 50.0, "{}", end.error_m());
+    assert!(!run.steps.iter().any(is_beyond));
+    let last = run.steps.last().unwrap();
+    let level_m = last.integrity.map(|it| it.protection_level_m);
+    assert!(last.error_m() < 0.5 && level_m < Some(1.5), "{last:?}");
+}
+
 #[test]
 fn a_departure_that_the_odometry_misses_is_detected_by_the_angles() {
     // At 42.3 s the yard's vehicle has been stopped for 8 s.

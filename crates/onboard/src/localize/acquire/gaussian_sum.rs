@@ -14,7 +14,7 @@ use crate::clone_in_place::clone_in_place;
 use crate::gaussian::CERTAIN_SIGMAS;
 use crate::geometry::{Area, Point, Pose, wrap_angle};
 use crate::localize::ekf::state::{ACROSS, ALONG, HEADING, STATES};
-use crate::localize::ekf::{Ekf, EkfConfig};
+use crate::localize::ekf::{Ekf, EkfConfig, PredictedMeasurement};
 use crate::localize::modes::{log_likelihood, log_likelihood_as_stated};
 use crate::localize::output::{InitialPose, PoseEstimate};
 use crate::localize::output::{OdometryResult, UpdateReason, UpdateResult};
@@ -62,6 +62,9 @@ const MAX_UPDATES_PER_S: f64 = 20_000.0;
 /// Maximum number of hypotheses that the protection level covers one by one.
 const MAX_SEPARATE_HYPOTHESES: usize = 64;
 
+/// Log-likelihood of an angle, given a filter and its prediction.
+type LogLikelihood = fn(&Ekf, &Result<PredictedMeasurement, UpdateReason>) -> f64;
+
 /// Region of the search.
 #[derive(Clone, Debug)]
 enum Ground {
@@ -93,16 +96,25 @@ impl Hypothesis {
 
     /// Returns the difference of one state from that of another hypothesis.
     fn apart(&self, other: &Self, state: usize) -> f64 {
-        self.apart_of(&other.ekf, state)
-    }
-
-    fn apart_of(&self, other: &Ekf, state: usize) -> f64 {
-        let apart = other.belief().mean[state] - self.ekf.belief().mean[state];
+        let apart = other.ekf.belief().mean[state] - self.ekf.belief().mean[state];
         if state == HEADING {
             wrap_angle(apart)
         } else {
             apart
         }
+    }
+
+    /// Whether each component of another pose is within the confidence interval of the difference.
+    fn is_at(&self, other: &PoseEstimate) -> bool {
+        let own = self.ekf.pose(f64::NEG_INFINITY);
+        let (Some(one), Some(two)) = (own.covariance, other.covariance) else {
+            return false;
+        };
+        let apart = own.pose.offset_of(other.pose);
+        apart.iter().enumerate().all(|(at, apart)| {
+            let variance = one[at][at] + two[at][at];
+            apart * apart < CERTAIN_SIGMAS * CERTAIN_SIGMAS * variance
+        })
     }
 
     /// Whether another hypothesis without a road is within one standard deviation in every
@@ -185,7 +197,7 @@ impl GaussianSum {
         heads: &[RadioHead],
     ) -> Self {
         if road.is_none() && Self::serves_as_stated(heads) {
-            return Self::as_stated(&config, heads);
+            return Self::as_stated(&config, None, heads);
         }
         Self {
             multipath_bias_probability: config.multipath_bias_probability,
@@ -193,13 +205,13 @@ impl GaussianSum {
         }
     }
 
-    /// Creates a search without a road with the specified noise only: the uncertainty of a
-    /// hypothesis reduces its likelihood, and no bias is estimated before the vehicle is located.
-    pub(super) fn as_stated(config: &EkfConfig, heads: &[RadioHead]) -> Self {
+    /// Creates a search with the specified noise only: the uncertainty of a hypothesis reduces its
+    /// likelihood, and no bias is estimated before the vehicle is located.
+    pub(super) fn as_stated(config: &EkfConfig, road: Option<Road>, heads: &[RadioHead]) -> Self {
         Self {
             is_as_stated: true,
             multipath_bias_probability: config.multipath_bias_probability,
-            ..Self::new(config.as_stated(), None, true, heads)
+            ..Self::new(config.as_stated(), road, true, heads)
         }
     }
 
@@ -327,11 +339,7 @@ impl GaussianSum {
         }
         let mut first = UpdateResult::unused(UpdateReason::Unusable);
         let mut is_used = false;
-        let log_likelihood = if self.is_as_stated {
-            log_likelihood_as_stated
-        } else {
-            log_likelihood
-        };
+        let log_likelihood = self.log_likelihood();
         for (rank, hypothesis) in self.hypotheses.iter_mut().enumerate() {
             let predicted = hypothesis.ekf.predict_measurement(head, measured);
             is_used |= predicted.is_ok();
@@ -353,6 +361,21 @@ impl GaussianSum {
             }
         }
         first
+    }
+
+    /// Returns the function that weights the hypotheses.
+    pub(super) fn log_likelihood(&self) -> LogLikelihood {
+        if self.is_as_stated {
+            log_likelihood_as_stated
+        } else {
+            log_likelihood
+        }
+    }
+
+    /// Returns the position of a filter as a hypothesis of this search: with its model, and without
+    /// memory of any angle.
+    pub(super) fn hypothesis_at(&self, ekf: &Ekf) -> Ekf {
+        ekf.as_hypothesis(&self.config)
     }
 
     /// Sets the noise model of another filter to that of the hypotheses.
@@ -433,28 +456,29 @@ impl GaussianSum {
             .map_or(f64::NEG_INFINITY, |best| best.log_likelihood)
     }
 
-    /// Returns the log-likelihood of the angles for a uniform prior over the initial hypotheses.
-    pub(super) fn evidence(&self) -> f64 {
+    /// Returns the log-likelihood of the angles at all positions other than that of `ekf`, for a
+    /// uniform prior over the initial hypotheses.
+    pub(super) fn evidence_elsewhere(&self, ekf: &Ekf) -> f64 {
         let best = self.best();
-        let all = self
-            .hypotheses
-            .iter()
+        let weights = self
+            .elsewhere(ekf)
             .map(|it| (it.log_likelihood - best).exp());
-        best + (all.sum::<f64>() / self.places.max(1) as f64).ln()
+        best + (weights.sum::<f64>() / self.places.max(1) as f64).ln()
+    }
+
+    /// Returns the hypotheses that are not at the position of `ekf`.
+    fn elsewhere(&self, ekf: &Ekf) -> impl Iterator<Item = &Hypothesis> + Clone {
+        let there = ekf.pose(f64::NEG_INFINITY);
+        (self.hypotheses.iter()).filter(move |it| !it.is_at(&there))
     }
 
     /// Whether every remaining hypothesis has a small covariance, and the position of `ekf` is
     /// within its confidence region.
     pub(super) fn is_at(&self, ekf: &Ekf) -> bool {
+        let there = ekf.pose(f64::NEG_INFINITY);
         self.hypotheses.iter().all(|it| {
             let [max_m2, _] = Ekf::principal_variances(it.ekf.belief());
-            let (one, other) = (it.ekf.belief(), ekf.belief());
-            let is_near = |state| {
-                let apart = it.apart_of(ekf, state);
-                let variance = one.covariance[state][state] + other.covariance[state][state];
-                apart * apart < CERTAIN_SIGMAS * CERTAIN_SIGMAS * variance
-            };
-            max_m2 < FOUND_STD_M * FOUND_STD_M && [ALONG, ACROSS, HEADING].into_iter().all(is_near)
+            max_m2 < FOUND_STD_M * FOUND_STD_M && it.is_at(&there)
         })
     }
 
@@ -463,7 +487,7 @@ impl GaussianSum {
     /// position to the variances of position and heading equals the limits for a located vehicle.
     pub(super) fn odds_to_neglect(&self, ekf: &Ekf) -> f64 {
         let (here, there) = (
-            Self::mixture(&self.hypotheses, f64::NEG_INFINITY, 0.0),
+            Self::mixture(self.hypotheses.iter(), f64::NEG_INFINITY, 0.0),
             ekf.pose(f64::NEG_INFINITY),
         );
         let [x_m, y_m, turned_rad] = here.pose.offset_of(there.pose);
@@ -474,7 +498,7 @@ impl GaussianSum {
 
     /// Returns one filter for all remaining hypotheses once they determine the position.
     pub fn found(&self) -> Option<Ekf> {
-        let all = Self::mixture(&self.hypotheses, f64::NEG_INFINITY, 0.0);
+        let all = Self::mixture(self.hypotheses.iter(), f64::NEG_INFINITY, 0.0);
         let is_placed = all.principal_variances()[0] < FOUND_STD_M * FOUND_STD_M;
         let heading_known = match self.ground {
             Ground::Roads(_) => true,
@@ -512,40 +536,44 @@ impl GaussianSum {
     /// covers every hypothesis that may become the best one. The distribution is far from Gaussian
     /// while several hypotheses remain.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
-        Self::mixture(&self.hypotheses, time_s, MIN_WEIGHT)
+        Self::mixture(self.hypotheses.iter(), time_s, MIN_WEIGHT)
     }
 
-    /// Returns the most probable hypotheses, each with its weight, and one Gaussian with mean and
-    /// covariance of all others. The weights sum to one.
-    pub(super) fn components(&self, time_s: f64) -> impl Iterator<Item = (f64, PoseEstimate)> {
+    /// Returns the positions other than that of `ekf`, each with its weight: the most probable
+    /// hypotheses, and one Gaussian with mean and covariance of all others. The weights sum to one.
+    pub(super) fn components_elsewhere(
+        &self,
+        ekf: &Ekf,
+        time_s: f64,
+    ) -> impl Iterator<Item = (f64, PoseEstimate)> {
         let best = self.best();
         let weight = move |it: &Hypothesis| (it.log_likelihood - best).exp();
-        let total: f64 = self.hypotheses.iter().map(weight).sum();
-        let (single, rest) =
-            (self.hypotheses).split_at(self.hypotheses.len().min(MAX_SEPARATE_HYPOTHESES));
-        let rest_weight = rest.iter().map(weight).sum::<f64>() / total;
-        let rest = (!rest.is_empty()).then(|| (rest_weight, Self::mixture(rest, time_s, 0.0)));
-        let single = single.iter();
+        let total: f64 = self.elsewhere(ekf).map(weight).sum();
+        let rest = self.elsewhere(ekf).skip(MAX_SEPARATE_HYPOTHESES);
+        let rest_weight = rest.clone().map(weight).sum::<f64>() / total;
+        let rest = (rest_weight > 0.0).then(|| (rest_weight, Self::mixture(rest, time_s, 0.0)));
+        let single = self.elsewhere(ekf).take(MAX_SEPARATE_HYPOTHESES);
         let single = single.map(move |it| (weight(it) / total, it.ekf.pose(time_s)));
         single.chain(rest)
     }
 
     /// Returns mean and covariance over hypotheses. In the covariance, the weight of a
     /// hypothesis is at least `min_weight` times the weight of the best.
-    fn mixture(hypotheses: &[Hypothesis], time_s: f64, min_weight: f64) -> PoseEstimate {
-        let best = hypotheses
-            .iter()
+    fn mixture<'a>(
+        hypotheses: impl Iterator<Item = &'a Hypothesis> + Clone,
+        time_s: f64,
+        min_weight: f64,
+    ) -> PoseEstimate {
+        let best = (hypotheses.clone())
             .map(|hypothesis| hypothesis.log_likelihood)
             .fold(f64::NEG_INFINITY, f64::max);
-        let weighed = || {
-            hypotheses.iter().map(|hypothesis| {
-                let weight = (hypothesis.log_likelihood - best).exp();
-                (weight, hypothesis.ekf.pose(time_s))
-            })
-        };
+        let weighed = hypotheses.map(|hypothesis| {
+            let weight = (hypothesis.log_likelihood - best).exp();
+            (weight, hypothesis.ekf.pose(time_s))
+        });
         let (mut total, mut x_m, mut y_m) = (0.0, 0.0, 0.0);
         let (mut sin, mut cos) = (0.0, 0.0);
-        for (weight, PoseEstimate { pose, .. }) in weighed() {
+        for (weight, PoseEstimate { pose, .. }) in weighed.clone() {
             total += weight;
             x_m += weight * pose.x_m;
             y_m += weight * pose.y_m;
@@ -559,7 +587,7 @@ impl GaussianSum {
         };
         let mut covariance = [[0.0; 3]; 3];
         let mut total = 0.0;
-        for (weight, estimate) in weighed() {
+        for (weight, estimate) in weighed {
             let weight = weight.max(min_weight);
             total += weight;
             estimate.add_about(mean, weight, &mut covariance);

@@ -6,13 +6,10 @@ use std::cmp::Ordering;
 use super::gaussian_sum::GaussianSum;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::Ekf;
-use crate::localize::modes::{
-    CERTAIN, EVENT_EPOCHS, EVENT_S, log_likelihood, log_likelihood_as_stated,
-};
+use crate::localize::modes::{CERTAIN, EVENT_EPOCHS, EVENT_S};
 use crate::localize::output::PoseEstimate;
 use crate::observation::{AngleMeasurement, OdometrySample};
 use crate::radio_head::RadioHead;
-use crate::settings::IntegritySettings;
 
 /// Minimum distance driven before a result of the search is accepted (m): at standstill, the same
 /// errors repeat.
@@ -33,8 +30,10 @@ clone_in_place! {
     #[derive(Debug)]
     pub(super) struct RelocalizationTest {
         pub search: GaussianSum,
-        /// Filter of the given start, with the specified noise only. The filters of the bank would
-        /// explain contradicting angles by learned noise. `None` if the vehicle was lost later.
+        /// Hypothesis at the given start. The filters of the solution would explain contradicting
+        /// angles by biases and noise that they have learned. `None` if the vehicle was lost later:
+        /// in strong multipath, a hypothesis without that knowledge is not distinguished from its
+        /// neighbours.
         given: Option<Box<Ekf>>,
         /// Time of the newest odometry when the search was first reported (s).
         pub reported_s: f64,
@@ -44,11 +43,13 @@ clone_in_place! {
         /// Whether the selected hypothesis explains contradicting angles without a lost vehicle.
         may_explain_contradictions: bool,
         /// Prior probability that the given start is wrong, and that the vehicle is anywhere in the
-        /// area of the radio heads. It equals the prior probability of a radio head fault.
+        /// area of the radio heads.
         wrong_start: f64,
         /// Log odds of other starts below which the given start is confirmed: the log odds of the
         /// integrity risk.
         confirmed_at: f64,
+        /// Log odds of another start to the given start.
+        log_odds: f64,
         /// Log-likelihood of the angles for the filter.
         of_filter: f64,
         /// Distance driven at the start of the search (m).
@@ -80,6 +81,7 @@ impl RelocalizationTest {
             may_explain_contradictions,
             wrong_start: 0.0,
             confirmed_at: f64::NEG_INFINITY,
+            log_odds: f64::NEG_INFINITY,
             of_filter: 0.0,
             since_m: ekf.driven_m(),
             driven_m: 0.0,
@@ -92,14 +94,12 @@ impl RelocalizationTest {
     }
 
     /// Creates the test of a given start against a search everywhere else.
-    pub fn of_start(search: GaussianSum, given: &Ekf, settings: &IntegritySettings) -> Self {
-        let risk = settings.risk_per_epoch();
+    pub fn of_start(search: GaussianSum, given: &Ekf, wrong_start: f64, risk: f64) -> Self {
         Self {
-            given: Some(Box::new(given.as_stated())),
-            wrong_start: settings
-                .fault_probability
-                .of_radio_head(given.is_with_bias()),
+            given: Some(Box::new(search.hypothesis_at(given))),
+            wrong_start,
             confirmed_at: (risk / (1.0 - risk)).ln(),
+            log_odds: (wrong_start / (1.0 - wrong_start)).ln(),
             ..Self::new(search, given, false)
         }
     }
@@ -109,12 +109,13 @@ impl RelocalizationTest {
         (self.given.as_ref()).is_some_and(|given| self.search.is_at(given))
     }
 
-    /// Returns the positions of the search, each with its probability per independent epoch: a wrong
+    /// Returns the other positions of the search, each with its probability per independent epoch: a wrong
     /// start is one error for several epochs, and counts once against the integrity risk.
     pub fn other_starts(&self, time_s: f64) -> impl Iterator<Item = (f64, PoseEstimate)> {
-        let odds = self.log_odds().exp();
+        let odds = self.log_odds.exp();
         let probability = odds / (1.0 + odds) / EVENT_EPOCHS;
-        let components = self.search.components(time_s);
+        let given = self.given.iter();
+        let components = given.flat_map(move |it| self.search.components_elsewhere(it, time_s));
         components.map(move |(weight, pose)| (probability * weight, pose))
     }
 
@@ -156,9 +157,10 @@ impl RelocalizationTest {
                 self.independent = self.independent.saturating_add(1);
             }
         }
+        let log_likelihood = self.search.log_likelihood();
         if let Some(given) = &mut self.given {
             let predicted = given.predict_measurement(head, measured);
-            self.of_filter += log_likelihood_as_stated(given, &predicted);
+            self.of_filter += log_likelihood(given, &predicted);
             given.update_predicted(predicted, measured);
         } else {
             self.of_filter += log_likelihood(ekf, &ekf.predict_measurement(head, measured));
@@ -166,6 +168,9 @@ impl RelocalizationTest {
         self.search.update(head, measured);
         if let Some(given) = &mut self.given {
             self.search.copy_noise_model_to(given);
+        }
+        if let Some(given) = &self.given {
+            self.log_odds = self.log_odds_against(given);
         }
     }
 
@@ -177,7 +182,7 @@ impl RelocalizationTest {
     pub fn compare(&self, is_confirming: bool) -> Ordering {
         let (ratio, less, greater) = if let Some(given) = &self.given {
             let greater = self.search.odds_to_neglect(given).ln();
-            (self.log_odds(), self.confirmed_at, greater)
+            (self.log_odds, self.confirmed_at, greater)
         } else {
             let ratio = self.search.best() - self.of_filter;
             let share = if is_confirming || self.may_explain_contradictions {
@@ -196,21 +201,18 @@ impl RelocalizationTest {
         }
     }
 
-    /// Returns the log odds of another start to the given start.
-    fn log_odds(&self) -> f64 {
-        (self.wrong_start / (1.0 - self.wrong_start)).ln() + self.against_start()
-    }
-
-    /// Returns the log-likelihood ratio of all other positions to the given start. A ratio in
-    /// favour of other positions is reduced to the number of independent angles, and divided by the
-    /// misfit of the best position, so that angles without any consistent position are no evidence.
-    fn against_start(&self) -> f64 {
-        let ratio = self.search.evidence() - self.of_filter;
-        if ratio > 0.0 {
-            ratio * self.information_fraction() / self.misfit()
+    /// Returns the log odds of another start to the given start, with the specified prior. A
+    /// log-likelihood ratio in favour of other positions is reduced to the number of independent
+    /// angles, and divided by the misfit of the best position, so that angles without any consistent
+    /// position are no evidence.
+    fn log_odds_against(&self, given: &Ekf) -> f64 {
+        let ratio = self.search.evidence_elsewhere(given) - self.of_filter;
+        let share = if ratio > 0.0 {
+            self.information_fraction() / self.misfit()
         } else {
-            ratio
-        }
+            1.0
+        };
+        (self.wrong_start / (1.0 - self.wrong_start)).ln() + share * ratio
     }
 
     /// Returns the mean squared normalised residual at the best position of the search, at least 1.
@@ -224,7 +226,7 @@ impl RelocalizationTest {
 
     /// Whether another start is more probable than the given one.
     pub fn other_start_is_likelier(&self) -> bool {
-        self.is_of_start() && self.log_odds() > 0.0
+        self.is_of_start() && self.log_odds > 0.0
     }
 
     /// Returns the minimum distance driven before a result is accepted (m).

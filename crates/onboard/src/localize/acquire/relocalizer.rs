@@ -6,13 +6,13 @@
 //! first around the filter's position, then in the area of the radio heads, or along the whole
 //! road. If the selected hypothesis may explain the contradiction, the filter is only confirmed:
 //! the position is unchanged until the search finds a better one. A given start without a road is
-//! one hypothesis of several, and is confirmed from the first angle on.
+//! one hypothesis of several, and is confirmed from the first angle on. The position after a fault
+//! of the odometry is treated in the same way, with a road too.
 //!
 //! A result of the search replaces the filter only if the same angles are more probable there, so
 //! that a restart never makes the position worse, or if search and given start have reached one
-//! position elsewhere. Meanwhile the covariance covers both; if the
-//! filter is refuted, only the nearby search is reported. If the bank restarts by itself meanwhile,
-//! the search ends.
+//! position elsewhere. Meanwhile the covariance covers both; if the filter is refuted, only the
+//! nearby search is reported. If the bank restarts by itself meanwhile, the search ends.
 
 use std::cmp::Ordering;
 use std::sync::Arc;
@@ -50,6 +50,10 @@ const REST_S: f64 = 10.0;
 
 /// Distance after which a confirmation with few angles ends (m).
 const LONG_DISTANCE_M: f64 = 100.0;
+
+/// Probability that the position after a fault of the odometry is wrong: without odometry, the filter may have lost the
+/// vehicle.
+const AFTER_FAULT: f64 = 0.5;
 
 /// Standard deviation of the start position (m) in the search for the heading with ranges.
 const START_STD_M: f64 = 1.0;
@@ -200,6 +204,8 @@ clone_in_place! {
         rests_until_s: f64,
         recovered: Option<Recovered>,
         keeps_journal: bool,
+        /// Prior probability that the given start is wrong.
+        wrong_start: f64,
         /// Whether the odometry is at fault, so that no search is possible.
         is_without_odometry: bool,
     }
@@ -220,6 +226,8 @@ impl Relocalizer {
             Phase::Tracking
         };
         let mut made = Self::new(phase, road, heads, integrity);
+        made.wrong_start =
+            (integrity.unwrap_or_default().fault_probability).of_radio_head(ekf.is_with_bias());
         made.heading = HeadingSearch::new(&ekf, heads, START_STD_M);
         made.solution = Some(Solution::new(ekf, &made.drive_config, None));
         made
@@ -252,6 +260,7 @@ impl Relocalizer {
             rests_until_s: f64::NEG_INFINITY,
             recovered: None,
             keeps_journal: false,
+            wrong_start: 0.0,
             is_without_odometry: false,
             drive_config: Arc::new(DriveConfig {
                 road,
@@ -273,9 +282,8 @@ impl Relocalizer {
     pub(crate) fn end_free_motion(&mut self, specified: &EkfConfig, before: &Ekf) {
         self.change_motion(|ekf| ekf.end_free_motion(specified, before));
         self.is_without_odometry = false;
-        if self.drive_config.road.is_none() {
-            self.phase = Phase::Given;
-        }
+        self.wrong_start = AFTER_FAULT;
+        self.begin_of_start(f64::NEG_INFINITY);
     }
 
     fn change_motion(&mut self, change: impl Fn(&mut Ekf)) {
@@ -341,17 +349,27 @@ impl Relocalizer {
     /// usual search.
     fn begin_of_start(&mut self, now_s: f64) {
         let heads = self.drive_config.heads.as_slice();
-        let (true, Some(solution)) = (self.drive_config.road.is_none(), &self.solution) else {
+        let road = self.drive_config.road.as_ref();
+        let (true, Some(solution)) = (
+            road.is_some() || GaussianSum::serves_as_stated(heads),
+            &self.solution,
+        ) else {
             return self.begin(Phase::Confirming, now_s);
         };
-        if !GaussianSum::serves_as_stated(heads) {
-            return self.begin(Phase::Confirming, now_s);
-        }
         let given = solution.ekf();
-        let mut search = GaussianSum::as_stated(given.config(), heads);
+        let mut search = GaussianSum::as_stated(given.config(), road.cloned(), heads);
         search.resume(given);
-        let settings = self.drive_config.integrity.unwrap_or_default();
-        self.test = Some(RelocalizationTest::of_start(search, given, &settings));
+        let risk = self
+            .drive_config
+            .integrity
+            .unwrap_or_default()
+            .risk_per_epoch();
+        self.test = Some(RelocalizationTest::of_start(
+            search,
+            given,
+            self.wrong_start,
+            risk,
+        ));
         self.phase = Phase::Confirming;
     }
 

@@ -51,6 +51,21 @@ pub(super) struct Head {
 }
 
 impl Head {
+    /// Creates a radio head without any measurement.
+    pub const fn new(known: RadioHead) -> Self {
+        Self {
+            known,
+            excluded: false,
+            kind: MeasurementKind::Angle,
+            last_update_m: f64::NEG_INFINITY,
+            last_update_s: f64::NEG_INFINITY,
+            last_update_rad: f64::NEG_INFINITY,
+            last_residual: None,
+            last_range_m: f64::NEG_INFINITY,
+            rejected_ranges: 0,
+        }
+    }
+
     pub fn is(&self, other: &RadioHead) -> bool {
         self.known.sends(other.pci, other.ssb_index)
     }
@@ -99,21 +114,10 @@ impl Ekf {
         start: &InitialPose,
     ) -> Self {
         let belief = Self::prior(&config, map.as_deref(), start);
-        let head = |&known| Head {
-            known,
-            excluded: false,
-            kind: MeasurementKind::default(),
-            last_update_m: f64::NEG_INFINITY,
-            last_update_s: f64::NEG_INFINITY,
-            last_update_rad: f64::NEG_INFINITY,
-            last_residual: None,
-            last_range_m: f64::NEG_INFINITY,
-            rejected_ranges: 0,
-        };
         let mut ekf = Self {
             config,
             map,
-            heads: heads.iter().map(head).collect(),
+            heads: heads.iter().copied().map(Head::new).collect(),
             belief,
             bias: Self::biases(&config, heads),
             odometry: None,

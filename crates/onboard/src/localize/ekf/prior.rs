@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::angle_model::locate;
 use super::config::EkfConfig;
-use super::filter::Ekf;
+use super::filter::{Ekf, Head};
 use super::state::{
     ACROSS, ALONG, ANGLE_TIME_OFFSET, Belief, CURVATURE, DATUM, HEADING, MOUNTING, PHASE, SCALE,
     STATES, YAW_RATE_BIAS, YAW_RATE_SCALE,
@@ -107,11 +107,17 @@ impl Ekf {
         ekf
     }
 
-    /// Returns a copy without bias estimation that expects the specified noise of the angles.
-    pub(in crate::localize) fn as_stated(&self) -> Self {
-        let mut ekf = self.nominal();
-        ekf.begin_bias(0.0);
-        ekf
+    /// Returns a filter at the same pose with this configuration, without memory of any angle, as a
+    /// hypothesis of a search.
+    pub(in crate::localize) fn as_hypothesis(&self, config: &EkfConfig) -> Self {
+        let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
+        Self {
+            bias: Self::biases(config, &heads),
+            heads: heads.into_iter().map(Head::new).collect(),
+            config: *config,
+            journal: None,
+            ..self.clone()
+        }
     }
 
     /// Estimates a bias of each radio head from now on, with this prior probability; none if it is 0.
