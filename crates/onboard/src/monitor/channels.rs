@@ -34,7 +34,8 @@ const MAX_HYPOTHESES: usize = MAX_ANTENNAS * (MAX_ANTENNAS - 1) / 2 + MAX_ANTENN
 /// Fraction of the power in the residual due to calibration errors, in addition to that of the
 /// site's scatter.
 const CALIBRATION: f64 = 0.02;
-/// Weight of the newest SSB in the measured scatter of a radio head.
+/// Weight of the newest SSB in the measured scatter of a radio head: a memory of 32 SSBs with
+/// independent fading, at least 3 m of motion.
 const SCATTER_WEIGHT: f64 = 1.0 / 32.0;
 /// Maximum evidence of one SSB for or against a hypothesis, in units of log-likelihood.
 const MAX_EVIDENCE_PER_SSB: f64 = 4.0;
@@ -394,7 +395,7 @@ mod tests {
     #[test]
     fn scatter_stronger_than_that_of_the_site_is_no_fault_and_hides_none() {
         for seed in 0..10 {
-            // The site specifies 13 dB.
+            // The site specifies 10 dB.
             assert!(reports(seed, 1.0, false).is_empty(), "{seed}");
             let found = reports(seed, 10.0, true);
             assert!(

@@ -41,7 +41,8 @@ const MOVING_SIGMA_RAD: f64 = 0.06;
 /// Weight of the newest comparison in the measured scatter of a radio head. A fault is reported after
 /// a few comparisons, and increases the scatter little until then.
 const SCATTER_WEIGHT: f64 = 1.0 / 64.0;
-/// Number of angles as which the minimum scatter counts in the measured one.
+/// Number of angles as which the minimum scatter counts in the measured one: the first comparison at
+/// most doubles it ([`OUTLIER`]).
 const FIRST_COUNT: f64 = 7.0;
 /// Maximum acceleration due to the friction of tyres, in m/s².
 const FRICTION_MPS2: f64 = 10.0;
@@ -385,27 +386,10 @@ impl MotionMonitor {
             let own = seen.variance + reference.variance;
             let variance = own + 2.0 * reference.scatter;
             let expected_rad = change_rad(motion);
-            let [backward, turned] = [
-                Pose {
-                    x_m: -motion.x_m,
-                    y_m: -motion.y_m,
-                    ..motion
-                },
-                Pose {
-                    y_m: -motion.y_m,
-                    heading_rad: -motion.heading_rad,
-                    ..motion
-                },
-            ];
-            let others_rad = [
-                change_rad(Pose::default()),
-                change_rad(backward),
-                if has_yaw_rate {
-                    change_rad(turned)
-                } else {
-                    expected_rad
-                },
-            ];
+            let mut others_rad = alternatives(motion).map(change_rad);
+            if !has_yaw_rate {
+                others_rad[2] = expected_rad;
+            }
             let apart = others_rad.map(|it| wrap_angle(it - expected_rad).powi(2) / variance);
             let is_distinct = apart.iter().any(|it| *it >= DISTINCT);
             let squared = expected_rad.powi(2) / variance;
@@ -495,6 +479,24 @@ impl MotionMonitor {
             self.confirmed.1 = (self.confirmed.1 + burst.good).max(0.0);
         }
     }
+}
+
+/// Returns the motion of the vehicle under each of [`FAULTS`], for the motion of the odometry.
+fn alternatives(motion: Pose) -> [Pose; FAULTS.len()] {
+    let (backward_m, right_m) = (-motion.x_m, -motion.y_m);
+    [
+        Pose::default(),
+        Pose {
+            x_m: backward_m,
+            y_m: right_m,
+            ..motion
+        },
+        Pose {
+            y_m: right_m,
+            heading_rad: -motion.heading_rad,
+            ..motion
+        },
+    ]
 }
 
 /// Returns the log-likelihood ratio in favour of the odometry, with a drift, for the squared

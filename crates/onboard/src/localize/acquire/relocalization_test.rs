@@ -42,9 +42,9 @@ clone_in_place! {
         pub refutes: bool,
         /// Whether the selected hypothesis explains contradicting angles without a lost vehicle.
         may_explain_contradictions: bool,
-        /// Prior probability that the given start is wrong, and that the vehicle is anywhere in the
-        /// area of the radio heads.
-        wrong_start: f64,
+        /// Prior log odds that the given start is wrong, and that the vehicle is anywhere in the area
+        /// of the radio heads.
+        prior_log_odds: f64,
         /// Log odds of other starts below which the given start is confirmed: the log odds of the
         /// integrity risk.
         confirmed_at: f64,
@@ -79,7 +79,7 @@ impl RelocalizationTest {
             reported_s: ekf.time_s(),
             refutes: false,
             may_explain_contradictions,
-            wrong_start: 0.0,
+            prior_log_odds: f64::NEG_INFINITY,
             confirmed_at: f64::NEG_INFINITY,
             log_odds: f64::NEG_INFINITY,
             of_filter: 0.0,
@@ -95,11 +95,13 @@ impl RelocalizationTest {
 
     /// Creates the test of a given start against a search everywhere else.
     pub fn of_start(search: GaussianSum, given: &Ekf, wrong_start: f64, risk: f64) -> Self {
+        let [prior_log_odds, confirmed_at] =
+            [wrong_start, risk].map(|probability| (probability / (1.0 - probability)).ln());
         Self {
             given: Some(Box::new(search.hypothesis_at(given))),
-            wrong_start,
-            confirmed_at: (risk / (1.0 - risk)).ln(),
-            log_odds: (wrong_start / (1.0 - wrong_start)).ln(),
+            prior_log_odds,
+            confirmed_at,
+            log_odds: prior_log_odds,
             ..Self::new(search, given, false)
         }
     }
@@ -212,7 +214,7 @@ impl RelocalizationTest {
         } else {
             1.0
         };
-        (self.wrong_start / (1.0 - self.wrong_start)).ln() + share * ratio
+        self.prior_log_odds + share * ratio
     }
 
     /// Returns the mean squared normalised residual at the best position of the search, at least 1.

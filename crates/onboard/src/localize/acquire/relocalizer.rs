@@ -51,8 +51,8 @@ const REST_S: f64 = 10.0;
 /// Distance after which a confirmation with few angles ends (m).
 const LONG_DISTANCE_M: f64 = 100.0;
 
-/// Probability that the position after a fault of the odometry is wrong: without odometry, the filter may have lost the
-/// vehicle.
+/// Probability that the position after a fault of the odometry is wrong, without knowledge of whether
+/// the filter without odometry has lost the vehicle.
 const AFTER_FAULT: f64 = 0.5;
 
 /// Standard deviation of the start position (m) in the search for the heading with ranges.
