@@ -76,6 +76,9 @@ const JUMPED_S: f64 = 1.0;
 const SINGLE_JUMPS: u32 = 3;
 /// Duration without a contradicting angle after which a fault can end, in seconds.
 const CONFIRMED_S: f64 = 1.5;
+/// Variance of the normalised residual under an unknown motion, which is five times as far from the
+/// odometry as the angle is exact.
+const UNKNOWN_MOTION_VARIANCE: f64 = 25.0;
 /// Maximum log-likelihood ratio of one angle in favour of the odometry, so that a fault ends after
 /// at least four angles ([`EVIDENCE`]).
 const MAX_CONFIRMATION: f64 = 0.5 * OUTLIER;
@@ -500,9 +503,17 @@ fn alternatives(motion: Pose) -> [Pose; FAULTS.len()] {
 }
 
 /// Returns the log-likelihood ratio in favour of the odometry, with a drift, for the squared
-/// normalised residuals of the odometry and of an alternative.
+/// normalised residuals of the odometry and of an alternative. An unknown motion is the alternative
+/// if it is more likely than the odometry.
 fn confirmation(squared: f64, other: f64) -> f64 {
-    let ratio = 0.5 * (other - squared);
+    let unknown =
+        0.5 * (UNKNOWN_MOTION_VARIANCE.ln() - squared * (1.0 - 1.0 / UNKNOWN_MOTION_VARIANCE));
+    let known = 0.5 * (other - squared);
+    let ratio = if unknown < 0.0 {
+        known.min(unknown)
+    } else {
+        known
+    };
     ratio.clamp(-MAX_CONFIRMATION, MAX_CONFIRMATION) - DRIFT
 }
 
@@ -630,6 +641,25 @@ mod tests {
             let found = first_report_of(("campus", 5.5, 100.0), |_| [0.0; 2], noise_rad);
             assert_eq!(found, None, "{seed}");
         }
+    }
+
+    #[test]
+    fn residuals_of_an_unknown_motion_do_not_confirm_the_odometry() {
+        // The alternative is even less likely than the odometry.
+        let other = 20.0;
+        assert!(confirmation(1.0, other) > 0.0);
+        assert!(confirmation(0.5 * OUTLIER, other) < 0.0);
+        // Correct odometry is confirmed in the mean over a χ² distribution (midpoint rule).
+        let steps = 2_000;
+        let width = 12.0 / f64::from(steps);
+        let mean: f64 = (0..steps)
+            .map(|step| -6.0 + width * (f64::from(step) + 0.5))
+            .map(|z| width * (-0.5 * z * z).exp() * confirmation(z * z, other))
+            .sum();
+        assert!(
+            mean / std::f64::consts::TAU.sqrt() > 0.7 * MAX_CONFIRMATION,
+            "{mean}"
+        );
     }
 
     #[test]
