@@ -78,7 +78,22 @@ FAULTS = (
         lasts_s=6.0,
         change=changes.yaw_rate(lambda _: 0.3),
         reported=False,
-        shortfall="recovery: not ok within 7 s in most runs",
+    ),
+    Fault(
+        "yaw rate stuck at 0.1 rad/s",
+        "",
+        lasts_s=6.0,
+        change=changes.yaw_rate(lambda _: 0.1),
+        reported=False,
+        shortfall="recovery: not ok within 7 s in 3 of 10 runs",
+    ),
+    Fault(
+        "yaw rate too small by 0.1 rad/s",
+        "",
+        lasts_s=6.0,
+        change=changes.yaw_rate(lambda it: it - 0.1),
+        reported=False,
+        shortfall="recovery: not ok within 5 s in most runs",
     ),
     Fault(
         "two odometry sources with different counters",

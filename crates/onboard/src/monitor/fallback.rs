@@ -23,8 +23,6 @@ const UNDETECTED_S: f64 = 1.0;
 const HEADING_STD_RAD: f64 = 0.2;
 /// Noise of the distance in m/√m and m/√s. Half of it does not shorten the recovery in the yard.
 const DISTANCE_NOISE: f64 = 1.5;
-/// Noise of the heading in rad/√s: the yaw rate may be at fault, too.
-const YAW_NOISE_RAD_PER_SQRT_S: f64 = 0.3;
 /// Minimum speed in m/s that the filter is driven with: a noise of 0.8 m/√s at the least.
 const MIN_MPS: f64 = 0.3;
 /// Interval over which the speed is measured, in seconds.
@@ -115,7 +113,6 @@ impl Fallback {
             start,
             along_m,
             distance_noise: DISTANCE_NOISE,
-            yaw_noise_rad_per_sqrt_s: YAW_NOISE_RAD_PER_SQRT_S,
         };
         if self.older.is_none() {
             let mut vehicle = self.vehicle.clone();

@@ -4,6 +4,7 @@
 use super::config::EkfConfig;
 use super::filter::Ekf;
 use super::odometer::{SampleInterval, SpeedJumps};
+use super::predict::FAULTY_YAW_NOISE_RAD_PER_SQRT_S;
 use super::state::{
     ACROSS, ALONG, Belief, CURVATURE, HEADING, SCALE, YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
@@ -24,8 +25,6 @@ pub(crate) struct FreeMotion {
     pub along_m: Option<f64>,
     /// Random walk of the distance in m/√m and, except at standstill, in m/√s.
     pub distance_noise: f64,
-    /// Random walk of the heading in rad/√s.
-    pub yaw_noise_rad_per_sqrt_s: f64,
 }
 
 /// Minimum standard deviation of the position after a motion without odometry (m).
@@ -49,7 +48,7 @@ impl Ekf {
         self.bias.decorrelate();
         self.config.noise.odometer_m_per_sqrt_m = motion.distance_noise;
         self.config.noise.odometer_m_per_sqrt_s = motion.distance_noise;
-        self.config.yaw_noise_rad_per_sqrt_s = motion.yaw_noise_rad_per_sqrt_s;
+        self.config.yaw_noise_rad_per_sqrt_s = FAULTY_YAW_NOISE_RAD_PER_SQRT_S;
         for head in &mut self.heads {
             // The distance since the last angle and range is unknown.
             head.last_update_m -= motion.start.position_std_m;
@@ -136,7 +135,6 @@ mod tests {
                     },
                     along_m: Some(4.0 * time_s + 2.0),
                     distance_noise: 1.5,
-                    yaw_noise_rad_per_sqrt_s: 0.3,
                 });
             } else if step == 250 {
                 ekf.end_free_motion(&specified, &before);

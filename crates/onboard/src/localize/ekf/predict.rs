@@ -42,6 +42,10 @@ const TURN_GATE: f64 = 36.0;
 /// (rad/s).
 const REFUSED_RADPS: f64 = 0.5;
 
+/// Noise of a yaw rate that may be at fault (rad/√s): as an error of 0.1 rad/s with a correlation
+/// time of 5 s.
+pub(super) const FAULTY_YAW_NOISE_RAD_PER_SQRT_S: f64 = 0.3;
+
 /// Random walk of the yaw rate during lost samples: spectral density of a white angular
 /// acceleration (rad²/s³), a change of 0.5 rad/s within half a second.
 const YAW_RATE_WALK: f64 = 0.5;
@@ -326,11 +330,14 @@ impl Ekf {
 
     /// Models slip from now on: a change of the scale at once and whenever the vehicle starts to
     /// move (if the speed does not reveal it), with every jump of the speed beyond its
-    /// acceleration, and with every metre of a differential drive, whose speed may jump.
+    /// acceleration, and with every metre of a differential drive, whose speed may jump. The yaw
+    /// rate may be wrong, too.
     pub(in crate::localize) fn expect_slip(&mut self, by: f64) {
         let config = &mut self.config;
         config.may_slip = true;
         config.slip_acceleration_mps2 = config.acceleration_mps2;
+        config.yaw_noise_rad_per_sqrt_s =
+            (config.yaw_noise_rad_per_sqrt_s).max(FAULTY_YAW_NOISE_RAD_PER_SQRT_S);
         if config.drive == DriveKind::Differential {
             config.noise.scale_per_sqrt_m = SLIP_WALK_PER_SQRT_M;
         }

@@ -214,6 +214,9 @@ mod tests {
         moved_m: [f64; 2],
         /// Relative scale error of the odometer, and the time of its onset (s).
         scale: (f64, f64),
+        /// Error of the yaw rate (rad/s), and the time of its onset (s); without an error, the yaw rate
+        /// is not measured.
+        yaw_rate: (f64, f64),
         /// Variance of the additional angle noise, relative to the specified variance.
         noise: f64,
         /// End of reception (s); 0 for none.
@@ -238,11 +241,14 @@ mod tests {
             let (scale, from_s) = world.scale;
             let reads = if time_s > from_s { 1.0 + scale } else { 1.0 };
             distance_m += 0.4 * reads;
+            // The road is straight.
+            let (error_radps, from_s) = world.yaw_rate;
+            let yaw_rate_radps = if time_s > from_s { error_radps } else { 0.0 };
             bank.odometry(&OdometrySample {
                 time_s,
                 distance_m,
                 speed_mps: 4.0 * reads,
-                yaw_rate_radps: None,
+                yaw_rate_radps: (error_radps != 0.0).then_some(yaw_rate_radps),
             });
             if world.received_until_s > 0.0 && time_s > world.received_until_s {
                 continue;
@@ -402,6 +408,22 @@ mod tests {
         assert!(odds(0.0) < 1e-3);
         assert!(odds(0.2) > 100.0);
         assert!(odds(-0.2) > 100.0);
+    }
+
+    #[test]
+    fn a_wrong_yaw_rate_is_a_fault_of_the_odometry() {
+        for error_radps in [-0.1, 0.1, 0.3] {
+            let world = World {
+                yaw_rate: (error_radps, 20.0),
+                ..World::default()
+            };
+            let (bank, off_m) = drive(&world, 24.0, EXACT);
+            let (odds, faulty) = bank.mode(SelectedHypothesis::WheelSlip).unwrap();
+            assert!(odds > 1.0, "{error_radps}: {odds}");
+            let [[xx, ..], [_, yy, _], _] = faulty.pose(23.9).covariance.unwrap();
+            let off_m = off_m(faulty);
+            assert!(off_m < 4.0 * (xx + yy).sqrt(), "{error_radps}: {off_m}");
+        }
     }
 
     #[test]
