@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 import polars as pl
 import pytest
 
+from access_av.cli.main import main
 from access_av.tables.inputs import inputs
 from short_plant import LAST_METRES
 
@@ -104,9 +104,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("log1", ("--angles",)),
         ("log2", ("--angles", "--run", "1")),
     )
-    for name, options in drives:
-        command = ("record", "synth", "short.toml", *options, "--out", name)
-        subprocess.run([sys.executable, "-m", "access_av", *command], cwd=where, check=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(where)
+        patch.setattr("access_av.tables.results_directory.RESULTS", where / "results")
+        for name, options in drives:
+            words = ("record", "synth", "short.toml", *options, "--out", name)
+            patch.setattr(sys, "argv", ["access-av", *words])
+            with pytest.raises(SystemExit) as stopped:
+                main()
+            assert not stopped.value.code
     return where
 
 

@@ -41,11 +41,11 @@ def test_drops_have_their_columns_and_statistics() -> None:
 
 def test_a_drive_under_every_model_and_with_blockage() -> None:
     yard = Scenario.load("yard").with_overrides(
-        {"site.road.polyline_m": [[-140.0, 0.0], [-60.0, 0.0]], "motion.stops": []}
+        {"site.road.polyline_m": [[-140.0, 0.0], [-120.0, 0.0]], "motion.stops": []}
     )
     for model in ("umi", "inf-sl", "inf-dl", "inf-sh", "inf-dh"):
         scenario = yard.with_overrides(
-            {"channel.model": model, "channel.blockage": {"per_minute": 3.0}}
+            {"channel.model": model, "channel.blockage": {"per_minute": 12.0}}
         )
         first, again = (simulate(scenario, seed=2, threads=threads) for threads in (1, 2))
         assert first.steps.equals(again.steps)
