@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use onboard::settings::{Check, SettingsError, TomlFile};
+use onboard::settings::{Check, SettingsError, TomlFile, TomlFormat};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -141,6 +141,11 @@ impl NodeSettings {
 impl TomlFile for NodeSettings {
     const WHAT: &'static str = "node";
     const SHIPPED: &'static [(&'static str, &'static str)] = &[];
+
+    fn format() -> &'static TomlFormat<Self> {
+        static FORMAT: TomlFormat<NodeSettings> = TomlFormat::new();
+        &FORMAT
+    }
 
     fn name(&self) -> &str {
         &self.name

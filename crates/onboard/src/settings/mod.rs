@@ -51,7 +51,7 @@ pub use road::{RoadSettings, SegmentSettings};
 pub use shipped::Shipped;
 pub use site::{SPEED_OF_LIGHT_MPS, Site};
 pub use start::StartSettings;
-pub use toml_file::{Library, NamedText, TomlFile};
+pub use toml_file::{Library, NamedText, TomlFile, TomlFormat};
 pub use underlay::UnderlaySettings;
 pub use vehicle::{PlatformSettings, Vehicle, check_together};
 pub use wake_up::{

@@ -10,7 +10,7 @@ use super::error::SettingsError;
 use super::figure::{Boundary, Extent, Figure, Quantity, check_ranges};
 use super::power::{CpuSettings, IdleSettings, PowerMode, ReceiverPower, SuspendSettings};
 use super::receiver::EstimatorMethod;
-use super::toml_file::TomlFile;
+use super::toml_file::{TomlFile, TomlFormat};
 use super::vehicle::{PlatformSettings, Vehicle};
 
 /// Platform file.
@@ -193,6 +193,11 @@ impl TomlFile for Platform {
             include_str!("../../../../platforms/raspberry-pi-5.toml"),
         ),
     ];
+
+    fn format() -> &'static TomlFormat<Self> {
+        static FORMAT: TomlFormat<Platform> = TomlFormat::new();
+        &FORMAT
+    }
 
     fn name(&self) -> &str {
         &self.name

@@ -10,7 +10,7 @@ use super::check::Check;
 use super::error::SettingsError;
 use super::radio::{RadioHeadSettings, SsbSettings};
 use super::road::RoadSettings;
-use super::toml_file::{Library, TomlFile};
+use super::toml_file::{Library, TomlFile, TomlFormat};
 use super::underlay::UnderlaySettings;
 use super::walls::WallSettings;
 use crate::geometry::Point;
@@ -109,6 +109,11 @@ impl TomlFile for Site {
         ("yard", include_str!("../../../../sites/yard.toml")),
         ("campus", include_str!("../../../../sites/campus.toml")),
     ];
+
+    fn format() -> &'static TomlFormat<Self> {
+        static FORMAT: TomlFormat<Site> = TomlFormat::new();
+        &FORMAT
+    }
 
     fn name(&self) -> &str {
         &self.name

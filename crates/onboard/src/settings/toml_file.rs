@@ -1,8 +1,6 @@
 //! Settings files: one way to read, check, modify and write them.
 
-use std::any::type_name;
-use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::OnceLock;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -56,12 +54,58 @@ pub trait Library {
     }
 }
 
+/// Conversions of a settings type from and to text.
+///
+/// They are functions of a static of the type's crate. As generic methods, they would be compiled again in every crate
+/// that reads or writes such a file, which takes minutes.
+pub struct TomlFormat<T> {
+    read: fn(Table, &str) -> Result<T, SettingsError>,
+    to_toml: fn(&T) -> String,
+    to_json: fn(&T) -> String,
+    to_value: fn(&T) -> Json,
+    to_table: fn(&T) -> Table,
+    make_schema: fn() -> Json,
+    schema: OnceLock<Json>,
+}
+
+impl<T: Serialize + DeserializeOwned + JsonSchema> TomlFormat<T> {
+    /// Returns the conversions by serde and schemars.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            read: from_table,
+            // Checked settings contain finite numbers, strings and tables only, which are valid TOML.
+            to_toml: |settings| toml::to_string_pretty(settings).unwrap_or_default(),
+            to_json: |settings| serde_json::to_string_pretty(settings).unwrap_or_default(),
+            to_value: |settings| serde_json::to_value(settings).unwrap_or_default(),
+            to_table: |settings| Table::try_from(settings).unwrap_or_default(),
+            make_schema: || with_extends(schemars::schema_for!(T).to_value()),
+            schema: OnceLock::new(),
+        }
+    }
+}
+
+impl<T: Serialize + DeserializeOwned + JsonSchema> Default for TomlFormat<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T> TomlFormat<T> {
+    fn schema(&self) -> &Json {
+        self.schema.get_or_init(self.make_schema)
+    }
+}
+
 /// Kind of settings file. A file with `extends = "another"` overrides keys of that other file.
-pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
+pub trait TomlFile: Sized + 'static {
     /// Name of this kind of file in error messages, such as "site".
     const WHAT: &'static str;
     /// Names and texts of the shipped files.
     const SHIPPED: &'static [(&'static str, &'static str)];
+
+    /// Returns the conversions of the type, a static.
+    fn format() -> &'static TomlFormat<Self>;
 
     /// Returns the short name of the file.
     fn name(&self) -> &str;
@@ -118,9 +162,9 @@ pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
         let check = Check { file: origin };
         apply_extends::<Self>(&mut table, origin, library)?;
         Self::resolve(&mut table, origin, library)?;
-        let settings: Self = from_table(table, origin)?;
-        let json = serde_json::to_value(&settings).unwrap_or_default();
-        check_limits(&json, &schema::<Self>(), check)?;
+        let format = Self::format();
+        let settings = (format.read)(table, origin)?;
+        check_limits(&(format.to_value)(&settings), format.schema(), check)?;
         let name = settings.name();
         check.that(
             is_usable_name(name),
@@ -158,7 +202,7 @@ pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
         library: &dyn Library,
     ) -> Result<Self, SettingsError> {
         let origin = format!("{} with overrides", self.name());
-        let mut table = parse(&self.to_toml(), &origin)?;
+        let mut table = self.to_table();
         let mut overrides: Vec<_> = overrides.into_iter().collect();
         overrides.sort_by_key(|(path, _)| !ends_in_tag(path));
         for (path, value) in overrides {
@@ -169,18 +213,22 @@ pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
 
     /// Returns TOML text with every default written out.
     fn to_toml(&self) -> String {
-        // Checked settings contain finite numbers, strings and tables only, which are valid TOML.
-        toml::to_string_pretty(self).unwrap_or_default()
+        (Self::format().to_toml)(self)
+    }
+
+    /// Returns a table with every default written out.
+    fn to_table(&self) -> Table {
+        (Self::format().to_table)(self)
     }
 
     /// Returns JSON text with every default written out.
     fn to_json(&self) -> String {
-        serde_json::to_string_pretty(self).unwrap_or_default()
+        (Self::format().to_json)(self)
     }
 
     /// Returns the JSON Schema of this kind of file.
     fn schema_json() -> String {
-        serde_json::to_string_pretty(&schema::<Self>()).unwrap_or_default()
+        serde_json::to_string_pretty(Self::format().schema()).unwrap_or_default()
     }
 }
 
@@ -220,16 +268,6 @@ fn apply_extends<T: TomlFile>(
     }
     let allowed = format!("a chain of `extends` may contain at most {MAX_EXTENDS} files");
     Err(Check { file: origin }.error("extends", "endless", &allowed))
-}
-
-/// Returns the schema of a type, computed once.
-fn schema<T: JsonSchema>() -> Json {
-    static MADE: Mutex<Option<HashMap<&'static str, Json>>> = Mutex::new(None);
-    let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
-    made.get_or_insert_default()
-        .entry(type_name::<T>())
-        .or_insert_with(|| with_extends(schemars::schema_for!(T).to_value()))
-        .clone()
 }
 
 /// Adds the key `extends` to a schema; the types do not contain it.

@@ -13,7 +13,7 @@ use super::ranging::{RangingKind, RangingSettings};
 use super::receiver::{EstimatorMethod, EstimatorSettings, Pilots, ReceiverSettings};
 use super::site::Site;
 use super::start::StartSettings;
-use super::toml_file::TomlFile;
+use super::toml_file::{TomlFile, TomlFormat};
 use super::wake_up::{UncertaintySettings, WakeUpSettings};
 
 /// Vehicle file.
@@ -158,6 +158,11 @@ impl TomlFile for Vehicle {
         ("carrier", include_str!("../../../../vehicles/carrier.toml")),
         ("tugger", include_str!("../../../../vehicles/tugger.toml")),
     ];
+
+    fn format() -> &'static TomlFormat<Self> {
+        static FORMAT: TomlFormat<Vehicle> = TomlFormat::new();
+        &FORMAT
+    }
 
     fn name(&self) -> &str {
         &self.name

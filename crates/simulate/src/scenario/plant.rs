@@ -1,7 +1,7 @@
 //! Plant: the task of a fleet on a site, the required accuracy and the prices.
 
 use onboard::plausible::Warning;
-use onboard::settings::{Check, Library, SettingsError, Site, TomlFile, Vehicle};
+use onboard::settings::{Check, Library, SettingsError, Site, TomlFile, TomlFormat, Vehicle};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
@@ -165,6 +165,11 @@ impl TomlFile for Plant {
         ("trip-4", include_str!("../../../../plants/trip-4.toml")),
         ("yard", include_str!("../../../../plants/yard.toml")),
     ];
+
+    fn format() -> &'static TomlFormat<Self> {
+        static FORMAT: TomlFormat<Plant> = TomlFormat::new();
+        &FORMAT
+    }
 
     fn name(&self) -> &str {
         &self.name

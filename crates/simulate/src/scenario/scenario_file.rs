@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use onboard::settings::{Check, Library, SettingsError, Site, TomlFile, Vehicle, check_together};
+use onboard::settings::{
+    Check, Library, SettingsError, Site, TomlFile, TomlFormat, Vehicle, check_together,
+};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
@@ -127,6 +129,11 @@ impl TomlFile for Scenario {
         ),
     ];
 
+    fn format() -> &'static TomlFormat<Self> {
+        static FORMAT: TomlFormat<Scenario> = TomlFormat::new();
+        &FORMAT
+    }
+
     fn name(&self) -> &str {
         &self.name
     }
@@ -185,7 +192,7 @@ pub(super) fn hold<T: TomlFile>(
             .map_err(|error| error.with_path_prefix(origin, T::WHAT))?,
         _ => return Ok(()), // the deserializer reports a missing value or a wrong type
     };
-    let held = Table::try_from(&held).unwrap_or_default();
+    let held = held.to_table();
     table.insert(T::WHAT.to_owned(), Value::Table(held));
     Ok(())
 }

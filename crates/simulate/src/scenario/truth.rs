@@ -99,7 +99,7 @@ fn depart<T: TomlFile + Clone>(
         return Ok(nominal.clone());
     }
     let path = format!("truth.{}", T::WHAT);
-    let mut table = Table::try_from(nominal).unwrap_or_default();
+    let mut table = nominal.to_table();
     let base = table.clone();
     let mut merged = over.clone();
     not_drawn(&mut merged);
