@@ -34,13 +34,16 @@ pub fn dot<const N: usize>(left: &[f64; N], right: &[f64; N]) -> f64 {
         .sum()
 }
 
-/// Returns the matrix product.
+/// Returns the matrix product. Zeros on the left are skipped: most elements of a Jacobian of motion.
 pub fn product<const N: usize>(left: &Matrix<N>, right: &Matrix<N>) -> Matrix<N> {
     let mut product = [[0.0; N]; N];
     for i in 0..N {
         for k in 0..N {
-            for j in 0..N {
-                product[i][j] += left[i][k] * right[k][j];
+            let factor = left[i][k];
+            if factor != 0.0 {
+                for j in 0..N {
+                    product[i][j] += factor * right[k][j];
+                }
             }
         }
     }
@@ -145,7 +148,10 @@ impl<const N: usize> Gaussian<N> {
             }
         }
         for j in 0..N {
-            let mut column: [f64; N] = std::array::from_fn(|i| noise[i][j]);
+            let mut column = [0.0; N];
+            for i in 0..N {
+                column[i] = noise[i][j];
+            }
             for k in 0..N {
                 let f = jacobian[j][k];
                 if f != 0.0 {
@@ -159,6 +165,40 @@ impl<const N: usize> Gaussian<N> {
                 self.covariance[j][i] = column[i];
             }
         }
+    }
+
+    /// Returns the covariance of the first `M` states after a linearised motion, equal to that of [`spread`](Self::spread).
+    pub fn spread_first<const M: usize>(
+        &self,
+        jacobian: &Matrix<N>,
+        noise: &Matrix<N>,
+    ) -> Matrix<M> {
+        let mut rows = [[0.0; N]; M];
+        for i in 0..M {
+            for k in 0..N {
+                let f = jacobian[i][k];
+                if f != 0.0 {
+                    for j in 0..N {
+                        rows[i][j] += f * self.covariance[k][j];
+                    }
+                }
+            }
+        }
+        let mut covariance = [[0.0; M]; M];
+        for j in 0..M {
+            for i in 0..=j {
+                let mut sum = noise[i][j];
+                for k in 0..N {
+                    let f = jacobian[j][k];
+                    if f != 0.0 {
+                        sum += rows[i][k] * f;
+                    }
+                }
+                covariance[i][j] = sum;
+                covariance[j][i] = sum;
+            }
+        }
+        covariance
     }
 
     /// Returns `P Hᵀ` for one measurement row.
@@ -283,7 +323,10 @@ mod tests {
         let f = [[1.0, 0.5, 0.0], [0.0, 1.0, -0.3], [0.0, 0.0, 0.9]];
         let q = [[0.1, 0.0, 0.0], [0.0, 0.2, 0.05], [0.0, 0.05, 0.3]];
         let p = belief.covariance;
+        let [[xx, xy], [yx, yy]] = belief.spread_first::<2>(&f, &q);
         belief.spread(&f, &q);
+        let [[s_xx, s_xy, _], [s_yx, s_yy, _], _] = belief.covariance;
+        assert_eq!([xx, xy, yx, yy], [s_xx, s_xy, s_yx, s_yy]);
         for i in 0..3 {
             for j in 0..3 {
                 let mut sum = q[i][j];

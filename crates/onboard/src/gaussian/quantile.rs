@@ -1,12 +1,16 @@
 //! Radial quantile of a Gaussian error in the plane.
 
 use std::f64::consts::FRAC_PI_2;
+use std::sync::{Mutex, PoisonError};
 
 /// Number of nodes for the ratio of the error ellipse's axes.
 const NODES: usize = 33;
 
 /// Number of quadrature points over a quarter turn.
 const QUADRATURE: usize = 400;
+
+/// Number of exceedance probabilities whose tables are stored. A process uses a few.
+const STORED: usize = 8;
 
 /// Radius that a zero-mean Gaussian error in the plane exceeds with a given probability, in units
 /// of the larger standard deviation. It depends on the ratio ρ of the two standard deviations, and
@@ -17,8 +21,23 @@ pub struct RadialQuantile {
 }
 
 impl RadialQuantile {
-    /// Creates the table for an exceedance probability in (0, 1).
+    /// Returns the table for an exceedance probability in (0, 1). A table is computed once, because this takes 7 ms, and
+    /// every simulated run needs several.
     pub fn new(risk: f64) -> Self {
+        static KNOWN: Mutex<[Option<(f64, RadialQuantile)>; STORED]> =
+            Mutex::new([const { None }; STORED]);
+        let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, table)) = known.iter().flatten().find(|it| it.0 == risk) {
+            return table.clone();
+        }
+        let table = Self::computed(risk);
+        if let Some(free) = known.iter_mut().find(|it| it.is_none()) {
+            *free = Some((risk, table.clone()));
+        }
+        table
+    }
+
+    fn computed(risk: f64) -> Self {
         let mut factors = [0.0; NODES];
         for (node, factor) in factors.iter_mut().enumerate() {
             *factor = radius(node as f64 / (NODES - 1) as f64, risk);

@@ -165,8 +165,7 @@ impl UncertaintyDriven {
     }
 
     fn error_m(&self, ekf: &Ekf, time_s: f64) -> f64 {
-        let belief = ekf.forecast(time_s);
-        self.quantile.radius(Ekf::principal_variances(&belief))
+        self.quantile.radius(ekf.forecast_variances(time_s))
     }
 }
 

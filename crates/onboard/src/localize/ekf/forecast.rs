@@ -50,6 +50,12 @@ impl Transition {
     }
 }
 
+/// Returns the number of steps of a forecast over an odometer distance, and the reading of each.
+fn forecast_steps(reading_m: f64) -> (usize, Reading) {
+    let steps = (reading_m.abs() / FORECAST_STEP_M).ceil().min(MAX_STEPS);
+    (steps as usize, Reading::exact(reading_m / steps))
+}
+
 impl Ekf {
     /// Returns the innovation of an angle; `None` if there is none.
     pub fn innovation(&self, head: &RadioHead, measured: &AngleMeasurement) -> Option<Innovation> {
@@ -106,35 +112,54 @@ impl Ekf {
         self.carry(self.belief, speed_mps * lag_s)
     }
 
-    /// Returns a state predicted over an odometer distance without measurements.
-    pub fn carry(&self, belief: Belief, reading_m: f64) -> Belief {
-        self.extrapolate_by(belief, reading_m, |_| ())
+    /// Returns the variances of the horizontal error of [`forecast`](Self::forecast) along its principal axes, larger first
+    /// (m²).
+    pub fn forecast_variances(&self, time_s: f64) -> [f64; 2] {
+        let lag_s = (time_s - self.time_s()).max(0.0);
+        let speed_mps = self.odometry.map_or(0.0, |sample| sample.speed_mps);
+        let (steps, reading) = forecast_steps(speed_mps * lag_s);
+        if steps == 0 {
+            return Self::principal_variances(&self.belief);
+        }
+        let mut belief = self.belief;
+        for _ in 1..steps {
+            self.step(&belief, &reading).apply(&mut belief);
+        }
+        let step = self.step(&belief, &reading);
+        let [[xx, xy], [_, yy]] = belief.spread_first(&step.jacobian, &step.noise);
+        principal_variances(xx, xy, yy)
     }
 
-    /// Predicts a state step by step.
-    fn extrapolate_by(
-        &self,
-        mut belief: Belief,
-        reading_m: f64,
-        mut by: impl FnMut(&Step),
-    ) -> Belief {
-        let steps = (reading_m.abs() / FORECAST_STEP_M).ceil().min(MAX_STEPS);
-        for _ in 0..steps as usize {
-            let step = self.step(&belief, &Reading::exact(reading_m / steps));
-            step.apply(&mut belief);
-            by(&step);
+    /// Returns a state predicted over an odometer distance without measurements.
+    pub fn carry(&self, mut belief: Belief, reading_m: f64) -> Belief {
+        let (steps, reading) = forecast_steps(reading_m);
+        for _ in 0..steps {
+            self.step(&belief, &reading).apply(&mut belief);
         }
         belief
     }
 
     /// Returns the propagation of covariances over an odometer distance, linearised at a state.
     pub fn transition(&self, belief: &Belief, reading_m: f64) -> Transition {
-        let mut jacobian = identity();
-        let mut noise = Belief::independent(belief.mean, [0.0; STATES]);
-        self.extrapolate_by(*belief, reading_m, |step| {
+        let (steps, reading) = forecast_steps(reading_m);
+        if steps == 0 {
+            return Transition {
+                jacobian: identity(),
+                noise: [[0.0; STATES]; STATES],
+            };
+        }
+        let mut step = self.step(belief, &reading);
+        let (mut belief, mut jacobian) = (*belief, step.jacobian);
+        let mut noise = Belief {
+            mean: belief.mean,
+            covariance: step.noise,
+        };
+        for _ in 1..steps {
+            step.apply(&mut belief);
+            step = self.step(&belief, &reading);
             step.apply(&mut noise);
             jacobian = product(&step.jacobian, &jacobian);
-        });
+        }
         Transition {
             jacobian,
             noise: noise.covariance,
