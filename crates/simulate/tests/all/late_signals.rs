@@ -9,7 +9,7 @@ use crate::common::{self, shipped, value};
 /// Start of the faults (s).
 const FROM_S: f64 = 8.0;
 
-/// Returns a drive of 80 m past four radio heads on one oscillator. The receiver measures angles, delays and range
+/// Returns a drive of 60 m past four radio heads on one oscillator. The receiver measures angles, delays and range
 /// rates in the samples.
 fn drive(more: &[(&'static str, Value)]) -> RunRecord {
     let heads = shipped("paper-real-odometry-4").site.radio_heads;
@@ -25,7 +25,7 @@ fn drive(more: &[(&'static str, Value)]) -> RunRecord {
         ("site.radio_heads", Value::Array(heads.collect())),
         (
             "site.road.segments",
-            value("[{ length_m = 80.0, turn_rad = 0.1 }]"),
+            value("[{ length_m = 60.0, turn_rad = 0.1 }]"),
         ),
         ("vehicle.wake_up.interval_ms", Value::from(100.0)),
         ("vehicle.ranging.kind", Value::from("one-way")),

@@ -12,13 +12,16 @@ use simulate::random::{Purpose, Streams};
 use simulate::scenario::Scenario;
 use toml::Value;
 
-use crate::common::{changed, logs, run, shipped, value};
+use crate::common::{changed, logs, run, shipped, simulation, value};
 
 fn unknown(name: &str) -> Scenario {
     changed(name, [("vehicle.start.known", false.into())])
 }
 
-/// Simulates a run that begins at a random position on the road except its last 60 m.
+/// Time after which the search has ended, unless it fails (s).
+const SEARCHED_S: f64 = 40.0;
+
+/// Simulates the beginning of a run that starts at a random position on the road except its last 60 m.
 fn run_from_anywhere(scenario: &Scenario, seed: u64, number: u64) -> RunRecord {
     let mut random = Streams::new(seed, number).generator(Purpose::Start, 1);
     let share = f64::from(random.next_u32()) / f64::from(u32::MAX);
@@ -26,7 +29,8 @@ fn run_from_anywhere(scenario: &Scenario, seed: u64, number: u64) -> RunRecord {
     let start_m = share * (road.length_m() - 60.0);
     let there = [("motion.start_at_m", Value::Float(start_m))];
     let there = scenario.with_overrides(there, &Shipped).unwrap();
-    run(&there, seed, number)
+    let beginning = simulation(&there).until(SEARCHED_S);
+    beginning.run(seed, number, common::NONE).unwrap()
 }
 
 /// Whether the found position is within 2 m and within four standard deviations of the truth.
