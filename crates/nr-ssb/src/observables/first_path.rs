@@ -51,10 +51,13 @@ const CHANGE: f64 = 0.01;
 const INDEPENDENT: f64 = 0.4;
 /// Maximum probability of K < 0 dB for a separated first path.
 const WEAK: f64 = 0.1;
-/// Minimum noise relative to the signal in the search, −20 dB: deviation of a channel of few paths
-/// from the exponential model. With −40 dB, the NEES of the delay at 30 dB is up to 19 in the
-/// channels of TR 38.901.
-const NOISE_FLOOR: f64 = 1e-2;
+/// Minimum noise relative to the signal in the search for the delay, −10 dB: deviation of a channel
+/// of few paths from the exponential model. With −20 dB, the NEES of the delay is 6 in the channels
+/// of TR 38.901 with K = 3 to 10 dB.
+const DELAY_FLOOR: f64 = 0.1;
+/// Minimum noise relative to the signal for the powers of the paths, −20 dB. With −10 dB, a blocked
+/// first path is not distinguished from K = 5 dB.
+const POWER_FLOOR: f64 = 1e-2;
 /// Number of delays of a grid.
 const GRID: usize = 17;
 /// Maximum number of grids, each finer than the previous one.
@@ -155,34 +158,20 @@ impl FirstPath {
         for ((slot, row), noise) in elements.iter_mut().zip(rows).zip(noise_variance) {
             *slot = basis.whitened(row, *noise);
         }
-        let direct = project(&elements, basis, single);
-        let known: f64 = basis.root.iter().map(|it| it * it).sum();
-        let power = (direct / A as f64 - 1.0).max(1.0) / known;
-        // Limit the signal-to-noise ratio.
-        let excess = (power * NOISE_FLOOR).max(1.0);
-        let scale = excess.sqrt().recip();
-        for element in elements.iter_mut().flatten() {
-            *element *= scale;
-        }
-        let single_variance = single_variance * excess;
-        let search = Search {
-            basis,
-            elements: &elements,
-            total: elements.iter().flatten().map(Complex64::norm_sqr).sum(),
-            power: power / excess,
-            prior: prior(base_rate_hz),
-        };
-        let multi = search.run(single, single_variance);
-        let odds = search.log_odds(&multi, single, single_variance);
+        let powers = Search::new(basis, &elements, POWER_FLOOR, single, base_rate_hz);
+        let multi = powers.run(single, single_variance);
+        let odds = powers.log_odds(&multi, single, single_variance);
         let before = self.single + CHANGE * (1.0 - 2.0 * self.single);
         self.single = 1.0 / (1.0 + odds.exp() * (1.0 - before) / before);
         if self.single > 0.5 {
             return Posterior::single(single);
         }
+        let delays = Search::new(basis, &elements, DELAY_FLOOR, single, base_rate_hz);
+        let delay = delays.run(single, single_variance);
         Posterior {
-            delay: multi.mean,
+            delay: delay.mean,
             // The first path is at most as precise as a single one.
-            multipath_variance: (multi.variance - single_variance).max(0.0),
+            multipath_variance: (delay.variance - single_variance * delays.excess).max(0.0),
             share: multi.share,
             share_sigma: multi.share_variance.sqrt(),
             diffuse: multi.diffuse,
@@ -333,8 +322,11 @@ fn remove(from: &mut Row, unit: &Row) {
 /// Search for the first path of one SSB.
 struct Search<'a, const A: usize> {
     basis: &'a Basis,
-    elements: &'a [Row; A],
+    /// Elements with unit noise, which includes the minimum noise.
+    elements: [Row; A],
     total: f64,
+    /// Noise variance relative to that of the receiver.
+    excess: f64,
     /// Power of a resource element relative to noise, mean over the antennas.
     power: f64,
     prior: [[f64; FACTORS]; SPREADS],
@@ -343,10 +335,37 @@ struct Search<'a, const A: usize> {
 /// Log-likelihoods of every delay spread and K factor.
 type Likelihoods = [[f64; FACTORS]; SPREADS];
 
-impl<const A: usize> Search<'_, A> {
+impl<'a, const A: usize> Search<'a, A> {
+    /// Creates a search with a minimum noise relative to the signal; `single` is the delay of a
+    /// single path.
+    fn new(
+        basis: &'a Basis,
+        elements: &[Row; A],
+        floor: f64,
+        single: f64,
+        base_rate_hz: f64,
+    ) -> Self {
+        let direct = project(elements, basis, single);
+        let known: f64 = basis.root.iter().map(|it| it * it).sum();
+        let power = (direct / A as f64 - 1.0).max(1.0) / known;
+        let excess = (power * floor).max(1.0);
+        let scale = excess.sqrt().recip();
+        let elements = elements.map(|row| row.map(|element| element * scale));
+        Self {
+            basis,
+            total: elements.iter().flatten().map(Complex64::norm_sqr).sum(),
+            elements,
+            excess,
+            power: power / excess,
+            prior: prior(base_rate_hz),
+        }
+    }
+
+    /// Returns the posterior, given the delay of a single path and its variance due to the noise of
+    /// the receiver.
     fn run(&self, single: f64, single_variance: f64) -> Moments {
         let (gains, losses) = self.weights();
-        let sigma = single_variance.sqrt();
+        let sigma = (self.excess * single_variance).sqrt();
         let (mut from, mut to) = (single - BEFORE - 6.0 * sigma, single + AFTER + 6.0 * sigma);
         let mut grid = [[[0.0; FACTORS]; SPREADS]; GRID];
         let mut moments = Moments::default();
@@ -398,7 +417,7 @@ impl<const A: usize> Search<'_, A> {
         let ramp = ramp(delay);
         let mut turned = [[Complex64::ZERO; GROUPS]; A];
         let mut misfit = self.total;
-        for (slot, row) in turned.iter_mut().zip(self.elements) {
+        for (slot, row) in turned.iter_mut().zip(&self.elements) {
             let mut direct = Complex64::ZERO;
             for (((slot, z), turn), e) in
                 slot.iter_mut().zip(row).zip(&ramp).zip(&self.basis.direct)
@@ -466,8 +485,8 @@ impl<const A: usize> Search<'_, A> {
 
     /// Returns the logarithm of the likelihood in multipath relative to that of a single path.
     fn log_odds(&self, multi: &Moments, single: f64, single_variance: f64) -> f64 {
-        let misfit = self.total - project(self.elements, self.basis, single);
-        let width = (std::f64::consts::TAU * single_variance).sqrt();
+        let misfit = self.total - project(&self.elements, self.basis, single);
+        let width = (std::f64::consts::TAU * self.excess * single_variance).sqrt();
         let odds = multi.log_evidence + misfit - width.max(f64::MIN_POSITIVE).ln();
         odds.clamp(-50.0, 50.0)
     }
