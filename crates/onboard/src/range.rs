@@ -33,7 +33,7 @@ pub struct RangeMeasurement {
     /// settings, which exists for ranges only.
     pub sigma: Option<f64>,
     /// Standard deviation of a further error of a range due to multipath (m). Ranges of a radio head share
-    /// it over a metre of travel.
+    /// it over 20 m of travel.
     pub scatter_m: f64,
 }
 

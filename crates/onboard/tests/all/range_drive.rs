@@ -28,7 +28,7 @@ const FREQUENCY_STD_PPB: f64 = 5.0;
 const PHASE_SIGMA_M: f64 = 0.002;
 const PHASE_WALK: f64 = 0.005;
 /// Correlation distance of multipath (m).
-const SCATTER_M: f64 = 1.0;
+const SCATTER_M: f64 = 20.0;
 
 /// Standard deviations of the errors, which are drawn and specified.
 #[derive(Clone, Copy)]

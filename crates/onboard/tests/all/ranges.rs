@@ -38,8 +38,8 @@ fn delays_reach_the_bound() {
     reaches_the_bound("delays", &DELAYS, 500, 0.9..1.1);
 }
 
-/// Successive delays share their multipath. As independent noise, it would have a NEES/2 of about 13: the number of
-/// delays in twice the correlation distance of 1 m.
+/// Successive delays share their multipath over 20 m. As independent noise, it would be averaged over the delays of this
+/// distance, and NEES/2 would be far above 1.
 #[test]
 fn multipath_that_successive_delays_share_is_not_averaged_as_noise() {
     const RUNS: u64 = 100;
