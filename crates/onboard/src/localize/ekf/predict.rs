@@ -331,15 +331,17 @@ impl Ekf {
     /// Models slip from now on: a change of the scale at once and whenever the vehicle starts to
     /// move (if the speed does not reveal it), with every jump of the speed beyond its
     /// acceleration, and with every metre of a differential drive, whose speed may jump. The yaw
-    /// rate may be wrong, too.
+    /// rate of a road vehicle may be wrong, too. A differential drive has no other source of the
+    /// heading: a filter without it would know nothing between two angles.
     pub(in crate::localize) fn expect_slip(&mut self, by: f64) {
         let config = &mut self.config;
         config.may_slip = true;
         config.slip_acceleration_mps2 = config.acceleration_mps2;
-        config.yaw_noise_rad_per_sqrt_s =
-            (config.yaw_noise_rad_per_sqrt_s).max(FAULTY_YAW_NOISE_RAD_PER_SQRT_S);
         if config.drive == DriveKind::Differential {
             config.noise.scale_per_sqrt_m = SLIP_WALK_PER_SQRT_M;
+        } else {
+            config.yaw_noise_rad_per_sqrt_s =
+                (config.yaw_noise_rad_per_sqrt_s).max(FAULTY_YAW_NOISE_RAD_PER_SQRT_S);
         }
         self.slip(by);
     }
