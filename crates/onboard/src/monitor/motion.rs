@@ -408,7 +408,14 @@ impl MotionMonitor {
                 if squared >= OUTLIER {
                     burst.bad += 1;
                 } else {
-                    burst.good += confirmation(squared, others.into_iter().fold(0.0, f64::max));
+                    let known = confirmation(squared, others.into_iter().fold(0.0, f64::max));
+                    let unknown = unknown_motion(squared);
+                    // Without a yaw rate, the heading change is that of the localizer.
+                    burst.good += if has_yaw_rate && unknown < 0.0 {
+                        known.min(unknown)
+                    } else {
+                        known
+                    };
                 }
             }
         } else {
@@ -503,18 +510,16 @@ fn alternatives(motion: Pose) -> [Pose; FAULTS.len()] {
 }
 
 /// Returns the log-likelihood ratio in favour of the odometry, with a drift, for the squared
-/// normalised residuals of the odometry and of an alternative. An unknown motion is the alternative
-/// if it is more likely than the odometry.
+/// normalised residuals of the odometry and of an alternative.
 fn confirmation(squared: f64, other: f64) -> f64 {
-    let unknown =
-        0.5 * (UNKNOWN_MOTION_VARIANCE.ln() - squared * (1.0 - 1.0 / UNKNOWN_MOTION_VARIANCE));
-    let known = 0.5 * (other - squared);
-    let ratio = if unknown < 0.0 {
-        known.min(unknown)
-    } else {
-        known
-    };
+    let ratio = 0.5 * (other - squared);
     ratio.clamp(-MAX_CONFIRMATION, MAX_CONFIRMATION) - DRIFT
+}
+
+/// Returns the log-likelihood ratio in favour of the odometry against an unknown motion, for the
+/// squared normalised residual of the odometry.
+fn unknown_motion(squared: f64) -> f64 {
+    0.5 * (UNKNOWN_MOTION_VARIANCE.ln() - squared * (1.0 - 1.0 / UNKNOWN_MOTION_VARIANCE))
 }
 
 /// Returns the threshold for the sum of `sums` cumulative sums. The height of an excursion from
@@ -644,22 +649,13 @@ mod tests {
     }
 
     #[test]
-    fn residuals_of_an_unknown_motion_do_not_confirm_the_odometry() {
-        // The alternative is even less likely than the odometry.
-        let other = 20.0;
-        assert!(confirmation(1.0, other) > 0.0);
-        assert!(confirmation(0.5 * OUTLIER, other) < 0.0);
-        // Correct odometry is confirmed in the mean over a χ² distribution (midpoint rule).
-        let steps = 2_000;
-        let width = 12.0 / f64::from(steps);
-        let mean: f64 = (0..steps)
-            .map(|step| -6.0 + width * (f64::from(step) + 0.5))
-            .map(|z| width * (-0.5 * z * z).exp() * confirmation(z * z, other))
-            .sum();
-        assert!(
-            mean / std::f64::consts::TAU.sqrt() > 0.7 * MAX_CONFIRMATION,
-            "{mean}"
-        );
+    fn an_unknown_motion_is_more_likely_than_the_odometry_above_1_8_standard_deviations() {
+        assert!(unknown_motion(1.8_f64.powi(2)) > 0.0);
+        assert!(unknown_motion(1.9_f64.powi(2)) < 0.0);
+        // Ratio of two normal densities with the variances 1 and 25.
+        let density = |variance: f64| (-0.5 * 4.0 / variance).exp() / variance.sqrt();
+        let expected = (density(1.0) / density(25.0)).ln();
+        assert!((unknown_motion(4.0) - expected).abs() < 1e-12);
     }
 
     #[test]
