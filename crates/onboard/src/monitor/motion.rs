@@ -76,8 +76,8 @@ const JUMPED_S: f64 = 1.0;
 const SINGLE_JUMPS: u32 = 3;
 /// Duration without a contradicting angle after which a fault can end, in seconds.
 const CONFIRMED_S: f64 = 1.5;
-/// Variance of the normalised residual under an unknown motion, which is five times as far from the
-/// odometry as the angle is exact.
+/// Variance of the normalised residual under an unknown motion: its angles typically deviate from the
+/// odometry by five standard deviations.
 const UNKNOWN_MOTION_VARIANCE: f64 = 25.0;
 /// Maximum log-likelihood ratio of one angle in favour of the odometry, so that a fault ends after
 /// at least four angles ([`EVIDENCE`]).
