@@ -158,7 +158,8 @@ impl FirstPath {
         for ((slot, row), noise) in elements.iter_mut().zip(rows).zip(noise_variance) {
             *slot = basis.whitened(row, *noise);
         }
-        let powers = Search::new(basis, &elements, POWER_FLOOR, single, base_rate_hz);
+        let search = Search::new(basis, elements, single, base_rate_hz);
+        let powers = search.with_floor(POWER_FLOOR);
         let multi = powers.run(single, single_variance);
         let odds = powers.log_odds(&multi, single, single_variance);
         let before = self.single + CHANGE * (1.0 - 2.0 * self.single);
@@ -166,7 +167,7 @@ impl FirstPath {
         if self.single > 0.5 {
             return Posterior::single(single);
         }
-        let delays = Search::new(basis, &elements, DELAY_FLOOR, single, base_rate_hz);
+        let delays = search.with_floor(DELAY_FLOOR);
         let delay = delays.run(single, single_variance);
         Posterior {
             delay: delay.mean,
@@ -193,6 +194,11 @@ impl Posterior {
             is_weak: false,
         }
     }
+}
+
+/// Returns Σ |z|² over the antennas.
+fn energy<const A: usize>(elements: &[Row; A]) -> f64 {
+    elements.iter().flatten().map(Complex64::norm_sqr).sum()
 }
 
 /// Returns Σ |directᴴ z|² over the antennas, without the delay.
@@ -336,28 +342,31 @@ struct Search<'a, const A: usize> {
 type Likelihoods = [[f64; FACTORS]; SPREADS];
 
 impl<'a, const A: usize> Search<'a, A> {
-    /// Creates a search with a minimum noise relative to the signal; `single` is the delay of a
-    /// single path.
-    fn new(
-        basis: &'a Basis,
-        elements: &[Row; A],
-        floor: f64,
-        single: f64,
-        base_rate_hz: f64,
-    ) -> Self {
-        let direct = project(elements, basis, single);
+    /// Creates a search in elements with unit noise; `single` is the delay of a single path.
+    fn new(basis: &'a Basis, elements: [Row; A], single: f64, base_rate_hz: f64) -> Self {
+        let direct = project(&elements, basis, single);
         let known: f64 = basis.root.iter().map(|it| it * it).sum();
-        let power = (direct / A as f64 - 1.0).max(1.0) / known;
-        let excess = (power * floor).max(1.0);
-        let scale = excess.sqrt().recip();
-        let elements = elements.map(|row| row.map(|element| element * scale));
         Self {
             basis,
-            total: elements.iter().flatten().map(Complex64::norm_sqr).sum(),
+            total: energy(&elements),
+            elements,
+            excess: 1.0,
+            power: (direct / A as f64 - 1.0).max(1.0) / known,
+            prior: prior(base_rate_hz),
+        }
+    }
+
+    /// Returns the search with a minimum noise relative to the signal.
+    fn with_floor(&self, floor: f64) -> Self {
+        let excess = (self.power * floor).max(1.0);
+        let scale = excess.sqrt().recip();
+        let elements = self.elements.map(|row| row.map(|element| element * scale));
+        Self {
+            total: energy(&elements),
             elements,
             excess,
-            power: power / excess,
-            prior: prior(base_rate_hz),
+            power: self.power / excess,
+            ..*self
         }
     }
 
