@@ -34,10 +34,13 @@ pub fn dot<const N: usize>(left: &[f64; N], right: &[f64; N]) -> f64 {
         .sum()
 }
 
-/// Returns the matrix product. Zeros on the left are skipped: most elements of a Jacobian of motion.
-pub fn product<const N: usize>(left: &Matrix<N>, right: &Matrix<N>) -> Matrix<N> {
-    let mut product = [[0.0; N]; N];
-    for i in 0..N {
+/// Returns the product of rows with a matrix. Zeros on the left are skipped: most elements of a Jacobian of motion.
+pub fn product<const M: usize, const N: usize>(
+    left: &[[f64; N]; M],
+    right: &Matrix<N>,
+) -> [[f64; N]; M] {
+    let mut product = [[0.0; N]; M];
+    for i in 0..M {
         for k in 0..N {
             let factor = left[i][k];
             if factor != 0.0 {
@@ -173,17 +176,8 @@ impl<const N: usize> Gaussian<N> {
         jacobian: &Matrix<N>,
         noise: &Matrix<N>,
     ) -> Matrix<M> {
-        let mut rows = [[0.0; N]; M];
-        for i in 0..M {
-            for k in 0..N {
-                let f = jacobian[i][k];
-                if f != 0.0 {
-                    for j in 0..N {
-                        rows[i][j] += f * self.covariance[k][j];
-                    }
-                }
-            }
-        }
+        let first: [[f64; N]; M] = std::array::from_fn(|i| jacobian[i]);
+        let rows = product(&first, &self.covariance);
         let mut covariance = [[0.0; M]; M];
         for j in 0..M {
             for i in 0..=j {

@@ -104,20 +104,23 @@ impl Ekf {
 
     /// Returns the predicted state at `time_s`, with constant speed and without measurements.
     pub fn forecast(&self, time_s: f64) -> Belief {
+        self.carry(self.belief, self.reading_until_m(time_s))
+    }
+
+    /// Returns the odometer distance from the newest odometry until `time_s`, with constant speed.
+    fn reading_until_m(&self, time_s: f64) -> f64 {
         let lag_s = (time_s - self.time_s()).max(0.0);
         let speed_mps = self.odometry.map_or(0.0, |sample| sample.speed_mps);
         if speed_mps == 0.0 {
-            return self.belief;
+            return 0.0;
         }
-        self.carry(self.belief, speed_mps * lag_s)
+        speed_mps * lag_s
     }
 
     /// Returns the variances of the horizontal error of [`forecast`](Self::forecast) along its principal axes, larger first
     /// (m²).
     pub fn forecast_variances(&self, time_s: f64) -> [f64; 2] {
-        let lag_s = (time_s - self.time_s()).max(0.0);
-        let speed_mps = self.odometry.map_or(0.0, |sample| sample.speed_mps);
-        let (steps, reading) = forecast_steps(speed_mps * lag_s);
+        let (steps, reading) = forecast_steps(self.reading_until_m(time_s));
         if steps == 0 {
             return Self::principal_variances(&self.belief);
         }
