@@ -31,7 +31,7 @@ pub const MAX_VARIANCE: f64 = VARIANCES[LARGE];
 const UNKNOWN: usize = LEVELS - 1;
 
 /// Correlation distance of the bias (m).
-pub(super) const VALUE_M: f64 = 1.0;
+pub const VALUE_M: f64 = 1.0;
 /// Correlation distance of the level (m).
 pub(super) const LEVEL_M: f64 = 20.0;
 
@@ -42,10 +42,10 @@ pub(super) const SOON_M: f64 = 0.3;
 /// there is no new information, but the variance must remain finite.
 const MIN_SHARE: f64 = 1e-5;
 
-/// Returns the independent fraction of an angle `travelled_m` after the previous one: one
-/// independent angle in twice the correlation distance.
-pub fn independent(travelled_m: f64) -> f64 {
-    (0.5 * travelled_m / VALUE_M).clamp(0.0, 1.0)
+/// Returns the independent fraction of a measurement `travelled_m` after the previous one: one
+/// independent measurement in twice the correlation distance.
+pub fn independent(travelled_m: f64, correlation_m: f64) -> f64 {
+    (0.5 * travelled_m / correlation_m).clamp(0.0, 1.0)
 }
 
 /// Returns the probability that the bias is unchanged after a distance.

@@ -5,7 +5,9 @@ mod jump_process;
 mod multipath_bias;
 mod range_states;
 
-pub(in crate::localize) use jump_process::{JumpHypotheses, MAX_VARIANCE, independent, share};
+pub(in crate::localize) use jump_process::{
+    JumpHypotheses, MAX_VARIANCE, VALUE_M, independent, share,
+};
 pub use multipath_bias::MultipathBias;
 pub(in crate::localize) use range_states::{
     CLOCK, DRIFT, HeadState, RANGE_SCALE, RangeTerms, common_phase,

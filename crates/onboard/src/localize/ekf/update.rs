@@ -72,7 +72,7 @@ impl PredictedMeasurement {
     /// Returns the fraction that is independent of the previous angle, if a time-correlated bias is
     /// estimated.
     pub fn information_fraction(&self) -> f64 {
-        bias::independent(self.moved.0.abs())
+        bias::independent(self.moved.0.abs(), bias::VALUE_M)
     }
 
     /// Returns the variance of an angle's systematic errors: surveys, odometry since its newest sample, second-order

@@ -2,7 +2,7 @@
 //! error s, the vehicle clock c (one-way delays only) and the offset b of the radio head.
 
 use super::pseudorange::PredictedRange;
-use crate::localize::bias::{CLOCK, DRIFT, HeadState, RANGE_SCALE};
+use crate::localize::bias::{CLOCK, DRIFT, HeadState, RANGE_SCALE, independent};
 use crate::localize::ekf::filter::Ekf;
 use crate::localize::output::UpdateReason;
 use crate::radio_head::RadioHead;
@@ -38,7 +38,7 @@ impl Ekf {
         // Noise is independent from one range to the next, multipath is not.
         let (noise, scatter) = (sigma_m * sigma_m, measured.scatter_m * measured.scatter_m);
         let variance = noise + scatter;
-        let independent_fraction = (0.5 * seen.travelled_m / SHARED_M).clamp(MIN_FRACTION, 1.0);
+        let independent_fraction = independent(seen.travelled_m, SHARED_M).max(MIN_FRACTION);
         let shift_m = state_m(CLOCK) + seen.lag_s * state_m(DRIFT) + state_m(offset);
         let mut predicted = self.predicted(
             &seen,
