@@ -7,6 +7,8 @@ SOURCES := $(shell find crates sites vehicles scenarios platforms plants -type f
 
 # Incremental builds take longer than full ones, and their programs are slower.
 export CARGO_INCREMENTAL ?= 0
+# `make test` repeats the same random cases; `cargo test` draws new ones.
+export PROPTEST_RNG_SEED ?= 1
 
 # All tests of a file run in one process and share its simulated drives. One process more than cores, because some
 # tests only wait.

@@ -1,7 +1,7 @@
 //! Reader of the messages of an MCAP file with odometry, IMU or angles.
 
 use std::collections::HashMap;
-use std::io::{BufReader, ErrorKind, Read};
+use std::io::{self, BufReader, ErrorKind, Read};
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -19,6 +19,8 @@ const LONGEST_RECORD: usize = 1 << 28;
 const SEQUENCE_BYTES: usize = 4;
 /// Length of the two times of a message record in bytes.
 const TIMES_BYTES: usize = 8 + 8;
+/// Length of the fields of a chunk record before its compression in bytes: two times, size and CRC.
+const CHUNK_TIMES_SIZE_CRC_BYTES: usize = 8 + 8 + 8 + 4;
 
 /// Type of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -82,43 +84,119 @@ fn each_record(
     file: &Path,
     mut take: impl FnMut(u8, &[u8]) -> Option<ControlFlow<()>>,
 ) -> Result<FileEnd, RecordingError> {
-    let syntax = |message: String| RecordingError::Syntax {
+    let opened = files::open(file).map_err(|source| RecordingError::io(file, source))?;
+    // The crate `mcap` subtracts with overflow if a record is longer than its uncompressed chunk.
+    let options = LinearReaderOptions::default().with_emit_chunks(true);
+    let mut has_records = false;
+    let read = each_event(options, BufReader::new(opened), |opcode, data| {
+        has_records = true;
+        if opcode == op::CHUNK {
+            each_chunk_record(data, &mut take)
+        } else {
+            take(opcode, data).ok_or(Failure::Record(opcode))
+        }
+    });
+    let message = match read {
+        Ok(_) => return Ok(FileEnd::Complete),
+        Err(Failure::File(McapError::UnexpectedEof)) if has_records => {
+            return Ok(FileEnd::Truncated);
+        }
+        Err(Failure::Io(source)) => return Err(RecordingError::io(file, source)),
+        Err(Failure::File(error)) => format!("{error}; `mcap recover` keeps the undamaged part"),
+        Err(Failure::Chunk(error)) => {
+            format!("in a chunk: {error}; `mcap recover` keeps the undamaged part")
+        }
+        Err(Failure::Record(opcode)) => format!("a record of type {opcode} is damaged"),
+    };
+    Err(RecordingError::Syntax {
         file: file.display().to_string(),
         format: "MCAP",
         message,
-    };
-    let opened = files::open(file).map_err(|source| RecordingError::io(file, source))?;
-    let mut source = BufReader::new(opened);
+    })
+}
+
+/// Reason why a file is not read to its end.
+enum Failure {
+    /// The file cannot be read.
+    Io(io::Error),
+    /// The sequence of records of the file is damaged or ends early.
+    File(McapError),
+    /// The sequence of records of a chunk is damaged.
+    Chunk(McapError),
+    /// The body of a record of this type is damaged.
+    Record(u8),
+}
+
+/// Calls `take` for each record of an MCAP stream until it breaks.
+fn each_event(
+    options: LinearReaderOptions,
+    mut source: impl Read,
+    mut take: impl FnMut(u8, &[u8]) -> Result<ControlFlow<()>, Failure>,
+) -> Result<ControlFlow<()>, Failure> {
     // The limit prevents a huge allocation for a damaged length.
-    let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
+    let options = options.with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
-    let mut has_records = false;
     while let Some(event) = reader.next_event() {
-        let event = match event {
-            Ok(event) => event,
-            Err(McapError::UnexpectedEof) if has_records => return Ok(FileEnd::Truncated),
-            Err(error) => {
-                let message = format!("{error}; `mcap recover` keeps the undamaged part");
-                return Err(syntax(message));
-            }
-        };
-        match event {
+        match event.map_err(Failure::File)? {
             LinearReadEvent::ReadRequest(need) => match source.read(reader.insert(need)) {
                 Ok(read) => reader.notify_read(read),
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(error) => return Err(RecordingError::io(file, error)),
+                Err(error) => return Err(Failure::Io(error)),
             },
             LinearReadEvent::Record { opcode, data } => {
-                has_records = true;
-                let taken = take(opcode, data)
-                    .ok_or_else(|| syntax(format!("a record of type {opcode} is damaged")))?;
-                if taken.is_break() {
-                    break;
+                if take(opcode, data)?.is_break() {
+                    return Ok(ControlFlow::Break(()));
                 }
             }
         }
     }
-    Ok(FileEnd::Complete)
+    Ok(ControlFlow::Continue(()))
+}
+
+/// Calls `take` for each record of a chunk until it breaks.
+fn each_chunk_record(
+    chunk: &[u8],
+    take: &mut impl FnMut(u8, &[u8]) -> Option<ControlFlow<()>>,
+) -> Result<ControlFlow<()>, Failure> {
+    let mut take = |opcode, data: &[u8]| take(opcode, data).ok_or(Failure::Record(opcode));
+    if let Some(records) = uncompressed(chunk) {
+        let mut rest = records;
+        while !rest.is_empty() {
+            let (opcode, body) = record(&mut rest).ok_or(Failure::Record(op::CHUNK))?;
+            if take(opcode, body)?.is_break() {
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        return Ok(ControlFlow::Continue(()));
+    }
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true);
+    let length = (chunk.len() as u64).to_le_bytes();
+    let stream = [op::CHUNK].as_slice().chain(length.as_slice()).chain(chunk);
+    each_event(options, stream, take).map_err(|failure| match failure {
+        Failure::File(error) => Failure::Chunk(error),
+        other => other,
+    })
+}
+
+/// Returns the records of a chunk without compression; `None` if it is compressed or damaged.
+fn uncompressed(mut chunk: &[u8]) -> Option<&[u8]> {
+    (_, chunk) = chunk.split_at_checked(CHUNK_TIMES_SIZE_CRC_BYTES)?;
+    let compression = string(&mut chunk)?;
+    let (length, records) = chunk.split_first_chunk()?;
+    let records = records.get(..usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
+    compression.is_empty().then_some(records)
+}
+
+/// Splits off the first record: its type and its body.
+fn record<'a>(records: &mut &'a [u8]) -> Option<(u8, &'a [u8])> {
+    let (&opcode, rest) = records.split_first()?;
+    let (length, rest) = rest.split_first_chunk()?;
+    let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
+    let (body, rest) = rest.split_at_checked(length)?;
+    *records = rest;
+    Some((opcode, body))
 }
 
 /// Schemas and channels up to the current position in the file.

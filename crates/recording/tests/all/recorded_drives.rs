@@ -252,6 +252,24 @@ fn is_truncated(log: &OdometryLog) -> bool {
         .any(|it| matches!(it.issue, OdometryIssue::Truncated(_)))
 }
 
+#[test]
+fn an_mcap_record_longer_than_its_chunk_is_rejected() {
+    let file = common::scratch("odometry-mcap-chunk").join("odo.mcap");
+    write_mcap(&file, &["/odom"], 0.02);
+    let mut bytes = fs::read(&file).unwrap();
+    let length = |at: usize| usize::from_le_bytes(*bytes[at..].first_chunk().unwrap());
+    // Magic bytes, then the header record, then the first chunk: type, length, body.
+    let chunk = 8 + (1 + 8 + length(8 + 1));
+    assert_eq!(bytes[chunk], mcap::records::op::CHUNK);
+    // The body begins with times, size, CRC, an empty compression and the length of the records.
+    let first_record = chunk + 1 + 8 + (8 + 8 + 8 + 4) + 4 + 8;
+    let too_long = length(chunk + 1) + 20;
+    bytes[first_record + 1..][..8].copy_from_slice(&too_long.to_le_bytes());
+    fs::write(&file, bytes).unwrap();
+    let error = read_odometry_mcap(&file, None, None).unwrap_err();
+    assert!(error.to_string().contains("MCAP"), "{error}");
+}
+
 /// A damaged length of a name is reported, without an allocation of that size.
 #[test]
 fn mcap_names_longer_than_their_record_are_rejected() {
