@@ -365,14 +365,22 @@ def jetson(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_profile_of_a_board_with_modes(jetson: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     meter = FedRapl(jetson / "sys")
-    fed_s = [time.perf_counter()]
+
+    fed = [(0.0, 0.0)]
 
     def draw(power_w: float, seconds: float) -> None:
-        end_s = time.perf_counter() + seconds
-        while fed_s[-1] < end_s:
+        now_s = time.perf_counter()
+        end_s = now_s + seconds
+        # The time between two windows, in which the power changes, belongs to neither.
+        before_w, before_s = fed[-1]
+        if power_w != before_w:
+            before_s = now_s
+        while now_s < end_s:
             time.sleep(2e-4)
-            fed_s.append(time.perf_counter())
-            meter.add(power_w, fed_s[-1] - fed_s[-2])
+            now_s = time.perf_counter()
+            meter.add(power_w, now_s - before_s)
+            before_s = now_s
+        fed.append((power_w, now_s))
 
     monkeypatch.setattr(device, "sleep", lambda seconds: draw(5.0, seconds))
     works = {"music": lambda: draw(15.0, 2e-3), "ssb-chain": lambda: draw(25.0, 4e-3)}
@@ -389,7 +397,6 @@ def test_profile_of_a_board_with_modes(jetson: Path, monkeypatch: pytest.MonkeyP
         assert each.energy_j is not None, each.why_not
         above_w = 10.0 if each.workload == "music" else 20.0
         true_j = above_w * each.busy.duration_s / each.timing.executions
-        # The time between two windows is part of the second.
         assert each.energy_j.value == pytest.approx(true_j, rel=0.1)
     platform = Platform(found.platform("jetson"))
     assert [mode.cpu_hz for mode in platform.modes] == [2201.6e6, 1200e6]
