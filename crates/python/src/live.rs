@@ -53,7 +53,7 @@ pub struct LiveStatus {
     protection_level_m: Option<f64>,
     /// Hypothesis that explains the measurements best, and whose position is reported: `nominal`,
     /// `radio_heads_excluded`, `wheel_slip`, `uncalibrated_array`, `noisy_odometer`,
-    /// `displaced_site` or `noisy_angles`; `None` without a monitored pose.
+    /// `displaced_site`, `biased_radio_heads` or `noisy_angles`; `None` without a monitored pose.
     selected_hypothesis: Option<&'static str>,
     /// Number of radio heads identified as faulty.
     faulty: usize,

@@ -105,19 +105,22 @@ pub enum SelectedHypothesis {
     NoisyOdometer,
     /// Displacement of the whole site plan.
     DisplacedSite,
+    /// Persistent biases of radio heads.
+    BiasedRadioHeads,
     /// Angle noise above the specified one.
     NoisyAngles,
 }
 
 impl SelectedHypothesis {
     /// All hypotheses.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Nominal,
         Self::RadioHeadsExcluded,
         Self::WheelSlip,
         Self::UncalibratedArray,
         Self::NoisyOdometer,
         Self::DisplacedSite,
+        Self::BiasedRadioHeads,
         Self::NoisyAngles,
     ];
 
@@ -130,6 +133,7 @@ impl SelectedHypothesis {
             Self::UncalibratedArray => "uncalibrated_array",
             Self::NoisyOdometer => "noisy_odometer",
             Self::DisplacedSite => "displaced_site",
+            Self::BiasedRadioHeads => "biased_radio_heads",
             Self::NoisyAngles => "noisy_angles",
         }
     }

@@ -37,7 +37,8 @@ pub struct IntegritySettings {
 #[serde(default, deny_unknown_fields)]
 pub struct FaultProbability {
     /// Fault of a radio head: moved or spoofed. Default: 1e-3 where its bias is estimated
-    /// (`receiver.multipath_bias_probability`) and two other radio heads exist to separate it from the position; else 0.01.
+    /// (`receiver.multipath_bias_probability`); else 0.01. Where it is estimated, this is the probability that the biases
+    /// of radio heads persist over hundreds of metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub radio_head: Option<f64>,

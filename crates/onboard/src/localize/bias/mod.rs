@@ -3,6 +3,7 @@
 
 mod jump_process;
 mod multipath_bias;
+mod persistent_bias;
 mod range_states;
 
 pub(in crate::localize) use jump_process::{

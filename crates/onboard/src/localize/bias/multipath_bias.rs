@@ -12,6 +12,7 @@ use super::jump_process::{JumpHypotheses, JumpProcess, MAX_VARIANCE};
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::smoother::Journal;
 use crate::gaussian::{Innovation, Matrix, dot};
+use crate::geometry::wrap_angle;
 use crate::localize::ekf::state::{Belief, STATES};
 
 /// Covariance of a quantity with an angle that contains the bias of its radio head, and with an
@@ -129,11 +130,13 @@ clone_in_place! {
     /// Biases of all radio heads; empty if they are not estimated.
     #[derive(Debug, PartialEq)]
     pub struct MultipathBias {
-        /// Biases, then the states of the ranges (see [`range_states`](super::range_states)).
+        /// Biases, the states of the ranges (see [`range_states`](super::range_states)), and persistent biases.
         pub(super) heads: Vec<HeadBias>,
         /// Number of biases.
         pub(super) biases: usize,
-        /// Covariance matrix of biases and range states, row by row.
+        /// Number of the first persistent bias, if they are estimated.
+        pub(super) persistent: Option<usize>,
+        /// Covariance matrix of all these, row by row.
         pub(super) among: Vec<f64>,
     }
 }
@@ -149,8 +152,22 @@ impl MultipathBias {
         Self {
             heads: vec![unknown; count],
             biases: count,
+            persistent: None,
             among: vec![0.0; count * count],
         }
+    }
+
+    /// Adds exactly known states, `count` in total.
+    pub(super) fn grow(&mut self, count: usize) {
+        let old = self.heads.len();
+        let mut among = vec![0.0; count * count];
+        for (place, &covariance) in self.among.iter().enumerate() {
+            if let Some(value) = among.get_mut((place / old) * count + place % old) {
+                *value = covariance;
+            }
+        }
+        self.among = among;
+        self.heads.resize(count, HeadBias::unused());
     }
 
     /// Whether no bias is estimated.
@@ -201,13 +218,20 @@ impl MultipathBias {
         let Some(error) = self.bias(head) else {
             return variance;
         };
-        let alone = belief.variance_along(row);
+        let state = belief.variance_along(row);
+        let mut known = 2.0 * error.along(row) + self.covariance(head, head);
+        // Covariance of the state with the angle, and variance of the angle, without the multipath bias.
+        let (mut alone, mut total) = (state, state);
+        if let Some((number, persistent)) = self.persistent(head) {
+            alone += persistent.along(row);
+            total += 2.0 * persistent.along(row) + self.covariance(number, number);
+            known += 2.0 * self.covariance(head, number);
+        }
         let with_bias = alone + error.along(row);
-        let known = 2.0 * error.along(row) + self.covariance(head, head);
         let [kept, redrawn] =
-            (error.size).expected_gains(travelled_m, alone + variance, known.max(-alone));
+            (error.size).expected_gains(travelled_m, total + variance, known.max(-total));
         let reduction = kept * with_bias * with_bias + redrawn * alone * alone;
-        (alone * alone / reduction - alone).max(variance)
+        (state * state / reduction - state).max(variance)
     }
 
     pub(super) fn covariance(&self, one: usize, other: usize) -> f64 {
@@ -235,8 +259,14 @@ impl MultipathBias {
         row: &[f64; STATES],
     ) -> Option<JumpHypotheses> {
         let error = self.bias(head)?;
-        let known = 2.0 * error.along(row) + self.covariance(head, head);
-        Some((error.size).jump_hypotheses(travelled_m, seen, error.mean_rad, known))
+        let mut known = 2.0 * error.along(row) + self.covariance(head, head);
+        let mut seen = *seen;
+        if let Some((number, persistent)) = self.persistent(head) {
+            seen.residual = wrap_angle(seen.residual - persistent.mean_rad);
+            seen.variance += 2.0 * persistent.along(row) + self.covariance(number, number);
+            known += 2.0 * self.covariance(head, number);
+        }
+        Some((error.size).jump_hypotheses(travelled_m, &seen, error.mean_rad, known))
     }
 
     /// Updates state and biases with an angle to a radio head and its jump hypotheses.
@@ -251,6 +281,12 @@ impl MultipathBias {
     ) {
         self.set_cross_covariances(row, Some(head));
         let own = self.covariance(head, head);
+        let mut without_bias = belief.cross(row);
+        if let Some((_, persistent)) = self.persistent(head) {
+            for (value, by) in without_bias.iter_mut().zip(persistent.state_covariance) {
+                *value += by;
+            }
+        }
         let Some(error) = self.heads.get_mut(head) else {
             return;
         };
@@ -258,13 +294,8 @@ impl MultipathBias {
         if hypotheses.density <= 0.0 {
             return; // the angle has no likelihood under either hypothesis
         }
-        let predicted_levels = belief.cross(row);
-        let cross_with_angle: [CrossCovariance; STATES] = std::array::from_fn(|i| {
-            [
-                predicted_levels[i] + error.state_covariance[i],
-                predicted_levels[i],
-            ]
-        });
+        let cross_with_angle: [CrossCovariance; STATES] =
+            std::array::from_fn(|i| [without_bias[i] + error.state_covariance[i], without_bias[i]]);
         let change = MixtureUpdate::new(hypotheses, error.mean_rad, error.cross_with_angle[0]);
         error.mean_rad = change.value_mean();
         for (covariance, cross_with_angle) in
@@ -369,12 +400,15 @@ impl MultipathBias {
     }
 
     /// Computes the covariance of each bias with a measurement of the state (`row`) and, for `of`,
-    /// of this radio head's bias.
+    /// of this radio head's biases.
     fn set_cross_covariances(&mut self, row: &[f64; STATES], of: Option<usize>) {
         for head in 0..self.heads.len() {
             let value_covariance = of.map_or(0.0, |of| self.covariance(head, of));
+            let persistent = of.and_then(|of| self.persistent(of));
+            let with_persistent =
+                persistent.map_or(0.0, |(number, _)| self.covariance(head, number));
             if let Some(error) = self.heads.get_mut(head) {
-                let alone = error.along(row);
+                let alone = error.along(row) + with_persistent;
                 error.cross_with_angle = [alone + value_covariance, alone];
             }
         }
@@ -470,7 +504,8 @@ mod tests {
         errors.update_with_angle(belief, head, travelled_m, &row(), &hypotheses, None);
     }
 
-    const ALL: usize = STATES + 2;
+    /// State, the biases of two radio heads, and their persistent biases.
+    const ALL: usize = STATES + 4;
 
     /// Returns state and biases as one Gaussian.
     fn whole(belief: &Belief, errors: &MultipathBias) -> Gaussian<ALL> {
@@ -485,7 +520,7 @@ mod tests {
                 whole.covariance[i][STATES + one] = error.state_covariance[i];
                 whole.covariance[STATES + one][i] = error.state_covariance[i];
             }
-            for other in 0..2 {
+            for other in 0..errors.heads.len() {
                 whole.covariance[STATES + one][STATES + other] = errors.covariance(one, other);
             }
         }
@@ -510,10 +545,11 @@ mod tests {
         travelled_m: f64,
         rad: f64,
     ) -> Gaussian<ALL> {
-        let mut whole_row = [0.0; ALL];
-        (whole_row[0], whole_row[STATES + head]) = (1.0, 1.0);
+        // Without persistent biases, these states are zero.
         let mut row = [0.0; ALL];
-        row[0] = 1.0;
+        (row[0], row[STATES + 2 + head]) = (1.0, 1.0);
+        let mut whole_row = row;
+        whole_row[STATES + head] = 1.0;
         let changes = 1.0 - (-travelled_m / LEVEL_M).exp();
         let stays = (-travelled_m / VALUE_M).exp();
         let mut parts = vec![];
@@ -531,7 +567,8 @@ mod tests {
                 let probable = if is_new { 1.0 - stays } else { stays };
                 if is_new && is_unknown {
                     // A uniform direction: the angle determines the bias and not the state.
-                    let seen = component.innovation(rad - component.mean[0], &row, OWN_VARIANCE);
+                    let seen =
+                        component.innovation(rad - dot(&row, &component.mean), &row, OWN_VARIANCE);
                     let cross = component.cross(&row);
                     component.mean[STATES + head] = seen.residual;
                     for i in 0..ALL {
@@ -542,7 +579,7 @@ mod tests {
                     parts.push((probable * probability / TAU, component));
                     continue;
                 }
-                let residual = rad - component.mean[0] - component.mean[STATES + head];
+                let residual = rad - dot(&whole_row, &component.mean);
                 let once = component.innovation(residual, &whole_row, OWN_VARIANCE + value);
                 let repeated = OWN_VARIANCE + value / share(travelled_m);
                 component.update(residual, &whole_row, repeated);
@@ -570,7 +607,18 @@ mod tests {
 
     #[test]
     fn state_and_errors_have_the_moments_of_the_mixture() {
-        let (mut errors, mut belief) = (MultipathBias::new(2, EVEN), unknown());
+        have_the_moments_of_the_mixture(MultipathBias::new(2, EVEN));
+    }
+
+    #[test]
+    fn persistent_biases_have_the_moments_of_the_mixture() {
+        let mut errors = MultipathBias::new(2, EVEN);
+        errors.expect_persistent();
+        have_the_moments_of_the_mixture(errors);
+    }
+
+    fn have_the_moments_of_the_mixture(mut errors: MultipathBias) {
+        let mut belief = unknown();
         let mut motion = identity::<STATES>();
         (motion[0][1], motion[1][1]) = (0.3, 0.9);
         let mut whole_motion = identity::<ALL>();

@@ -59,19 +59,11 @@ pub(in crate::localize) const fn common_phase(heads: usize, model: &RangeModel) 
 impl MultipathBias {
     /// Adds the states of the ranges of these radio heads.
     pub fn add_ranges(&mut self, model: &RangeModel, heads: &[RadioHead]) {
-        let old = self.heads.len();
-        let count = old
+        let count = self.heads.len()
             + FIRST_OFFSET
             + blocks(model) * heads.len()
             + usize::from(model.uses_carrier_phase);
-        let mut among = vec![0.0; count * count];
-        for (place, &covariance) in self.among.iter().enumerate() {
-            if let Some(value) = among.get_mut((place / old) * count + place % old) {
-                *value = covariance;
-            }
-        }
-        self.among = among;
-        self.heads.resize(count, HeadBias::unused());
+        self.grow(count);
         self.add_to(RANGE_SCALE, RANGE_SCALE, model.scale_std.powi(2));
         self.add_to(CLOCK, CLOCK, model.clock_std_m.powi(2));
         self.add_to(DRIFT, DRIFT, model.drift_std_mps.powi(2));

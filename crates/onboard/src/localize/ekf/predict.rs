@@ -118,6 +118,7 @@ impl Ekf {
         let last_s = if yaw.is_some() { covered_s } else { duration_s };
         self.advance(covered, last_s, yaw);
         self.advance_ranges(reading_m, duration_s);
+        self.bias.advance_persistent(reading_m);
         if jumped {
             self.add_along_variance(self.config.coasting_variance(duration_s));
         }

@@ -158,6 +158,11 @@ impl Ekf {
         self.config.datum_std_m = self.config.datum_std_m.hypot(std_m);
     }
 
+    /// Estimates a persistent bias of each radio head.
+    pub(in crate::localize) fn expect_persistent_biases(&mut self) {
+        self.bias.expect_persistent();
+    }
+
     /// Sets the odometer noise, so that angles determine the distance (m/√m).
     pub(in crate::localize) const fn expect_free_motion(&mut self, m_per_sqrt_m: f64) {
         self.config.noise.odometer_m_per_sqrt_m = m_per_sqrt_m;

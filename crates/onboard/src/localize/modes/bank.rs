@@ -34,9 +34,6 @@ pub(in crate::localize) const EVENT_S: f64 = 20.0;
 /// Number of independent epochs for which the error of an event lasts.
 pub(in crate::localize) const EVENT_EPOCHS: f64 = EVENT_S / ERROR_CORRELATION_S;
 
-/// Minimum number of radio heads that separate the bias of one of them from the position.
-const MIN_SEPARABLE: usize = 3;
-
 clone_in_place! {
     /// Filter of a mode, weighted by its posterior probability.
     #[derive(Debug)]
@@ -190,7 +187,6 @@ impl Bank {
         let faults = &settings.fault_probability;
         let nominal = given.nominal();
         let count = heads.len();
-        let is_separable = nominal.is_with_bias() && count >= MIN_SEPARABLE;
         Self {
             settings: *settings,
             subsets: Subsets::new(count),
@@ -200,7 +196,7 @@ impl Bank {
             lost_s: now_s,
             heads: heads.to_vec(),
             modes,
-            head_prior: faults.of_radio_head(is_separable),
+            head_prior: faults.of_radio_head(nominal.is_with_bias()),
             nominal,
             base: SelectedHypothesis::Nominal,
             noise: NoiseScale::new(count),
@@ -417,8 +413,12 @@ impl Bank {
         let number = head.number_in(&self.heads);
         if !self.has_angles {
             self.has_angles = true;
-            for subset in self.subsets.iter_mut() {
-                subset.range_tests = [HeadTest::default(); 2];
+            if self.has_subsets() {
+                for subset in self.subsets.iter_mut() {
+                    subset.range_tests = [HeadTest::default(); 2];
+                }
+            } else {
+                self.subsets = Subsets::new(self.heads.len());
             }
         }
         if let Some(number) = number {
@@ -437,8 +437,17 @@ impl Bank {
         self.nominal.update_predicted(predicted, measured)
     }
 
+    /// Whether there are filters without single radio heads. If the biases of angles are estimated, a mode represents
+    /// their faults.
+    const fn has_subsets(&self) -> bool {
+        !(self.has_angles && self.nominal.is_with_bias())
+    }
+
     /// Starts the filters without a radio head of which there is a measurement, if there are none.
     pub(super) fn watch(&mut self, number: usize) {
+        if !self.has_subsets() {
+            return;
+        }
         let (faulty, noise) = (&self.faulty, &self.noise);
         let keeps = |head: usize, statistic: f64| {
             let is_faulty = faulty.get(head).is_some_and(|it| *it);

@@ -79,7 +79,7 @@ const SLIP: Mode = Mode {
 };
 
 /// Modes, in the order of their filter updates.
-pub(in crate::localize) static TABLE: [Mode; 5] = [
+pub(in crate::localize) static TABLE: [Mode; 6] = [
     SLIP,
     // If biases are estimated, a bias can also explain the effect of slip. The likelihood ratio
     // dominates this prior, and that of noisier angles, after a few angles.
@@ -119,6 +119,17 @@ pub(in crate::localize) static TABLE: [Mode; 5] = [
         },
         is_fault: true,
         on_exclude: Carry::All,
+        ..ROW
+    },
+    // Any number of radio heads that are displaced or received by a reflection. Without estimated
+    // biases, filters without one or two radio heads represent this fault.
+    Mode {
+        id: SelectedHypothesis::BiasedRadioHeads,
+        applies: |nominal, _| nominal.is_with_bias(),
+        prior: |_, faults| faults.of_radio_head(true),
+        alter: Ekf::expect_persistent_biases,
+        is_fault: true,
+        on_exclude: Carry::AllButHead,
         ..ROW
     },
     Mode {
@@ -495,6 +506,30 @@ mod tests {
         let [[xx, ..], [_, yy, _], _] = bank.leader().pose(59.9).covariance.unwrap();
         assert!(off_m(bank.leader()) < 4.0 * (xx + yy).sqrt());
         assert!(off_m(bank.leader()) < off_m(bank.nominal()));
+    }
+
+    /// One or three of four radio heads are received by a reflection from half-way on. The jump process alone averages
+    /// such a bias like noise.
+    #[test]
+    fn persistent_biases_of_radio_heads_are_selected_and_are_a_fault() {
+        for biased in [1, 3] {
+            let bias_rad = |head: usize, along_m: f64| {
+                let is_biased = head < biased && along_m > 120.0;
+                if is_biased { 0.3 } else { 0.0 }
+            };
+            let world = World {
+                multipath_bias_probability: MULTIPATH,
+                ..World::default()
+            };
+            let (bank, off_m) = drive(&world, 60.0, bias_rad);
+            assert_eq!(
+                bank.selected(),
+                SelectedHypothesis::BiasedRadioHeads,
+                "{biased}"
+            );
+            let [[xx, ..], [_, yy, _], _] = bank.leader().pose(59.9).covariance.unwrap();
+            assert!(off_m(bank.leader()) < 4.0 * (xx + yy).sqrt());
+        }
     }
 
     /// Angles with independent errors at 50 Hz, on a straight road far from the radio heads,
