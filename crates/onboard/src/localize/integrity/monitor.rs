@@ -4,8 +4,8 @@
 //! Under each hypothesis of the [`Bank`], one of its filters is correct within its own covariance,
 //! whatever the reported solution is. The protection level is the radius around the reported
 //! position that holds for all hypotheses together ([`LevelEquation`]), with the measured noise of
-//! the angles. With a single radio head it is determined by odometry and road, grows with the
-//! distance driven, and exceeds the alert limit unless they are precise. `docs/integrity.md`
+//! the angles. With a single radio head and without estimated biases it is determined by odometry and road, grows with
+//! the distance driven, and exceeds the alert limit unless they are precise. `docs/integrity.md`
 //! defines the states.
 
 use std::cell::RefCell;
