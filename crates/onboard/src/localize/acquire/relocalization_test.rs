@@ -15,9 +15,9 @@ use crate::radio_head::RadioHead;
 /// errors repeat.
 const MIN_DRIVEN_M: f64 = 0.5;
 
-/// Distance within which angles of one radio head are dependent (m): a cluster of scatterers biases
-/// the angle over this distance.
-const INDEPENDENT_M: f64 = 10.0;
+/// Distance within which angles of one radio head are dependent (m): three correlation distances of
+/// the multipath bias.
+const INDEPENDENT_M: f64 = 3.0;
 
 /// Maximum duration of a search with angles and without a result (s).
 pub(super) const PATIENCE_S: f64 = EVENT_S;
