@@ -9,10 +9,10 @@
 //! bilinear form of these two vectors.
 
 use super::jump_process::{JumpHypotheses, JumpProcess, MAX_VARIANCE};
+use super::persistent_bias::PersistentPart;
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::smoother::Journal;
 use crate::gaussian::{Innovation, Matrix, dot};
-use crate::geometry::wrap_angle;
 use crate::localize::ekf::state::{Belief, STATES};
 
 /// Covariance of a quantity with an angle that contains the bias of its radio head, and with an
@@ -218,20 +218,27 @@ impl MultipathBias {
         let Some(error) = self.bias(head) else {
             return variance;
         };
-        let state = belief.variance_along(row);
-        let mut known = 2.0 * error.along(row) + self.covariance(head, head);
+        let (state, persistent) = (belief.variance_along(row), self.persistent_part(head, row));
         // Covariance of the state with the angle, and variance of the angle, without the multipath bias.
-        let (mut alone, mut total) = (state, state);
-        if let Some((number, persistent)) = self.persistent(head) {
-            alone += persistent.along(row);
-            total += 2.0 * persistent.along(row) + self.covariance(number, number);
-            known += 2.0 * self.covariance(head, number);
-        }
+        let alone = state + persistent.state_covariance;
+        let total = alone + persistent.state_covariance + persistent.variance;
+        let known = self.known(head, row, error, &persistent);
         let with_bias = alone + error.along(row);
         let [kept, redrawn] =
             (error.size).expected_gains(travelled_m, total + variance, known.max(-total));
         let reduction = kept * with_bias * with_bias + redrawn * alone * alone;
         (state * state / reduction - state).max(variance)
+    }
+
+    /// Returns the variance that the retained multipath bias adds to an angle.
+    fn known(
+        &self,
+        head: usize,
+        row: &[f64; STATES],
+        error: &HeadBias,
+        persistent: &PersistentPart,
+    ) -> f64 {
+        2.0 * (error.along(row) + persistent.bias_covariance) + self.covariance(head, head)
     }
 
     pub(super) fn covariance(&self, one: usize, other: usize) -> f64 {
@@ -259,13 +266,13 @@ impl MultipathBias {
         row: &[f64; STATES],
     ) -> Option<JumpHypotheses> {
         let error = self.bias(head)?;
-        let mut known = 2.0 * error.along(row) + self.covariance(head, head);
-        let mut seen = *seen;
-        if let Some((number, persistent)) = self.persistent(head) {
-            seen.residual = wrap_angle(seen.residual - persistent.mean_rad);
-            seen.variance += 2.0 * persistent.along(row) + self.covariance(number, number);
-            known += 2.0 * self.covariance(head, number);
-        }
+        let persistent = self.persistent_part(head, row);
+        let seen = Innovation {
+            residual: seen.residual - persistent.mean_rad,
+            variance: seen.variance + 2.0 * persistent.state_covariance + persistent.variance,
+            ..*seen
+        };
+        let known = self.known(head, row, error, &persistent);
         Some((error.size).jump_hypotheses(travelled_m, &seen, error.mean_rad, known))
     }
 

@@ -5,7 +5,7 @@
 //! IMM), so that a filter without a radio head has never used the angles of that radio head, as
 //! solution separation requires.
 //!
-//! In addition to the filter of all fault-free radio heads there is one without each of them, and
+//! Unless the biases of angles are estimated, there is also a filter without each radio head, and
 //! one without each pair. If one radio head is faulty (received by a reflection, moved, spoofed),
 //! the filters without it are correct. The filters without pairs identify it: without the faulty
 //! radio head, the others are consistent with each other; without another one, the fault remains.
@@ -413,12 +413,11 @@ impl Bank {
         let number = head.number_in(&self.heads);
         if !self.has_angles {
             self.has_angles = true;
-            if self.has_subsets() {
-                for subset in self.subsets.iter_mut() {
-                    subset.range_tests = [HeadTest::default(); 2];
-                }
-            } else {
-                self.subsets = Subsets::new(self.heads.len());
+            if !self.has_subsets() {
+                self.subsets.clear();
+            }
+            for subset in self.subsets.iter_mut() {
+                subset.range_tests = [HeadTest::default(); 2];
             }
         }
         if let Some(number) = number {

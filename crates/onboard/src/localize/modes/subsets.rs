@@ -169,6 +169,11 @@ impl Subsets {
         }
     }
 
+    /// Ends all filters; keeps them for reuse.
+    pub const fn clear(&mut self) {
+        self.used = 0;
+    }
+
     pub fn iter(&self) -> impl Iterator<Item = &SubsetFilter> + Clone {
         self.filters.iter().take(self.used)
     }
