@@ -65,9 +65,8 @@ impl Ekf {
             .map(|predicted| predicted.innovation)
     }
 
-    /// Returns the innovation of an angle to an excluded radio head; it counts as an update. With
-    /// an estimated time-correlated bias there is nothing to test: an inconsistent radio head has a
-    /// large bias and little weight.
+    /// Returns the innovation of an angle to an excluded radio head, for a filter without estimated biases; it counts as
+    /// an update.
     pub(in crate::localize) fn innovation_of_excluded(
         &mut self,
         head: &RadioHead,
@@ -75,9 +74,6 @@ impl Ekf {
     ) -> Option<ExcludedInnovation> {
         let predicted = self.predict_measurement(head, measured).ok()?;
         self.heads.get_mut(predicted.head)?.last_update_m = predicted.place_m;
-        if self.is_with_bias() {
-            return None;
-        }
         let Innovation {
             residual,
             variance,
