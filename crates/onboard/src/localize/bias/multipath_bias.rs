@@ -9,7 +9,6 @@
 //! bilinear form of these two vectors.
 
 use super::jump_process::{JumpHypotheses, JumpProcess, MAX_VARIANCE};
-use super::persistent_bias::PersistentPart;
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::smoother::Journal;
 use crate::gaussian::{Innovation, Matrix, dot};
@@ -126,6 +125,17 @@ impl HeadBias {
     }
 }
 
+/// Part of a radio head's persistent bias in its angles.
+#[derive(Clone, Copy, Debug, Default)]
+struct PersistentPart {
+    /// Mean (rad) and variance (rad²).
+    mean_rad: f64,
+    variance: f64,
+    /// Covariance with the part of the state, and with the multipath bias (rad²).
+    state_covariance: f64,
+    bias_covariance: f64,
+}
+
 clone_in_place! {
     /// Biases of all radio heads; empty if they are not estimated.
     #[derive(Debug, PartialEq)]
@@ -178,6 +188,26 @@ impl MultipathBias {
     /// Returns the bias of a radio head's angles, if it is estimated.
     fn bias(&self, head: usize) -> Option<&HeadBias> {
         self.heads.get(..self.biases)?.get(head)
+    }
+
+    /// Returns the state of a radio head's persistent bias and its number, if it is estimated.
+    pub(super) fn persistent(&self, head: usize) -> Option<(usize, &HeadBias)> {
+        let number = self.persistent? + head;
+        Some((number, self.heads.get(number)?))
+    }
+
+    /// Returns the part of a radio head's persistent bias in its angles, for the state row of an angle; zero if it is not
+    /// estimated.
+    fn persistent_part(&self, head: usize, row: &[f64; STATES]) -> PersistentPart {
+        let Some((number, bias)) = self.persistent(head) else {
+            return PersistentPart::default();
+        };
+        PersistentPart {
+            mean_rad: bias.mean_rad,
+            variance: self.covariance(number, number),
+            state_covariance: bias.along(row),
+            bias_covariance: self.covariance(head, number),
+        }
     }
 
     /// Removes the covariances with the state, which was replaced.

@@ -5,25 +5,13 @@
 //! Applied Kalman Filtering, 2012, 4.6), constant at standstill. The multipath bias cannot represent it: its value is
 //! drawn again after a metre, so that the filter would average a constant bias like noise.
 
-use super::multipath_bias::{HeadBias, MultipathBias};
-use crate::localize::ekf::state::STATES;
+use super::multipath_bias::MultipathBias;
 
 /// Standard deviation (rad).
 const STD_RAD: f64 = 0.1;
 
 /// Correlation distance (m).
 const CORRELATION_M: f64 = 300.0;
-
-/// Part of a radio head's persistent bias in its angles.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct PersistentPart {
-    /// Mean (rad) and variance (rad²).
-    pub mean_rad: f64,
-    pub variance: f64,
-    /// Covariance with the part of the state, and with the multipath bias (rad²).
-    pub state_covariance: f64,
-    pub bias_covariance: f64,
-}
 
 impl MultipathBias {
     /// Estimates a persistent bias of each radio head from now on, if multipath biases are estimated.
@@ -35,26 +23,6 @@ impl MultipathBias {
         self.persistent = Some(first);
         self.grow(first + self.biases);
         self.decay_persistent(0.0);
-    }
-
-    /// Returns the state of a radio head's persistent bias and its number, if it is estimated.
-    pub(super) fn persistent(&self, head: usize) -> Option<(usize, &HeadBias)> {
-        let number = self.persistent? + head;
-        Some((number, self.heads.get(number)?))
-    }
-
-    /// Returns the part of a radio head's persistent bias in its angles, for the state row of an angle; zero if it is not
-    /// estimated.
-    pub(super) fn persistent_part(&self, head: usize, row: &[f64; STATES]) -> PersistentPart {
-        let Some((number, bias)) = self.persistent(head) else {
-            return PersistentPart::default();
-        };
-        PersistentPart {
-            mean_rad: bias.mean_rad,
-            variance: self.covariance(number, number),
-            state_covariance: bias.along(row),
-            bias_covariance: self.covariance(head, number),
-        }
     }
 
     /// Predicts the persistent biases over a distance.
@@ -90,7 +58,7 @@ impl MultipathBias {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::localize::ekf::state::Belief;
+    use crate::localize::ekf::state::{Belief, STATES};
 
     fn persistent(of: &MultipathBias, head: usize) -> (f64, f64) {
         let (number, bias) = of.persistent(head).unwrap();
