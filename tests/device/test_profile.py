@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
 import stat
+import threading
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,7 +30,7 @@ from access_av.device.platform import Platform
 from access_av.device.workload import Timing, repeat
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from conftest import Finished
 
@@ -363,29 +365,38 @@ def jetson(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return root
 
 
-def test_profile_of_a_board_with_modes(jetson: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    meter = FedRapl(jetson / "sys")
+@contextlib.contextmanager
+def powered(meter: FedRapl) -> Iterator[Callable[[float, float], None]]:
+    """Feeds the meter all the time; yields a function that draws a power for a duration."""
+    power_w = [5.0]
+    ended = threading.Event()
 
-    fed = [(0.0, 0.0)]
-
-    def draw(power_w: float, seconds: float) -> None:
-        now_s = time.perf_counter()
-        end_s = now_s + seconds
-        # The time between two windows, in which the power changes, belongs to neither.
-        before_w, before_s = fed[-1]
-        if power_w != before_w:
-            before_s = now_s
-        while now_s < end_s:
-            time.sleep(2e-4)
+    def feed() -> None:
+        before_s = time.perf_counter()
+        while not ended.wait(2e-4):
             now_s = time.perf_counter()
-            meter.add(power_w, now_s - before_s)
+            meter.add(power_w[0], now_s - before_s)
             before_s = now_s
-        fed.append((power_w, now_s))
 
-    monkeypatch.setattr(device, "sleep", lambda seconds: draw(5.0, seconds))
-    works = {"music": lambda: draw(15.0, 2e-3), "ssb-chain": lambda: draw(25.0, 4e-3)}
-    monkeypatch.setattr(device, "workloads", lambda: works)
-    found = device.profile(jetson, window_s=1.2)
+    def draw(watts: float, seconds: float) -> None:
+        power_w[0] = watts
+        time.sleep(seconds)
+
+    feeder = threading.Thread(target=feed)
+    feeder.start()
+    try:
+        yield draw
+    finally:
+        ended.set()
+        feeder.join()
+
+
+def test_profile_of_a_board_with_modes(jetson: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with powered(FedRapl(jetson / "sys")) as draw:
+        monkeypatch.setattr(device, "sleep", lambda seconds: draw(5.0, seconds))
+        works = {"music": lambda: draw(15.0, 2e-3), "ssb-chain": lambda: draw(25.0, 4e-3)}
+        monkeypatch.setattr(device, "workloads", lambda: works)
+        found = device.profile(jetson, window_s=1.2)
     assert found.machine == "A Jetson"
     assert found.sensors == "psys (RAPL)"
     assert found.warnings == ("mode 3 (NEEDS_REBOOT) needs a reboot: it is not measured",)
