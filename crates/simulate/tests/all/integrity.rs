@@ -191,8 +191,8 @@ fn a_double_fault_is_reported_and_the_pose_recovers() {
 }
 
 /// With a single radio head, only odometry and road can reveal a fault. Once the angles exclude
-/// slip at departure, the protection level grows with the distance, because the bias of the radio
-/// head may persist.
+/// slip at departure, the protection level grows with the distance until it exceeds the alert
+/// limit; if the bias of the radio head is estimated, its prior limits the level.
 #[test]
 fn one_radio_head_is_trusted_within_the_accuracy_of_odometry() {
     let alone = |faults| Scenario {
@@ -200,7 +200,17 @@ fn one_radio_head_is_trusted_within_the_accuracy_of_odometry() {
         ..changed("paper-real-odometry", [("vehicle.integrity", value("{}"))])
     };
     let nominal = drives(&alone(Vec::new()), SEED, 2);
-    for record in &nominal {
+    let without_bias = changed(
+        "paper-real-odometry",
+        [
+            ("vehicle.integrity", value("{}")),
+            ("vehicle.receiver.multipath_bias_probability", value("0.0")),
+        ],
+    );
+    let without_bias = drives(&without_bias, SEED, 2);
+    for (record, is_limited) in
+        (nominal.iter().map(|it| (it, true))).chain(without_bias.iter().map(|it| (it, false)))
+    {
         let level_m = |time_s: f64| {
             let step = record
                 .steps
@@ -210,6 +220,7 @@ fn one_radio_head_is_trusted_within_the_accuracy_of_odometry() {
             step.integrity.unwrap().protection_level_m
         };
         assert!(level_m(25.0) < level_m(45.0));
+        assert!(is_limited || level_m(45.0) < level_m(70.0));
     }
     let what = FaultKind::MovedHead {
         radio_head: 0,
