@@ -88,12 +88,13 @@ fn each_record(
     // The crate `mcap` subtracts with overflow if a record is longer than its uncompressed chunk.
     let options = LinearReaderOptions::default().with_emit_chunks(true);
     let mut has_records = false;
-    let read = each_event(options, BufReader::new(opened), |opcode, data| {
+    let mut take = |opcode, body: &[u8]| take(opcode, body).ok_or(Failure::Record(opcode));
+    let read = each_event(options, BufReader::new(opened), |opcode, body| {
         has_records = true;
         if opcode == op::CHUNK {
-            each_chunk_record(data, &mut take)
+            each_chunk_record(body, &mut take)
         } else {
-            take(opcode, data).ok_or(Failure::Record(opcode))
+            take(opcode, body)
         }
     });
     let message = match read {
@@ -156,9 +157,8 @@ fn each_event(
 /// Calls `take` for each record of a chunk until it breaks.
 fn each_chunk_record(
     chunk: &[u8],
-    take: &mut impl FnMut(u8, &[u8]) -> Option<ControlFlow<()>>,
+    mut take: impl FnMut(u8, &[u8]) -> Result<ControlFlow<()>, Failure>,
 ) -> Result<ControlFlow<()>, Failure> {
-    let mut take = |opcode, data: &[u8]| take(opcode, data).ok_or(Failure::Record(opcode));
     if let Some(records) = uncompressed(chunk) {
         let mut rest = records;
         while !rest.is_empty() {
