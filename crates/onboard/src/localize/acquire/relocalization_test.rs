@@ -5,6 +5,7 @@ use std::cmp::Ordering;
 
 use super::gaussian_sum::GaussianSum;
 use crate::clone_in_place::clone_in_place;
+use crate::localize::bias::VALUE_M;
 use crate::localize::ekf::Ekf;
 use crate::localize::modes::{CERTAIN, EVENT_EPOCHS, EVENT_S};
 use crate::localize::output::PoseEstimate;
@@ -15,9 +16,9 @@ use crate::radio_head::RadioHead;
 /// errors repeat.
 const MIN_DRIVEN_M: f64 = 0.5;
 
-/// Distance within which angles of one radio head are dependent (m): three correlation distances of
-/// the multipath bias.
-const INDEPENDENT_M: f64 = 3.0;
+/// Distance within which angles of one radio head are dependent (m): the multipath bias is then
+/// retained with a probability of 5 %.
+const INDEPENDENT_M: f64 = 3.0 * VALUE_M;
 
 /// Maximum duration of a search with angles and without a result (s).
 pub(super) const PATIENCE_S: f64 = EVENT_S;

@@ -2,6 +2,7 @@
 //! a jump process, whose hypotheses of value and level are merged to one Gaussian after each angle.
 
 mod jump_process;
+mod mixture_update;
 mod multipath_bias;
 mod persistent_bias;
 mod range_states;
