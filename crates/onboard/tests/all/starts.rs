@@ -111,6 +111,19 @@ impl Environment {
     }
 }
 
+/// Returns a measured electrical angle.
+const fn angle(time_s: f64, phase_rad: f64) -> AngleMeasurement {
+    AngleMeasurement {
+        kind: MeasurementKind::Angle,
+        time_s,
+        phase_rad,
+        phase_sigma_rad: SIGMA_RAD,
+        angle_rad: f64::NAN,
+        snr_db: 20.0,
+        resolved: true,
+    }
+}
+
 /// Result of a drive.
 #[derive(Debug, Default)]
 struct Driven {
@@ -169,15 +182,7 @@ fn drive(environment: &Environment, seed: u64, given: Option<fn(Pose) -> Pose>) 
                 if chance < OUTLIERS {
                     phase_rad = PI * (2.0 * normal()[1] - 1.0);
                 }
-                let measured = AngleMeasurement {
-                    kind: MeasurementKind::Angle,
-                    time_s,
-                    phase_rad,
-                    phase_sigma_rad: SIGMA_RAD,
-                    angle_rad: f64::NAN,
-                    snr_db: 20.0,
-                    resolved: true,
-                };
+                let measured = angle(time_s, phase_rad);
                 localizer.update(head, &measured).unwrap();
             }
         }
@@ -309,5 +314,35 @@ fn a_wrong_start_is_corrected_within_seconds() {
                 "{name}, {what}, seed {seed}: {driven:?}"
             );
         }
+    }
+}
+
+/// Every angle of a standing vehicle has the same multipath error. Three angles agree with some pose, whatever their
+/// errors.
+#[test]
+fn a_correct_start_stays_ok_at_standstill_with_three_biased_angles() {
+    let errors_rad = [0.1, 0.7, -0.3];
+    let site = ONE_SIDED.site();
+    let vehicle = VEHICLE.replace("correlated_noise_fraction", "multipath_bias_probability");
+    let vehicle = Vehicle::from_toml(&vehicle, "cart", &Shipped).unwrap();
+    let pose = ONE_SIDED.pose(0.0);
+    let mut localizer = built_in(&site, &vehicle, pose).unwrap();
+    let heads = RadioHead::received_by(&site, &vehicle);
+    for step in 1..500 {
+        let time_s = STEP_S * f64::from(step);
+        let sample = OdometrySample {
+            time_s,
+            distance_m: 0.0,
+            speed_mps: 0.0,
+            yaw_rate_radps: Some(0.0),
+        };
+        localizer.odometry(&sample).unwrap();
+        for (head, error_rad) in heads.iter().zip(errors_rad) {
+            let bearing_rad = pose.point().bearing_rad(head.position);
+            let phase_rad = PI * (bearing_rad - pose.heading_rad).cos() + error_rad;
+            localizer.update(head, &angle(time_s, phase_rad)).unwrap();
+        }
+        let state = localizer.pose(time_s).unwrap().integrity.unwrap().state;
+        assert_eq!(state, IntegrityState::Ok, "{time_s}");
     }
 }

@@ -16,6 +16,9 @@ use crate::radio_head::RadioHead;
 /// errors repeat.
 const MIN_DRIVEN_M: f64 = 0.5;
 
+/// Number of coordinates of a pose: position and heading.
+const COORDINATES: f64 = 3.0;
+
 /// Distance within which angles of one radio head are dependent (m): the multipath bias is then
 /// retained with a probability of 5 %.
 const INDEPENDENT_M: f64 = 3.0 * VALUE_M;
@@ -218,9 +221,18 @@ impl RelocalizationTest {
         self.prior_log_odds + share * ratio
     }
 
-    /// Returns the mean squared normalised residual at the best position of the search, at least 1.
+    /// Returns the mean squared normalised residual at the best position of the search, at least 1. At standstill, it is
+    /// the reduced χ², because a pose explains as many angles as it has coordinates, whatever their errors.
     fn misfit(&self) -> f64 {
-        (-2.0 * self.search.best() / f64::from(self.angles.max(1))).max(1.0)
+        let mut freedom = f64::from(self.angles.max(1));
+        if self.driven_m < MIN_DRIVEN_M {
+            freedom *= 1.0 - COORDINATES / f64::from(self.independent.max(1));
+        }
+        if freedom > 0.0 {
+            (-2.0 * self.search.best() / freedom).max(1.0)
+        } else {
+            f64::INFINITY
+        }
     }
 
     fn information_fraction(&self) -> f64 {
