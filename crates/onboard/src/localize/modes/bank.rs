@@ -277,11 +277,17 @@ impl Bank {
         self.leading().map(|it| self.about(it))
     }
 
-    /// Returns the selected mode: its odds to the nominal mode exceed a minimum and those of every
-    /// other mode.
+    /// Returns the selected mode: the most probable one, if its odds to the nominal mode exceed a minimum. The odds of a
+    /// fault to all other modes together must exceed it: with the freedom of a fault, its filter can follow multipath
+    /// that another mode explains as well.
     pub(super) fn leading(&self) -> Option<&ModeFilter> {
-        let most = (self.modes.iter()).max_by(|one, other| one.odds().total_cmp(&other.odds()));
-        most.filter(|it| it.odds() > MIN_ODDS)
+        let most = (self.modes.iter()).max_by(|one, other| one.odds().total_cmp(&other.odds()))?;
+        let others = if most.mode.is_fault {
+            1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>() - most.odds()
+        } else {
+            1.0
+        };
+        (most.odds() > MIN_ODDS * others).then_some(most)
     }
 
     /// Returns the selected filter: the nominal one, unless another mode is selected.

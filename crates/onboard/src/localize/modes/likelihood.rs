@@ -29,8 +29,8 @@ impl Ekf {
 /// causes more.
 const OUTLIERS: f64 = 2e-3;
 
-/// Minimum posterior odds, against the nominal mode, for the selection of a mode. The protection
-/// level covers every hypothesis, whether selected or not. With lower odds, the position alternates
+/// Minimum posterior odds, against the nominal mode or, for a fault, all other modes, for the selection of a mode. The
+/// protection level covers every hypothesis, whether selected or not. With lower odds, the position alternates
 /// between filters, which reduces the availability (K = 5 dB: 91 % instead of 94 %).
 pub(super) const MIN_ODDS: f64 = 100.0;
 
