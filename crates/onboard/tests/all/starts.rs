@@ -317,6 +317,15 @@ fn a_wrong_start_is_corrected_within_seconds() {
     }
 }
 
+/// The hypothesis of a wrong yaw rate reached the position of the search after 5 s and ended it. The nominal filter remained
+/// at the refuted start, so that the position was uncertain until the end.
+#[test]
+fn a_wrong_heading_is_not_explained_by_a_wrong_yaw_rate() {
+    let (_, given) = STARTS[3];
+    let driven = drive(&ONE_SIDED, 3, given);
+    assert!(driven.located_s <= 30.0 && driven.ok > 0.8, "{driven:?}");
+}
+
 /// Every angle of a standing vehicle has the same multipath error. Three angles agree with some pose, whatever their
 /// errors.
 #[test]

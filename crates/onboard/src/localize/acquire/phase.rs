@@ -43,7 +43,8 @@ pub(super) struct Evidence {
     pub is_merged: bool,
     /// Whether another start is more probable than the given one.
     pub other_start_is_likelier: bool,
-    /// Whether the search of a given start has found the reported position.
+    /// Whether the search of a given start has found the reported position, and the nominal filter has it too. A fault
+    /// of the odometry also explains a wrong start: its filter can reach the position, but remains uncertain.
     pub agrees: bool,
     /// Whether no odometry has arrived since the search was reported. The covariance then covers
     /// the position of the filter and that of the search.

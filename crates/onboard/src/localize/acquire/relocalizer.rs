@@ -120,6 +120,14 @@ impl Solution {
         }
     }
 
+    /// Returns the filter without a fault.
+    fn nominal(&self) -> &Ekf {
+        match self {
+            Self::Bare(ekf) => ekf,
+            Self::Monitored(monitor) => monitor.bank().nominal(),
+        }
+    }
+
     /// Returns the time of the solution's last restart (s).
     fn begun_s(&self) -> f64 {
         (self.monitor()).map_or(f64::NEG_INFINITY, IntegrityMonitor::begun_s)
@@ -450,7 +458,7 @@ impl Relocalizer {
             is_of_start,
             is_merged: is(&RelocalizationTest::is_merged),
             other_start_is_likelier: self.other_start_is_likelier(),
-            agrees: is(&|it| it.agrees_with(solution.ekf())),
+            agrees: is(&|it| it.agrees_with(solution.ekf()) && it.agrees_with(solution.nominal())),
             is_just_reported: is(&|it| it.reported_s == odometry_s),
             has_moved: is(&|it| it.driven_m >= it.min_driven_m()),
             has_moved_far: is(&|it| it.driven_m > LONG_DISTANCE_M),
