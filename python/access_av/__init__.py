@@ -95,35 +95,4 @@ __all__ = [
 ]  # fmt: skip
 
 if not TYPE_CHECKING:
-    __getattr__, __dir__ = attach(
-        __name__,
-        {
-            "access_av.drives.angle_log": ["AngleLog", "estimate_angles"],
-            "access_av.designs.query": ["Query", "explore"],
-            "access_av.drives.recorded": ["Drive", "SynthesizedDrive", "locate", "synthesize"],
-            "access_av.run.difference": ["Difference", "difference"],
-            "access_av.run.error_bound": ["ErrorBound", "bound"],
-            "access_av.paper.evaluation": ["Evaluation", "evaluate"],
-            "access_av.radio.placement": ["Plan", "plan"],
-            "access_av.device.platform": ["Platform"],
-            "access_av.drives.self_survey": ["Survey", "survey"],
-            "access_av.run.simulation": ["Simulation", "simulate"],
-            "access_av.run.sweep": ["Sweep", "sweep"],
-            "access_av.study.answer": ["study_plant"],
-            "access_av.study.study_result": ["Study"],
-        },
-        modules={
-            "aoa": "access_av.signal.aoa",
-            "carbon": "access_av.economics.carbon",
-            "channel": "access_av.radio.channel",
-            "columns": "access_av.tables.columns",
-            "cost": "access_av.economics.cost",
-            "drives": "access_av.drives",
-            "nr": "access_av.signal.nr",
-            "paper": "access_av.paper",
-            "ray_paths": "access_av.radio.ray_paths",
-            "recorded_angles": "access_av.signal.recorded_angles",
-            "service_levels": "access_av.run.service_levels",
-            "statistics": "access_av.statistics",
-        },
-    )
+    __getattr__, __dir__ = attach(__name__)

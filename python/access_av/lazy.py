@@ -2,39 +2,48 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from importlib import import_module
 from importlib.machinery import ModuleSpec
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Mapping
     from types import ModuleType
 
+# Folder of the package `access_av`.
+ROOT = Path(__file__).parent.parent
+IMPORT = re.compile(r"^    from (\S+) import (\([^)]*\)|.+)$", re.MULTILINE)
 
-def attach(
-    package: str, homes: Mapping[str, Sequence[str]], modules: Mapping[str, str] | None = None
-) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+
+def attach(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Returns ``__getattr__`` and ``__dir__`` of a package.
+
+    The lazily imported names are those that the package imports under ``if TYPE_CHECKING``.
+    ``import`` also accepts a module by its alias in the package, such as ``access_av.cost``.
 
     Parameters
     ----------
     package
         The package's ``__name__``.
-    homes
-        Lazily imported names, by the module that defines them.
-    modules
-        Modules by their alias in the package; ``import`` also accepts the alias.
 
     Examples
     --------
-    >>> modules = {"cost": "access_av.economics.cost"}
-    >>> find, names = attach("access_av", {"access_av.signal.methods": ["label"]}, modules)
-    >>> find("label")("music"), find("cost").__name__
-    ('MUSIC', 'access_av.economics.cost')
+    >>> find, names = attach("access_av")
+    >>> find("cost").__name__, "locate" in names()
+    ('access_av.economics.cost', True)
     """
-    home = {name: module for module, names in homes.items() for name in names}
-    modules = modules or {}
+    text = Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8")
+    home, modules = dict[str, str](), dict[str, str]()
+    for module, imported in IMPORT.findall(text):
+        for name in re.findall(r"\w+", imported):
+            file = ROOT.joinpath(*module.split("."), name)
+            if file.is_dir() or file.with_suffix(".py").is_file():
+                modules[name] = f"{module}.{name}"
+            else:
+                home[name] = module
     sys.meta_path.append(_Aliases({f"{package}.{name}": it for name, it in modules.items()}))
 
     def find(name: str) -> Any:

@@ -34,4 +34,4 @@ __all__ = [
 ]  # fmt: skip
 
 if not TYPE_CHECKING:
-    __getattr__, __dir__ = attach(__name__, {"access_av.drives.recorded": __all__})
+    __getattr__, __dir__ = attach(__name__)

@@ -39,17 +39,4 @@ __all__ = [
 ]
 
 if not TYPE_CHECKING:
-    __getattr__, __dir__ = attach(
-        __name__,
-        {
-            "access_av.paper.claims": ["Claim", "check_claims"],
-            "access_av.paper.energy_fit": ["fit_energy"],
-            "access_av.paper.evaluation": ["Evaluation", "evaluate"],
-            "access_av.paper.interpretations": ["Interpretation"],
-            "access_av.paper.statements": ["paper_numbers"],
-        },
-        modules={
-            name: f"access_av.paper.{name}"
-            for name in ("claims", "energy_fit", "evaluation", "interpretations", "study")
-        },
-    )
+    __getattr__, __dir__ = attach(__name__)
