@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -15,7 +15,6 @@ from access_av.paper.claims import (
     NOT_JUDGED,
     NOT_TESTABLE,
     VERDICTS,
-    as_records,
     check_claims,
     evidence,
     with_seeds,
@@ -211,7 +210,9 @@ def test_a_platform_without_a_mode_is_reported() -> None:
 
 
 def test_claim_records_have_the_documented_fields() -> None:
-    records = json.loads(json.dumps(as_records(check_claims(synthetic.evaluation().outcome))))
+    records = json.loads(
+        json.dumps(list(map(asdict, check_claims(synthetic.evaluation().outcome))))
+    )
     for record in records:
         assert record["verdict"] in VERDICTS
         assert record["evidence"] in EVIDENCE or record["verdict"] == NOT_TESTABLE

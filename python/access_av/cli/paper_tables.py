@@ -24,8 +24,8 @@ def show_study(study: Study) -> None:
     console.print(f"{summary.headline(study)}.", style="bold")
     title = f"Adaptive MUSIC, interpretation “{study.shown.interpretation.title}”"
     made = table(["figure", "paper", "obtained", "verdict"], title=title, text=1)
-    for each in summary.main_figures(study):
-        made.add_row(each.name, each.stated, each.obtained, each.verdict)
+    for cells in summary.main_figures(study):
+        made.add_row(*cells)
     console.print(made)
     if seeds := summary.seeds_text(study):
         console.print(seeds)

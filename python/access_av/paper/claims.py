@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -184,11 +184,6 @@ def with_seeds(claims: Mapping[int, list[Claim]]) -> list[Claim]:
     return made
 
 
-def as_records(claims: list[Claim]) -> list[dict[str, Any]]:
-    """Returns the claims as plain values for JSON."""
-    return [asdict(claim) for claim in claims]
-
-
 def _judge(
     claim_id: str, entry: Mapping[str, Any], outcome: Outcome, interpretation: str, kind: str
 ) -> Claim:
@@ -211,6 +206,10 @@ def _judge(
             note = " ".join(filter(None, (finding.note, "" if met else finding.conflict)))
         except (MissingFigureError, InputError) as error:
             finding, verdict, note = None, NOT_JUDGED, f"Not judged: {error}"
+    deviation = tolerance = None
+    if finding is not None and entry["rule"] == "about":
+        deviation = round(abs(_first(margin({**entry, "tolerance": 0.0}, finding.value))), 4)
+        tolerance = float(entry.get("tolerance", 0.0))
     return Claim(
         interpretation=interpretation,
         id=claim_id,
@@ -225,22 +224,9 @@ def _judge(
         evidence=kind,
         note=note,
         spread={} if finding is None else dict(finding.spread),
-        deviation=None if finding is None else _deviation(entry, finding.value),
-        tolerance=_tolerance(entry) if finding else None,
+        deviation=deviation,
+        tolerance=tolerance,
     )
-
-
-def _tolerance(entry: Mapping[str, Any]) -> float | None:
-    """Returns the maximum relative deviation that the rule ``about`` allows."""
-    return float(entry.get("tolerance", 0.0)) if entry["rule"] == "about" else None
-
-
-def _deviation(entry: Mapping[str, Any], value: Any) -> float | None:
-    """Returns the relative deviation of an obtained from a stated value (rule ``about``)."""
-    if entry["rule"] != "about":
-        return None
-    exact = margin({**entry, "tolerance": 0.0}, value)
-    return round(abs(_first(exact)), 4)
 
 
 def _turns(margins: Numbers) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from access_av._core import MeasurementTraces
-from access_av.paper.outcome import Drives, Numbers, resamples
+from access_av.paper.outcome import Drives, resamples
 from access_av.paper.statements import METHODS
 from access_av.run.pairs import ErrorSamples
 from access_av.run.simulation import Simulation, simulate
@@ -116,9 +116,10 @@ class Driver:
     def _drive(self, scenario: Scenario) -> Driven:
         found = self._simulate(scenario)
         assert found.errors_m is not None
-        weights = self._weights()
         drives = Drives.of_runs(
-            found.runs["aoa_estimates"].to_numpy().astype(np.float64), found.errors_m, weights
+            found.runs["aoa_estimates"].to_numpy().astype(np.float64),
+            found.errors_m,
+            resamples(self.runs, self.count),
         )
         # The original sample has double precision.
         exact: dict[str, Any] = {}
@@ -150,6 +151,3 @@ class Driver:
                 duration_s=float(found.steps["time_s"][-1]),
             ),
         )
-
-    def _weights(self) -> Numbers:
-        return resamples(self.runs, self.count)

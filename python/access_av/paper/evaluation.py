@@ -308,21 +308,17 @@ def outcome_of(
             adaptive[case.mode.number] = each
     figures = [it for mode in platform.modes for it in mode.energy_per_execution_j.values()]
     refits = adaptive.keys() >= NEEDED_MODES and all(it.provenance == "fitted" for it in figures)
-    if refits:
-        energies_j = fit_energy(_demands(platform, fixed, adaptive, None if fit_each else 1))
-    else:
-        energies_j = {
+    outcome = Outcome(
+        every_ssb,
+        fixed,
+        adaptive,
+        {
             mode.number: {
                 method: np.asarray(figure.value)
                 for method, figure in mode.energy_per_execution_j.items()
             }
             for mode in platform.modes
-        }
-    outcome = Outcome(
-        every_ssb,
-        fixed,
-        adaptive,
-        energies_j,
+        },
         trip_s,
         float(paper_numbers()["day"]["duty"]),
         platform.name,
@@ -330,6 +326,9 @@ def outcome_of(
         {mode.number: mode.base_wake_up_ms for mode in platform.modes},
         {} if settings is None else settings,
     )
+    if refits:
+        fitted_j = fit_energy(demands(outcome, platform, None if fit_each else 1))
+        outcome = replace(outcome, energy_per_execution_j=fitted_j)
     return outcome, refits
 
 
@@ -347,25 +346,19 @@ def settings_of(interpretation: Interpretation, platform: Platform) -> dict[str,
     }
 
 
-def demands(outcome: Outcome, platform: Platform) -> dict[int, ModeDemand]:
-    """Returns the load of each power mode in an evaluation."""
-    return _demands(platform, outcome.fixed, outcome.adaptive, 1)
-
-
-def _demands(
-    platform: Platform,
-    fixed: Mapping[tuple[int, str], Drives],
-    adaptive: Mapping[int, Drives],
-    variants: int | None,
+def demands(
+    outcome: Outcome, platform: Platform, variants: int | None = 1
 ) -> dict[int, ModeDemand]:
+    """Returns the load of each power mode, for the first ``variants`` or for all (``None``)."""
     return {
         mode.number: ModeDemand(
             cpu_hz=mode.cpu_hz,
             base_wake_up_s={method: mode.base_wake_up_ms[method] / 1e3 for method in METHODS},
             fixed_aoa_estimates={
-                method: float(fixed[mode.number, method].aoa_estimates[0]) for method in METHODS
+                method: float(outcome.fixed[mode.number, method].aoa_estimates[0])
+                for method in METHODS
             },
-            adaptive_aoa_estimates=adaptive[mode.number].aoa_estimates[:variants],
+            adaptive_aoa_estimates=outcome.adaptive[mode.number].aoa_estimates[:variants],
         )
         for mode in platform.modes
     }

@@ -174,10 +174,6 @@ def _mean_saving_percent(outcome: Outcome, mode: int) -> Numbers:
     return np.asarray(np.mean(list(savings_percent(outcome, mode).values()), axis=0))
 
 
-def _e1(outcome: Outcome) -> Finding:
-    return Finding({method: energy_j(outcome, 0, method) for method in METHODS})
-
-
 def _aoa_estimates(outcome: Outcome, modes: tuple[int, ...]) -> Finding:
     """Returns the duration of the trip divided by the base wake-up time, as in the paper."""
     counts, driven = {}, []
@@ -318,10 +314,6 @@ def _d2(outcome: Outcome) -> Finding:
     )
 
 
-def _both_at_once(outcome: Outcome) -> Finding:
-    return Finding({"worst_m": _a1(outcome).value, "saving_percent": _e4(outcome).value})
-
-
 # --- Setup ----------------------------------------------------------------------------------------
 
 
@@ -365,10 +357,6 @@ def _kinematics(_: Outcome) -> Finding:
 # --- Cost -----------------------------------------------------------------------------------------
 
 
-def _c1(_: Outcome) -> Finding:
-    return Finding(np.array([sensor_cost_ratio()]))
-
-
 def _c2(_: Outcome) -> Finding:
     four = roadside_units(4)
     return Finding(
@@ -397,7 +385,7 @@ FINDINGS: dict[str, Callable[[Outcome], Finding]] = {
     "a7_fixed_errors_accumulate": _errors_accumulate,
     "a8_esprit_is_worst": _esprit_is_worst,
     "a9_root_music_exceeds_0.3_m": lambda it: Finding(_fixed_worst(it, "root_music")),
-    "e1_mode0_fixed_j": _e1,
+    "e1_mode0_fixed_j": lambda it: Finding({name: energy_j(it, 0, name) for name in METHODS}),
     "e2_mode0_executions": lambda outcome: _aoa_estimates(outcome, (0,)),
     "e3_mode67_saving_percent": _e3_saving,
     "e3_mode67_executions": lambda outcome: _aoa_estimates(outcome, (6, 7)),
@@ -410,7 +398,9 @@ FINDINGS: dict[str, Callable[[Outcome], Finding]] = {
     "e10_two_refrigerators": _refrigerators,
     "d1_budget_210_j": _design_space,
     "d2_budget_260_j_rms_015_m": _d2,
-    "c1_sensor_cost_ratio_above": _c1,
+    "c1_sensor_cost_ratio_above": lambda _: Finding(np.array([sensor_cost_ratio()])),
     "c2_four_rsu_usd": _c2,
-    "c3_accurate_and_saving": _both_at_once,
+    "c3_accurate_and_saving": lambda it: Finding(
+        {"worst_m": _a1(it).value, "saving_percent": _e4(it).value}
+    ),
 }

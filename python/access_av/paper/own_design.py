@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
-from access_av._core import Bound
 from access_av.paper.findings import MissingFigureError, energy_j
 from access_av.paper.outcome import interval
+from access_av.run.error_bound import along_route
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -256,20 +256,14 @@ def fair(driver: Driver, evaluation: Evaluation) -> list[Fair]:
         mine = _ours(paper, mode.base_wake_up_ms["music"], knows_road=knows_road)
         once = mine.with_overrides({"vehicle.wake_up": {"policy": "fixed", "interval_ms": ONCE_MS}})
         if who == "bound":
-            found.append(_bound(real, knows_road, once))
+            route = along_route(once)
+            rms_m = float(route.select((pl.col("bound_m") ** 2).mean().sqrt()).item())
+            figures = (float(route.height), rms_m, rms_m, rms_m, None)
+            found.append(Fair(real, knows_road, who, *figures))
             continue
         scenario = {"paper": paper, "ours": mine, "one angle": once}[who]
-        found.append(_fair(real, knows_road, who, drivers[real].drive(scenario).drives))
+        drives = drivers[real].drive(scenario).drives
+        rms_m, ends_m = float(drives.rms_error_m[0]), interval(drives.rms_error_m)
+        count, worst_m = float(drives.aoa_estimates[0]), float(drives.worst_m[0])
+        found.append(Fair(real, knows_road, who, count, rms_m, *ends_m, worst_m, drives))
     return found
-
-
-def _fair(real: bool, knows_road: bool, who: str, drives: Drives) -> Fair:
-    rms_m, ends_m = drives.rms_error_m, interval(drives.rms_error_m)
-    estimates, worst_m = float(drives.aoa_estimates[0]), float(drives.worst_m[0])
-    return Fair(real, knows_road, who, estimates, float(rms_m[0]), *ends_m, worst_m, drives)
-
-
-def _bound(real: bool, knows_road: bool, scenario: Scenario) -> Fair:
-    route = pl.DataFrame(Bound(scenario).along_route())
-    rms_m = float(route.select((pl.col("bound_m") ** 2).mean().sqrt()).item())
-    return Fair(real, knows_road, "bound", float(route.height), rms_m, rms_m, rms_m, None)

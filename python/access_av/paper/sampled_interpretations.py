@@ -160,16 +160,15 @@ def _task(
             "seed": seed,
             "platform": board,
             "scenario": Scenario.load("paper").to_toml(),
-            "claims": {name: _rule(entry) for name, entry in stated_claims().items()},
+            # The rule of a claim with its bound, from which the margin is computed.
+            "claims": {
+                name: {key: entry.get(key) for key in ("rule", "stated", "tolerance", "query")}
+                for name, entry in stated_claims().items()
+            },
         },
         work=judge,
         arguments=(board, world, controllers, runs, seed),
     )
-
-
-def _rule(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns the rule of a claim with its bound, from which the margin is computed."""
-    return {key: entry.get(key) for key in ("rule", "stated", "tolerance", "query")}
 
 
 def judge(

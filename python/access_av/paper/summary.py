@@ -22,7 +22,6 @@ from access_av.tables.numbers import value_text
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from access_av.paper.ablation import Ablation
     from access_av.paper.claims import Claim
     from access_av.paper.interpretations import Interpretation
     from access_av.paper.study import Study
@@ -34,8 +33,6 @@ class ClaimGroups:
 
     Attributes
     ----------
-    gated
-        Whether estimates wait for a better SSB, which is not part of the paper's Algorithm 1.
     keeps_t_max
         Whether the maximum time between two estimates is at most t_max in the simulation.
     controller
@@ -45,7 +42,6 @@ class ClaimGroups:
     interpretation: Interpretation
     accuracy: bool
     energy: bool
-    gated: bool
     keeps_t_max: bool
     longest_gap_s: float
     controller: tuple[int, int, int]
@@ -56,27 +52,20 @@ def claim_groups(study: Study) -> list[ClaimGroups]:
     found = []
     for each in study.evaluations:
         accuracy, energy = met_halves(study.of(each.interpretation.name))
-        ablations = [
-            one for one in study.ablations if one.interpretation == each.interpretation.name
-        ]
+        effects = Counter(
+            it.matters for it in study.ablations if it.interpretation == each.interpretation.name
+        )
         found.append(
             ClaimGroups(
                 interpretation=each.interpretation,
                 accuracy=accuracy,
                 energy=energy,
-                gated=each.interpretation.is_gated,
                 keeps_t_max=each.interpretation.keeps(each.longest_gap_s),
                 longest_gap_s=each.longest_gap_s,
-                controller=controller(ablations),
+                controller=(effects[1], effects[0], effects[-1]),
             )
         )
     return found
-
-
-def controller(ablations: Sequence[Ablation]) -> tuple[int, int, int]:
-    """Numbers of power modes in which the controller helps, makes no difference, and harms."""
-    found = Counter(each.matters for each in ablations)
-    return found[1], found[0], found[-1]
 
 
 def controller_text(counts: tuple[int, int, int]) -> str:
@@ -111,26 +100,11 @@ PROMISE = (
 )
 
 
-@dataclass(frozen=True)
-class MainFigure:
-    """A main figure of the shown interpretation as text.
-
-    Attributes
-    ----------
-    verdict
-        Verdict on the claim; empty for a count of claims.
-    """
-
-    name: str
-    stated: str
-    obtained: str
-    verdict: str
-
-
-def main_figures(study: Study) -> list[MainFigure]:
+def main_figures(study: Study) -> list[tuple[str, str, str, str]]:
     """Returns maximum error, mean saving and number of reproduced claims, as text.
 
-    Claims that agree by construction or by arithmetic are not counted.
+    Each row has name, stated and obtained value, and the verdict on the claim. Claims that agree by
+    construction or by arithmetic are not counted.
     """
     claims = study.of(study.shown.interpretation.name)
     found = []
@@ -141,19 +115,19 @@ def main_figures(study: Study) -> list[MainFigure]:
         for claim in claims:
             if claim.id == id_:
                 stated, obtained = (shown_value(it) for it in (claim.stated, claim.obtained))
-                found.append(MainFigure(name, sign + stated, obtained, claim.verdict))
+                found.append((name, sign + stated, obtained, claim.verdict))
     evident = [it for it in claims if it.evidence not in NO_EVIDENCE and it.is_judged]
     met = sum(it.met for it in evident)
-    return [*found, MainFigure("reproduced claims", str(len(evident)), str(met), "")]
+    return [*found, ("reproduced claims", str(len(evident)), str(met), "")]
 
 
 def headline(study: Study) -> str:
     """Returns a headline: the claim groups that hold under one interpretation."""
     found = claim_groups(study)
     both = [group for group in found if group.accuracy and group.energy]
-    if any(not group.gated and group.keeps_t_max for group in both):
+    if any(not group.interpretation.is_gated and group.keeps_t_max for group in both):
         return "The paper's accuracy and its saving hold together under the published Algorithm 1"
-    if both and all(group.gated for group in both):
+    if both and all(group.interpretation.is_gated for group in both):
         return "Accuracy and saving hold together only if estimates wait for a better SSB"
     if both:
         return "Accuracy and saving hold together, but t_max is not kept"
@@ -182,11 +156,6 @@ def bought_text(study: Study) -> str:
     return "Both hold with no set of parameters of the energy fit."
 
 
-def _saving_percent(study: Study, group: ClaimGroups) -> float | None:
-    claims = {claim.id: claim.obtained for claim in study.of(group.interpretation.name)}
-    return claims.get(SAVING)
-
-
 def lead(study: Study) -> str:
     """Returns a paragraph about the claim groups that hold under each interpretation."""
     found = claim_groups(study)
@@ -203,10 +172,11 @@ def lead(study: Study) -> str:
         f"Energy claims (e3, e4) without the accuracy claims hold under {titles(saving)}. "
         f"Both hold under {titles(both)}."
     ]
+    saving_percent = {it.interpretation: it.obtained for it in study.claims if it.id == SAVING}
     saved = [
         f"“{group.interpretation.title}” saves {percent:.1f} %"
         for group in found
-        if group.accuracy and (percent := _saving_percent(study, group)) is not None
+        if group.accuracy and (percent := saving_percent.get(group.interpretation.name)) is not None
     ]
     if saved and not both:
         sentences.append(
@@ -220,7 +190,7 @@ def lead(study: Study) -> str:
             if group.keeps_t_max
             else f"t_max is exceeded (longest gap {group.longest_gap_s:.2f} s)"
         )
-        if group.gated:
+        if group.interpretation.is_gated:
             sentences.append(
                 f"Under “{group.interpretation.title}” estimates wait for a better SSB, which "
                 "Algorithm 1 "

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from access_av.device.platform import Platform
 from access_av.errors import InputError
-from access_av.paper.claims import as_records
 from access_av.paper.interpretations import SHIPPED, load_all
 from access_av.paper.study import Study, study
 from access_av.tables import validation
@@ -42,7 +42,7 @@ def write(
     tables = made.tables()
     for name in list(tables):
         directory.write_table(f"{name}.parquet", tables.pop(name))
-    directory.write_json("claims.json", as_records(made.claims))
+    directory.write_json("claims.json", [asdict(claim) for claim in made.claims])
     progress(1, 4)
     specs: dict[str, Spec] = {}
     directory.write_text("report.html", render(made, specs))
