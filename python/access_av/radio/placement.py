@@ -15,7 +15,7 @@ import polars as pl
 from access_av import _core
 from access_av.errors import InputError
 from access_av.run import service_levels
-from access_av.run.error_bound import along_route
+from access_av.run.error_bound import along_route, p90_m
 from access_av.settings import as_dict
 from access_av.tables import validation
 from access_av.tables.result import Origin, Result, origin
@@ -135,14 +135,14 @@ def plan(
         ]
         return scenario.with_overrides({"site.radio_heads": [*heads, *new]}) if new else scenario
 
-    def p90_m(chosen: Sequence[int]) -> float:
-        return _p90_m(equipped(chosen))
+    def with_masts_m(chosen: Sequence[int]) -> float:
+        return p90_m(equipped(chosen))
 
     everyone = range(len(candidates))
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        before_m = p90_m([])
+        before_m = with_masts_m([])
         alone_m = []
-        for value_m in pool.map(p90_m, ([number] for number in everyone)):
+        for value_m in pool.map(with_masts_m, ([number] for number in everyone)):
             alone_m.append(value_m)
             if progress is not None:
                 progress(len(alone_m), len(candidates))
@@ -151,7 +151,8 @@ def plan(
 
         def better(kept: list[int]) -> tuple[float, int]:
             others = [number for number in everyone if number not in kept]
-            return min(zip(pool.map(p90_m, ([*kept, it] for it in others)), others, strict=True))
+            of_others_m = pool.map(with_masts_m, ([*kept, it] for it in others))
+            return min(zip(of_others_m, others, strict=True))
 
         while len(chosen) < add:
             after_m, number = better(chosen)
@@ -175,10 +176,6 @@ def plan(
         ranking=ranking.sort("p90_bound_m", maintain_order=True),
         verdicts=service_levels.of_bound(route["along_std_m"], route["across_std_m"]),
     )
-
-
-def _p90_m(scenario: _core.Scenario) -> float:
-    return float(along_route(scenario)["bound_m"].quantile(0.9, "linear") or math.nan)
 
 
 def _next_to_route(scenario: _core.Scenario, site: dict[str, Any]) -> list[dict[str, Any]]:

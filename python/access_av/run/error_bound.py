@@ -118,10 +118,10 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
     if not isinstance(scenario, _core.Scenario):
         scenario = _core.Scenario.load(scenario)
     settings = as_dict(scenario.site)
-    core = _core.Bound(scenario)
-    route = pl.DataFrame(core.along_route())
+    core, route = _core.Bound(scenario), along_route(scenario)
     heads = _heads(core, settings["radio_heads"], route)
-    low, high = _extent(route, heads)
+    places = np.vstack([table.select("x_m", "y_m").to_numpy() for table in (route, heads)])
+    low, high = places.min(axis=0) - MARGIN_M, places.max(axis=0) + MARGIN_M
     step_m = _round_step(low, high) if map_step_m is None else map_step_m
     if not (math.isfinite(step_m) and step_m > 0.0):
         raise InputError(f"--map-step-m {step_m}: it must be above 0")
@@ -132,9 +132,10 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
         )
     cells = math.prod(np.maximum(1.0, np.ceil((high - low) / step_m)).tolist())
     if cells > MOST_MAP_CELLS:
+        least_m = 1.1 * math.sqrt(float(np.prod(high - low)) / MOST_MAP_CELLS)
         raise InputError(
             f"--map-step-m {step_m:g}: it gives {cells:.3g} squares; at most {MOST_MAP_CELLS} "
-            f"are allowed: write at least {_least_step(low, high):.2g} m"
+            f"are allowed: write at least {least_m:.2g} m"
         )
     wavelength_m = SPEED_OF_LIGHT_MPS / (settings["carrier_mhz"] * 1e6)
     looks = max(1.0, MAP_TRAVEL_M * ANGLES_PER_WAVELENGTH / wavelength_m)
@@ -165,6 +166,11 @@ def along_route(scenario: _core.Scenario) -> pl.DataFrame:
     return pl.DataFrame(_core.Bound(scenario).along_route())
 
 
+def p90_m(scenario: _core.Scenario) -> float:
+    """Returns the 90th percentile of the bound along the route, in metres."""
+    return float(along_route(scenario)["bound_m"].quantile(0.9, "linear") or 0.0)
+
+
 def _heads(core: _core.Bound, settings: list[dict[str, Any]], route: pl.DataFrame) -> pl.DataFrame:
     x_m, y_m = route["x_m"].to_numpy(), route["y_m"].to_numpy()
     snrs_db = core.snr_db(x_m, y_m)
@@ -190,17 +196,8 @@ def _heads(core: _core.Bound, settings: list[dict[str, Any]], route: pl.DataFram
     return pl.DataFrame(rows)
 
 
-def _extent(route: pl.DataFrame, heads: pl.DataFrame) -> tuple[NDArray[np.float64], ...]:
-    places = np.vstack([table.select("x_m", "y_m").to_numpy() for table in (route, heads)])
-    return places.min(axis=0) - MARGIN_M, places.max(axis=0) + MARGIN_M
-
-
 def _round_step(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
     """Returns the smallest round step (1, 2, 5 times 10ⁿ) with at most ``MAP_CELLS`` squares."""
     least_m = math.sqrt(float(np.prod(high - low)) / MAP_CELLS)
     power = 10.0 ** math.floor(math.log10(least_m))
     return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= least_m)
-
-
-def _least_step(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
-    return 1.1 * math.sqrt(float(np.prod(high - low)) / MOST_MAP_CELLS)

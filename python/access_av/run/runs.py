@@ -227,7 +227,7 @@ def drive(
         raise RuntimeError("the simulation stored no error samples")
     errors_m = np.hypot(found.errors_m[:, :, 0], found.errors_m[:, :, 1]).astype(np.float64)
     errors_m[np.isnan(errors_m)] = np.inf
-    time_s = found.steps["time_s"].to_numpy()
+    time_s, energy_j = found.steps["time_s"].to_numpy(), found.runs["energy_j"]
     return Runs(
         name=name,
         scenario=scenario,
@@ -240,10 +240,5 @@ def drive(
         integrity=found.integrity,
         seeds=np.full(runs, seed, dtype=np.int64),
         has_own_estimator="estimator" in (plug_ins or {}),
-        own_energy_j=_mean(found.runs["energy_j"]),
+        own_energy_j=None if energy_j.null_count() else float(energy_j.to_numpy().mean()),
     )
-
-
-def _mean(values: pl.Series) -> float | None:
-    """Returns the mean of values; all must be known."""
-    return None if values.null_count() else float(values.to_numpy().mean())

@@ -28,7 +28,7 @@ from access_av.tables.numbers import number
 from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -178,7 +178,9 @@ class Simulation(Result):
                 return None
             errors_m = self.errors_m.astype(np.float64)
             return np.asarray(np.hypot(errors_m[..., 0], errors_m[..., 1]))
-        return self._at_every_ssb()
+        error_m = pl.when(~pl.col("searching")).then(horizontal_error_m())
+        errors_m = self.trajectories.sort("run", "time_s").select(error_m).to_numpy()
+        return np.asarray(errors_m.reshape(-1, self.steps.height))
 
     def plot(self) -> Any:
         """Draws the RMS error and percentiles of all runs against time, with Altair."""
@@ -187,13 +189,6 @@ class Simulation(Result):
         columns = ("rms_error_m", "p50_error_m", "p90_error_m", "p99_error_m")
         titles = ("time / s", "horizontal error / m")
         return lines(self.steps, "time_s", columns, titles=titles)
-
-    def _at_every_ssb(self) -> NDArray[np.float64] | None:
-        if self.trajectories is None:
-            return None
-        error_m = pl.when(~pl.col("searching")).then(horizontal_error_m())
-        errors_m = self.trajectories.sort("run", "time_s").select(error_m).to_numpy()
-        return np.asarray(errors_m.reshape(-1, self.steps.height))
 
     @property
     def operation(self) -> Operation | None:
@@ -216,8 +211,8 @@ class Simulation(Result):
     @property
     def service_levels(self) -> list[service_levels.Verdict] | None:
         """Results for the 3GPP service levels; ``None`` without trajectories."""
-        errors_m = self._at_every_ssb()
-        if errors_m is None:
+        errors_m = self.horizontal_errors_m
+        if errors_m is None or self.trajectories is None:
             return None
         step_s = float(self.steps["time_s"][-1]) / max(1, self.steps.height - 1)
         return service_levels.of_runs(errors_m, step_s)
@@ -345,28 +340,6 @@ def simulate(
     if runs > 1:
         shared.warn_of_changes(stacklevel=2)
     return Simulation.of(found, scenario, seed)
-
-
-def simulate_each(
-    scenarios: Sequence[Scenario],
-    *,
-    runs: int,
-    plug_ins: Sequence[Mapping[str, Any]] | None = None,
-    progress: Callable[[int, int], None] | None = None,
-    **how: Any,
-) -> Iterator[Simulation]:
-    """Simulates scenarios one after the other, with plug-ins by role and one total of runs.
-
-    ``how`` are further arguments of :func:`simulate`; equal seeds give equal environments.
-    """
-    for index, scenario in enumerate(scenarios):
-
-        def tell(done: int, _: int, before: int = index * runs) -> None:
-            if progress is not None:
-                progress(before + done, runs * len(scenarios))
-
-        its = plug_ins[index] if plug_ins else {}
-        yield simulate(scenario, runs=runs, progress=tell, **its, **how)
 
 
 def _warn_of_localizer(scenario: Scenario) -> None:

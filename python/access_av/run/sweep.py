@@ -11,7 +11,7 @@ import polars as pl
 from access_av._core import Scenario
 from access_av.errors import InputError
 from access_av.run.difference import Difference, difference
-from access_av.run.simulation import Simulation, simulate_each
+from access_av.run.simulation import Simulation, simulate
 from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
@@ -139,17 +139,25 @@ def sweep(
             f"vary: {len(combined)} combinations; at most {MAX_COMBINATIONS} are allowed"
         )
     keys = [{key: it for key, it in each.items() if key not in PLUG_INS} for each in combined]
-    results = [
-        *simulate_each(
-            [scenario.with_overrides(it) for it in keys],
-            plug_ins=[{key: it[key] for key in PLUG_INS if key in it} for it in combined],
-            runs=runs,
-            seed=seed,
-            threads=threads,
-            errors_every=ERRORS_EVERY,
-            progress=progress,
+    scenarios = [scenario.with_overrides(it) for it in keys]
+    results: list[Simulation] = []
+
+    def tell(done: int, _: int) -> None:
+        if progress is not None:
+            progress(runs * len(results) + done, runs * len(combined))
+
+    for changed, its in zip(scenarios, combined, strict=True):
+        results.append(
+            simulate(
+                changed,
+                runs=runs,
+                seed=seed,
+                threads=threads,
+                errors_every=ERRORS_EVERY,
+                progress=tell,
+                **{key: its[key] for key in PLUG_INS if key in its},
+            )
         )
-    ]
     values = [{key: _shown(value) for key, value in chosen.items()} for chosen in combined]
     rows = [
         _row(each, result, difference(result, results[0], percent=percent))

@@ -166,13 +166,13 @@ def compare(
     """
     known = [] if baseline is None else [baseline]
     left = dict(list(scenarios.items())[len(known) :])
-    total, found = runs * len(left), list[ErrorSamples](known)
-    for number, (label, scenario) in enumerate(left.items()):
+    found = list[ErrorSamples](known)
 
-        def tell(done: int, _: int, before: int = number * runs) -> None:
-            if progress is not None:
-                progress(before + done, total)
+    def tell(done: int, _: int) -> None:
+        if progress is not None:
+            progress(runs * (len(found) - len(known)) + done, runs * len(left))
 
+    for label, scenario in left.items():
         found.append(drive(label, scenario, runs, seed, threads, tell, (plug_ins or {}).get(label)))
     return beside_first(found, percents)
 

@@ -185,7 +185,10 @@ def operate(
     if leader is None:
         return Recommendation(found, front(found), None, None, [])
     chosen = _chosen(plant, targets, found, leader)
-    others = _alternatives(found, found[chosen])
+    # The other operations in the chosen mode, and the chosen operation in other modes.
+    operation, mode = found[chosen].operation, found[chosen].mode
+    others = [it for it in found if it.operation == operation or it.mode == mode]
+    others = sorted((it for it in others if it is not found[chosen]), key=lambda it: it.energy_j)
     comparisons = _comparisons(found)
     rivals = [Rival.of(plant, targets, it, found[chosen], comparisons) for it in others]
     return Recommendation(found, front(found), leader, chosen, rivals)
@@ -207,16 +210,6 @@ def _chosen(plant: _core.Plant, targets: Targets, found: Sequence[Point], leader
 
 def _comparisons(found: Sequence[Point]) -> int:
     return max(1, len({it.driven.name for it in found}) - 1)
-
-
-def _alternatives(found: Sequence[Point], chosen: Point) -> list[Point]:
-    """Returns the other operations in the chosen mode, and the chosen operation in other modes."""
-    others = [
-        it
-        for it in found
-        if it is not chosen and (it.operation == chosen.operation or it.mode == chosen.mode)
-    ]
-    return sorted(others, key=lambda it: it.energy_j)
 
 
 def _day_wh(plant: _core.Plant, it: Point) -> float:

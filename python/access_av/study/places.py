@@ -134,26 +134,14 @@ def worst_places(places: pl.DataFrame, plant: _core.Plant) -> list[WorstPlace]:
     found: list[WorstPlace] = []
     for row in left.iter_rows(named=True):
         if all(abs(row["along_m"] - place.along_m) >= APART_M for place in found):
-            found.append(
-                WorstPlace(
-                    along_m=row["along_m"],
-                    x_m=row["x_m"],
-                    y_m=row["y_m"],
-                    error_m=row["target_error_m"],
-                    why=_cause(row, places, written),
-                )
-            )
+            why, error_m = _why(row, places, written), row["target_error_m"]
+            if error_m > LOST_M:
+                lost = f"lost drives determine the percentile here (error above {LOST_M:g} m)"
+                why = f"{lost}; {why}"
+            found.append(WorstPlace(row["along_m"], row["x_m"], row["y_m"], error_m, why))
         if len(found) == MOST_PLACES:
             break
     return found
-
-
-def _cause(row: Mapping[str, Any], places: pl.DataFrame, plant: Mapping[str, Any]) -> str:
-    """Returns the cause of a large error as text; lost drives come first."""
-    why = _why(row, places, plant)
-    if row["target_error_m"] <= LOST_M:
-        return why
-    return f"lost drives determine the percentile here (error above {LOST_M:g} m); {why}"
 
 
 def _why(row: Mapping[str, Any], places: pl.DataFrame, plant: Mapping[str, Any]) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from access_av.radio.placement import plan
-from access_av.run.error_bound import along_route
+from access_av.run.error_bound import p90_m
 from access_av.settings import as_dict
 
 if TYPE_CHECKING:
@@ -133,15 +133,11 @@ def _move(scenario: _core.Scenario, site: Mapping[str, Any], planned: Plan) -> R
     place = planned.ranking.row(0, named=True)
     position_m = [place["x_m"], place["y_m"], place["z_m"]]
 
-    def p90_m(index: int) -> float:
-        moved = scenario.with_overrides({f"site.radio_heads[{index}].position_m": position_m})
-        return float(along_route(moved)["bound_m"].quantile(0.9, "linear") or 0.0)
-
-    index = min(range(len(heads)), key=p90_m)
+    changes = [{f"site.radio_heads[{it}].position_m": position_m} for it in range(len(heads))]
+    index = min(range(len(heads)), key=lambda it: p90_m(scenario.with_overrides(changes[it])))
     name = heads[index]["name"] or f"radio head {index + 1}"
     what = f"“{name}” moved to ({position_m[0]:g}, {position_m[1]:g}) m, {position_m[2]:g} m high"
-    settings = {f"site.radio_heads[{index}].position_m": position_m}
-    return Remedy("move a radio head", what, settings, "move_radio_head", 1)
+    return Remedy("move a radio head", what, changes[index], "move_radio_head", 1)
 
 
 def _mast(planned: Plan) -> Remedy | None:

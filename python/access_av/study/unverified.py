@@ -7,7 +7,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from access_av import _core
-from access_av.run.error_bound import along_route
+from access_av.run.error_bound import p90_m
 from access_av.settings import as_dict
 from access_av.site_files.templates import new
 
@@ -56,12 +56,12 @@ def unverified(plant: _core.Plant) -> list[Unverified]:
     """
     mine, template = as_dict(plant), _template()
     scenario = plant.scenario()
-    before_m = _p90_m(scenario)
+    before_m = p90_m(scenario)
     found = []
     for key, what, otherwise, settings in _candidates(mine["site"], mine["vehicle"]):
         if not _is_shared(mine, template, key):
             continue
-        after_m = _p90_m(scenario.with_overrides(settings))
+        after_m = p90_m(scenario.with_overrides(settings))
         found.append(Unverified(key, what, otherwise, after_m / before_m))
     found.sort(key=lambda one: -(one.effect or 0.0))
     for key, unit in OTHERS.items():
@@ -98,10 +98,6 @@ def _is_shared(mine: Mapping[str, Any], template: Mapping[str, Any], key: str) -
         return all(_at(mine, f"{key}.{one}") == _at(template, f"{key}.{one}") for one in shared)
     value = _at(mine, key)
     return value is not None and value == _at(template, key)
-
-
-def _p90_m(scenario: _core.Scenario) -> float:
-    return float(along_route(scenario)["bound_m"].quantile(0.9, "linear") or 0.0)
 
 
 def _candidates(
