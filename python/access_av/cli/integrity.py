@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,8 +17,6 @@ from access_av.cli.terminal import progress, say, show_rows
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from access_av.run.integrity_campaign import Case
     from access_av.study.compare import Compared
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 from typer import Argument, Option
 
-from access_av._core import Scenario, Site, Vehicle
+from access_av._core import Scenario, SettingsWarning, Site, Vehicle
 from access_av.cli.terminal import show_warning
 from access_av.errors import InputError
 from access_av.tables.toml import tomllib
@@ -18,7 +18,6 @@ from access_av.tables.toml import tomllib
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from access_av._core import SettingsWarning
 
 ScenarioArgument = Annotated[str, Argument(help="Scenario: shipped name, or path of a TOML file.")]
 PlatformOption = Annotated[str, Option(help="Platform: shipped name, or path of a TOML file.")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from access_av.cli import options as opt
 from access_av.cli.terminal import progress, show
@@ -10,7 +10,6 @@ from access_av.report.shown import compared
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from typing import Any
 
     from access_av import _core
     from access_av.run.pairs import ErrorSamples

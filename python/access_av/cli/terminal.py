@@ -18,7 +18,7 @@ from rich.table import Table as RichTable
 
 from access_av._core import brief
 from access_av.report import shown
-from access_av.report.shown import Badge
+from access_av.report.shown import Badge, Shown
 from access_av.signal.methods import label
 from access_av.tables.numbers import unsigned_zero, value_text
 
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from access_av.drives.angle_log import AngleLog
     from access_av.radio.placement import Plan
     from access_av.radio.upgrades import NextLevel
-    from access_av.report.shown import Shown
     from access_av.run.service_levels import Verdict
     from access_av.run.simulation import Simulation
     from access_av.signal.recorded_angles import BurstAngle

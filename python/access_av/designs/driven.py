@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from access_av._core import Scenario, SettingsError
 from access_av.designs.space import shown
 from access_av.device.platform import Platform
 from access_av.errors import InputError
-from access_av.run.campaign import Task
+from access_av.run.campaign import Campaign, Task
 from access_av.run.pairs import ErrorSamples
 from access_av.run.plug_in_files import checksum, load, split
 from access_av.run.simulation import simulate
@@ -20,11 +20,8 @@ from access_av.statistics.percentiles import PERCENTS, Percentile
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from typing import TypeAlias
 
     from numpy.typing import NDArray
-
-    from access_av.run.campaign import Campaign
 
     # Results of the runs of a scenario, by name.
     Part: TypeAlias = Mapping[str, NDArray[Any]]

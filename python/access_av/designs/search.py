@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av.designs.driven import drive, in_worlds, in_worst, joined
+from access_av.designs.driven import Design, Driven, drive, in_worlds, in_worst, joined
 from access_av.designs.front import aims
 from access_av.errors import InputError
 from access_av.statistics.pareto import pareto_front
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from access_av._core import Scenario
-    from access_av.designs.driven import Design, Driven, Part
+    from access_av.designs.driven import Part
     from access_av.designs.space import Space
     from access_av.run.campaign import Campaign
 

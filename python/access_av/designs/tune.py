@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av.designs.driven import designs_of, drive, joined
+from access_av.designs.driven import Design, Driven, designs_of, drive, joined
 from access_av.designs.front import differences
 from access_av.designs.search import suggested
 from access_av.designs.space import Dimension, Space
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from access_av._core import Scenario
-    from access_av.designs.driven import Design, Driven
     from access_av.designs.query import Query
     from access_av.run.campaign import Campaign
 

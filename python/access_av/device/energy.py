@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from access_av.device.counters import RAPL_UNIT_J, SensorError
+from access_av.device.counters import RAPL_UNIT_J, Counters, SensorError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from access_av.device.counters import Counters
 
 # Mean interval of sensor reads (s); varied by half, so that no load is synchronous to it.
 LOOK_S = 2e-3

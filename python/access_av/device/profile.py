@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from access_av import _core
 from access_av.device import counters, power_modes
-from access_av.device.counters import SensorError
+from access_av.device.counters import Counters, SensorError
 from access_av.device.energy import Interval, Recording, TooShortError, Window, above_idle
 from access_av.device.power_modes import Mode, ModeError
 from access_av.device.workload import CHAIN, Timing, repeat, workloads
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from access_av.device.counters import Counters
 
 NO_SENSOR = "no power sensor on this machine (looked for INA3221, INA238, RAPL)"
 # The radio is not measured: it has the assumed values of this platform, to be replaced by those of

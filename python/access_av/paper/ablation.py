@@ -12,16 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from access_av.paper.evaluation import cases, fixed_interval
-from access_av.paper.outcome import interval
+from access_av.paper.evaluation import Evaluation, cases, fixed_interval
+from access_av.paper.outcome import Drives, interval
 from access_av.paper.statements import paper_numbers
 
 if TYPE_CHECKING:
     from access_av._core import Scenario
     from access_av.paper.driver import Driver
-    from access_av.paper.evaluation import Evaluation
     from access_av.paper.interpretations import Interpretation
-    from access_av.paper.outcome import Drives
 
 # Intervals of the front in ms, from every SSB to more than the paper's t_max.
 FRONT_MS = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 150.0, 180.0, 240.0, 320.0, 480.0, 1000.0)

@@ -11,13 +11,12 @@ from access_av.errors import InputError
 from access_av.paper import energy_fit
 from access_av.paper.findings import FINDINGS, Finding, MissingFigureError
 from access_av.paper.margins import margin
-from access_av.paper.outcome import interval
+from access_av.paper.outcome import Numbers, Outcome, interval
 from access_av.paper.statements import stated_claims
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
-    from access_av.paper.outcome import Numbers, Outcome
 
 REPRODUCED = "reproduced"
 NOT_REPRODUCED = "not reproduced"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
-from access_av._core import MeasurementTraces
+from access_av._core import MeasurementTraces, Scenario
 from access_av.paper.outcome import Drives, resamples
 from access_av.paper.statements import METHODS
 from access_av.run.pairs import ErrorSamples
@@ -18,7 +18,6 @@ from access_av.run.simulation import Simulation, simulate
 if TYPE_CHECKING:
     from collections.abc import MutableMapping
 
-    from access_av._core import Scenario
     from access_av.device.platform import Platform
     from access_av.statistics.percentiles import Percentile
 

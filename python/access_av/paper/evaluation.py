@@ -18,7 +18,7 @@ import numpy as np
 import polars as pl
 
 from access_av._core import Scenario
-from access_av.device.platform import Platform
+from access_av.device.platform import Platform, PowerMode
 from access_av.errors import InputError
 from access_av.paper import energy_fit
 from access_av.paper.driver import Driven, Driver
@@ -33,8 +33,6 @@ from access_av.tables.result import Origin, Result, origin
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-
-    from access_av.device.platform import PowerMode
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from access_av.paper.claims import ARITHMETIC, BY_CONSTRUCTION, check_claims
+from access_av.paper.claims import ARITHMETIC, BY_CONSTRUCTION, Claim, check_claims
 from access_av.paper.energy_fit import FREEDOMS, NONE, SHIPPED, numbers
 from access_av.paper.statements import claim_group, stated_claims
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from access_av.paper.claims import Claim
     from access_av.paper.evaluation import Evaluation
 
 # Sets of degrees of freedom, each with one more than the previous set.

@@ -19,7 +19,7 @@ import numpy as np
 import polars as pl
 
 from access_av.paper.findings import MissingFigureError, energy_j
-from access_av.paper.outcome import interval
+from access_av.paper.outcome import Drives, interval
 from access_av.run.error_bound import along_route
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from access_av.device.platform import Platform
     from access_av.paper.driver import Driver
     from access_av.paper.evaluation import Evaluation
-    from access_av.paper.outcome import Drives
 
 # Target error of the proposed policy with a probability of 90 %: the paper's 0.3 m.
 BOUND_M = 0.3

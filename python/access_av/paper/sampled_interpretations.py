@@ -33,12 +33,10 @@ from access_av.paper.open_choices import (
 )
 from access_av.paper.outcome import Drives, Numbers
 from access_av.paper.statements import stated_claims
-from access_av.run.campaign import Task
+from access_av.run.campaign import Campaign, Task
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-
-    from access_av.run.campaign import Campaign
 
 
 @dataclass(frozen=True)

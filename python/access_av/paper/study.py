@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from access_av._core import SettingsError
+from access_av._core import Scenario, SettingsError
 from access_av.device.platform import Figure, Platform
 from access_av.errors import InputError
 from access_av.paper import ablation, freedoms, own_design, run_tables
@@ -16,9 +16,16 @@ from access_av.paper import chosen as chosen_otherwise
 from access_av.paper.claims import Claim, check_claims, with_seeds
 from access_av.paper.driver import Driver
 from access_av.paper.energy_fit import fit_energy
-from access_av.paper.evaluation import Evaluation, demands, evaluate, evaluate_with, planned
-from access_av.paper.interpretations import SHIPPED
-from access_av.paper.outcome import rows
+from access_av.paper.evaluation import (
+    Evaluation,
+    Setting,
+    demands,
+    evaluate,
+    evaluate_with,
+    planned,
+)
+from access_av.paper.interpretations import SHIPPED, Interpretation
+from access_av.paper.outcome import Drives, rows
 from access_av.paper.sampled_interpretations import sample
 from access_av.paper.stages import Stages
 from access_av.paper.unknowns import Unknowns, sobol
@@ -27,10 +34,6 @@ from access_av.tables.columns import TABLES
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from access_av._core import Scenario
-    from access_av.paper.evaluation import Setting
-    from access_av.paper.interpretations import Interpretation
-    from access_av.paper.outcome import Drives
     from access_av.paper.own_design import Fair
     from access_av.run.campaign import Campaign
 

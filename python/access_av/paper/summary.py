@@ -13,6 +13,7 @@ from access_av.paper.claims import (
     NO_EVIDENCE,
     NOT_REPRODUCED,
     REPRODUCED,
+    Claim,
 )
 from access_av.paper.energy_fit import FREEDOMS
 from access_av.paper.freedoms import met_halves
@@ -22,7 +23,6 @@ from access_av.tables.numbers import value_text
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from access_av.paper.claims import Claim
     from access_av.paper.interpretations import Interpretation
     from access_av.paper.study import Study
 

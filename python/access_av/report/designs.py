@@ -8,7 +8,7 @@ import altair as alt
 import numpy as np
 import polars as pl
 
-from access_av.report.chart import GREEN, GREY, ORANGE, finish, thinned, tips
+from access_av.report.chart import GREEN, GREY, ORANGE, Spec, finish, thinned, tips
 from access_av.report.labels import Axis, placed
 from access_av.report.labels import layers as labels
 from access_av.report.page import VERSION, sheet
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from access_av._core import Scenario
     from access_av.designs.driven import Driven
-    from access_av.report.chart import Spec
 
 # Maximum number of designs in the chart, in the chart over time, and in the table, ordered by front
 # and energy.

@@ -13,19 +13,19 @@ from access_av.report.chart import (
     GREEN,
     LEAST_M,
     ORANGE,
+    Spec,
     finish,
     line_chart,
     lines_of,
     thinned,
     tips,
-)  # fmt: skip
+)
 from access_av.report.played import played, received_of, steps_of
 from access_av.report.site_map import Frame, heads_of
 from access_av.statistics.consistency import horizontal_error_m
 
 if TYPE_CHECKING:
     from access_av._core import Scenario
-    from access_av.report.chart import Spec
     from access_av.run.error_bound import ErrorBound
     from access_av.run.simulation import Simulation
 

@@ -14,6 +14,7 @@ from access_av.report.chart import (
     LEAST_M,
     ORANGE,
     PURPLE,
+    Spec,
     colours,
     dashed,
     finish,
@@ -21,14 +22,13 @@ from access_av.report.chart import (
     thinned,
     time_axis,
     tips,
-)  # fmt: skip
+)
 from access_av.report.played import played
 from access_av.report.site_map import Frame, heads_of
 
 if TYPE_CHECKING:
     from access_av._core import Site
     from access_av.drives.recorded import Drive
-    from access_av.report.chart import Spec
 
 TALLEST_MAP_PX = 700.0
 POINTS_PER_TRACK = 1500

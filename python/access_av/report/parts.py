@@ -5,12 +5,10 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
-from access_av.report.shown import Badge
+from access_av.report.shown import Badge, Shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
-
-    from access_av.report.shown import Shown
 
 
 class Html(str):

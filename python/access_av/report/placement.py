@@ -9,11 +9,10 @@ from access_av.report import drive_charts as charts
 from access_av.report.page import VERSION, sheet
 from access_av.report.parts import figure, section, shown, source, warnings
 from access_av.report.shown import next_level, radio_heads, service_levels
-from access_av.run.error_bound import MAP_TRAVEL_M, VISIBLE_SNR_DB
+from access_av.run.error_bound import MAP_TRAVEL_M, VISIBLE_SNR_DB, ErrorBound
 
 if TYPE_CHECKING:
     from access_av.radio.upgrades import NextLevel
-    from access_av.run.error_bound import ErrorBound
 
 
 def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:

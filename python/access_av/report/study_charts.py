@@ -14,6 +14,7 @@ from access_av.report.chart import (
     GREY,
     ORANGE,
     PURPLE,
+    Spec,
     colours,
     dashed,
     finish,
@@ -21,7 +22,7 @@ from access_av.report.chart import (
     lines_of,
     thinned,
     tips,
-)  # fmt: skip
+)
 from access_av.report.labels import Axis, labelled
 from access_av.report.played import played, received_of, steps_of
 from access_av.report.site_map import Frame, heads_of
@@ -30,7 +31,6 @@ from access_av.settings import as_dict
 from access_av.study.economy import trip_j
 
 if TYPE_CHECKING:
-    from access_av.report.chart import Spec
     from access_av.study.study_result import Study
 
 TALLEST_MAP_PX = 640.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from access_av.report.parts import badge, code, figure, folded, records, section, small
 from access_av.report.study_parts import (
@@ -21,12 +20,8 @@ from access_av.report.study_parts import (
 from access_av.run.assumptions import energy_boundary
 from access_av.settings import as_dict
 from access_av.study import economy
-from access_av.study.points import MATTERS_SHARE, OK_MARGIN
-from access_av.study.study_result import as_toml, rule
-
-if TYPE_CHECKING:
-    from access_av.study.points import Point
-    from access_av.study.study_result import Study
+from access_av.study.points import MATTERS_SHARE, OK_MARGIN, Point
+from access_av.study.study_result import Study, as_toml, rule
 
 # Condition of the badge "equivalent" of a rival.
 EQUIVALENT = (

@@ -10,7 +10,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.errors import InputError
-from access_av.run.campaign import Task
+from access_av.run.campaign import Campaign, Task
 from access_av.run.fault_injection import Overrides, hypotheses, mismatches
 from access_av.run.pairs import UNCHANGED, ErrorSamples
 from access_av.run.simulation import simulate
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from access_av.run.campaign import Campaign
 
 # Runs per part, which are lost by an interruption.
 PART_RUNS = 5

@@ -9,7 +9,7 @@ import numpy as np
 
 from access_av.run.service_levels import INDEPENDENT_S
 from access_av.statistics.paired import paired_difference
-from access_av.statistics.percentiles import PERCENTS, finite, percentiles
+from access_av.statistics.percentiles import PERCENTS, Percentile, finite, percentiles
 from access_av.statistics.proportions import share_interval
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from access_av.statistics.percentiles import Percentile
 
 # Baseline of the comparison of variants.
 UNCHANGED = "unchanged"

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from access_av._core.aoa import direction
+from access_av._core.aoa import DirectionEstimate, direction
 from access_av.signal.manifold import ManifoldFit
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from access_av._core.aoa import DirectionEstimate
 
 # Directions of the search, five degrees apart: eight elements half a wavelength apart lose 0.3 dB
 # between two of them.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from access_av.errors import InputError
 from access_av.site_files import curves, dxf_curves
-from access_av.site_files.curves import CurveError
+from access_av.site_files.curves import CurveError, Point, Vertex
 from access_av.site_files.drawn import Drawn, Head
 from access_av.site_files.dxf_curves import UnsupportedError
 from access_av.site_files.dxf_layer import Layer, TooManyError, layer_of
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from access_av.site_files.curves import Point, Vertex
 
 MOST_BYTES = 256 << 20
 US_SURVEY_FOOT_M = 1200.0 / 3937.0

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from access_av import _core
 from access_av.errors import InputError
 from access_av.run.pairs import UNCHANGED
-from access_av.run.runs import drive
+from access_av.run.runs import Runs, drive
 from access_av.run.service_levels import INDEPENDENT_S
 from access_av.run.simulation import simulate
 from access_av.settings import as_dict
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from access_av.run.runs import Runs
 
 # Angles of all drives of the nominal plant, without a given number of runs. A vehicle that wakes
 # up by its own error estimates the angles of about a quarter of the SSBs.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av.device.platform import Platform
+from access_av.device.platform import Platform, PowerMode
 from access_av.run.runs import EXTENTS, Energy, Runs
 from access_av.settings import as_dict, platform_name, ssb_period_s
 from access_av.statistics.pareto import pareto_front
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from access_av import _core
-    from access_av.device.platform import PowerMode
     from access_av.study.targets import Targets
 
 # Intervals of the fixed wake-ups that are simulated next to the vehicle's own wake-up, in ms.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from access_av.radio.placement import plan
+from access_av.radio.placement import Plan, plan
 from access_av.run.error_bound import p90_m
 from access_av.settings import as_dict
 
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from access_av import _core
-    from access_av.radio.placement import Plan
 
 # Standard deviations after the remedies.
 SURVEYED_STD_M = 0.02  # m, in x and y: total station or RTK-GNSS

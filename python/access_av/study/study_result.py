@@ -10,7 +10,7 @@ import polars as pl
 
 from access_av.settings import as_dict
 from access_av.study import economy
-from access_av.study.points import OK_MARGIN, OWN, own_mode
+from access_av.study.points import OK_MARGIN, OWN, Point, own_mode
 from access_av.study.targets import table as targets_table
 from access_av.tables.result import Origin, Result, origin
 from access_av.verdicts import Judgement
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from access_av.study.measures import Measure, Measures
     from access_av.study.operate import Recommendation, Rival
     from access_av.study.places import WorstPlace
-    from access_av.study.points import Point
     from access_av.study.targets import TargetResult, Targets
     from access_av.study.unverified import Unverified
 

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from access_av.paper.statements import METHODS, paper_numbers
-from access_av.report.chart import BLUE, finish, thinned, tips
+from access_av.report.chart import BLUE, Spec, finish, thinned, tips
 from access_av.report.paper.lines import EVERY_SSB, coloured
 from access_av.report.parts import figure, folded, records
 from access_av.signal.methods import label
@@ -17,7 +17,6 @@ from access_av.tables.numbers import number
 
 if TYPE_CHECKING:
     from access_av.paper.evaluation import Evaluation
-    from access_av.report.chart import Spec
 
 
 # Trend: average over this number of SSBs, because the shadowing of each SSB is independent.

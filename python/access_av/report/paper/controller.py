@@ -9,13 +9,12 @@ import altair as alt
 import polars as pl
 
 from access_av.paper import summary
-from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, colours, finish
+from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, Spec, colours, finish
 from access_av.report.parts import badge, figure, folded, records
 from access_av.tables.numbers import number, unsigned_zero
 
 if TYPE_CHECKING:
     from access_av.paper.study import Study
-    from access_av.report.chart import Spec
 
 FIXED, INTERPRETATION, CONSTANT, OURS = NAMES = (
     "fixed interval", "interpretation", "constant instead", "ours",

@@ -10,14 +10,13 @@ import polars as pl
 
 from access_av.designs.query import Query, explore
 from access_av.paper.statements import ADAPTIVE_LABEL, of_claim
-from access_av.report.chart import finish, tips
+from access_av.report.chart import Spec, finish, tips
 from access_av.report.labels import Axis, labelled
 from access_av.report.paper.lines import COLOURS, NAMES, by_mode, coloured
 from access_av.report.parts import figure, table
 
 if TYPE_CHECKING:
     from access_av.paper.evaluation import Evaluation
-    from access_av.report.chart import Spec
 
 # Heights of the plots (px).
 PROJECTION_PX, SPACE_PX = 260, 420

@@ -11,7 +11,7 @@ import polars as pl
 from access_av.paper.energy_fit import numbers
 from access_av.paper.findings import MissingFigureError, savings_percent
 from access_av.paper.statements import ADAPTIVE_LABEL, METHODS, paper_numbers
-from access_av.report.chart import finish, tips
+from access_av.report.chart import Spec, finish, tips
 from access_av.report.paper.lines import NAMES, by_mode, coloured
 from access_av.report.parts import Html, figure, records
 from access_av.signal.methods import LABELS, label
@@ -20,7 +20,6 @@ from access_av.tables.numbers import number
 if TYPE_CHECKING:
     from access_av.paper.evaluation import Evaluation
     from access_av.paper.study import Study
-    from access_av.report.chart import Spec
 
 
 def energy_text(evaluation: Evaluation) -> str:

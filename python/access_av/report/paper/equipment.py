@@ -11,13 +11,12 @@ import polars as pl
 from access_av.economics import carbon, cost
 from access_av.paper.findings import MissingFigureError, saving
 from access_av.paper.statements import of_claim, paper_numbers
-from access_av.report.chart import BLUE, GREEN, ORANGE, colours, finish
+from access_av.report.chart import BLUE, GREEN, ORANGE, Spec, colours, finish
 from access_av.report.parts import figure, table
 from access_av.tables.numbers import number
 
 if TYPE_CHECKING:
     from access_av.paper.evaluation import Evaluation
-    from access_av.report.chart import Spec
 
 # Number of roadside units, and fleet size, of the paper.
 UNITS_NOT_BUILT = 4

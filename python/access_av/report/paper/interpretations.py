@@ -11,20 +11,18 @@ import polars as pl
 
 from access_av.paper import summary
 from access_av.paper.chosen import entries
-from access_av.paper.claims import NO_EVIDENCE, NOT_REPRODUCED, REPRODUCED
+from access_av.paper.claims import NO_EVIDENCE, NOT_REPRODUCED, REPRODUCED, Claim
 from access_av.paper.margins import ROUNDED
 from access_av.paper.statements import METHODS, claim_group, of_claim, paper_numbers
-from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, colours, finish
+from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, Spec, colours, finish
 from access_av.report.labels import Axis, labelled
 from access_av.report.parts import Html, badge, code, figure, records, small, table
 from access_av.signal.methods import label
 from access_av.tables.numbers import value_text
 
 if TYPE_CHECKING:
-    from access_av.paper.claims import Claim
     from access_av.paper.evaluation import Evaluation
     from access_av.paper.study import Study
-    from access_av.report.chart import Spec
 
 # Claims of the overview chart (maximum error, average saving), and its height (px).
 OVERVIEW_PX = 300

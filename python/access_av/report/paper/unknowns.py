@@ -9,14 +9,12 @@ import altair as alt
 import polars as pl
 
 from access_av.paper.open_choices import GATE, OPEN_CONTROLLER, OPEN_WORLD
-from access_av.paper.unknowns import MATTERS
-from access_av.report.chart import BLUE, GREY, finish
+from access_av.paper.unknowns import MATTERS, Unknowns
+from access_av.report.chart import BLUE, GREY, Spec, finish
 from access_av.report.parts import figure, folded, records
 
 if TYPE_CHECKING:
     from access_av.paper.study import Study
-    from access_av.paper.unknowns import Unknowns
-    from access_av.report.chart import Spec
 
 DIMENSIONS = (*OPEN_WORLD, *OPEN_CONTROLLER, GATE)
 # Minimum shown total index.
