@@ -19,8 +19,7 @@ FILES = {
 }
 CORE = "access_av._core"
 # Modules that may import the general part and the paper's part.
-TOP = {"access_av", "access_av.cli.main", "access_av.cli.paper_tables", "access_av.__main__"}
-TOP |= {"access_av.cli.paper", "access_av.cli.codesign"}
+TOP = {"access_av", "access_av.cli.main", "access_av.cli.paper", "access_av.__main__"}
 PAPERS = ("access_av.paper", "access_av.report.paper")
 # Folders whose files have the name of a command or a report; elsewhere file names are unique.
 NAMED_AFTER_ANOTHER = {"cli", "report"}

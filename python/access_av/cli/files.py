@@ -1,20 +1,24 @@
-"""Commands that list, show, check and describe settings files."""
+"""Commands that list, show, check and describe settings files, and describe columns."""
 
 from __future__ import annotations
 
 import json
 from enum import Enum
+from operator import itemgetter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer import Argument, Option
 
 from access_av._core import Plant, Platform, Scenario, SettingsError, Site, Vehicle
 from access_av.cli import options as opt
-from access_av.cli.terminal import say, show_error
+from access_av.cli.terminal import console, say, show_error, show_rows
 from access_av.errors import InputError
 from access_av.tables import toml
+
+if TYPE_CHECKING:
+    from access_av.tables.columns import Table
 
 app = typer.Typer()
 
@@ -142,3 +146,38 @@ def _check(name: str, kind: Kind, allow_large: bool) -> None:
 def schema(kind: KindArgument) -> None:
     """Print the JSON Schema of one kind of settings file, for editors."""
     print(CLASSES[kind].schema_json())
+
+
+@opt.command(app, "Results", "file columns trajectories")
+def columns(
+    name: Annotated[
+        str | None,
+        Argument(metavar="TABLE", help="Table or file.", show_default="all"),
+    ] = None,
+    as_json_: opt.AsJson = False,
+    as_markdown: Annotated[
+        bool, Option("--markdown", help="Print all tables as Markdown (docs/columns.md).")
+    ] = False,
+) -> None:
+    """Print name, unit and meaning of each column, and the condition of a null value."""
+    from access_av.tables.columns import TABLES, as_json, markdown, table
+
+    if as_markdown:
+        print(markdown(), end="")
+        return
+    chosen = list(TABLES.values()) if name is None else [table(name)]
+    if as_json_:
+        print(json.dumps(as_json(chosen), indent=2, ensure_ascii=False))
+        return
+    for one in chosen:
+        _show_columns(one)
+
+
+def _show_columns(columns: Table) -> None:
+    """Prints the columns of one table."""
+    where = columns.where.replace("`", "")
+    console.print(columns.name, style="bold", end="")
+    console.print(f"  {columns.row}. {where}.")
+    keys = {"column": "name", "unit": "unit", "meaning": "meaning", "null when": "null"}
+    cells = [(head, itemgetter(key)) for head, key in keys.items()]
+    show_rows(cells, columns.records(), text=4)

@@ -19,9 +19,6 @@ from access_av import interrupt
 from access_av._core import RecordingError, SettingsError, __version__, brief
 from access_av.cli import (
     balance,
-    bound,
-    codesign,
-    columns,
     designs,
     drives,
     files,
@@ -118,12 +115,12 @@ def _options(
 
 _METHOD, _DATA = "Paper and configurations", "Data"
 _GROUPS = (
-    ("paper", _METHOD, "Reproduce the paper, and search its open parameters.", (paper, codesign)),
+    ("paper", _METHOD, "Reproduce the paper, and search its open parameters.", (paper,)),
     (
         "design",
         _METHOD,
         "Plan radio heads, choose operating points, and evaluate integrity, computer and cost.",
-        (bound, radio, integrity, designs, tune, balance, profile),
+        (radio, integrity, designs, tune, balance, profile),
     ),
     (
         "record",
@@ -135,7 +132,7 @@ _GROUPS = (
         "file",
         _DATA,
         "Write, check, show and export settings files; describe the columns of results.",
-        (new, files, columns),
+        (new, files),
     ),
 )
 for _module in (study, run, rerun):

@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer import Argument, Option
 
 from access_av.cli import options as opt
-from access_av.cli.terminal import console, progress, say, show_points, table
+from access_av.cli.terminal import console, is_narrow, progress, say, show_rows, table
+from access_av.signal.methods import label
+from access_av.tables.numbers import value_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    import polars as pl
+
+    from access_av.paper.chosen import Effect
+    from access_av.paper.sampled_interpretations import Confirmed, Sample
+    from access_av.paper.study import Study
 
 app = typer.Typer()
 
@@ -48,7 +59,6 @@ def evaluate(
     interval of the computer, and adaptive MUSIC, each over all power modes. results/latest points
     to the files.
     """
-    from access_av.cli.paper_tables import show_study
     from access_av.report.paper import results
     from access_av.run.campaign import campaign
     from access_av.tables.results_directory import RESULTS
@@ -68,7 +78,7 @@ def evaluate(
             stated=None if claims is None else _claims(claims),
             progress=tick,
         )
-    show_study(made)
+    _show_study(made)
     say(
         f"{runs} runs per setting in {made.duration_s:.1f} s. "
         f"Report: {directory.path / 'report.html'}"
@@ -124,7 +134,6 @@ def chosen(
     """
     from dataclasses import asdict
 
-    from access_av.cli.paper_tables import show_chosen
     from access_av.device.platform import Platform
     from access_av.paper.chosen import effects
     from access_av.paper.driver import Driver
@@ -136,7 +145,7 @@ def chosen(
     if as_json:
         print(json_text([asdict(each) for each in found]))
         return
-    show_chosen(found, runs)
+    _show_chosen(found, runs)
     for each in found:
         if each.is_shipped:
             console.print(f"{each.what}: {each.why}")
@@ -169,7 +178,6 @@ def search(
     so that a repeated command continues. The best interpretation and its neighbours are simulated
     again with more runs.
     """
-    from access_av.cli.paper_tables import show_search
     from access_av.device.platform import Platform
     from access_av.paper.sampled_interpretations import as_scenario, confirmed, sample
     from access_av.run.campaign import campaign
@@ -182,7 +190,7 @@ def search(
             kept, board, worlds=worlds, controllers=controllers, runs=runs, seed=seed, progress=tick
         )
         checked = confirmed(kept, board, found, runs=confirm, seed=seed + 1) if confirm else []
-    show_search(found, checked)
+    _show_search(found, checked)
     if out is not None:
         best = checked[0].values if checked else found.values(found.best()[0])
         write_whole(out, as_scenario(best).to_toml())
@@ -234,12 +242,12 @@ def explore(
     elif found.is_empty():
         console.print(f"No operating point has {query}.")
         nearest = points.sort("energy_j").head(1)
-        show_points(nearest, title="Operating point with the minimum energy")
+        _show_points(nearest, title="Operating point with the minimum energy")
     if found.is_empty():
         raise typer.Exit(opt.MISSED)
     if as_json:
         return
-    show_points(found, title=f"Operating points with {query}")
+    _show_points(found, title=f"Operating points with {query}")
     best = found.row(0, named=True)
     name = column(query.percent)
     ends = [best[name.replace("_error_m", f"_error_{end}_m")] for end in ("low", "high")]
@@ -269,7 +277,6 @@ def fit(
     from access_av.paper import study
     from access_av.paper.energy_fit import numbers
     from access_av.paper.statements import METHODS
-    from access_av.signal.methods import label
     from access_av.tables.results_directory import write_whole
 
     with progress("Counting angle estimates") as tick:
@@ -286,3 +293,140 @@ def fit(
     if out is not None:
         write_whole(out, fitted.to_toml())
         say(f"Platform file: {out}")
+
+
+@opt.command(app, "Energy", "paper codesign --runs 20")
+def codesign(
+    interpretation: Annotated[str, Option(help="Name of an interpretation of the paper.")] = "gate",
+    runs: opt.Runs = 100,
+    seed: opt.Seed = 1,
+    threads: opt.Threads = None,
+    as_json: opt.AsJson = False,
+) -> None:
+    """Compare tracker, policy and engine with the paper's adaptive point in each power mode.
+
+    Energies of a trip include angle estimates and receiver. Ranges cover all parameter ranges of
+    the platform files. Second row of each mode: with the paper's energy per estimate. Third row:
+    with the energy of this project's cycles at the clock of the mode. The share is the energy
+    relative to the paper's, at the worst end of the range.
+    """
+    from dataclasses import asdict
+
+    from access_av.paper.codesign import compare
+    from access_av.tables.results_directory import json_text
+
+    with progress("Driving") as tick:
+        found = compare(interpretation, runs=runs, seed=seed, threads=threads, progress=tick)
+    if as_json:
+        records = [
+            {
+                **asdict(each),
+                "policy_ratio": each.policy_ratio,
+                "engine_ratio": each.engine_ratio,
+                "is_better": each.is_better,
+            }
+            for each in found
+        ]
+        print(json_text(records))
+        return
+    head = ["mode", "point", "RMS m", "angle estimates", "received", "energy J", "share ≤"]
+    made = table(head, title=f"Interpretation {interpretation}, {runs} runs, seed {seed}", text=2)
+    for each in found:
+        for name, point, share in (
+            ("paper", each.paper, ""),
+            ("own policy", each.policy, f"{each.policy_ratio:.3f}"),
+            ("own policy and engine", each.engine, f"{each.engine_ratio:.2g}"),
+        ):
+            low_j, value_j, high_j = point.energy_j
+            made.add_row(
+                str(each.mode) if name == "paper" else "",
+                name,
+                f"{point.rms_error_m:.3f}",
+                f"{point.aoa_estimates:.0f}",
+                f"{point.bursts_received:.0f}",
+                f"{value_j:.3g} ({low_j:.3g}…{high_j:.3g})",
+                share,
+            )
+    console.print(made)
+    better = sum(each.is_better for each in found)
+    console.print(
+        f"Smaller error and energy in {better} of {len(found)} power modes. "
+        f"Boundary: {found[0].paper.boundary} (paper), {found[0].engine.boundary} (own engine)."
+    )
+
+
+def _show_study(study: Study) -> None:
+    """Prints the verdict, the main figures, and the interpretations that were not evaluated.
+
+    The report and the tables contain everything else.
+    """
+    from access_av.paper import summary
+
+    console.print(f"{summary.headline(study)}.", style="bold")
+    title = f"Adaptive MUSIC, interpretation “{study.shown.interpretation.title}”"
+    made = table(["figure", "paper", "obtained", "verdict"], title=title, text=1)
+    for cells in summary.main_figures(study):
+        made.add_row(*cells)
+    console.print(made)
+    if seeds := summary.seeds_text(study):
+        console.print(seeds)
+    for name, why in study.unusable.items():
+        console.print(f"Not evaluated: {name}: {why}")
+
+
+def _show_chosen(effects: Sequence[Effect], runs: int) -> None:
+    """Prints the open choices of the paper, the chosen values, and the effect of alternatives."""
+    columns: list[tuple[str, Callable[[Effect], str]]] = [
+        ("choice", lambda it: it.what if it.is_shipped else ""),
+        ("value", lambda it: it.value if it.is_shipped else f"instead {it.value}"),
+        ("angle estimates", lambda it: f"{it.aoa_estimates:.0f}"),
+        ("maximum m", lambda it: f"{it.worst_error_m:.2f}"),
+        ("RMS m", lambda it: f"{it.rms_error_m:.3f} ± {it.rms_std_m:.3f}"),
+        ("80 ms: RMS", lambda it: f"{it.fixed_rms_m:.3f}"),
+        ("every SSB: RMS", lambda it: f"{it.every_ssb_rms_m:.3f}"),
+    ]
+    title = f"Single changes, mode 0 of the shipped interpretation, {runs} runs"
+    show_rows(columns, effects, title=title, text=2)
+
+
+def _show_search(found: Sample, checked: Sequence[Confirmed]) -> None:
+    """Prints the best interpretations of a search, and their confirmation by more runs."""
+    held = found.held()
+    made = table(
+        ["claims met", "angle estimates", "maximum m", "drawn values"],
+        title=f"Best of {len(held)} interpretations ({len(found.margins)} claims)",
+    )
+    for index in found.best()[:8]:
+        drawn = ", ".join(f"{name} {value_text(it)}" for name, it in found.values(index).items())
+        made.add_row(
+            f"{held[index]:.0f}",
+            f"{found.aoa_estimates[index]:.0f}",
+            f"{found.worst_error_m[index]:.2f}",
+            drawn,
+        )
+    console.print(made)
+    if checked:
+        again = table(["interpretation", "claims met", "not met"], title="Confirmation", text=1)
+        for each in checked:
+            again.add_row(each.label, str(each.held), ", ".join(each.missed))
+        console.print(again)
+
+
+def _show_points(points: pl.DataFrame, title: str = "") -> None:
+    """Prints operating points as a table."""
+    head = ["mode", "method", "energy J", "RMS m", "worst X m", "worst Y m", "angle estimates"]
+    if is_narrow():
+        head = ["mode", "method", "J", "RMS m", "X m", "Y m"]
+    made = table(head, title=title, text=2)
+    for point in points.iter_rows(named=True):
+        cells = [
+            str(point["mode"]) if is_narrow() else f"{point['mode']} {point['mode_name']}",
+            label(point["method"], adaptive=point["adaptive"]),
+            f"{point['energy_j']:.1f}",
+            f"{point['rms_error_m']:.3f}",
+            f"{point['worst_error_x_m']:.3f}",
+            f"{point['worst_error_y_m']:.3f}",
+            f"{point['aoa_estimates']:.0f}",
+        ]
+        made.add_row(*cells[: len(head)])
+    console.print(made)

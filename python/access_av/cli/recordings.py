@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer import Argument, Option
 
 from access_av.cli import options as opt
-from access_av.cli.terminal import (
-    console,
-    progress,
-    say,
-    show_angles,
-    show_bursts,
-    show_cells,
-    show_warning,
-)
+from access_av.cli.terminal import console, is_narrow, progress, say, show_warning, table
 from access_av.errors import InputError
+from access_av.tables.numbers import unsigned_zero
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from access_av.drives.angle_log import AngleLog
+    from access_av.signal.recorded_angles import BurstAngle
 
 app = typer.Typer()
 
@@ -119,7 +118,7 @@ def scan(
         if as_json:
             continue
         if cells:
-            show_cells(path.name, cells)
+            _show_cells(path.name, cells)
         else:
             say(f"{path}: no SSB found. Searched:")
             for where in result.looked:
@@ -159,7 +158,7 @@ def aoa(
     if as_json:
         print(json_text([burst.as_record() for burst in bursts]))
     else:
-        show_bursts(bursts)
+        _show_bursts(bursts)
 
 
 @opt.command(
@@ -211,7 +210,7 @@ def angles(
         return
     for warning in found.warnings:
         show_warning(warning)
-    show_angles(found)
+    _show_angles(found)
     say(f"Files: {directory.path}")
 
 
@@ -222,3 +221,64 @@ def _gains(text: str) -> list[complex]:
         raise InputError(
             f"--calibration {text}: write one complex number per channel, such as 1,0.9+0.2j,1j,-1"
         ) from error
+
+
+def _show_angles(log: AngleLog) -> None:
+    """Prints the angles of a recording: counts and medians per SSB."""
+    made = table(["PCI", "SSB", "angles", "resolved", "SNR dB", "σ rad", "σ noise rad"], text=0)
+    for row in log.by_ssb().iter_rows():
+        *counts, snr_db, sigma_rad, noise_rad = row
+        made.add_row(*map(str, counts), f"{snr_db:.1f}", f"{sigma_rad:.4f}", f"{noise_rad:.4f}")
+    console.print(made)
+
+
+def _show_bursts(bursts: Sequence[BurstAngle]) -> None:
+    """Prints the angles of bursts, with errors if the truth is known."""
+    made = table(["sample", "azimuth °", "σ °", "SNR dB", "truth °", "error °", "doubt"], text=0)
+    for burst in bursts:
+        azimuth_deg, truth_deg = burst.azimuth_deg, burst.truth_deg
+        made.add_row(
+            str(burst.sample_start),
+            unsigned_zero(f"{azimuth_deg:.2f}"),
+            f"{burst.sigma_deg:.3f}",
+            f"{burst.snr_db:.1f}",
+            "" if truth_deg is None else f"{truth_deg:.2f}",
+            "" if truth_deg is None else unsigned_zero(f"{azimuth_deg - truth_deg:+.2f}"),
+            burst.doubt or "–",
+        )
+    console.print(made)
+    # Imported here, because it imports NumPy.
+    from access_av.signal.recorded_angles import mean_absolute_error_deg
+
+    error_deg = mean_absolute_error_deg(bursts)
+    if error_deg is not None:
+        console.print(f"Mean absolute error {error_deg:.2f}° over {len(bursts)} bursts.")
+
+
+def _show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
+    """Prints the SSBs of one recording; a narrow terminal omits their time and frequency."""
+    with_angles = any("azimuth_deg" in cell for cell in cells)
+    columns = ["PCI", "SSB", "SFN", "SNR dB", "CFO Hz"]
+    if with_angles:
+        columns += ["azimuth °", "σ °"]
+    if not is_narrow():
+        columns += ["sample", "MHz", "kHz"] + ["doubt"] * with_angles
+    made = table(columns, title=title, text=0)
+    for cell in cells:
+        texts = {
+            "PCI": str(cell["pci"]),
+            "SSB": str(cell["ssb_index"]),
+            "SFN": "–" if cell["sfn"] is None else str(cell["sfn"]),
+            "SNR dB": f"{cell['snr_db']:.1f}",
+            "CFO Hz": unsigned_zero(f"{cell['cfo_hz']:.1f}"),
+            "azimuth °": unsigned_zero(f"{cell['azimuth_deg']:.2f}")
+            if "azimuth_deg" in cell
+            else "–",
+            "σ °": f"{cell['sigma_deg']:.3f}" if "sigma_deg" in cell else "–",
+            "doubt": cell.get("doubt") or "–",
+            "sample": str(cell["sample_start"]),
+            "MHz": f"{cell['ssb_freq_hz'] / 1e6:.3f}",
+            "kHz": str(cell["scs_khz"]),
+        }
+        made.add_row(*(texts[column] for column in columns))
+    console.print(made)

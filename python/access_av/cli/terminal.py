@@ -7,7 +7,6 @@ import os
 import sys
 import time
 from contextlib import contextmanager
-from operator import itemgetter
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -17,23 +16,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table as RichTable
 
 from access_av._core import brief
-from access_av.report import shown
 from access_av.report.shown import Badge, Shown
-from access_av.signal.methods import label
-from access_av.tables.numbers import unsigned_zero, value_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    import polars as pl
-
-    from access_av.drives.angle_log import AngleLog
-    from access_av.radio.placement import Plan
-    from access_av.radio.upgrades import NextLevel
-    from access_av.run.service_levels import Verdict
-    from access_av.run.simulation import Simulation
-    from access_av.signal.recorded_angles import BurstAngle
-    from access_av.tables.columns import Table
 
 # Printed texts can come from files, therefore markup is disabled.
 console = Console(highlight=False, markup=False)
@@ -240,187 +227,3 @@ def plain(text: str) -> str:
         sign if sign.isprintable() or sign == "\n" else sign.encode("unicode_escape").decode()
         for sign in text
     )
-
-
-def show_points(points: pl.DataFrame, title: str = "") -> None:
-    """Prints operating points as a table."""
-    head = ["mode", "method", "energy J", "RMS m", "worst X m", "worst Y m", "angle estimates"]
-    if is_narrow():
-        head = ["mode", "method", "J", "RMS m", "X m", "Y m"]
-    made = table(head, title=title, text=2)
-    for point in points.iter_rows(named=True):
-        cells = [
-            str(point["mode"]) if is_narrow() else f"{point['mode']} {point['mode_name']}",
-            label(point["method"], adaptive=point["adaptive"]),
-            f"{point['energy_j']:.1f}",
-            f"{point['rms_error_m']:.3f}",
-            f"{point['worst_error_x_m']:.3f}",
-            f"{point['worst_error_y_m']:.3f}",
-            f"{point['aoa_estimates']:.0f}",
-        ]
-        made.add_row(*cells[: len(head)])
-    console.print(made)
-
-
-# Percentiles that only the report contains, so that the table fits a screen of 24 lines.
-REPORT_ONLY_PERCENTS = (95.0, 99.9)
-
-
-def show_simulation(result: Simulation, title: str, energy_boundary: str | None) -> None:
-    """Prints errors, angle estimates and energy of a simulation as a table."""
-    from access_av.run.service_levels import reached_in_words
-
-    steps, runs = result.steps, result.runs
-    made = table(["", "value", "95 % interval"], title=title)
-    rows: dict[str, tuple[Any, str]] = {
-        "RMS error / m": (result.rms_error_m, ""),
-    }
-    for each in result.percentiles or ():
-        if each.percent in REPORT_ONLY_PERCENTS:
-            continue
-        rows[f"{each.percent:g}th percentile of the error / m"] = each.value, each.interval
-    rows |= {
-        "maximum mean error along the track, X / m": (steps["mean_abs_error_x_m"].max(), ""),
-        "maximum mean error along the track, Y / m": (steps["mean_abs_error_y_m"].max(), ""),
-        "duration / s": (steps["time_s"].max(), ""),
-        "angle estimates": (runs["aoa_estimates"].mean(), ""),
-        f"energy / J, {energy_boundary or 'not counted'}": (runs["energy_j"].mean(), ""),
-    }
-    if runs["found_s"].fill_null(1.0).max() != 0.0:
-        found = runs.height - runs["found_s"].null_count()
-        rows["runs with a successful search"] = found, ""
-        rows["distance until found, median / m"] = runs["found_m"].median(), ""
-        rows["distance until found, maximum / m"] = runs["found_m"].max(), ""
-    consistency = result.consistency
-    if consistency is not None and consistency.anees is not None:
-        interval = consistency.anees_interval if runs.height > 1 else None
-        rows["NEES per axis (expected: 1)"] = (
-            consistency.anees,
-            "" if interval is None else f"{interval[0]:.3g} to {interval[1]:.3g}",
-        )
-    integrity = result.integrity
-    if integrity is not None:
-        rows["protection level / error, median"] = integrity.median_level_over_error, ""
-    for name, (value, interval_text) in rows.items():
-        made.add_row(name, value_text(value), interval_text)
-    console.print(made)
-    if (operation := result.operation) is not None:
-        console.print(f"{operation.in_words()} {operation.what_helps()}".strip())
-    if levels := result.service_levels:
-        console.print(f"3GPP positioning service: {reached_in_words(levels)} reached (see report).")
-
-
-def show_plan(found: Plan) -> None:
-    """Prints the selected masts, and the next best ones."""
-    console.print(
-        f"{found.scenario.name}: 90th percentile of the error bound along the route "
-        f"{found.before_m:.3f} m; with {', '.join(found.chosen)} {found.after_m:.3f} m."
-    )
-    made = table(["mast", "90th percentile with this mast only, m"])
-    for row in found.ranking.head(10).iter_rows(named=True):
-        made.add_row(row["name"], f"{row['p90_bound_m']:.3f}")
-    console.print(made)
-    show(
-        shown.service_levels(found.verdicts),
-        title=f"3GPP positioning service levels with {', '.join(found.chosen)}",
-    )
-
-
-def show_next_level(found: NextLevel) -> None:
-    """Prints where the site fails the next service level, and the effect of changes."""
-    console.print(found.in_words())
-    show(shown.next_level(found))
-
-
-def show_bound(summary: dict[str, Any], verdicts: Sequence[Verdict]) -> None:
-    """Prints the bound along the route, and the SNR of each radio head."""
-    made = table(["lower bound of the RMS error", "m"], title=summary["scenario"])
-    for name, key in (("median along the route", "median_m"), ("90th percentile", "p90_m")):
-        made.add_row(name, f"{summary[key]:.3f}")
-    made.add_row("worst position", f"{summary['max_m']:.3f}")
-    console.print(made)
-    show(shown.radio_heads(summary["heads"]))
-    show(shown.service_levels(verdicts), title="3GPP positioning service levels")
-
-
-def show_kinds(bounds: pl.DataFrame) -> None:
-    """Prints the bound by radio heads, kind of measurement and clocks."""
-    columns: list[tuple[str, Callable[[Any], str]]] = [
-        ("radio heads", lambda row: str(row["num_heads"])),
-        ("measurements", lambda row: row["kinds"]),
-        ("clocks", lambda row: row["clocks"]),
-        ("without road m", lambda row: f"{row['bound_without_road_m']:.3f}"),
-        ("with road m", lambda row: f"{row['bound_with_road_m']:.3f}"),
-    ]
-    show_rows(columns, bounds.to_dicts(), title="Lower bound by measurement", text=3)
-
-
-def show_columns(columns: Table) -> None:
-    """Prints the columns of one table."""
-    where = columns.where.replace("`", "")
-    console.print(columns.name, style="bold", end="")
-    console.print(f"  {columns.row}. {where}.")
-    keys = {"column": "name", "unit": "unit", "meaning": "meaning", "null when": "null"}
-    cells = [(head, itemgetter(key)) for head, key in keys.items()]
-    show_rows(cells, columns.records(), text=4)
-
-
-def show_angles(log: AngleLog) -> None:
-    """Prints the angles of a recording: counts and medians per SSB."""
-    made = table(["PCI", "SSB", "angles", "resolved", "SNR dB", "σ rad", "σ noise rad"], text=0)
-    for row in log.by_ssb().iter_rows():
-        *counts, snr_db, sigma_rad, noise_rad = row
-        made.add_row(*map(str, counts), f"{snr_db:.1f}", f"{sigma_rad:.4f}", f"{noise_rad:.4f}")
-    console.print(made)
-
-
-def show_bursts(bursts: Sequence[BurstAngle]) -> None:
-    """Prints the angles of bursts, with errors if the truth is known."""
-    made = table(["sample", "azimuth °", "σ °", "SNR dB", "truth °", "error °", "doubt"], text=0)
-    for burst in bursts:
-        azimuth_deg, truth_deg = burst.azimuth_deg, burst.truth_deg
-        made.add_row(
-            str(burst.sample_start),
-            unsigned_zero(f"{azimuth_deg:.2f}"),
-            f"{burst.sigma_deg:.3f}",
-            f"{burst.snr_db:.1f}",
-            "" if truth_deg is None else f"{truth_deg:.2f}",
-            "" if truth_deg is None else unsigned_zero(f"{azimuth_deg - truth_deg:+.2f}"),
-            burst.doubt or "–",
-        )
-    console.print(made)
-    # Imported here, because it imports NumPy.
-    from access_av.signal.recorded_angles import mean_absolute_error_deg
-
-    error_deg = mean_absolute_error_deg(bursts)
-    if error_deg is not None:
-        console.print(f"Mean absolute error {error_deg:.2f}° over {len(bursts)} bursts.")
-
-
-def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
-    """Prints the SSBs of one recording; a narrow terminal omits their time and frequency."""
-    with_angles = any("azimuth_deg" in cell for cell in cells)
-    columns = ["PCI", "SSB", "SFN", "SNR dB", "CFO Hz"]
-    if with_angles:
-        columns += ["azimuth °", "σ °"]
-    if not is_narrow():
-        columns += ["sample", "MHz", "kHz"] + ["doubt"] * with_angles
-    made = table(columns, title=title, text=0)
-    for cell in cells:
-        texts = {
-            "PCI": str(cell["pci"]),
-            "SSB": str(cell["ssb_index"]),
-            "SFN": "–" if cell["sfn"] is None else str(cell["sfn"]),
-            "SNR dB": f"{cell['snr_db']:.1f}",
-            "CFO Hz": unsigned_zero(f"{cell['cfo_hz']:.1f}"),
-            "azimuth °": unsigned_zero(f"{cell['azimuth_deg']:.2f}")
-            if "azimuth_deg" in cell
-            else "–",
-            "σ °": f"{cell['sigma_deg']:.3f}" if "sigma_deg" in cell else "–",
-            "doubt": cell.get("doubt") or "–",
-            "sample": str(cell["sample_start"]),
-            "MHz": f"{cell['ssb_freq_hz'] / 1e6:.3f}",
-            "kHz": str(cell["scs_khz"]),
-        }
-        made.add_row(*(texts[column] for column in columns))
-    console.print(made)
