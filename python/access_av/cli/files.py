@@ -60,7 +60,8 @@ def kind_of(name: str) -> Kind:
         Unknown name, unreadable file, or several kinds are possible.
     """
     path = Path(name)
-    kinds = _kinds_of_file(path) if path.exists() else _kinds_of_name(name)
+    of_name = [kind for kind, of in CLASSES.items() if name in of.names()]
+    kinds = _kinds_of_file(path) if path.exists() else of_name
     if len(kinds) == 1:
         return kinds[0]
     if not kinds:
@@ -68,10 +69,6 @@ def kind_of(name: str) -> Kind:
     raise InputError(
         f"{name}: could be a {' or a '.join(kinds)} file: add --kind {' or --kind '.join(kinds)}"
     )
-
-
-def _kinds_of_name(name: str) -> list[Kind]:
-    return [kind for kind, of in CLASSES.items() if name in of.names()]
 
 
 def _kinds_of_file(path: Path) -> list[Kind]:

@@ -15,6 +15,7 @@ from access_av.cli.files import CLASSES, PANEL, Kind, kind_of
 from access_av.cli.terminal import say
 from access_av.errors import InputError
 from access_av.site_files.drawn import Drawn
+from access_av.tables.numbers import count
 
 if TYPE_CHECKING:
     from access_av.site_files.picture import Placed
@@ -211,25 +212,21 @@ def _report(drawn: Drawn) -> None:
     if drawn.length_m:
         x0, y0 = drawn.road_m[0] if drawn.road_m else drawn.start[:2]
         road = (
-            f"road of {drawn.length_m:.2f} m with {_count(drawn.bends, 'bend')}, from "
+            f"road of {drawn.length_m:.2f} m with {count(drawn.bends or 'no', 'bend')}, from "
             f"({x0:.2f}, {y0:.2f}) m"
         )
     walls_m = sum(length_m(it) for it in drawn.walls_m)
-    walls = _count(len(drawn.walls_m), "wall")
+    walls = count(len(drawn.walls_m) or "no", "wall")
     if drawn.walls_m:
         walls += f" of {walls_m:.2f} m in total"
-    heads = _count(len(drawn.heads), "radio head")
+    heads = count(len(drawn.heads) or "no", "radio head")
     say(f"Imported: {road}; {heads}; {walls}.")
-    for what, count in drawn.skipped.items():
-        say(f"Not imported: {plain(what)}: {count}")
+    for what, number in drawn.skipped.items():
+        say(f"Not imported: {plain(what)}: {number}")
     if not drawn.skipped:
         say("Not imported: nothing.")
     for note in drawn.notes:
         show_warning(note)
-
-
-def _count(count: int, what: str) -> str:
-    return f"{count or 'no'} {what}{'' if count == 1 else 's'}"
 
 
 def _next(kind: str, file: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -85,7 +86,8 @@ def rerun(
     arguments = _arguments(manifest)
     if changed and manifest.get("repeat"):
         show_warning("the copy of the settings in the results is used")
-        where, arguments = results, _split(manifest["repeat"])
+        where = results
+        arguments = renamed.current(shlex.split(manifest["repeat"])[1:])
     with tempfile.TemporaryDirectory(prefix="access-av-rerun-") as scratch:
         again = _run(arguments, where, Path(scratch), keep)
         differences = compared(results, again)
@@ -154,12 +156,6 @@ def _arguments(manifest: Mapping[str, Any]) -> list[str]:
         elif not argument.startswith(tuple(f"{it}=" for it in WHERE)):
             found.append(argument)
     return renamed.current(found)
-
-
-def _split(command: str) -> list[str]:
-    import shlex
-
-    return renamed.current(shlex.split(command)[1:])
 
 
 def _changed_inputs(manifest: Mapping[str, Any], where: Path) -> list[str]:

@@ -41,16 +41,13 @@ def of_scenario(
 
     def changed(it: _core.Scenario, keys: dict[str, Any]) -> _core.Scenario:
         made = it.with_overrides(keys)
-        announce_new(", ".join(f"{key} = {value}" for key, value in keys.items()), made, it)
+        # Warnings of the baseline are known.
+        known = {str(warning) for warning in it.warnings()}
+        name = ", ".join(f"{key} = {value}" for key, value in keys.items())
+        opt.announce(name, [new for new in made.warnings() if str(new) not in known])
         return made
 
     return variants(scenario, vary, others, changed)
-
-
-def announce_new(name: str, changed: _core.Scenario, baseline: _core.Scenario) -> None:
-    """Shows the warnings of a changed scenario that its baseline does not have."""
-    known = {str(warning) for warning in baseline.warnings()}
-    opt.announce(name, [it for it in changed.warnings() if str(it) not in known])
 
 
 def plug_ins_of(compare: Sequence[str] | None) -> dict[str, dict[str, Any]]:

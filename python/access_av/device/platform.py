@@ -96,7 +96,9 @@ class Platform:
         return Platform(
             self.core.with_overrides(
                 {
-                    f"modes[{index}].energy_per_execution_j.{_as_written(method)}": _stated(figure)
+                    f"modes[{index}].energy_per_execution_j.{method.replace('_', '-')}": {
+                        key: value for key, value in vars(figure).items() if value is not None
+                    }
                     for index, mode in enumerate(self.modes)
                     for method, figure in energies_j[mode.number].items()
                 }
@@ -134,14 +136,6 @@ class Platform:
             for figure in mode.energy_per_execution_j.values()
         }
         return "; ".join(BOUNDARIES[boundary] for boundary in sorted(found))
-
-
-def _stated(figure: Figure) -> dict[str, Any]:
-    return {key: value for key, value in vars(figure).items() if value is not None}
-
-
-def _as_written(method: str) -> str:
-    return method.replace("_", "-")
 
 
 def _by_method(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -105,7 +105,10 @@ def find(root: Path, sysfs: Path, cpu_mhz: float | None = None) -> Board:
     InputError
         Unknown clock.
     """
-    most_mhz = cpu_mhz or _most_mhz(sysfs) or _cpuinfo_mhz(root) or _cpuinfo_mhz(Path("/"))
+    limits = [policy / "cpuinfo_max_freq" for policy in _policies(sysfs)]
+    khz = [float(file.read_text(encoding="utf-8")) for file in limits if file.is_file()]
+    limit_mhz = max(khz) * 1e-3 if khz else None
+    most_mhz = cpu_mhz or limit_mhz or _cpuinfo_mhz(root) or _cpuinfo_mhz(Path("/"))
     if most_mhz is None:
         raise InputError("the CPU clock of this computer is unknown; add --cpu-mhz")
     file = root / "etc/nvpmodel.conf"
@@ -113,7 +116,8 @@ def find(root: Path, sysfs: Path, cpu_mhz: float | None = None) -> Board:
         modes = parse_nvpmodel(file.read_text(encoding="utf-8", errors="replace"), most_mhz)
         if modes:
             return Board("nvpmodel", tuple(modes), sysfs)
-    cores, clocks = _cores(sysfs), _clocks(sysfs)
+    cores = max(len(list(sysfs.glob("devices/system/cpu/cpu[0-9]*"))), 1)
+    clocks = _clocks(sysfs)
     writable = all(_is_writable(policy / "scaling_max_freq") for policy in _policies(sysfs))
     if len(clocks) > 1 and writable:
         modes = [
@@ -222,21 +226,11 @@ def _clocks(sysfs: Path) -> list[float]:
     return [khz * 1e-3 for khz in ordered]
 
 
-def _most_mhz(sysfs: Path) -> float | None:
-    limits = [policy / "cpuinfo_max_freq" for policy in _policies(sysfs)]
-    khz = [float(file.read_text(encoding="utf-8")) for file in limits if file.is_file()]
-    return max(khz) * 1e-3 if khz else None
-
-
 def _cpuinfo_mhz(root: Path) -> float | None:
     file = root / "proc/cpuinfo"
     text = file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
     clocks = [float(mhz) for mhz in re.findall(r"^cpu MHz\s*:\s*([\d.]+)", text, re.M)]
     return max(clocks, default=None)
-
-
-def _cores(sysfs: Path) -> int:
-    return max(len(list(sysfs.glob("devices/system/cpu/cpu[0-9]*"))), 1)
 
 
 def _is_writable(file: Path) -> bool:

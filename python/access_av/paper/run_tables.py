@@ -72,7 +72,7 @@ def _key(given: Mapping[str, Any]) -> list[pl.Expr]:
     ]
 
 
-def _points(evaluation: Evaluation) -> Iterator[tuple[dict[str, Any], Drives, float | None]]:
+def points_of(evaluation: Evaluation) -> Iterator[tuple[dict[str, Any], Drives, float | None]]:
     """Yields key, drives and energy per estimate of every operating point."""
     outcome = evaluation.outcome
     for point in evaluation.points.iter_rows(named=True):
@@ -85,19 +85,13 @@ def _points(evaluation: Evaluation) -> Iterator[tuple[dict[str, Any], Drives, fl
         yield key, drives, point["energy_per_execution_j"]
 
 
-def runs_of(evaluation: Evaluation) -> list[pl.DataFrame]:
-    """Returns the runs of every operating point of an evaluation, one table each."""
-    tables = (of_drives(drives, each_j, **key) for key, drives, each_j in _points(evaluation))
-    return [table for table in tables if not table.is_empty()]
-
-
 def resamples_of(evaluation: Evaluation) -> list[pl.DataFrame]:
     """Returns the bootstrap resamples of every operating point of an evaluation.
 
     Columns ``runs`` of :mod:`access_av.columns`. Row 0 of a setting is the sample.
     """
     tables = []
-    for key, drives, _ in _points(evaluation):
+    for key, drives, _ in points_of(evaluation):
         count = len(drives.rms_error_m)
         shares: Mapping[str, Any] = {f"share_below_{method}": None for method in METHODS}
         if key["adaptive"]:

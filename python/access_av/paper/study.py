@@ -126,7 +126,8 @@ class Study:
     def _runs(self) -> Iterator[pl.DataFrame]:
         """Yields the runs of every setting: operating points and their references."""
         for each in self.evaluations:
-            yield from run_tables.runs_of(each)
+            for key, drives, energy_j in run_tables.points_of(each):
+                yield run_tables.of_drives(drives, energy_j, **key)
         shown = self.shown
         energies_j = shown.outcome.energy_per_execution_j
 

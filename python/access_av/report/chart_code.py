@@ -21,19 +21,16 @@ def chart_code() -> str:
     file = None
     # The home directory may be unknown (RuntimeError).
     with contextlib.suppress(OSError, UnicodeDecodeError, RuntimeError):
-        file = _directory() / f"charts-{version('vl-convert-python')}.js"
+        # The specification of this variable ignores relative paths.
+        given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+        home = given if given.is_absolute() else Path.home() / ".cache"
+        file = home / f"access-av/charts-{version('vl-convert-python')}.js"
         return file.read_text(encoding="utf-8")
     code: str = vl_convert.javascript_bundle()  # type: ignore[call-arg]  # its type stub is wrong
     if file is not None:
         with contextlib.suppress(OSError):
             _write(file, code)
     return code
-
-
-def _directory() -> Path:
-    # The specification of this variable ignores relative paths.
-    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    return (given if given.is_absolute() else Path.home() / ".cache") / "access-av"
 
 
 def _write(file: Path, code: str) -> None:

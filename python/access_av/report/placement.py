@@ -31,6 +31,9 @@ def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:
         "route": charts.bound_along_route(bound.route),
         "site": charts.bound_over_site(bound),
     }
+    changes = ""
+    if missed is not None:
+        changes = f"<p>{escape(missed.in_words())}</p>{shown(next_level(missed))}"
     sections = [
         warnings(scenario.warnings()),
         section(
@@ -51,7 +54,7 @@ def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:
             "Service levels",
             "Levels of TS 22.261, 7.3.2.2, and TR 38.857 for Gaussian errors as small as the "
             "bound. No localizer reaches a level that is not reached here.",
-            shown(service_levels(bound.verdicts)) + _missed(missed),
+            shown(service_levels(bound.verdicts)) + changes,
         ),
         section("Provenance", "", source("Scenario with all default values", scenario.to_toml())),
     ]
@@ -70,13 +73,6 @@ def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:
         meta=f"Scenario “{scenario.name}”, {VERSION}.",
         sections=sections,
     )
-
-
-def _missed(level: NextLevel | None) -> str:
-    """Returns the shortfall, and the effect of each single change."""
-    if level is None:
-        return ""
-    return f"<p>{escape(level.in_words())}</p>{shown(next_level(level))}"
 
 
 def _map_text(bound: ErrorBound) -> str:

@@ -74,7 +74,12 @@ class Frame:
                     picture.mark_image(url=it.url, aspect=False, opacity=0.55, clip=True), ends=True
                 )
             )
-        if walls := walls_of(site):
+        walls = [
+            {"x_m": x_m, "y_m": y_m, "x2_m": x2_m, "y2_m": y2_m}
+            for wall in as_dict(site).get("walls", ())
+            for (x_m, y_m), (x2_m, y2_m) in pairwise(wall["polyline_m"])
+        ]
+        if walls:
             lines = alt.Chart(pl.DataFrame(walls)).mark_rule(strokeWidth=3, color=GREY)
             made.append(self.put(lines, ends=True))
         return made
@@ -104,12 +109,3 @@ def heads_of(site: _core.Site) -> pl.DataFrame:
             for head in heads
         ]
     )
-
-
-def walls_of(site: _core.Site) -> list[dict[str, float]]:
-    """Returns the wall segments of a site, from ``x_m``, ``y_m`` to ``x2_m``, ``y2_m``."""
-    return [
-        {"x_m": x_m, "y_m": y_m, "x2_m": x2_m, "y2_m": y2_m}
-        for wall in as_dict(site).get("walls", ())
-        for (x_m, y_m), (x2_m, y2_m) in pairwise(wall["polyline_m"])
-    ]

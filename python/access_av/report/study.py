@@ -24,7 +24,6 @@ from access_av.report.parts import (
 from access_av.report.played import CAPTION as PLAYED
 from access_av.report.study_operation import money_section, operation_section
 from access_av.report.study_parts import (
-    count,
     digits,
     ends,
     joules,
@@ -35,6 +34,7 @@ from access_av.report.study_parts import (
 from access_av.run.assumptions import in_words, optimistic_assumptions
 from access_av.settings import as_dict
 from access_av.study import economy
+from access_av.tables.numbers import count
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

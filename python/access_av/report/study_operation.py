@@ -6,7 +6,6 @@ import math
 
 from access_av.report.parts import badge, code, figure, folded, records, section, small
 from access_av.report.study_parts import (
-    count,
     digits,
     ends,
     in_points,
@@ -22,6 +21,7 @@ from access_av.settings import as_dict
 from access_av.study import economy
 from access_av.study.points import MATTERS_SHARE, OK_MARGIN, Point
 from access_av.study.study_result import Study, as_toml, rule
+from access_av.tables.numbers import count
 
 # Condition of the badge "equivalent" of a rival.
 EQUIVALENT = (
@@ -187,7 +187,9 @@ def _points(study: Study, point: Point) -> str:
             f"{study.percent:g} % within": f"{it.error_m:.3f} m",
             "a trip, above idle": joules_range(economy.trip_j(it)),
             "idle / W": "–" if it.idle_w is None else watts(it.idle_w),
-            "Wh a fleet’s day, with idle": "–" if it.idle_w is None else _fleet_day(study, it),
+            "Wh a fleet’s day, with idle": "–"
+            if (idle_wh := (day := economy.day(study.plant, it)).idle_wh) is None
+            else ends(day.trips_wh.plus(idle_wh)),
         }
         for it in study.points
         if it.operation.name == point.operation.name
@@ -220,11 +222,6 @@ def _way(study: Study, it: Point) -> dict[str, str]:
         "state ok": ok(it.driven),
         "": label,
     }
-
-
-def _fleet_day(study: Study, it: Point) -> str:
-    day = economy.day(study.plant, it)
-    return "–" if day.idle_wh is None else ends(day.trips_wh.plus(day.idle_wh))
 
 
 def money_section(study: Study) -> str:

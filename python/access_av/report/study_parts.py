@@ -57,11 +57,6 @@ def in_points(delta: tuple[float, float, float]) -> str:
     return f"{middle} points ({low} to {high})"
 
 
-def count(number: int, what: str) -> str:
-    """Returns a number with its noun."""
-    return f"{number} {what}{'' if number == 1 else 's'}"
-
-
 def sources(study: Study, keys: list[str]) -> str:
     """Returns a collapsed table of figures and their sources."""
     rows = [

@@ -199,11 +199,11 @@ def record(cell: Cell) -> dict[str, Any]:
         "elevation_deg": cell.elevation_rad,
         "sigma_deg": cell.sigma_rad,
     }
-    values |= {name: _degrees(angle) for name, angle in angles.items() if angle is not None}
+    values |= {
+        name: round(angle_rad * 57.29577951308232, 4)
+        for name, angle_rad in angles.items()
+        if angle_rad is not None
+    }
     if cell.verdict is not None:
         values |= {"verdict": cell.verdict, "doubt": cell.doubt, "p_value": cell.p_value}
     return values
-
-
-def _degrees(angle_rad: float) -> float:
-    return round(angle_rad * 57.29577951308232, 4)

@@ -107,7 +107,8 @@ def segments(vertices: Sequence[Vertex]) -> tuple[tuple[float, float, float], li
         else:
             heading, start = begin, (x0, y0, begin)
         end = chord_rad + 0.5 * turn_rad
-        made.append(Segment(chord_m * _arc_over_chord(turn_rad), turn_rad))
+        arc_over_chord = 0.5 * turn_rad / math.sin(0.5 * turn_rad) if turn_rad else 1.0
+        made.append(Segment(chord_m * arc_over_chord, turn_rad))
         # Follow the segments as a vehicle does, which knows no kinks.
         x += chord_m * math.cos(heading + 0.5 * turn_rad)
         y += chord_m * math.sin(heading + 0.5 * turn_rad)
@@ -116,10 +117,6 @@ def segments(vertices: Sequence[Vertex]) -> tuple[tuple[float, float, float], li
     if drift_m > DRIFT_M or any(kink >= SMOOTH_RAD for kink in kinks):
         return None
     return start, made
-
-
-def _arc_over_chord(turn_rad: float) -> float:
-    return 0.5 * turn_rad / math.sin(0.5 * turn_rad) if turn_rad else 1.0
 
 
 def flatten(vertices: Sequence[Vertex], sagitta_m: float) -> list[Point]:

@@ -59,7 +59,8 @@ def paired_difference(
     if len(mine) != len(its):
         raise ValueError(f"{len(mine)} drives cannot be paired with {len(its)}")
     every = np.ones((1, len(mine)), dtype=np.int64)
-    difference = _less(*(float(_resampled(it, every, percent)[0]) for it in (mine, its)))
+    first, second = (float(_resampled(it, every, percent)[0]) for it in (mine, its))
+    difference = 0.0 if first == second else first - second  # also for infinite percentiles
     runs = len(mine)
     if runs == 1 or not np.isfinite(difference):
         return difference, -math.inf, math.inf
@@ -96,10 +97,6 @@ def paired_mean(
     standard_error = float(np.std(less, ddof=1)) / math.sqrt(less.size)
     half = student_quantile(1.0 - 0.025 / comparisons, less.size - 1) * standard_error
     return mean, mean - half, mean + half
-
-
-def _less(first: float, second: float) -> float:
-    return 0.0 if first == second else first - second
 
 
 def _resampled(errors: NDArray[Any], drawn: NDArray[Any], percent: float) -> NDArray[np.float64]:

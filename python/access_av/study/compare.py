@@ -13,6 +13,7 @@ import polars as pl
 from access_av.errors import InputError
 from access_av.run.pairs import ErrorSamples
 from access_av.run.runs import Runs, drive
+from access_av.tables.numbers import count
 from access_av.tables.toml import tomllib
 
 if TYPE_CHECKING:
@@ -137,9 +138,6 @@ def combinations(vary: Sequence[str]) -> str:
     keys = [values(text) for text in vary]
     if not keys:
         return ""
-
-    def count(number: int, what: str) -> str:
-        return f"{number} {what}{'' if number == 1 else 's'}"
 
     parts = " × ".join(f"{count(len(its), 'value')} of {key}" for key, its in keys)
     total = count(math.prod(len(its) for _, its in keys), "variant")

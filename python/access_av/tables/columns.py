@@ -84,11 +84,12 @@ class Table:
 
     def records(self) -> list[dict[str, str]]:
         """Returns name, unit, meaning and null condition of each column."""
-        return [{**vars(GLOSSARY[name]), "null": self._null(name)} for name in self.columns]
-
-    def _null(self, name: str) -> str:
-        null, absent = self.null.get(name, "never"), self.absent.get(name, ())
-        return f"{null}; absent: {', '.join(absent)}" if absent else null
+        rows = []
+        for name in self.columns:
+            null, absent = self.null.get(name, "never"), self.absent.get(name, ())
+            null += f"; absent: {', '.join(absent)}" if absent else ""
+            rows.append({**vars(GLOSSARY[name]), "null": null})
+        return rows
 
     def frame(self, columns: Mapping[str, Any] | pl.DataFrame) -> pl.DataFrame:
         """Returns columns in the order of this table, with null for NaN."""
@@ -145,11 +146,6 @@ def as_json(tables: list[Table]) -> dict[str, Any]:
     }
 
 
-def _lower(text: str) -> str:
-    """Returns the text with a lower-case first letter, unless it begins with an abbreviation."""
-    return text if text[:2].isupper() else text[0].lower() + text[1:]
-
-
 def markdown() -> str:
     """Returns the text of ``docs/columns.md``."""
     parts = [
@@ -164,7 +160,9 @@ def markdown() -> str:
             for one in table.records()
         ]
         head = "| column | unit | meaning | null when |\n|---|---|---|---|"
-        row = f"Row: {_lower(table.row)}. {table.where}."
+        # An abbreviation keeps its capitals.
+        of = table.row if table.row[:2].isupper() else table.row[0].lower() + table.row[1:]
+        row = f"Row: {of}. {table.where}."
         parts += [f"## {table.name}", row]
         parts.append("\n".join([head, *rows]))
     # Wrap paragraphs, but no table rows.

@@ -21,6 +21,17 @@ def unsigned_zero(text: str) -> str:
     return text if set(text) - set("+-0.,") else text.lstrip("+-")
 
 
+def count(number: int | str, what: str) -> str:
+    """Returns a number with its noun.
+
+    Examples
+    --------
+    >>> count(1, "wall"), count(2, "wall")
+    ('1 wall', '2 walls')
+    """
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 def value_text(value: Any) -> str:
     """Returns a value of a claim (number, list or table) as text."""
     if value is None:

@@ -120,15 +120,11 @@ class ResultsDirectory:
                 "directory": str(Path.cwd()),
                 "inputs": inputs(sys.argv[1:], self.path),
                 "written": datetime.now(timezone.utc).isoformat(timespec="seconds"),
-                **({"repeat": _typed(repeat)} if repeat else {}),
+                **({"repeat": shlex.join(["access-av", *map(str, repeat)])} if repeat else {}),
                 **settings,
                 "warnings": [*map(str, warnings)],
             },
         )
-
-
-def _typed(command: Sequence[object]) -> str:
-    return shlex.join(["access-av", *map(str, command)])
 
 
 def commit() -> str | None:

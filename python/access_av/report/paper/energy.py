@@ -63,7 +63,11 @@ def _savings(evaluation: Evaluation, mode: int) -> float | None:
 def energy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
     """Returns the section on energy and angle estimates of a trip in each mode."""
     specs["energy-bars"] = _energy_chart(evaluation)
-    specs["aoa_estimates"] = _aoa_estimates_chart(evaluation)
+    specs["aoa_estimates"] = finish(
+        _grouped_bars(evaluation, "aoa_estimates", "angle estimates in a trip", ".0f"),
+        height=230,
+        description="Angle estimates in one trip per power mode and method",
+    )
     bars = figure("energy-bars", title="Energy of a trip")
     return f'<div class="charts">{bars}{figure("aoa_estimates", title="Estimates in a trip")}</div>'
 
@@ -145,14 +149,6 @@ def _energy_chart(evaluation: Evaluation) -> Spec:
     bars = _grouped_bars(evaluation, "energy_j", "energy of a trip / J", ".1f")
     return finish(
         bars + marks, height=260, description="Energy of one trip per power mode and method"
-    )
-
-
-def _aoa_estimates_chart(evaluation: Evaluation) -> Spec:
-    """Returns the chart of angle estimates in a trip, per mode."""
-    bars = _grouped_bars(evaluation, "aoa_estimates", "angle estimates in a trip", ".0f")
-    return finish(
-        bars, height=230, description="Angle estimates in one trip per power mode and method"
     )
 
 

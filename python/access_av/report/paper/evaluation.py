@@ -61,7 +61,10 @@ def render(study: Study, specs: dict[str, Spec] | None = None) -> str:
         fair=controller.fair(study),
         lead=escape(summary.lead(study)),
         tiles=_tiles(study),
-        meta=_meta(study),
+        meta=escape(
+            f"{len(study.evaluations)} interpretations, platform “{evaluation.platform.name}”, "
+            f"{evaluation.runs} runs per setting, seed {evaluation.seed}, {VERSION}."
+        ),
         runs=evaluation.runs,
         interpretations=interpretations.interpretations(study),
         matrix=interpretations.matrix(study),
@@ -105,15 +108,6 @@ def _tiles(study: Study) -> str:
     better = sum(each.is_better for each in without_map)
     text = "modes with less error and energy of the proposed method, both without a road map"
     return "".join([*made, tile(f"{better} of {len(without_map)}", text)])
-
-
-def _meta(study: Study) -> str:
-    evaluation = study.shown
-    return escape(
-        f"{len(study.evaluations)} interpretations, platform “{evaluation.platform.name}”, "
-        f"{evaluation.runs} runs per setting, seed {evaluation.seed}, "
-        f"{VERSION}."
-    )
 
 
 def _provenance(evaluation: Evaluation) -> str:

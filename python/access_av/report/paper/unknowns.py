@@ -38,13 +38,18 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
     specs["sobol"] = _index_chart(found)
     specs["share"] = _share_chart(found)
     ranges = [{"Unspecified parameter": it.label, "Range": it.range_text} for it in DIMENSIONS]
+    widest = max((each.half_width for each in found.matter), default=0.0)
+    widths = (
+        f"For claims that are neither by arithmetic nor by construction, {len(found.matter)} total "
+        f"indices are {MATTERS:g} or more; their 95 % intervals are at most ± {widest:.3f} wide."
+    )
     return (
         f"<p>{found.interpretations} interpretations of {found.runs} runs each, drawn from the "
         "ranges below. A total index of 0.6 means: 60 % of the variance of the claim's margin "
         "involves this parameter, alone or together with others. Cells below "
         f"{LEAST_TOTAL:.0%} are left empty; “unexplained” is the share of the variance that the "
         "expansion does not explain.</p>"
-        + f"<p>{escape(_width_text(found))}</p>"
+        + f"<p>{escape(widths)}</p>"
         + figure("sobol", SOBOL_CAPTION, "Sensitivity of the claims")
         + figure(
             "share",
@@ -52,14 +57,6 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
             "Share of the drawn interpretations in which each claim holds",
         )
         + folded("The ranges", records(ranges))
-    )
-
-
-def _width_text(found: Unknowns) -> str:
-    widest = max((each.half_width for each in found.matter), default=0.0)
-    return (
-        f"For claims that are neither by arithmetic nor by construction, {len(found.matter)} total "
-        f"indices are {MATTERS:g} or more; their 95 % intervals are at most ± {widest:.3f} wide."
     )
 
 
