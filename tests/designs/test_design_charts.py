@@ -12,8 +12,7 @@ from test_designs import cloud
 
 import layout
 from access_av import Scenario
-from access_av.designs.front import front
-from access_av.designs.table import rows_of, rows_of_worlds
+from access_av.designs.front import front, rows_of, rows_of_worlds
 from access_av.report.designs import MOST_NAMES, render_designs
 from browser import Browser
 

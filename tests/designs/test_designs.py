@@ -22,18 +22,16 @@ import pytest
 from access_av import Scenario, columns
 from access_av.designs import driven
 from access_av.designs.driven import Design, Driven, designs_of, in_worlds
-from access_av.designs.front import front, may_be_front
+from access_av.designs.front import front, may_be_front, rows_of, rows_of_worlds
 from access_av.designs.query import Query, what_to_change
 from access_av.designs.search import Found, rounds, search, suggested
 from access_av.designs.space import Space, sobol
-from access_av.designs.table import rows_of, rows_of_worlds
 from access_av.device.platform import Platform
 from access_av.errors import InputError
 from access_av.report.designs import render_designs
-from access_av.run.campaign import Campaign, CampaignError, Task
+from access_av.run.campaign import Campaign, CampaignError, ResultCache, Task
 from access_av.run.campaign import campaign as opened
 from access_av.run.pairs import ErrorSamples
-from access_av.run.result_cache import ResultCache
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -205,7 +203,7 @@ import os, signal, sys, time
 from pathlib import Path
 sys.path.insert(0, {tests!r})
 from access_av.run.campaign import Campaign
-from access_av.run.result_cache import ResultCache
+from access_av.run.campaign import ResultCache
 from test_designs import tasks
 campaign = Campaign(ResultCache(Path({parts!r})))
 for instant in {instants!r}:
@@ -291,7 +289,7 @@ from pathlib import Path
 sys.path.insert(0, {tests!r})
 from distributed import Client
 from access_av.run.campaign import Campaign, CampaignError
-from access_av.run.result_cache import ResultCache
+from access_av.run.campaign import ResultCache
 from test_designs import tasks
 parts, file = Path({parts!r}), Path({parts!r}) / "scheduler.json"
 parts.mkdir()

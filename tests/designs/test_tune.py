@@ -11,8 +11,7 @@ import pytest
 from access_av import InputError, Scenario
 from access_av.designs.query import Query
 from access_av.designs.tune import space_of, tune
-from access_av.run.campaign import Campaign
-from access_av.run.result_cache import ResultCache
+from access_av.run.campaign import Campaign, ResultCache
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -12,7 +12,7 @@ from access_av.paper import own_design
 from access_av.paper.driver import Driver
 from access_av.paper.evaluation import evaluate_with
 from access_av.paper.interpretations import load
-from access_av.paper.stages import Stages
+from access_av.paper.study import Stages
 from access_av.report.paper import results
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ import pytest
 import layout
 from access_av.paper import study
 from access_av.report.paper import results as paper_results
-from access_av.run.campaign import Campaign
-from access_av.run.result_cache import ResultCache
+from access_av.run.campaign import Campaign, ResultCache
 from access_av.tables.toml import tomllib
 from browser import Browser
 from conftest import ROOT

@@ -23,8 +23,7 @@ from access_av.paper.open_choices import (
     latin_hypercube,
 )
 from access_av.paper.unknowns import sobol
-from access_av.run.campaign import Campaign
-from access_av.run.result_cache import ResultCache
+from access_av.run.campaign import Campaign, ResultCache
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -12,10 +12,9 @@ import pytest
 
 from access_av import InputError, Scenario, bound, columns, plan, service_levels, simulate
 from access_av.radio.upgrades import next_level
-from access_av.run.campaign import Campaign
+from access_av.run.campaign import Campaign, ResultCache
 from access_av.run.fault_injection import SIZES, hypotheses, mismatches
 from access_av.run.integrity_campaign import Case, drive
-from access_av.run.result_cache import ResultCache
 from access_av.verdicts import LevelResult
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from access_av.cli.side_by_side import show_compared
-from access_av.report.compared import compared_section
+from access_av.report.parts import compared_section
 from access_av.run.pairs import ErrorSamples
 from access_av.statistics.paired import paired_difference
 from access_av.study.compare import beside_first

@@ -26,8 +26,7 @@ from access_av import (
 from access_av.device.platform import Platform
 from access_av.paper.sampled_interpretations import sample
 from access_av.paper.unknowns import sobol
-from access_av.run.campaign import Campaign
-from access_av.run.result_cache import ResultCache
+from access_av.run.campaign import Campaign, ResultCache
 from conftest import ROOT
 
 if TYPE_CHECKING:

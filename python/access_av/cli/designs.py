@@ -66,9 +66,9 @@ def designs(
     select), worlds.parquet, report.html, scenario.toml and space.toml.
     """
     from access_av.designs.driven import in_worlds
+    from access_av.designs.front import rows_of, rows_of_worlds
     from access_av.designs.search import search, suggested
     from access_av.designs.space import Space
-    from access_av.designs.table import rows_of, rows_of_worlds
     from access_av.errors import InputError
     from access_av.report.designs import render_designs
     from access_av.run.campaign import campaign

@@ -163,8 +163,8 @@ def locate(
     """
     from access_av.drives import recorded as drives
     from access_av.drives.recorded import Drive
-    from access_av.report.compared import compared_section
     from access_av.report.located import render_located
+    from access_av.report.parts import compared_section
     from access_av.run.operation import Operation
     from access_av.tables.results_directory import ResultsDirectory, json_text
 

@@ -100,8 +100,8 @@ def integrity(
     """
     import polars as pl
 
-    from access_av.report.compared import compared_section
     from access_av.report.integrity import render_integrity
+    from access_av.report.parts import compared_section
     from access_av.run import integrity_campaign
     from access_av.run.campaign import campaign
     from access_av.run.fault_injection import hypotheses as sized

@@ -49,8 +49,8 @@ def run(
     """
     import polars as pl
 
-    from access_av.report.compared import compared_section
     from access_av.report.drive import render_drive
+    from access_av.report.parts import compared_section
     from access_av.run.assumptions import energy_boundary, in_words, optimistic_assumptions
     from access_av.run.simulation import simulate
     from access_av.tables.results_directory import ResultsDirectory, tum_trajectory

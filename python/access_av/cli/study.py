@@ -51,7 +51,7 @@ def study(
     trajectories.parquet (the run that the report plays), plant.toml with all default values, and
     manifest.json. With --sweep or --against also compared.parquet.
     """
-    from access_av.report.compared import compared_section
+    from access_av.report.parts import compared_section
     from access_av.report.study import render_study
     from access_av.study.answer import study_plant
     from access_av.study.compare import combinations

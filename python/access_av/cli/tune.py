@@ -54,8 +54,8 @@ def tune(
     Exit code 0: the limits are met in these runs. 3: a limit is missed; the message gives its
     margin.
     """
+    from access_av.designs.front import row_of
     from access_av.designs.query import Query
-    from access_av.designs.table import row_of
     from access_av.designs.tune import space_of
     from access_av.designs.tune import tune as search
     from access_av.run.campaign import campaign

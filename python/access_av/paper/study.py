@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,6 @@ from access_av.paper.evaluation import (
 from access_av.paper.interpretations import SHIPPED, Interpretation
 from access_av.paper.outcome import Drives, rows
 from access_av.paper.sampled_interpretations import sample
-from access_av.paper.stages import Stages
 from access_av.paper.unknowns import Unknowns, sobol
 from access_av.tables.columns import TABLES
 
@@ -43,6 +43,43 @@ FIT_SOURCE = "access-av paper fit: agrees with the sums and statements of the pa
 TRACKER_COST, TRACES_COST, ABLATION_COST = 13, 9, 1
 # Sizes of `evaluate --sensitivity`: environments, controllers in each, runs per setting.
 UNKNOWNS = (512, 2, 8)
+
+
+@dataclass
+class Stages:
+    """Progress over stages; the total does not change.
+
+    Attributes
+    ----------
+    costs
+        Cost of each stage, in the order in which they run.
+    report
+        Called as ``report(done, total)`` with costs.
+    completed
+        Number of completed stages.
+    """
+
+    costs: Sequence[int]
+    report: Callable[[int, int], None] | None = None
+    completed: int = 0
+
+    @contextmanager
+    def stage(self) -> Iterator[Callable[[int, int], None]]:
+        """Yields the progress function of the next stage, ``(done, total)`` in any unit.
+
+        The stage is complete at the end of the context, also if an exception leaves it.
+        """
+        before, cost = sum(self.costs[: self.completed]), self.costs[self.completed]
+
+        def tick(done: int, of: int) -> None:
+            if self.report is not None:
+                self.report(before + cost * min(done, of) // of, sum(self.costs))
+
+        try:
+            yield tick
+        finally:
+            tick(1, 1)
+            self.completed += 1
 
 
 @dataclass(frozen=True)

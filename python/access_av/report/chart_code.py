@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
 from importlib.metadata import version
 from pathlib import Path
 
 import vl_convert
+
+from access_av.tables.results_directory import write_whole
 
 
 def chart_code() -> str:
@@ -29,18 +30,6 @@ def chart_code() -> str:
     code: str = vl_convert.javascript_bundle()  # type: ignore[call-arg]  # its type stub is wrong
     if file is not None:
         with contextlib.suppress(OSError):
-            _write(file, code)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(file, code)
     return code
-
-
-def _write(file: Path, code: str) -> None:
-    """Writes the file at once: another process reads the whole code or no file."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=file.parent, suffix=".part")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as part:
-            part.write(code)
-        Path(name).replace(file)
-    except OSError:
-        Path(name).unlink(missing_ok=True)
-        raise

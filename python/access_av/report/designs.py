@@ -51,8 +51,8 @@ def render_designs(
     driven
         Designs.
     rows, of_worlds
-        Results of :func:`~access_av.designs.table.rows_of` and
-        :func:`~access_av.designs.table.rows_of_worlds`.
+        Results of :func:`~access_av.designs.front.rows_of` and
+        :func:`~access_av.designs.front.rows_of_worlds`.
     """
     ordered = rows.sort("on_front", "energy_j", descending=[True, False], nulls_last=True)
     known = ordered.drop_nulls(["energy_j", "rms_error_m"])

@@ -5,10 +5,12 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
-from access_av.report.shown import Badge, Shown
+from access_av.report.shown import Badge, Shown, compared
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
+
+    from access_av.study.compare import Compared
 
 
 class Html(str):
@@ -112,3 +114,20 @@ def source(title: str, text: str) -> str:
     """Returns a file in a collapsed element."""
     # tabindex makes the scrolling text accessible by keyboard.
     return folded(title, f'<pre tabindex="0">{escape(text)}</pre>')
+
+
+def compared_section(found: Sequence[Compared], combined: str = "") -> str:
+    """Returns a section of the report; empty without variants.
+
+    ``combined`` states the combinations of the variants.
+    """
+    if not found:
+        return ""
+    return section(
+        "Comparison of variants",
+        (f"{combined}. " if combined else "")
+        + f"Percentiles of the horizontal error, {found[0].driven.runs} {found[0].driven.rows} "
+        "each, in equal environments. Differences to the first variant are paired, with 95 % "
+        "intervals.",
+        shown(compared(found)),
+    )

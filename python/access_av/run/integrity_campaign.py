@@ -182,7 +182,7 @@ def drive(
     >>> import tempfile
     >>> from pathlib import Path
     >>> from access_av.run.campaign import Campaign
-    >>> from access_av.run.result_cache import ResultCache
+    >>> from access_av.run.campaign import ResultCache
     >>> kept = Campaign(ResultCache(Path(tempfile.mkdtemp())))
     >>> [case] = drive(kept, "paper-real-odometry-4", runs=1, only=["none"])
     >>> case.as_record()["availability"] > 0.9
