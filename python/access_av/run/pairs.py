@@ -11,11 +11,14 @@ from access_av.run.service_levels import INDEPENDENT_S
 from access_av.statistics.paired import paired_difference
 from access_av.statistics.percentiles import PERCENTS, Percentile, finite, percentiles
 from access_av.statistics.proportions import share_interval
+from access_av.verdicts import NotOk
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
+
+    from access_av.statistics.integrity import Integrity
 
 
 # Baseline of the comparison of variants.
@@ -43,12 +46,15 @@ class ErrorSamples:
         Duration of a row.
     rows
         Name of the rows, in the plural.
+    integrity
+        Counts of states and of errors above the protection level; ``None`` without a monitor.
     """
 
     name: str = ""
     errors_m: NDArray[Any]
     duration_s: float
     rows: str = DRIVES
+    integrity: Integrity | None = None
 
     @property
     def runs(self) -> int:
@@ -115,12 +121,25 @@ class ErrorSamples:
     @property
     def state_shares(self) -> Mapping[str, float] | None:
         """Share of the time by state of integrity; ``None`` without an integrity monitor."""
-        return None
+        return None if self.integrity is None else self.integrity.state_shares
+
+    @property
+    def not_ok_shares(self) -> Mapping[NotOk, float] | None:
+        """Share of the time by reason why the state is not ``ok``; ``None`` without a monitor."""
+        if self.integrity is None:
+            return None
+        counts = {name: float(it.sum()) for name, it in self.integrity.by_run.items()}
+        epochs = counts["ok"] + counts["degraded"] + counts["unavailable"]
+        return {
+            NotOk.LEVEL: counts["too_wide"] / epochs,
+            NotOk.SUSPECTED: (counts["degraded"] - counts["too_wide"]) / epochs,
+            NotOk.CONTRADICTED: counts["unavailable"] / epochs,
+        }
 
     @property
     def exceedances(self) -> int | None:
         """Number of positions in state ``ok`` whose error exceeds the protection level."""
-        return None
+        return None if self.integrity is None else self.integrity.exceedances
 
     def delta_m(
         self, baseline: ErrorSamples, percent: float, comparisons: int = 1

@@ -13,7 +13,6 @@ from access_av.run.pairs import ErrorSamples
 from access_av.run.simulation import simulate
 from access_av.settings import platform_name, ssb_period_s
 from access_av.statistics.paired import paired_mean
-from access_av.verdicts import NotOk
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from access_av import _core
-    from access_av.statistics.integrity import Integrity
 
 # Interval of the stored errors (s): a vehicle moves less than its width in this time.
 KEPT_EVERY_S = 0.1
@@ -60,8 +58,6 @@ class Runs(ErrorSamples):
     ----------
     levels_m
         Protection levels, shape (runs, epochs); NaN unless the state is ``ok``.
-    integrity
-        Counts of states and of errors above the protection level; ``None`` without a monitor.
     """
 
     scenario: _core.Scenario
@@ -69,15 +65,9 @@ class Runs(ErrorSamples):
     time_s: NDArray[np.float64]
     aoa_estimates: NDArray[np.int64]
     bursts_received: NDArray[np.int64]
-    integrity: Integrity | None
     seeds: NDArray[np.int64]
     has_own_estimator: bool = False
     own_energy_j: float | None = None
-
-    @property
-    def state_shares(self) -> Mapping[str, float] | None:
-        """Share of the time by state of integrity; ``None`` without an integrity monitor."""
-        return None if self.integrity is None else self.integrity.state_shares
 
     @property
     def ok_share(self) -> float | None:
@@ -94,24 +84,6 @@ class Runs(ErrorSamples):
             return None
         mine, its = self.integrity.ok_shares, baseline.integrity.ok_shares
         return paired_mean(mine, its, comparisons=comparisons)
-
-    @property
-    def not_ok_shares(self) -> Mapping[NotOk, float] | None:
-        """Share of the time by reason why the state is not ``ok``; ``None`` without a monitor."""
-        if self.integrity is None:
-            return None
-        counts = {name: float(it.sum()) for name, it in self.integrity.by_run.items()}
-        epochs = counts["ok"] + counts["degraded"] + counts["unavailable"]
-        return {
-            NotOk.LEVEL: counts["too_wide"] / epochs,
-            NotOk.SUSPECTED: (counts["degraded"] - counts["too_wide"]) / epochs,
-            NotOk.CONTRADICTED: counts["unavailable"] / epochs,
-        }
-
-    @property
-    def exceedances(self) -> int | None:
-        """Number of positions in state ``ok`` whose error exceeds the protection level."""
-        return None if self.integrity is None else self.integrity.exceedances
 
     @property
     def energy_j(self) -> float | None:

@@ -156,7 +156,9 @@ class Simulation(Result):
         errors_m, duration_s = self.horizontal_errors_m, float(self.steps["time_s"][-1])
         if errors_m is None:
             return None
-        return ErrorSamples(name=name, errors_m=errors_m, duration_s=duration_s)
+        return ErrorSamples(
+            name=name, errors_m=errors_m, duration_s=duration_s, integrity=self.integrity
+        )
 
     @property
     def mean_error_m(self) -> float | None:

@@ -173,10 +173,6 @@ def _row(values: Mapping[str, Any], found: Simulation, to_first: Difference) -> 
     errors = found.errors(name)
     assert errors is not None  # errors_every is set
     row = errors.record(to_first.percent, ends)
-    if (integrity := found.integrity) is not None:
-        row["availability"] = integrity.availability
-        row["unavailable_share"] = integrity.state_shares["unavailable"]
-        row["exceedances"] = integrity.exceedances
     return {**row, **found.means, "rms_error_m": found.rms_error_m}
 
 

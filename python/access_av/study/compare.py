@@ -12,7 +12,7 @@ import polars as pl
 
 from access_av.errors import InputError
 from access_av.run.pairs import ErrorSamples
-from access_av.run.runs import Runs, drive
+from access_av.run.runs import drive
 from access_av.tables.numbers import count
 from access_av.tables.toml import tomllib
 
@@ -49,15 +49,10 @@ class Compared:
 
     def reliability(self) -> str:
         """Returns shares of the states, and errors above the level in state ``ok``, as text."""
-        shares = self.driven.state_shares
-        if shares is None:
+        shares, reasons = self.driven.state_shares, self.driven.not_ok_shares
+        if shares is None or reasons is None:
             return "no monitor"
-        reasons = self.driven.not_ok_shares if isinstance(self.driven, Runs) else None
-        others = (
-            [f"{share:.1%} {state}" for state, share in shares.items() if state != "ok"]
-            if reasons is None
-            else [f"{share:.1%} {reason.words}" for reason, share in reasons.items() if share > 0.0]
-        )
+        others = [f"{share:.1%} {it.words}" for it, share in reasons.items() if share > 0.0]
         text = ", ".join([f"{shares['ok']:.1%} ok", *others])
         beyond = self.driven.exceedances
         return f"{text}; {beyond} errors beyond the level while ok" if beyond else text
