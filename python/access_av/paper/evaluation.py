@@ -43,13 +43,6 @@ class Setting:
     adaptive: bool
     base_wake_up_ms: float
 
-    def apply(self, scenario: Scenario) -> Scenario:
-        """Returns the scenario with this method and, for a fixed interval, with this interval."""
-        changes: dict[str, Any] = {"vehicle.estimator.method": self.method.replace("_", "-")}
-        if not self.adaptive:
-            changes["vehicle.wake_up"] = fixed_interval(scenario, self.base_wake_up_ms)
-        return scenario.with_overrides(changes)
-
 
 def fixed_interval(scenario: Scenario, interval_ms: float) -> dict[str, Any]:
     """Returns the wake-up settings of a fixed interval, with the SSB selection of the scenario."""
@@ -65,6 +58,16 @@ class Case:
     campaign: str
     setting: Setting
     mode: PowerMode | None = None
+
+    def apply(self, scenario: Scenario) -> Scenario:
+        """Returns the scenario with the method, and with its fixed interval or its power mode."""
+        setting = self.setting
+        changes: dict[str, Any] = {"vehicle.estimator.method": setting.method.replace("_", "-")}
+        if not setting.adaptive:
+            changes["vehicle.wake_up"] = fixed_interval(scenario, setting.base_wake_up_ms)
+        elif self.mode is not None:
+            changes["vehicle.platform.mode"] = self.mode.number
+        return scenario.with_overrides(changes)
 
 
 def cases(platform: Platform) -> list[Case]:
@@ -227,10 +230,7 @@ def planned(driver: Driver, interpretation: Interpretation) -> dict[Setting, Sce
     found: dict[Setting, Scenario] = {}
     for case in cases(driver.platform):
         if case.setting not in found:
-            scenario = case.setting.apply(interpretation.scenario)
-            if case.setting.adaptive and case.mode is not None:
-                scenario = scenario.with_overrides({"vehicle.platform.mode": case.mode.number})
-            found[case.setting] = driver.as_driven(scenario)
+            found[case.setting] = driver.as_driven(case.apply(interpretation.scenario))
     return found
 
 
@@ -272,7 +272,13 @@ def evaluate_with(
                 "energy_provenance": pl.String,
             },
         ),
-        errors=pl.concat([_errors(setting, each.steps) for setting, each in driven.items()]),
+        errors=pl.concat(
+            each.steps.select(
+                *(pl.lit(value).alias(name) for name, value in vars(setting).items()),
+                *("time_s", "mean_abs_error_x_m", "mean_abs_error_y_m"),
+            )
+            for setting, each in driven.items()
+        ),
         snr=reference.select("time_s", "mean_true_snr_db"),
         outcome=outcome,
         platform=platform,
@@ -388,14 +394,3 @@ def _point(case: Case, outcome: Outcome, refitted: bool) -> dict[str, Any]:
         "energy_j": total_j,
         "energy_provenance": provenance,
     }
-
-
-def _errors(setting: Setting, steps: pl.DataFrame) -> pl.DataFrame:
-    return steps.select(
-        pl.lit(setting.method).alias("method"),
-        pl.lit(setting.adaptive).alias("adaptive"),
-        pl.lit(setting.base_wake_up_ms).alias("base_wake_up_ms"),
-        pl.col("time_s"),
-        "mean_abs_error_x_m",
-        "mean_abs_error_y_m",
-    )

@@ -187,15 +187,11 @@ def judge(
     scenarios = [paper.with_overrides(controller_changes(point, world)) for point in controllers]
     drives: list[tuple[Case, Drives]] = []
     for case in cases(platform):
-        if case.setting.adaptive and case.mode is not None:
-            mode = {"vehicle.platform.mode": case.mode.number}
-            each = [
-                driver.drive(case.setting.apply(scenario).with_overrides(mode)).drives
-                for scenario in scenarios
-            ]
+        if case.setting.adaptive:
+            each = [driver.drive(case.apply(scenario)).drives for scenario in scenarios]
             drives.append((case, _side_by_side(each)))
         else:
-            drives.append((case, driver.drive(case.setting.apply(paper)).drives))
+            drives.append((case, driver.drive(case.apply(paper)).drives))
     outcome, _ = outcome_of(drives, platform, driver.trip_s, fit_each=True)
     gaps_s = [np.atleast_1d(each.longest_gap_s) for each in outcome.adaptive.values()]
     count = len(controllers)
