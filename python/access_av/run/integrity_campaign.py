@@ -19,6 +19,7 @@ from access_av.statistics.alarms import Alarms
 from access_av.statistics.consistency import horizontal_error_m
 from access_av.statistics.extremes import ObtainedRisk
 from access_av.statistics.integrity import STATES, Integrity
+from access_av.statistics.percentiles import with_ends
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -77,16 +78,14 @@ class Case:
             "availability": found.availability,
             "unavailable_share": found.state_shares["unavailable"],
             "exceedances": found.exceedances,
-            "exceedance_share": found.exceedance_share,
-            "exceedance_share_low": found.exceedance_interval[0],
-            "exceedance_share_high": found.exceedance_interval[1],
+            **with_ends("exceedance_share{}", (found.exceedance_share, *found.exceedance_interval)),
             "runs_with_exceedances": found.runs_with_exceedances,
             "time_to_alert_s": alarms.longest_silence_s,
             "level_over_error": found.median_level_over_error,
             "asked_risk_per_hour": self.asked_risk_per_hour,
-            "risk_per_hour": risk and risk.per_hour,
-            "risk_per_hour_low": risk and risk.interval[0],
-            "risk_per_hour_high": risk and risk.interval[1],
+            **with_ends(
+                "risk_per_hour{}", None if risk is None else (risk.per_hour, *risk.interval)
+            ),
             "p90_error_m": error_m.quantile(0.9, "linear"),
             "max_error_m": error_m.max(),
         }

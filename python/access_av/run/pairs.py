@@ -9,7 +9,7 @@ import numpy as np
 
 from access_av.run.service_levels import INDEPENDENT_S
 from access_av.statistics.paired import paired_difference
-from access_av.statistics.percentiles import PERCENTS, Percentile, finite, percentiles
+from access_av.statistics.percentiles import PERCENTS, Percentile, finite, percentiles, with_ends
 from access_av.statistics.proportions import share_interval
 from access_av.verdicts import NotOk
 
@@ -159,17 +159,14 @@ class ErrorSamples:
     def record(self, percent: float, delta_m: tuple[float, float, float] | None) -> dict[str, Any]:
         """Returns a row of the table ``compared`` of :mod:`access_av.columns`."""
         known, shares = self.percentile(percent), self.state_shares or {}
-        ends = (None, None, None) if delta_m is None else delta_m
         counts = {name: getattr(self, name, None) for name in ("aoa_estimates", "bursts_received")}
         rms_m = float(np.sqrt(np.mean(np.square(self.errors_m))))
         return {
             "variant": self.name,
             "runs": self.runs,
             "percent": percent,
-            "percentile_m": known.value,
-            "percentile_low_m": known.low,
-            "percentile_high_m": known.high,
-            **dict(zip(("delta_m", "delta_low_m", "delta_high_m"), ends, strict=True)),
+            **with_ends("percentile{}_m", known.numbers),
+            **with_ends("delta{}_m", delta_m),
             "rms_error_m": finite(rms_m),
             "lost_runs": self.lost_runs,
             "availability": shares.get("ok"),

@@ -13,7 +13,7 @@ from access_av.statistics.distributions import student_quantile
 from access_av.statistics.proportions import clopper_pearson
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -48,6 +48,23 @@ class Percentile:
         """Returns the interval as text."""
         return ends_text(self.low, self.high)
 
+    @property
+    def numbers(self) -> tuple[float, float | None, float | None]:
+        """Value and both ends of the interval."""
+        return self.value, self.low, self.high
+
+
+def with_ends(name: str, values: Iterable[Any] | None) -> dict[str, Any]:
+    """Returns a value and the ends of its interval by column; ``None`` for unknown ones.
+
+    Examples
+    --------
+    >>> with_ends("delta{}_m", (1.0, 0.5, 1.5))
+    {'delta_m': 1.0, 'delta_low_m': 0.5, 'delta_high_m': 1.5}
+    """
+    columns = (name.format(end) for end in ("", "_low", "_high"))
+    return dict(zip(columns, (None, None, None) if values is None else values, strict=True))
+
 
 def ends_text(low: float | None, high: float | None) -> str:
     """Returns an interval as text; an infinite upper end means too few runs.
@@ -77,10 +94,8 @@ def as_columns(percentiles: Sequence[Percentile]) -> dict[str, float | None]:
     """Returns percentiles of the horizontal error and their intervals, by column name."""
     found: dict[str, float | None] = {}
     for each in percentiles:
-        name = column(each.percent)
-        found[name] = finite(each.value)
-        for end in ("low", "high"):
-            found[name.replace("_error_m", f"_error_{end}_m")] = finite(getattr(each, end))
+        name = column(each.percent).replace("_error_m", "_error{}_m")
+        found |= with_ends(name, map(finite, each.numbers))
     return found
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from access_av.settings import as_dict
+from access_av.statistics.percentiles import with_ends
 from access_av.study import economy
 from access_av.study.points import OK_MARGIN, OWN, Point, own_mode
 from access_av.study.targets import table as targets_table
@@ -20,9 +21,8 @@ if TYPE_CHECKING:
     from access_av.economics.balance import Way
     from access_av.run.runs import Runs
     from access_av.run.simulation import Simulation
-    from access_av.statistics.percentiles import Percentile
     from access_av.study.measures import Measure, Measures
-    from access_av.study.operate import Recommendation, Rival
+    from access_av.study.operate import Recommendation
     from access_av.study.places import WorstPlace
     from access_av.study.targets import TargetResult, Targets
     from access_av.study.unverified import Unverified
@@ -296,15 +296,12 @@ def as_toml(value: object) -> str:
 
 
 def _measure(study: Study, it: Measure) -> dict[str, Any]:
-    delta_m, low_m, high_m = it.delta_m
     return {
         "name": it.name,
         "what": it.what,
         "settings": [dict(one.settings) for one in it.remedies],
         **_figures(study, it.driven),
-        "delta_m": delta_m,
-        "delta_low_m": low_m,
-        "delta_high_m": high_m,
+        **with_ends("delta{}_m", it.delta_m),
         "effect": it.effect.value,
         "cost": vars(it.cost),
         "cm_per_price": it.cm_per_price,
@@ -325,15 +322,27 @@ def _recommendation(study: Study) -> dict[str, Any]:
             "settings": point.settings,
             "runs": point.driven.runs,
             "error_m": point.error_m,
-            **_percentile(point.driven.percentile(study.percent)),
+            **with_ends("target_error{}_m", point.driven.percentile(study.percent).numbers),
             "ok_share": point.driven.ok_share,
-            **_ok_delta(point.ok_delta),
+            **with_ends("ok_delta{}", point.ok_delta),
             "judged": point.judgement.value,
             "trip_j": vars(economy.trip_j(point)),
             "idle_w": point.idle_w and dict(point.idle_w),
             "best": study.points[study.recommendation.best or 0].name,
         },
-        "rivals": [_rival(it) for it in study.recommendation.rivals],
+        "rivals": [
+            {
+                "name": it.point.name,
+                "error_m": it.point.error_m,
+                **with_ends("delta{}_m", it.delta_m),
+                **with_ends("ok_delta{}", it.ok_delta),
+                "delta_j": it.delta_j,
+                "day_share": it.day_share,
+                "is_equivalent": it.is_equivalent,
+                "judged": it.point.judgement.value,
+            }
+            for it in study.recommendation.rivals
+        ],
         "day": {
             "trips_wh": vars(day.trips_wh),
             "idle_wh": day.idle_wh and vars(day.idle_wh),
@@ -343,48 +352,16 @@ def _recommendation(study: Study) -> dict[str, Any]:
     }
 
 
-def _rival(it: Rival) -> dict[str, Any]:
-    delta_m, low_m, high_m = it.delta_m
-    return {
-        "name": it.point.name,
-        "error_m": it.point.error_m,
-        "delta_m": delta_m,
-        "delta_low_m": low_m,
-        "delta_high_m": high_m,
-        **_ok_delta(it.ok_delta),
-        "delta_j": it.delta_j,
-        "day_share": it.day_share,
-        "is_equivalent": it.is_equivalent,
-        "judged": it.point.judgement.value,
-    }
-
-
-def _ok_delta(delta: tuple[float, float, float] | None) -> dict[str, float | None]:
-    keys = ("ok_delta", "ok_delta_low", "ok_delta_high")
-    return dict(zip(keys, delta or (None,) * 3, strict=True))
-
-
 def _figures(study: Study, driven: Runs) -> dict[str, Any]:
-    share, low, high = driven.within(study.error_m)
     reasons = driven.not_ok_shares
     return {
         "runs": driven.runs,
-        **_percentile(driven.percentile(study.percent)),
-        "within_share": share,
-        "within_low_share": low,
-        "within_high_share": high,
+        **with_ends("target_error{}_m", driven.percentile(study.percent).numbers),
+        **with_ends("within{}_share", driven.within(study.error_m)),
         "judged": study.judged(driven).value,
         "lost_runs": driven.lost_runs,
         "ok_share": driven.ok_share,
         "state_shares": driven.state_shares and dict(driven.state_shares),
         "not_ok_shares": reasons and {it.value: share for it, share in reasons.items()},
         "integrity_failures": driven.exceedances,
-    }
-
-
-def _percentile(found: Percentile) -> dict[str, Any]:
-    return {
-        "target_error_m": found.value,
-        "target_error_low_m": found.low,
-        "target_error_high_m": found.high,
     }

@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 
 from access_av.run.error_bound import along_route
+from access_av.statistics.percentiles import Percentile, with_ends
 from access_av.verdicts import Judgement
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
     from access_av import _core
     from access_av.run.runs import Runs
-    from access_av.statistics.percentiles import Percentile
 
 WHOLE_TRIP = "whole trip"
 
@@ -124,16 +124,8 @@ def table(found: dict[str, list[TargetResult]]) -> pl.DataFrame:
                 "to_m": it.target.to_m,
                 "required_error_m": it.target.error_m,
                 "percent": it.target.percent,
-                "target_error_m": it.error.value,
-                "target_error_low_m": it.error.low,
-                "target_error_high_m": it.error.high,
-                **dict(
-                    zip(
-                        ("within_share", "within_low_share", "within_high_share"),
-                        it.share,
-                        strict=True,
-                    )
-                ),
+                **with_ends("target_error{}_m", it.error.numbers),
+                **with_ends("within{}_share", it.share),
                 "judgement": it.judgement.value,
             }
             for variant, each in found.items()
