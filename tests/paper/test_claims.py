@@ -17,10 +17,10 @@ from access_av.paper.claims import (
     VERDICTS,
     check_claims,
     evidence,
+    margin,
     with_seeds,
 )
 from access_av.paper.findings import FINDINGS
-from access_av.paper.margins import margin
 from access_av.paper.statements import stated_claims
 from conftest import ROOT
 

@@ -32,7 +32,6 @@ from access_av.cli import (
     run,
     study,
     survey,
-    tune,
 )
 from access_av.cli.terminal import (
     console,
@@ -120,7 +119,7 @@ _GROUPS = (
         "design",
         _METHOD,
         "Plan radio heads, choose operating points, and evaluate integrity, computer and cost.",
-        (radio, integrity, designs, tune, balance, profile),
+        (radio, integrity, designs, balance, profile),
     ),
     (
         "record",

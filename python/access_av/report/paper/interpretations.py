@@ -11,8 +11,7 @@ import polars as pl
 
 from access_av.paper import summary
 from access_av.paper.chosen import entries
-from access_av.paper.claims import NO_EVIDENCE, NOT_REPRODUCED, REPRODUCED, Claim
-from access_av.paper.margins import ROUNDED
+from access_av.paper.claims import NO_EVIDENCE, NOT_REPRODUCED, REPRODUCED, ROUNDED, Claim
 from access_av.paper.statements import METHODS, claim_group, of_claim, paper_numbers
 from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, Spec, colours, finish
 from access_av.report.labels import Axis, labelled
