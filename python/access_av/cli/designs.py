@@ -241,13 +241,14 @@ def tune(
     chosen = opt.load_scenario(
         scenario, overrides={"vehicle.platform": {"name": platform, "mode": mode}}
     )
-    limits = Query(
-        max_energy_j=max_energy_j,
-        max_rms_m=max_rms_m,
-        max_worst_m=max_worst_m,
-        max_error_m=max_error_m,
-        percentile=percentile,
-    )
+    given: dict[str, Any] = {
+        "max_error_m": max_error_m,
+        "percentile": percentile,
+        "max_rms_m": max_rms_m,
+        "max_worst_m": max_worst_m,
+        "max_energy_j": max_energy_j,
+    }
+    limits = Query(**given)
     with progress("Tuning") as tick, campaign(RESULTS / "parts", executor, threads) as kept:
         found = search(kept, chosen, limits, designs=designs, runs=runs, seed=seed, progress=tick)
     row = row_of(found.after)
@@ -269,21 +270,11 @@ def tune(
     }
     directory.write_json("tuned.json", record)
     directory.write_text("scenario.toml", chosen.to_toml())
-    asked = {
-        "--max-error-m": max_error_m,
-        "--percentile": percentile,
-        "--max-rms-m": max_rms_m,
-        "--max-worst-m": max_worst_m,
-        "--max-energy-j": max_energy_j,
-        "--platform": platform,
-        "--mode": mode,
-        "--designs": designs,
-        "--runs": runs,
-        "--seed": seed,
-    }
-    given = [text for name, value in asked.items() if value is not None for text in (name, value)]
+    how = {"platform": platform, "mode": mode, "designs": designs, "runs": runs, "seed": seed}
+    options = {f"--{name.replace('_', '-')}": it for name, it in {**given, **how}.items()}
+    typed = [it for option in options.items() if option[1] is not None for it in option]
     directory.write_manifest(
-        repeat=("design", "tune", "scenario.toml", *given),
+        repeat=("design", "tune", "scenario.toml", *typed),
         scenario=chosen.name,
         runs=runs,
         seed=seed,
