@@ -20,51 +20,12 @@ from access_av.tables.numbers import count
 if TYPE_CHECKING:
     from access_av.site_files.picture import Placed
 
-Target = Annotated[Path, Argument(help="File to write, for example mine.toml.")]
-Force = Annotated[bool, Option("--force", help="Overwrite an existing file.")]
 Road = Annotated[
     Path | None,
     Option(help="Road: CSV (x_m, y_m), GeoJSON (LineString) or DXF (joining curves of a layer)."),
 ]
-Heads = Annotated[
-    Path | None,
-    Option(
-        "--heads-file",
-        help="Radio heads: CSV (x_m, y_m, z_m, name, pci), GeoJSON or DXF (points, blocks).",
-    ),
-]
 Walls = Annotated[
     Path | None, Option(help="Walls: GeoJSON (LineStrings, Polygons) or DXF (curves and faces).")
-]
-Picture = Annotated[
-    Path | None, Option("--underlay", help="PNG or JPEG as background of the site's maps.")
-]
-PicturePoints = Annotated[
-    str | None,
-    Option(
-        "--underlay-points",
-        metavar="X1,Y1,X2,Y2",
-        help="Two pixels X1,Y1,X2,Y2 of the background, counted from its upper left corner.",
-    ),
-]
-PictureLength = Annotated[
-    float | None,
-    Option("--underlay-length-m", min=0.0, help="Distance between the two pixels, in m."),
-]
-PictureScale = Annotated[
-    float | None,
-    Option(
-        "--underlay-metres-per-pixel", min=0.0, help="Scale of the background, in metres per pixel."
-    ),
-]
-PictureZero = Annotated[
-    str | None,
-    Option(
-        "--underlay-zero",
-        metavar="X,Y",
-        help="Pixel X,Y of the map origin.",
-        show_default="lower left",
-    ),
 ]
 OriginText = Annotated[
     str | None,
@@ -74,21 +35,6 @@ OriginText = Annotated[
         help="Map origin of a GeoJSON file: latitude,longitude in degrees.",
         show_default="first point",
     ),
-]
-RoadLayer = Annotated[str, Option(help="DXF layer of the road.")]
-HeadsLayer = Annotated[str, Option(help="DXF layer of the radio heads.")]
-WallsLayer = Annotated[str, Option(help="DXF layer of the walls.")]
-TwoPoints = Annotated[
-    str | None,
-    Option(
-        metavar="X1,Y1,X2,Y2", help="Two points X1,Y1,X2,Y2 of a DXF drawing, --length-m apart."
-    ),
-]
-Length = Annotated[
-    float | None, Option("--length-m", min=0.0, help="Distance between --two-points, in m.")
-]
-MetresPerUnit = Annotated[
-    float | None, Option(min=0.0, help="Unit of a DXF drawing, for example 0.001 for mm.")
 ]
 
 app = typer.Typer()
@@ -242,23 +188,65 @@ def _next(kind: str, file: Path) -> str:
 def new(
     context: typer.Context,
     kind: Annotated[New, Argument(help="Kind of file.")],
-    file: Target,
-    force: Force = False,
+    file: Annotated[Path, Argument(help="File to write, for example mine.toml.")],
+    force: Annotated[bool, Option("--force", help="Overwrite an existing file.")] = False,
     road: Road = None,
-    heads: Heads = None,
+    heads: Annotated[
+        Path | None,
+        Option(
+            "--heads-file",
+            help="Radio heads: CSV (x_m, y_m, z_m, name, pci), GeoJSON or DXF (points, blocks).",
+        ),
+    ] = None,
     walls: Walls = None,
     origin: OriginText = None,
-    road_layer: RoadLayer = "ROAD",
-    heads_layer: HeadsLayer = "HEADS",
-    walls_layer: WallsLayer = "WALLS",
-    two_points: TwoPoints = None,
-    length_m: Length = None,
-    metres_per_unit: MetresPerUnit = None,
-    underlay: Picture = None,
-    underlay_points: PicturePoints = None,
-    underlay_length_m: PictureLength = None,
-    underlay_metres_per_pixel: PictureScale = None,
-    underlay_zero: PictureZero = None,
+    road_layer: Annotated[str, Option(help="DXF layer of the road.")] = "ROAD",
+    heads_layer: Annotated[str, Option(help="DXF layer of the radio heads.")] = "HEADS",
+    walls_layer: Annotated[str, Option(help="DXF layer of the walls.")] = "WALLS",
+    two_points: Annotated[
+        str | None,
+        Option(
+            metavar="X1,Y1,X2,Y2", help="Two points X1,Y1,X2,Y2 of a DXF drawing, --length-m apart."
+        ),
+    ] = None,
+    length_m: Annotated[
+        float | None, Option("--length-m", min=0.0, help="Distance between --two-points, in m.")
+    ] = None,
+    metres_per_unit: Annotated[
+        float | None, Option(min=0.0, help="Unit of a DXF drawing, for example 0.001 for mm.")
+    ] = None,
+    underlay: Annotated[
+        Path | None, Option("--underlay", help="PNG or JPEG as background of the site's maps.")
+    ] = None,
+    underlay_points: Annotated[
+        str | None,
+        Option(
+            "--underlay-points",
+            metavar="X1,Y1,X2,Y2",
+            help="Two pixels X1,Y1,X2,Y2 of the background, counted from its upper left corner.",
+        ),
+    ] = None,
+    underlay_length_m: Annotated[
+        float | None,
+        Option("--underlay-length-m", min=0.0, help="Distance between the two pixels, in m."),
+    ] = None,
+    underlay_metres_per_pixel: Annotated[
+        float | None,
+        Option(
+            "--underlay-metres-per-pixel",
+            min=0.0,
+            help="Scale of the background, in metres per pixel.",
+        ),
+    ] = None,
+    underlay_zero: Annotated[
+        str | None,
+        Option(
+            "--underlay-zero",
+            metavar="X,Y",
+            help="Pixel X,Y of the map origin.",
+            show_default="lower left",
+        ),
+    ] = None,
 ) -> None:
     """Write an example file, or a plant or site file from a drawing or map.
 
