@@ -9,6 +9,7 @@ ends of its intervals. The given policy remains unless one of them is better.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -133,7 +134,11 @@ def tune(
     space = space_of(scenario)
     if not space.dimensions:
         raise InputError(f"{scenario.name}: its wake-up policy has no parameters to tune")
-    goal = _Goal(limits)
+
+    def order(driven: Driven, *, with_margin: bool = True) -> tuple[float, float]:
+        """Returns the sort key of a design: violation of the limits, then objective."""
+        objective, constraints = _rated(limits, driven, with_margin=with_margin)
+        return max(0.0, *constraints.values()), objective
 
     def again(some: list[Design], first_run: int) -> list[Driven]:
         made = drive(campaign, some, first_run=first_run, runs=runs, seed=seed)
@@ -146,60 +151,46 @@ def tune(
         count=designs,
         runs=runs,
         seed=seed,
-        goal=goal.for_search,
+        goal=partial(_rated, limits),
         progress=progress,
     )
-    tried = sorted(found.driven, key=goal.with_margin)
+    tried = sorted(found.driven, key=order)
     if not np.isfinite(tried[0].mean_energy_j):
         name = tried[0].design.platform.name
         raise InputError(f"platform {name} contains no energy of the vehicle's estimator")
     finalists = [it.design for it in tried[:FINALISTS]]
     confirmed = again(finalists, runs)
-    safest, best = (min(confirmed, key=it).design for it in (goal.with_margin, goal.as_found))
+    as_found = partial(order, with_margin=False)
+    safest, best = (min(confirmed, key=it).design for it in (order, as_found))
     [baseline] = designs_of(scenario, [{}])
     last = [baseline, safest, *([best] if best is not safest else [])]
     # Prefer the first of equal ones, which is the given policy.
     before, *others = again(last, 2 * runs)
-    after = min([before, *others], key=goal.as_found)
+    after = min([before, *others], key=as_found)
     less = -differences(after, [before])[0][:, [0, 2, 1]]
     return Tuned(before, after, less, found.drives + runs * (len(finalists) + len(last)))
 
 
-@dataclass(frozen=True)
-class _Goal:
-    """Sort key of a design: violation of the limits, then objective."""
+def _rated(
+    limits: Query, driven: Driven, *, with_margin: bool = True
+) -> tuple[float, dict[str, float]]:
+    """Returns the objective of a design, and the relative violation of each limit.
 
-    limits: Query
-
-    def as_found(self, driven: Driven) -> tuple[float, float]:
-        """Returns the sort key by the mean results."""
-        objective, constraints = self._rated(driven, with_margin=False)
-        return max(0.0, *constraints.values()), objective
-
-    def with_margin(self, driven: Driven) -> tuple[float, float]:
-        """Returns the sort key by the upper ends of the errors' intervals."""
-        objective, constraints = self.for_search(driven)
-        return max(0.0, *constraints.values()), objective
-
-    def for_search(self, driven: Driven) -> tuple[float, dict[str, float]]:
-        """Returns the objective, and the relative violation of each limit with its margin."""
-        return self._rated(driven, with_margin=True)
-
-    def _rated(self, driven: Driven, *, with_margin: bool) -> tuple[float, dict[str, float]]:
-        limits, count = self.limits, driven.square_m2.size
-        square_m2 = driven.rms_m**2
-        if with_margin and count > 1:
-            spread_m2 = float(np.std(driven.square_m2, ddof=1))
-            square_m2 += student_quantile(0.975, count - 1) * spread_m2 / np.sqrt(count)
-        [error] = driven.percentiles([limits.percent], of_seen=True)
-        error_m = error.high if with_margin and error.high is not None else error.value
-        row = {
-            "energy_j": driven.mean_energy_j,
-            "rms_error_m": float(np.sqrt(square_m2)),
-            "p90_max_error_m": driven.p90_worst_m,
-            column(limits.percent): error_m,
-        }
-        constraints = {name: ratio - 1.0 for name, ratio in limits.excess(row).items()}
-        if not limits.binds_energy_alone:
-            return driven.mean_energy_j, constraints
-        return driven.rms_m if limits.percentile is None else error_m, constraints
+    With a margin, errors are the upper ends of their intervals.
+    """
+    count, square_m2 = driven.square_m2.size, driven.rms_m**2
+    if with_margin and count > 1:
+        spread_m2 = float(np.std(driven.square_m2, ddof=1))
+        square_m2 += student_quantile(0.975, count - 1) * spread_m2 / np.sqrt(count)
+    [error] = driven.percentiles([limits.percent], of_seen=True)
+    error_m = error.high if with_margin and error.high is not None else error.value
+    row = {
+        "energy_j": driven.mean_energy_j,
+        "rms_error_m": float(np.sqrt(square_m2)),
+        "p90_max_error_m": driven.p90_worst_m,
+        column(limits.percent): error_m,
+    }
+    constraints = {name: ratio - 1.0 for name, ratio in limits.excess(row).items()}
+    if not limits.binds_energy_alone:
+        return driven.mean_energy_j, constraints
+    return driven.rms_m if limits.percentile is None else error_m, constraints
