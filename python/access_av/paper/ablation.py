@@ -31,15 +31,14 @@ LEAST_SHARE = 0.05
 class Ablation:
     """Power mode of an interpretation, with its controller and with a constant wake-up time.
 
+    Columns ``comparisons`` of :mod:`access_av.columns`. The interval of ``gain_m`` is that of a
+    joint bootstrap over the common runs. A difference ``matters`` if the whole interval exceeds
+    :data:`LEAST_SHARE` of the error.
+
     Attributes
     ----------
-    gain_m
-        RMS error with the constant minus that with the controller.
-    gain_low_m, gain_high_m
-        Ends of the paired 95 % interval of ``gain_m`` by a joint bootstrap over the common runs.
-    matters
-        1: the controller helps, -1: it harms, 0: no relevant difference. A difference is relevant
-        if the whole interval exceeds :data:`LEAST_SHARE` of the error.
+    constant
+        Runs with the constant wake-up time.
     """
 
     interpretation: str

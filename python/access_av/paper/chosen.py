@@ -28,18 +28,10 @@ BASE_MS, EVERY_SSB_MS = 80.0, 20.0
 
 @dataclass(frozen=True)
 class Effect:
-    """Result of the shipped interpretation in mode 0 with one alternative value.
+    """Result of the shipped interpretation in mode 0 with one value.
 
-    Attributes
-    ----------
-    value
-        Alternative value; the shipped value if ``is_shipped``.
-    worst_error_m, rms_error_m, aoa_estimates
-        Result of adaptive MUSIC.
-    fixed_rms_m, every_ssb_rms_m
-        Results of MUSIC at its base wake-up time and at every SSB.
-    rms_std_m
-        Standard deviation of ``rms_error_m`` by the runs.
+    Columns ``assumptions`` of :mod:`access_av.columns`; errors and estimates are those of adaptive
+    MUSIC unless the name of the column contains another setting.
     """
 
     what: str

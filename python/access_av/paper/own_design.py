@@ -43,16 +43,10 @@ HEADROOM_DB = 9.0
 class Comparison:
     """Comparison of the proposed method with the paper's adaptive point in a power mode.
 
+    Columns ``comparisons`` of :mod:`access_av.columns`.
+
     Attributes
     ----------
-    map
-        Whether the tracker has a road map.
-    energy_j, papers_energy_j
-        Energy of a trip; ``None`` if the platform has no value.
-    rms_error_reduction_m, rms_error_reduction_low_m, rms_error_reduction_high_m
-        RMS error of the paper minus that of the proposed method, with its paired 95 % interval.
-    estimates_saved, estimates_saved_low, estimates_saved_high
-        Difference of the numbers of estimates, with its paired 95 % interval.
     ours
         Runs of the proposed tracker.
     """
@@ -204,17 +198,13 @@ EQUAL = (
 
 @dataclass(frozen=True)
 class Fair:
-    """Method in mode 0 with its information.
+    """Method in mode 0 with its information: columns ``comparisons`` of :mod:`access_av.columns`.
+
+    A real odometer has the errors of :data:`REAL`. The bound is the posterior Cramér–Rao bound of
+    the tracker's model with an angle at every SSB, a mean over the roads of its curvature prior.
 
     Attributes
     ----------
-    real_odometer
-        Whether odometer and start have errors, as :data:`REAL` has them.
-    who
-        ``paper``, ``ours``, ``one angle``, or ``bound``: the posterior Cramér–Rao bound of the
-        tracker's model with an angle at every SSB, a mean over the roads of its curvature prior.
-    rms_low_m, rms_high_m
-        95 % interval of ``rms_error_m`` over the runs.
     drives
         Runs; ``None`` for the bound.
     """

@@ -37,14 +37,9 @@ STANDS_OUT = 3.0
 
 @dataclass(frozen=True)
 class Index:
-    """Sensitivity of a claim's margin to a parameter: fractions of its variance.
+    """Sensitivity of a claim's margin to a parameter, as fractions of the margin's variance.
 
-    Attributes
-    ----------
-    first, total
-        First-order and total index.
-    first_low, first_high, total_low, total_high
-        Ends of their 95 % intervals.
+    Columns ``sensitivity`` of :mod:`access_av.columns`.
     """
 
     claim: str
