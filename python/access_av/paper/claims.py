@@ -53,26 +53,8 @@ ROUNDED = 1e-3
 class Claim:
     """One statement of the paper, and the simulated result under one interpretation.
 
-    Attributes
-    ----------
-    interval
-        95 % interval of ``obtained`` over the runs; ``None`` for results that are not random, and
-        for sets of modes.
-    seed_sensitive
-        Whether other runs may give another verdict: by the standard deviation of the margin, or
-        because another seed gave one.
-    verdict
-        One of :data:`VERDICTS`.
-    evidence
-        One of :data:`EVIDENCE`: the kind of evidence; empty for a claim that is not testable.
-    deviation
-        Maximum relative deviation of ``obtained`` from ``stated``, for claims with a tolerance.
-    tolerance
-        Maximum allowed deviation; ``None`` without one.
-    spread
-        Deviation of single trips from the mean, if the claim is about a mean over the runs.
-    met_by_seed
-        Whether the claim is met with each seed, if several seeds were simulated.
+    Columns ``claims`` of :mod:`access_av.columns`. ``verdict`` is one of :data:`VERDICTS`, and
+    ``evidence`` one of :data:`EVIDENCE`; it is empty for a claim that is not testable.
     """
 
     interpretation: str
