@@ -66,18 +66,6 @@ class OffsetSurvey:
 
 
 @dataclass(frozen=True)
-class RangingHead:
-    """Radio head of a site, as in the site file."""
-
-    pci: int
-    ssb_index: int
-    position_m: tuple[float, float, float]
-    position_std_m: float
-    offset_m: float
-    surveyed_std_m: float | None
-
-
-@dataclass(frozen=True)
 class Ranging:
     """``[ranging]`` of a vehicle.
 
@@ -106,24 +94,9 @@ class Ranging:
         return cls(ranging["offset_std_m"], ranging.get("sigma_m"), tuple(antenna_m))
 
 
-def heads_of(site: _core.Site) -> list[RangingHead]:
-    """Returns the radio heads of a site."""
-    return [
-        RangingHead(
-            pci=head.get("pci", 0),
-            ssb_index=head.get("ssb_index", 0),
-            position_m=tuple(head["position_m"]),
-            position_std_m=head.get("position_std_m", 0.0),
-            offset_m=head.get("range_offset_m", 0.0),
-            surveyed_std_m=head.get("range_offset_std_m"),
-        )
-        for head in as_dict(site)["radio_heads"]
-    ]
-
-
-def places_of(columns: dict[str, NDArray[Any]], heads: list[RangingHead]) -> NDArray[np.int_]:
+def places_of(columns: dict[str, NDArray[Any]], heads: list[dict[str, Any]]) -> NDArray[np.int_]:
     """Returns the number of the radio head of each range; -1 for others."""
-    places = {(head.pci, head.ssb_index): at for at, head in enumerate(heads)}
+    places = {(head["pci"], head["ssb_index"]): at for at, head in enumerate(heads)}
     pairs = zip(columns["pci"].tolist(), columns["ssb_index"].tolist(), strict=True)
     return np.array([places.get(pair, -1) for pair in pairs], int)
 
@@ -163,9 +136,9 @@ def survey_offsets(
     """
     site = _core.Site.load(site) if isinstance(site, str) else site
     vehicle = _core.Vehicle.load(vehicle) if isinstance(vehicle, str) else vehicle
-    heads = heads_of(site)
+    heads = as_dict(site)["radio_heads"]
     ranging = Ranging.of(vehicle)
-    positions_m = np.array([head.position_m for head in heads])
+    positions_m = np.array([head["position_m"] for head in heads])
     found = np.full((len(folders), len(heads)), np.nan)
     ranges = np.zeros(len(heads), int)
     remarks: list[str] = []
@@ -204,8 +177,8 @@ def survey_offsets(
             changed[f"radio_heads[{at}].range_offset_std_m"] = std_m
     offsets = pl.DataFrame(
         {
-            "pci": [it.pci for it in heads],
-            "ssb_index": [it.ssb_index for it in heads],
+            "pci": [it["pci"] for it in heads],
+            "ssb_index": [it["ssb_index"] for it in heads],
             "range_offset_m": [None if np.isnan(it) else float(it) for it in mean_m],
             "range_offset_std_m": [None if np.isnan(it) else std_m for it in mean_m],
             "positions": np.isfinite(found).sum(axis=0),

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from access_av import _core
-from access_av.drives.range_survey import Ranging, epochs, heads_of, median_ranges, places_of
+from access_av.drives.range_survey import Ranging, epochs, median_ranges, places_of
 from access_av.errors import InputError
+from access_av.settings import as_dict
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -116,7 +117,7 @@ def locate_stationary(
     """
     site = _core.Site.load(site) if isinstance(site, str) else site
     vehicle = _core.Vehicle.load(vehicle) if isinstance(vehicle, str) else vehicle
-    heads = heads_of(site)
+    heads = as_dict(site)["radio_heads"]
     columns, one_way, sample_m, said = _core.read_ranges(site, recording)
     index = places_of(columns, heads)
     known = index >= 0
@@ -141,14 +142,14 @@ def locate_stationary(
     sigma_m = ranging.sigma_m or SAMPLE_SIGMA * (sample_m or 0.0)
     noise_m = sigma_m / math.sqrt(1.0 + duration_s / INDEPENDENT_S)
     measured = [heads[at] for at in received]
-    surveyed_m = [head.surveyed_std_m for head in measured]
-    offset_std_m = [ranging.offset_std_m if std is None else std for std in surveyed_m]
-    position_std_m = [head.position_std_m for head in measured]
+    offset_std_m = [it.get("range_offset_std_m", ranging.offset_std_m) for it in measured]
+    position_std_m = [it["position_std_m"] for it in measured]
     std_m = np.sqrt(np.square(offset_std_m) + np.square(position_std_m) + noise_m**2)
     problem = _Problem(
-        positions_m=np.array([head.position_m for head in measured]),
+        positions_m=np.array([it["position_m"] for it in measured]),
         height_m=ranging.antenna_m[2],
-        pseudorange_m=median_m[received] - np.array([head.offset_m for head in measured]),
+        pseudorange_m=median_m[received]
+        - np.array([it.get("range_offset_m", 0.0) for it in measured]),
         std_m=np.maximum(std_m, 1e-3),
         has_clock=one_way,
     )
