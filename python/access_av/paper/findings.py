@@ -53,6 +53,13 @@ def _largest(values: list[Numbers]) -> Numbers:
     return np.asarray(np.max(np.broadcast_arrays(*values), axis=0), dtype=np.float64)
 
 
+def _least(values: Mapping[tuple[int, str], Numbers], text: str) -> Finding:
+    """Returns the minimum over power modes and methods; its note ends with mode and method."""
+    mode, method = min(values, key=lambda key: np.atleast_1d(values[key])[0])
+    least = np.min(np.broadcast_arrays(*values.values()), axis=0)
+    return Finding(least, note=f"{text} {label(method)} in mode {mode}.")
+
+
 def _a1(outcome: Outcome) -> Finding:
     drives = list(outcome.adaptive.values())
     worst_x_m, worst_y_m = (
@@ -83,9 +90,7 @@ def _a2(outcome: Outcome) -> Finding:
         for mode, ours in outcome.adaptive.items()
         for method in METHODS
     }
-    mode, method = min(shares, key=lambda key: shares[key][0])
-    least = np.min(np.broadcast_arrays(*shares.values()), axis=0)
-    return Finding(least, note=f"Smallest difference: {label(method)} in mode {mode}.")
+    return _least(shares, "Smallest difference:")
 
 
 def _a3(outcome: Outcome) -> Finding:
@@ -117,12 +122,7 @@ def _fixed_worst(outcome: Outcome, method: str) -> Numbers:
 def _errors_accumulate(outcome: Outcome) -> Finding:
     """Returns the ratio of the mean errors in the last and in the first quarter of the trip."""
     ratios = {case: drives.late_to_early for case, drives in outcome.fixed.items()}
-    mode, method = min(ratios, key=lambda key: ratios[key][0])
-    return Finding(
-        np.min(np.broadcast_arrays(*ratios.values()), axis=0),
-        note="Mean error of the last quarter divided by that of the first; minimum: "
-        f"{label(method)} in mode {mode}.",
-    )
+    return _least(ratios, "Mean error of the last quarter divided by that of the first; minimum:")
 
 
 def _esprit_is_worst(outcome: Outcome) -> Finding:
@@ -201,11 +201,7 @@ def _saves_in_every_mode(outcome: Outcome) -> Finding:
         for mode in outcome.adaptive
         for method, percent in savings_percent(outcome, mode).items()
     }
-    mode, method = min(savings, key=lambda key: np.atleast_1d(savings[key])[0])
-    return Finding(
-        np.min(np.broadcast_arrays(*savings.values()), axis=0),
-        note=f"Minimum: saving against {label(method)} in mode {mode}.",
-    )
+    return _least(savings, "Minimum: saving against")
 
 
 def _most_in_mode_0(outcome: Outcome) -> Finding:
