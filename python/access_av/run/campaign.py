@@ -43,35 +43,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ResultCache:
-    """A directory of parts: arrays by name, one file each."""
+    """A directory of parts: arrays by name, one file each.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> parts = ResultCache(Path(tempfile.mkdtemp()))
+    >>> _ = parts.put({"seed": 1}, {"x": np.arange(2)})
+    >>> parts.read({"seed": 1})["x"].tolist(), parts.read({"seed": 2})
+    ([0, 1], None)
+    """
 
     path: Path
-
-    def get(
-        self, depends_on: Any, compute: Callable[[], Mapping[str, NDArray[Any]]]
-    ) -> dict[str, NDArray[Any]]:
-        """Reads a part, or computes and stores it.
-
-        Parameters
-        ----------
-        depends_on
-            Everything that the part's numbers depend on, as plain values.
-        compute
-            Computes the part.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from pathlib import Path
-        >>> parts = ResultCache(Path(tempfile.mkdtemp()))
-        >>> for _ in range(2):
-        ...     part = parts.get({"seed": 1}, lambda: print("computed") or {"x": np.arange(2)})
-        computed
-        >>> part["x"].tolist()
-        [0, 1]
-        """
-        held = self.read(depends_on)
-        return self.put(depends_on, compute()) if held is None else held
 
     def read(self, depends_on: Any) -> dict[str, NDArray[Any]] | None:
         """Reads a part; ``None`` if it is missing or damaged (with a warning)."""
