@@ -165,7 +165,7 @@ class Outcome:
         return self.adaptive[mode] if adaptive else self.fixed[mode, method]
 
 
-def resamples(runs: int, count: int, seed: int = 0) -> Numbers:
+def resamples(runs: int, count: int) -> Numbers:
     """Returns weights of a bootstrap over whole runs; the first row is the original sample.
 
     Examples
@@ -173,7 +173,7 @@ def resamples(runs: int, count: int, seed: int = 0) -> Numbers:
     >>> resamples(4, 2).shape, resamples(4, 2)[0].tolist()
     ((3, 4), [0.25, 0.25, 0.25, 0.25])
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     drawn = rng.multinomial(runs, np.full(runs, 1.0 / runs), size=count) / runs
     return np.vstack([np.full(runs, 1.0 / runs), drawn])
 

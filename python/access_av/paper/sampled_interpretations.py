@@ -219,9 +219,9 @@ def _side_by_side(interpretations: list[Drives]) -> Drives:
     )
 
 
-def as_scenario(values: Mapping[str, Any], name: str = "found") -> Scenario:
+def as_scenario(values: Mapping[str, Any]) -> Scenario:
     """Returns a sampled point as a scenario."""
-    named_alike = {"name": name, "description": "Found by access-av paper search-controllers"}
+    named_alike = {"name": "found", "description": "Found by access-av paper search-controllers"}
     changes = world_changes(values) | controller_changes(values, values)
     return Scenario.load("paper").with_overrides(named_alike | changes)
 

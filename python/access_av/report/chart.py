@@ -104,9 +104,9 @@ def line_chart(
     return chart
 
 
-def time_axis(column: str = "time_s") -> alt.X:
+def time_axis() -> alt.X:
     """Returns a time axis from the first to the last time, because clocks may count from 1970."""
-    return alt.X(f"{column}:Q", title="time / s", scale=alt.Scale(zero=False, nice=False))
+    return alt.X("time_s:Q", title="time / s", scale=alt.Scale(zero=False, nice=False))
 
 
 def finish(chart: alt.Chart | alt.LayerChart, *, height: int, description: str) -> Spec:

@@ -25,11 +25,11 @@ CAPTION = (
 )
 
 
-def steps_of(result: Simulation, run: int = 0) -> pl.DataFrame:
-    """Returns the steps of one simulated run for :func:`played` (needs trajectories)."""
+def steps_of(result: Simulation) -> pl.DataFrame:
+    """Returns the steps of the first simulated run for :func:`played` (needs trajectories)."""
     if result.trajectories is None:
         raise ValueError("the animation needs trajectories: set keep_trajectories=True")
-    return result.trajectories.filter(run=run).select(
+    return result.trajectories.filter(run=0).select(
         "time_s",
         "searching",
         "integrity",
@@ -40,11 +40,11 @@ def steps_of(result: Simulation, run: int = 0) -> pl.DataFrame:
     )
 
 
-def received_of(result: Simulation, run: int = 0) -> pl.DataFrame:
-    """Returns the angles of one simulated run: ``time_s``, ``pci`` and ``ssb_index``."""
+def received_of(result: Simulation) -> pl.DataFrame:
+    """Returns the angles of the first simulated run: ``time_s``, ``pci`` and ``ssb_index``."""
     if result.aoa_estimates is None:
         raise ValueError("the animation needs angle estimates: set keep_trajectories=True")
-    return result.aoa_estimates.filter(run=run).select("time_s", "pci", "ssb_index")
+    return result.aoa_estimates.filter(run=0).select("time_s", "pci", "ssb_index")
 
 
 def played(

@@ -57,13 +57,13 @@ class Compared:
         beyond = self.driven.exceedances
         return f"{text}; {beyond} errors beyond the level while ok" if beyond else text
 
-    def difference_in_words(self, place: int = -1) -> str:
-        """Returns the difference of a percentile to the baseline as text."""
+    def difference_in_words(self) -> str:
+        """Returns the difference of the last percentile to the baseline as text."""
         if self.delta_m is None:
             return "baseline"
         if self.identical:
             return "identical to the baseline"
-        delta, low, high = self.delta_m[place]
+        delta, low, high = self.delta_m[-1]
         if math.isinf(low):
             return f"{delta:+.3f} m; no interval: it needs at least two {self.driven.rows}"
         if math.isnan(delta):
