@@ -16,6 +16,9 @@ use crate::radio_head::RadioHead;
 /// errors repeat.
 const MIN_DRIVEN_M: f64 = 0.5;
 
+/// Distance to the last angle of a radio head below which an angle of a vehicle that stands at its start repeats it (m).
+const SAME_PLACE_M: f64 = 0.02;
+
 /// Number of coordinates of a pose: position and heading.
 const COORDINATES: f64 = 3.0;
 
@@ -68,8 +71,24 @@ clone_in_place! {
         angles: u32,
         /// Number of independent angles.
         independent: u32,
-        /// Distance driven at the last independent angle of each radio head (m).
-        independent_m: Vec<f64>,
+        /// Distances driven at the last angles of each radio head.
+        last: Vec<LastAngles>,
+    }
+}
+
+/// Distances driven at the last angles of a radio head (m); infinite before the first one.
+#[derive(Clone, Copy, Debug)]
+struct LastAngles {
+    used_m: f64,
+    independent_m: f64,
+}
+
+impl Default for LastAngles {
+    fn default() -> Self {
+        Self {
+            used_m: f64::NEG_INFINITY,
+            independent_m: f64::NEG_INFINITY,
+        }
     }
 }
 
@@ -93,7 +112,7 @@ impl RelocalizationTest {
             listened_s: 0.0,
             angles: 0,
             independent: 0,
-            independent_m: vec![f64::NEG_INFINITY; heads],
+            last: vec![LastAngles::default(); heads],
         }
     }
 
@@ -156,10 +175,16 @@ impl RelocalizationTest {
             return;
         }
         let number = head.number_in(self.search.heads());
-        if let Some(last_m) = number.and_then(|number| self.independent_m.get_mut(number)) {
+        if let Some(last) = number.and_then(|number| self.last.get_mut(number)) {
+            // The angles of a standing vehicle have one error. Its weight would not decrease while the vehicle drives.
+            let stands = self.driven_m < MIN_DRIVEN_M;
+            if stands && self.given.is_some() && self.driven_m - last.used_m < SAME_PLACE_M {
+                return;
+            }
+            last.used_m = self.driven_m;
             self.angles = self.angles.saturating_add(1);
-            if self.driven_m - *last_m >= INDEPENDENT_M {
-                *last_m = self.driven_m;
+            if self.driven_m - last.independent_m >= INDEPENDENT_M {
+                last.independent_m = self.driven_m;
                 self.independent = self.independent.saturating_add(1);
             }
         }
