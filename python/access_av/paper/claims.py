@@ -1,7 +1,7 @@
 """Verdicts on the paper's claims, with their weight of evidence and the rules of ``paper.toml``.
 
-The margin of a claim is relative to the stated value, unless this is 0. It is positive if the claim
-is met. It is continuous, so that it has an interval and a sensitivity. Obtained values may be
+The margin of a claim is relative to the paper's value, unless this is 0. It is positive if the
+claim is met. It is continuous, so that it has an interval and a sensitivity. Obtained values may be
 arrays over variants.
 """
 

@@ -17,3 +17,18 @@ mod settings;
 mod starts;
 mod tracker;
 mod yaw_rate;
+
+use onboard::localize::{AngleMeasurement, MeasurementKind};
+
+/// Returns a measured electrical angle.
+const fn angle(time_s: f64, phase_rad: f64, phase_sigma_rad: f64) -> AngleMeasurement {
+    AngleMeasurement {
+        kind: MeasurementKind::Angle,
+        time_s,
+        phase_rad,
+        phase_sigma_rad,
+        angle_rad: f64::NAN,
+        snr_db: 20.0,
+        resolved: true,
+    }
+}

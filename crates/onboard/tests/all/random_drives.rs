@@ -4,16 +4,15 @@ use std::f64::consts::PI;
 use std::fmt::Write as _;
 
 use onboard::geometry::Pose;
-use onboard::localize::{
-    AngleMeasurement, AngleUpdate, MeasurementKind, OutOfSequenceBuffer, UpdateReason,
-    UpdateResult, built_in,
-};
+use onboard::localize::{AngleUpdate, OutOfSequenceBuffer, UpdateReason, UpdateResult, built_in};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+
+use crate::angle;
 
 /// Number of drives of the test, which takes seconds.
 const DRIVES: u64 = 20;
@@ -97,15 +96,8 @@ fn drive(seed: u64) {
             let ground_m = eye.distance_m(head.position);
             let level = ground_m / ground_m.hypot(head.height_m - 0.5).max(1e-9);
             let phase_rad = PI * level * (eye.bearing_rad(head.position) - truth.heading_rad).cos();
-            let measured = AngleMeasurement {
-                kind: MeasurementKind::Angle,
-                time_s: time_s - late_s,
-                phase_rad: phase_rad + 0.1 * noise + outlier,
-                phase_sigma_rad: 0.1,
-                angle_rad: f64::NAN,
-                snr_db: 20.0,
-                resolved: true,
-            };
+            let phase_rad = phase_rad + 0.1 * noise + outlier;
+            let measured = angle(time_s - late_s, phase_rad, 0.1);
             burst.push(AngleUpdate {
                 number: burst.len(),
                 head: *head,

@@ -3,13 +3,15 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use onboard::geometry::Pose;
-use onboard::localize::{AngleMeasurement, Localizer, MeasurementKind, built_in};
+use onboard::localize::{Localizer, built_in};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+
+use crate::angle;
 
 const SITE: &str = "
 name = 'hall'
@@ -90,15 +92,9 @@ impl Drive {
         }
         for head in self.heads.clone() {
             let bearing_rad = self.truth.point().bearing_rad(head.position);
-            let measured = AngleMeasurement {
-                kind: MeasurementKind::Angle,
-                time_s: self.time_s(),
-                phase_rad: PI * (bearing_rad - self.truth.heading_rad).cos() + 0.05 * self.normal(),
-                phase_sigma_rad: 0.05,
-                angle_rad: f64::NAN,
-                snr_db: 20.0,
-                resolved: true,
-            };
+            let phase_rad =
+                PI * (bearing_rad - self.truth.heading_rad).cos() + 0.05 * self.normal();
+            let measured = angle(self.time_s(), phase_rad, 0.05);
             self.localizer.update(&head, &measured).unwrap();
         }
     }

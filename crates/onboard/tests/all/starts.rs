@@ -1,16 +1,18 @@
 //! Given, wrong and unknown starts of a road vehicle without a road: a correct start stays available, and a wrong start
 //! costs seconds.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI};
 
-use onboard::geometry::{Point, Pose};
-use onboard::localize::{AngleMeasurement, IntegrityState, MeasurementKind, built_in};
+use onboard::geometry::{Point, Pose, wrap_angle};
+use onboard::localize::{IntegrityState, built_in};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+
+use crate::angle;
 
 /// Standard deviation of the electrical angles (rad).
 const SIGMA_RAD: f64 = 0.06;
@@ -111,17 +113,9 @@ impl Environment {
     }
 }
 
-/// Returns a measured electrical angle.
-const fn angle(time_s: f64, phase_rad: f64) -> AngleMeasurement {
-    AngleMeasurement {
-        kind: MeasurementKind::Angle,
-        time_s,
-        phase_rad,
-        phase_sigma_rad: SIGMA_RAD,
-        angle_rad: f64::NAN,
-        snr_db: 20.0,
-        resolved: true,
-    }
+/// Returns the exact electrical angle of a radio head.
+fn exact_phase_rad(pose: Pose, head: &RadioHead) -> f64 {
+    PI * (pose.point().bearing_rad(head.position) - pose.heading_rad).cos()
 }
 
 /// Result of a drive.
@@ -165,7 +159,7 @@ fn drive(environment: &Environment, seed: u64, given: Option<fn(Pose) -> Pose>) 
         distance_m += SPEED_MPS * STEP_S;
         let pose = environment.pose(distance_m);
         read_m += scale * SPEED_MPS * STEP_S + 0.01 * (SPEED_MPS * STEP_S).sqrt() * normal()[0];
-        let turned_rad = (pose.heading_rad - before.heading_rad + PI).rem_euclid(TAU) - PI;
+        let turned_rad = wrap_angle(pose.heading_rad - before.heading_rad);
         before = pose;
         let sample = OdometrySample {
             time_s,
@@ -176,13 +170,12 @@ fn drive(environment: &Environment, seed: u64, given: Option<fn(Pose) -> Pose>) 
         localizer.odometry(&sample).unwrap();
         if step % 4 == 0 {
             for head in &heads {
-                let bearing_rad = pose.point().bearing_rad(head.position);
                 let [noise, chance] = normal();
-                let mut phase_rad = PI * (bearing_rad - pose.heading_rad).cos() + SIGMA_RAD * noise;
+                let mut phase_rad = exact_phase_rad(pose, head) + SIGMA_RAD * noise;
                 if chance < OUTLIERS {
                     phase_rad = PI * (2.0 * normal()[1] - 1.0);
                 }
-                let measured = angle(time_s, phase_rad);
+                let measured = angle(time_s, phase_rad, SIGMA_RAD);
                 localizer.update(head, &measured).unwrap();
             }
         }
@@ -341,7 +334,7 @@ fn a_start_at_standstill_with_biased_angles_is_ok_ten_seconds_after_departure() 
         let time_s = STEP_S * f64::from(step);
         let distance_m = SPEED_MPS * (time_s - STANDS_S).max(0.0);
         let pose = ONE_SIDED.pose(distance_m);
-        let turned_rad = (pose.heading_rad - before.heading_rad + PI).rem_euclid(TAU) - PI;
+        let turned_rad = wrap_angle(pose.heading_rad - before.heading_rad);
         before = pose;
         let sample = OdometrySample {
             time_s,
@@ -352,9 +345,8 @@ fn a_start_at_standstill_with_biased_angles_is_ok_ten_seconds_after_departure() 
         localizer.odometry(&sample).unwrap();
         for (head, error_rad) in heads.iter().zip([0.1, 0.7, -0.3]) {
             let error_rad = if distance_m < 0.3 { error_rad } else { 0.0 };
-            let bearing_rad = pose.point().bearing_rad(head.position);
-            let phase_rad = PI * (bearing_rad - pose.heading_rad).cos() + error_rad;
-            localizer.update(head, &angle(time_s, phase_rad)).unwrap();
+            let measured = angle(time_s, exact_phase_rad(pose, head) + error_rad, SIGMA_RAD);
+            localizer.update(head, &measured).unwrap();
         }
         let state = localizer.pose(time_s).unwrap().integrity.unwrap().state;
         if !(STANDS_S..STANDS_S + 10.0).contains(&time_s) {

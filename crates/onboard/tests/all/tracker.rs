@@ -4,12 +4,14 @@ use std::sync::Arc;
 
 use onboard::geometry::Pose;
 use onboard::localize::ekf::EkfConfig;
-use onboard::localize::{AngleMeasurement, Ekf, MeasurementKind, UpdateReason};
+use onboard::localize::{AngleMeasurement, Ekf, UpdateReason};
 use onboard::localize::{InitialPose, OdometryResult};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::road::Road;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
+
+use crate::angle;
 
 fn site() -> Site {
     Site::from_library("trip-1", &Shipped).unwrap()
@@ -45,18 +47,6 @@ fn sample(time_s: f64, distance_m: f64) -> OdometrySample {
         distance_m,
         speed_mps: 4.0,
         yaw_rate_radps: None,
-    }
-}
-
-fn angle(time_s: f64, phase_rad: f64, phase_sigma_rad: f64) -> AngleMeasurement {
-    AngleMeasurement {
-        kind: MeasurementKind::Angle,
-        time_s,
-        phase_rad,
-        phase_sigma_rad,
-        angle_rad: 0.0,
-        snr_db: 20.0,
-        resolved: true,
     }
 }
 

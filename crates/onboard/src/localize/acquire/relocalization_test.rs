@@ -16,7 +16,8 @@ use crate::radio_head::RadioHead;
 /// errors repeat.
 const MIN_DRIVEN_M: f64 = 0.5;
 
-/// Distance to the last angle of a radio head below which an angle of a vehicle that stands at its start repeats it (m).
+/// Distance to the last angle of a radio head below which an angle of a vehicle that stands at its start repeats it (m): an
+/// assumption, above the noise of an odometer at standstill and below the distance between SSBs of a slow vehicle.
 const SAME_PLACE_M: f64 = 0.02;
 
 /// Number of coordinates of a pose: position and heading.
@@ -249,12 +250,12 @@ impl RelocalizationTest {
     /// Returns the mean squared normalised residual at the best position of the search, at least 1. At standstill, it is
     /// the reduced χ², because a pose explains as many angles as it has coordinates, whatever their errors.
     fn misfit(&self) -> f64 {
-        let mut freedom = f64::from(self.angles.max(1));
+        let mut degrees_of_freedom = f64::from(self.angles.max(1));
         if self.driven_m < MIN_DRIVEN_M {
-            freedom *= 1.0 - COORDINATES / f64::from(self.independent.max(1));
+            degrees_of_freedom *= 1.0 - COORDINATES / f64::from(self.independent.max(1));
         }
-        if freedom > 0.0 {
-            (-2.0 * self.search.best() / freedom).max(1.0)
+        if degrees_of_freedom > 0.0 {
+            (-2.0 * self.search.best() / degrees_of_freedom).max(1.0)
         } else {
             f64::INFINITY
         }
