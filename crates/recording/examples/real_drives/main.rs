@@ -411,6 +411,9 @@ fn main() {
     if wants("seeds") && only.is_none() {
         street::ten_odometers(&data.join("street"));
     }
+    if wants("begins") && only.is_none() {
+        street::begins(&data.join("street"));
+    }
 }
 
 /// Locates parts of the drive from several starts, for comparison with the whole drive.
