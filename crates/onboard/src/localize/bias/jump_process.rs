@@ -50,13 +50,40 @@ pub fn independent(travelled_m: f64, correlation_m: f64) -> f64 {
 }
 
 /// Returns the probability that the bias is unchanged after a distance.
-pub(super) fn kept(travelled_m: f64) -> f64 {
+fn kept(travelled_m: f64) -> f64 {
     (-travelled_m / VALUE_M).exp()
 }
 
 /// Returns the independent fraction of the short-lived error.
 pub fn share(travelled_m: f64) -> f64 {
     (travelled_m / SOON_M).clamp(MIN_SHARE, 1.0)
+}
+
+/// Dependence of an angle's error on that of the previous angle of the radio head.
+#[derive(Clone, Copy, Debug)]
+pub struct Dependence {
+    /// Distance between both (m).
+    pub travelled_m: f64,
+    /// Fraction of the bias's variance that is scatter instead, and therefore short-lived.
+    pub white_fraction: f64,
+}
+
+impl Dependence {
+    /// Returns the dependence without scatter.
+    #[cfg(test)]
+    pub(super) const fn of_bias(travelled_m: f64) -> Self {
+        Self {
+            travelled_m,
+            white_fraction: 0.0,
+        }
+    }
+
+    /// Returns the variances of the bias and of the short-lived error (rad²) at a level. Their sum is
+    /// twice the variance of the level, so that the likelihood of an angle hardly depends on the
+    /// fraction of scatter.
+    pub(super) fn parts(&self, value: f64) -> [f64; 2] {
+        [1.0 - self.white_fraction, 1.0 + self.white_fraction].map(|fraction| value * fraction)
+    }
 }
 
 /// Level of a radio head's bias: the probability of each level, current and prior.
@@ -150,19 +177,19 @@ impl JumpProcess {
         self.levels.iter().skip(LARGE).sum::<f64>() > 0.5
     }
 
-    /// Returns the jump hypotheses of an angle, `travelled_m` after the previous one, with the
-    /// innovation `seen` without bias. `value_rad` is the mean of the bias, and `known` is the
-    /// contribution of its variance and covariance to the variance of the innovation.
+    /// Returns the jump hypotheses of an angle with the innovation `seen` without bias. `value_rad`
+    /// is the mean of the bias, and `known` is the contribution of its variance and covariance to
+    /// the variance of the innovation.
     pub fn jump_hypotheses(
         &self,
-        travelled_m: f64,
+        dependence: &Dependence,
         seen: &Innovation,
         value_rad: f64,
         known: f64,
     ) -> JumpHypotheses {
-        let predicted_levels = self.predicted_levels(travelled_m);
-        let stays = kept(travelled_m);
-        let repetition = share(travelled_m).recip();
+        let predicted_levels = self.predicted_levels(dependence.travelled_m);
+        let stays = kept(dependence.travelled_m);
+        let repetition = share(dependence.travelled_m).recip();
         let (kept_residual, redrawn_residual) =
             (wrap_angle(seen.residual - value_rad), seen.residual);
         let mut weights = [[0.0; LEVELS]; 2];
@@ -171,29 +198,30 @@ impl JumpProcess {
         let (mut inverse, mut of_value) = ([[0.0; LEVELS]; 2], [0.0; LEVELS]);
         let mut left = [0.0; LEVELS];
         for (level, value) in VARIANCES.into_iter().enumerate() {
+            let [bias, short_lived] = dependence.parts(value);
             for (hypothesis, share, residual, variance) in [
                 (0, stays, kept_residual, known),
-                (1, 1.0 - stays, redrawn_residual, value),
+                (1, 1.0 - stays, redrawn_residual, bias),
             ] {
                 let once = Innovation {
                     residual,
-                    variance: seen.variance + variance + value,
+                    variance: seen.variance + variance + short_lived,
                     ..*seen
                 };
                 let (density, information) = if (hypothesis, level) == (1, UNKNOWN) {
                     (TAU.recip(), 0.0)
                 } else {
-                    let repeated = seen.variance + variance + value * repetition;
+                    let repeated = seen.variance + variance + short_lived * repetition;
                     (once.density(), repeated.recip())
                 };
                 weights[hypothesis][level] = share * predicted_levels[level] * density;
                 inverse[hypothesis][level] = information;
             }
             (of_value[level], left[level]) = if level == UNKNOWN {
-                (1.0, seen.variance + value)
+                (1.0, seen.variance + short_lived)
             } else {
-                let of_value = value * inverse[1][level];
-                (of_value, value - value * of_value)
+                let of_value = bias * inverse[1][level];
+                (of_value, bias - bias * of_value)
             };
         }
         let [kept, redrawn] = [0, 1].map(|hypothesis| weights[hypothesis].iter().sum::<f64>());
@@ -243,17 +271,18 @@ impl JumpProcess {
     }
 
     /// Returns the expected `E 1/S` (1/rad²) of an angle for a retained and for a new bias, each
-    /// weighted by its probability, a distance after the previous angle of the radio head. `seen` is
-    /// the variance of the innovation without bias; `known` as in [`Self::jump_hypotheses`].
-    pub fn expected_gains(&self, travelled_m: f64, seen: f64, known: f64) -> [f64; 2] {
-        let stays = kept(travelled_m);
-        let repetition = share(travelled_m).recip();
-        let levels = self.predicted_levels(travelled_m).into_iter();
+    /// weighted by its probability. `seen` is the variance of the innovation without bias; `known` as in
+    /// [`Self::jump_hypotheses`].
+    pub fn expected_gains(&self, dependence: &Dependence, seen: f64, known: f64) -> [f64; 2] {
+        let stays = kept(dependence.travelled_m);
+        let repetition = share(dependence.travelled_m).recip();
+        let levels = self.predicted_levels(dependence.travelled_m).into_iter();
         let gains = levels.zip(VARIANCES).map(|(level, value)| {
-            let once = seen + value * repetition;
+            let [bias, short_lived] = dependence.parts(value);
+            let once = seen + short_lived * repetition;
             [
                 level * stays / (once + known),
-                level * (1.0 - stays) / (once + value),
+                level * (1.0 - stays) / (once + bias),
             ]
         });
         gains.fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]])
@@ -276,7 +305,7 @@ mod tests {
             variance: 0.01,
             measurement_variance: 0.01,
         };
-        process.jump_hypotheses(travelled_m, &seen, value_rad, 0.01)
+        process.jump_hypotheses(&Dependence::of_bias(travelled_m), &seen, value_rad, 0.01)
     }
 
     #[test]

@@ -8,7 +8,7 @@
 //! `P Hᵀ` that the state contributes. The change of the covariance by an angle is therefore a
 //! bilinear form of these two vectors.
 
-use super::jump_process::{JumpHypotheses, JumpProcess, MAX_VARIANCE};
+use super::jump_process::{Dependence, JumpHypotheses, JumpProcess, MAX_VARIANCE};
 use super::mixture_update::{CrossCovariance, MixtureUpdate};
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::smoother::Journal;
@@ -158,7 +158,7 @@ impl MultipathBias {
         &self,
         belief: &Belief,
         head: usize,
-        travelled_m: f64,
+        dependence: &Dependence,
         row: &[f64; STATES],
         variance: f64,
     ) -> f64 {
@@ -172,7 +172,7 @@ impl MultipathBias {
         let known = self.known(head, row, error, &persistent);
         let with_bias = alone + error.along(row);
         let [kept, redrawn] =
-            (error.size).expected_gains(travelled_m, total + variance, known.max(-total));
+            (error.size).expected_gains(dependence, total + variance, known.max(-total));
         let reduction = kept * with_bias * with_bias + redrawn * alone * alone;
         (state * state / reduction - state).max(variance)
     }
@@ -208,7 +208,7 @@ impl MultipathBias {
     pub fn jump_hypotheses(
         &self,
         head: usize,
-        travelled_m: f64,
+        dependence: &Dependence,
         seen: &Innovation,
         row: &[f64; STATES],
     ) -> Option<JumpHypotheses> {
@@ -220,7 +220,7 @@ impl MultipathBias {
             ..*seen
         };
         let known = self.known(head, row, error, &persistent);
-        Some((error.size).jump_hypotheses(travelled_m, &seen, error.mean_rad, known))
+        Some((error.size).jump_hypotheses(dependence, &seen, error.mean_rad, known))
     }
 
     /// Updates state and biases with an angle to a radio head and its jump hypotheses.
@@ -228,7 +228,7 @@ impl MultipathBias {
         &mut self,
         belief: &mut Belief,
         head: usize,
-        travelled_m: f64,
+        dependence: &Dependence,
         row: &[f64; STATES],
         hypotheses: &JumpHypotheses,
         journal: Option<&mut Journal<STATES>>,
@@ -244,7 +244,7 @@ impl MultipathBias {
         let Some(error) = self.heads.get_mut(head) else {
             return;
         };
-        error.size.learn(travelled_m, hypotheses);
+        error.size.learn(dependence.travelled_m, hypotheses);
         if hypotheses.density <= 0.0 {
             return; // the angle has no likelihood under either hypothesis
         }
@@ -450,11 +450,21 @@ mod tests {
         travelled_m: f64,
         rad: f64,
     ) {
+        take_with(errors, belief, head, &Dependence::of_bias(travelled_m), rad);
+    }
+
+    fn take_with(
+        errors: &mut MultipathBias,
+        belief: &mut Belief,
+        head: usize,
+        dependence: &Dependence,
+        rad: f64,
+    ) {
         let seen = belief.innovation(rad - belief.mean[0], &row(), OWN_VARIANCE);
         let hypotheses = errors
-            .jump_hypotheses(head, travelled_m, &seen, &row())
+            .jump_hypotheses(head, dependence, &seen, &row())
             .unwrap();
-        errors.update_with_angle(belief, head, travelled_m, &row(), &hypotheses, None);
+        errors.update_with_angle(belief, head, dependence, &row(), &hypotheses, None);
     }
 
     /// State, the biases of two radio heads, and their persistent biases.
@@ -495,9 +505,10 @@ mod tests {
         before: &Gaussian<ALL>,
         levels: [f64; LEVELS],
         head: usize,
-        travelled_m: f64,
+        dependence: &Dependence,
         rad: f64,
     ) -> Gaussian<ALL> {
+        let travelled_m = dependence.travelled_m;
         // Without persistent biases, these states are zero.
         let mut row = [0.0; ALL];
         (row[0], row[STATES + 2 + head]) = (1.0, 1.0);
@@ -508,13 +519,14 @@ mod tests {
         let mut parts = vec![];
         for (level, value) in levels.into_iter().zip(VARIANCES) {
             let probability = level + changes * (1.0 / LEVELS as f64 - level);
+            let [bias, short_lived] = dependence.parts(value);
             let mut redrawn = *before;
             redrawn.mean[STATES + head] = 0.0;
             for i in 0..ALL {
                 redrawn.covariance[i][STATES + head] = 0.0;
                 redrawn.covariance[STATES + head][i] = 0.0;
             }
-            redrawn.covariance[STATES + head][STATES + head] = value;
+            redrawn.covariance[STATES + head][STATES + head] = bias;
             let is_unknown = value == VARIANCES[LEVELS - 1];
             for (is_new, mut component) in [(false, *before), (true, redrawn)] {
                 let probable = if is_new { 1.0 - stays } else { stays };
@@ -528,13 +540,14 @@ mod tests {
                         component.covariance[i][STATES + head] = -cross[i];
                         component.covariance[STATES + head][i] = -cross[i];
                     }
-                    component.covariance[STATES + head][STATES + head] = seen.variance + value;
+                    component.covariance[STATES + head][STATES + head] =
+                        seen.variance + short_lived;
                     parts.push((probable * probability / TAU, component));
                     continue;
                 }
                 let residual = rad - dot(&whole_row, &component.mean);
-                let once = component.innovation(residual, &whole_row, OWN_VARIANCE + value);
-                let repeated = OWN_VARIANCE + value / share(travelled_m);
+                let once = component.innovation(residual, &whole_row, OWN_VARIANCE + short_lived);
+                let repeated = OWN_VARIANCE + short_lived / share(travelled_m);
                 component.update(residual, &whole_row, repeated);
                 parts.push((probable * probability * once.density(), component));
             }
@@ -560,17 +573,19 @@ mod tests {
 
     #[test]
     fn state_and_errors_have_the_moments_of_the_mixture() {
-        have_the_moments_of_the_mixture(MultipathBias::new(2, EVEN));
+        for white_fraction in [0.0, 0.4, 1.0] {
+            have_the_moments_of_the_mixture(MultipathBias::new(2, EVEN), white_fraction);
+        }
     }
 
     #[test]
     fn persistent_biases_have_the_moments_of_the_mixture() {
         let mut errors = MultipathBias::new(2, EVEN);
         errors.expect_persistent();
-        have_the_moments_of_the_mixture(errors);
+        have_the_moments_of_the_mixture(errors, 0.0);
     }
 
-    fn have_the_moments_of_the_mixture(mut errors: MultipathBias) {
+    fn have_the_moments_of_the_mixture(mut errors: MultipathBias, white_fraction: f64) {
         let mut belief = unknown();
         let mut motion = identity::<STATES>();
         (motion[0][1], motion[1][1]) = (0.3, 0.9);
@@ -586,8 +601,12 @@ mod tests {
             (1, 0.3, 0.1),
         ] {
             let levels = errors.heads[head].size.levels;
-            let expected = mixture(&whole(&belief, &errors), levels, head, travelled_m, rad);
-            take(&mut errors, &mut belief, head, travelled_m, rad);
+            let dependence = Dependence {
+                white_fraction,
+                ..Dependence::of_bias(travelled_m)
+            };
+            let expected = mixture(&whole(&belief, &errors), levels, head, &dependence, rad);
+            take_with(&mut errors, &mut belief, head, &dependence, rad);
             assert_same(&whole(&belief, &errors), &expected);
             // A motion of the state, and a measurement of the state alone.
             let mut expected = whole(&belief, &errors);
@@ -695,7 +714,8 @@ mod tests {
             take(&mut errors, &mut belief, 0, 0.1, error_rad);
         }
         assert!(!errors.is_large(0));
-        let small = errors.equivalent_variance(&belief, 0, 2.0, &row(), OWN_VARIANCE);
+        let small =
+            errors.equivalent_variance(&belief, 0, &Dependence::of_bias(2.0), &row(), OWN_VARIANCE);
         assert!(small < 0.05 * 0.05, "{small}");
         for predict_measurement in 0..60 {
             let error_rad = 0.8 + 0.3 * f64::from(predict_measurement % 3 - 1);
@@ -721,7 +741,13 @@ mod tests {
             for number in 0..300 {
                 let error = drawn.after(STEP_M, &mut random);
                 let before = belief.covariance[0][0];
-                let variance = errors.equivalent_variance(&belief, 0, STEP_M, &row(), OWN_VARIANCE);
+                let variance = errors.equivalent_variance(
+                    &belief,
+                    0,
+                    &Dependence::of_bias(STEP_M),
+                    &row(),
+                    OWN_VARIANCE,
+                );
                 take(&mut errors, &mut belief, 0, STEP_M, error);
                 // The first metres determine the level.
                 if number >= 50 {

@@ -59,6 +59,7 @@ impl MultipathBias {
 
 #[cfg(test)]
 mod tests {
+    use super::super::jump_process::Dependence;
     use super::*;
     use crate::localize::ekf::state::{Belief, STATES};
 
@@ -85,6 +86,7 @@ mod tests {
     #[test]
     fn a_constant_error_of_one_radio_head_is_its_persistent_bias() {
         const STEP_M: f64 = 0.5;
+        let dependence = Dependence::of_bias(STEP_M);
         let mut biases = MultipathBias::new(2, 0.75);
         biases.expect_persistent();
         let mut belief = Belief::independent([0.0; STATES], [1e-3; STATES]);
@@ -94,8 +96,10 @@ mod tests {
             biases.advance_persistent(STEP_M);
             for (head, error_rad) in [0.15, 0.0].into_iter().enumerate() {
                 let seen = belief.innovation(error_rad - belief.mean[0], &row, 1e-4);
-                let jumps = biases.jump_hypotheses(head, STEP_M, &seen, &row).unwrap();
-                biases.update_with_angle(&mut belief, head, STEP_M, &row, &jumps, None);
+                let jumps = biases
+                    .jump_hypotheses(head, &dependence, &seen, &row)
+                    .unwrap();
+                biases.update_with_angle(&mut belief, head, &dependence, &row, &jumps, None);
             }
         }
         for (head, error_rad) in [0.15, 0.0].into_iter().enumerate() {

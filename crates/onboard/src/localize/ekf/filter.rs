@@ -12,7 +12,7 @@ use super::white_noise_fraction::{Residual, WhiteNoiseFraction};
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::CERTAIN_SIGMAS;
 use crate::gaussian::smoother::Journal;
-use crate::localize::bias::MultipathBias;
+use crate::localize::bias::{AngleError, ErrorCorrelation, MultipathBias};
 use crate::localize::output::InitialPose;
 use crate::observation::{MeasurementKind, OdometrySample};
 use crate::radio_head::RadioHead;
@@ -44,6 +44,8 @@ pub(super) struct Head {
     pub last_update_rad: f64,
     /// Residual of the last used angle after its update.
     pub last_residual: Option<Residual>,
+    /// Error of the last angle that a wavelength separates from the previous one.
+    pub last_error: Option<AngleError>,
     /// Distance driven at the last used range (m).
     pub last_range_m: f64,
     /// Number of successive rejected ranges.
@@ -61,6 +63,7 @@ impl Head {
             last_update_s: f64::NEG_INFINITY,
             last_update_rad: f64::NEG_INFINITY,
             last_residual: None,
+            last_error: None,
             last_range_m: f64::NEG_INFINITY,
             rejected_ranges: 0,
         }
@@ -94,6 +97,8 @@ clone_in_place! {
         pub(super) unread_m: f64,
         /// White fraction of the angles' noise.
         pub(super) white: WhiteNoiseFraction,
+        /// Correlation of the angles' errors, where their biases are estimated.
+        pub(super) error_correlation: ErrorCorrelation,
         /// Noise of the ranges relative to the specified one.
         pub(super) range_noise: RangeNoise,
         /// Random walk of the clocks relative to the specified one.
@@ -129,6 +134,7 @@ impl Ekf {
             speed_jumps: SpeedJumps::default(),
             unread_m: 0.0,
             white: WhiteNoiseFraction::new(config.correlated_noise.share),
+            error_correlation: ErrorCorrelation::PRIOR,
             range_noise: RangeNoise::STATED,
             clock_noise: RangeNoise::STATED,
             last_delay_s: f64::NEG_INFINITY,

@@ -191,8 +191,8 @@ impl Ekf {
             + self.config.shared_variance(travelled_m, &angle_model);
         // The biases are correlated with the state of the filter, not with that after other angles.
         let bias = &self.bias;
-        let (row, distance_m) = (&angle_model.row, travelled_m.abs());
-        let variance = bias.equivalent_variance(&self.belief, number, distance_m, row, variance);
+        let (row, dependence) = (&angle_model.row, self.dependence(travelled_m));
+        let variance = bias.equivalent_variance(&self.belief, number, &dependence, row, variance);
         if !variance.is_finite() {
             return None;
         }

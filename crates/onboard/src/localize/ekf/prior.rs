@@ -92,12 +92,18 @@ impl Ekf {
         self.copy_noise_state(other);
     }
 
-    /// Sets the white fraction of the angles' noise and the noise of the ranges to those of another
-    /// filter of the same receiver.
+    /// Sets the white fraction of the angles' noise, the correlation of their errors and the noise of the ranges to those
+    /// of another filter of the same receiver.
     pub(in crate::localize) const fn copy_noise_state(&mut self, other: &Self) {
         self.white = other.white;
+        self.copy_error_correlation(other);
         self.range_noise = other.range_noise;
         self.clock_noise = other.clock_noise;
+    }
+
+    /// Sets the correlation of the angles' errors to that of another filter.
+    pub(in crate::localize) const fn copy_error_correlation(&mut self, other: &Self) {
+        self.error_correlation = other.error_correlation;
     }
 
     /// Returns a copy that expects the specified noise of the angles.

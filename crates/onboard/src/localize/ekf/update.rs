@@ -7,7 +7,7 @@ use super::state::{ACROSS, ALONG, ANGLE_TIME_OFFSET, HEADING, SCALE, STATES, YAW
 use super::white_noise_fraction::Residual;
 use crate::gaussian::{Innovation, with_outliers};
 use crate::geometry::wrap_angle;
-use crate::localize::bias::{self, JumpHypotheses, MAX_VARIANCE};
+use crate::localize::bias::{self, AngleError, Dependence, JumpHypotheses, MAX_VARIANCE};
 use crate::localize::output::{UpdateReason, UpdateResult};
 use crate::observation::{AngleMeasurement, MeasurementKind};
 use crate::radio_head::RadioHead;
@@ -146,7 +146,7 @@ impl Ekf {
         let hypotheses = if head.excluded {
             None
         } else {
-            (self.bias).jump_hypotheses(index, travelled_m.abs(), &innovation, &row)
+            (self.bias).jump_hypotheses(index, &self.dependence(travelled_m), &innovation, &row)
         };
         Ok(PredictedMeasurement {
             head: index,
@@ -272,20 +272,52 @@ impl Ekf {
         let mahalanobis2 = seen.mahalanobis2();
         let is_known = self.bias.is_large(predicted.head);
         let before = self.belief.mean;
-        let (distance_m, journal) = (predicted.moved.0.abs(), self.journal.as_mut());
+        let (dependence, journal) = (self.dependence(predicted.moved.0), self.journal.as_mut());
         (self.bias).update_with_angle(
             &mut self.belief,
             predicted.head,
-            distance_m,
+            &dependence,
             &predicted.row,
             hypotheses,
             journal,
         );
+        self.update_error_correlation(predicted, &before);
         self.note_update(predicted, measured, &before);
         if mahalanobis2 > self.config.gate {
             return self.verdict(UpdateReason::Outlier, (!is_known).then_some(mahalanobis2));
         }
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// Returns the dependence of an angle's error on the previous one of its radio head, after a distance.
+    pub(super) fn dependence(&self, travelled_m: f64) -> Dependence {
+        Dependence {
+            travelled_m: travelled_m.abs(),
+            white_fraction: self.error_correlation.white_fraction(),
+        }
+    }
+
+    /// Updates the correlation of the angles' errors; `before` is the state before the update.
+    fn update_error_correlation(
+        &mut self,
+        predicted: &PredictedMeasurement,
+        before: &[f64; STATES],
+    ) {
+        let residual_rad = predicted.innovation.residual;
+        let after = AngleError {
+            residual_rad: residual_rad - self.corrected_rad(predicted, before),
+            place_m: predicted.place_m,
+        };
+        let wavelength_m = self.config.array.wavelength_m;
+        if let Some(head) = self.heads.get_mut(predicted.head) {
+            (self.error_correlation).add(&mut head.last_error, wavelength_m, residual_rad, after);
+        }
+    }
+
+    /// Returns the correction of a predicted angle by an update (rad); `before` is the state before it.
+    fn corrected_rad(&self, predicted: &PredictedMeasurement, before: &[f64; STATES]) -> f64 {
+        let states = self.belief.mean.iter().zip(before).zip(&predicted.row);
+        states.map(|((now, before), by)| by * (now - before)).sum()
     }
 
     /// Returns the time-correlated noise of the angles with its estimated fraction.
@@ -301,16 +333,13 @@ impl Ekf {
     /// the update.
     fn update_white_fraction(&mut self, predicted: &PredictedMeasurement, before: &[f64; STATES]) {
         let stated = self.config.correlated_noise;
-        let Some(head) = self.heads.get_mut(predicted.head) else {
-            return;
-        };
         if !(stated.is_found && stated.share > 0.0) {
             return; // the fraction is not estimated
         }
-        let corrected = self.belief.mean.iter().zip(before).zip(&predicted.row);
-        let corrected_rad: f64 = corrected
-            .map(|((now, before), by)| by * (now - before))
-            .sum();
+        let corrected_rad = self.corrected_rad(predicted, before);
+        let Some(head) = self.heads.get_mut(predicted.head) else {
+            return;
+        };
         let is_correlated = stated.steps(predicted.elapsed_s, predicted.moved) < 1.0;
         let mut residual = Residual {
             residual_rad: predicted.innovation.residual,

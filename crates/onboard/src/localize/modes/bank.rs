@@ -414,7 +414,8 @@ impl Bank {
     }
 
     /// Updates with an angle: the test of its radio head, and every filter that uses the radio
-    /// head.
+    /// head. All hypotheses have the nominal correlation of errors, because a filter that follows
+    /// the angles makes its own errors less correlated, and would be favoured by it.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateResult {
         let number = head.number_in(&self.heads);
         if !self.has_angles {
@@ -433,6 +434,7 @@ impl Bank {
         let predicted = self.nominal.predict_measurement(head, measured);
         for it in &mut self.modes {
             (it.mode.adapt)(&mut it.ekf, noise_scale);
+            it.ekf.copy_error_correlation(&self.nominal);
             it.update((&self.nominal, &predicted), head, measured);
         }
         let most = (self.modes.iter()).fold(LikelihoodRatio::NONE, |most, it| most.max(it.ratio));
