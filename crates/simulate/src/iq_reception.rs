@@ -1,7 +1,7 @@
 //! Reception of simulated IQ samples with the receiver of the vehicle.
 
 use onboard::observation::{SsbDetection, SsbObservation};
-use onboard::receive::{Receiver, ReceiverConfig, Window};
+use onboard::receive::{Receiver, ReceiverConfig, Window, window_receiver};
 use onboard::{BoxError, SsbInput, SsbSource};
 
 use crate::channel::{HeadChannel, IqAir};
@@ -13,7 +13,7 @@ use crate::world::{Path, VehicleState};
 /// Signal synthesis and receiver of one run.
 pub struct IqReception {
     air: IqAir,
-    receiver: Receiver,
+    receiver: Box<dyn Receiver>,
     observations: Vec<SsbObservation>,
 }
 
@@ -42,7 +42,7 @@ impl IqReception {
         let config = ReceiverConfig::new(&scenario.site, &scenario.vehicle);
         Ok(Self {
             air: IqAir::new(scenario, streams)?,
-            receiver: Receiver::new(config)?,
+            receiver: window_receiver(config)?,
             observations: Vec::new(),
         })
     }
@@ -63,7 +63,7 @@ impl IqReception {
         };
         let observations = &mut self.observations;
         observations.clear();
-        self.receiver.receive(&window, |observation| {
+        self.receiver.receive(&window, &mut |observation| {
             observations.push(observation.clone());
         })?;
         observations.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));

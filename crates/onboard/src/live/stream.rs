@@ -9,7 +9,7 @@ use super::error::LiveError;
 use super::stream_clock::{Continuity, StreamClock};
 use crate::burst::first_burst;
 use crate::observation::{BURST_S, MAX_ELEMENTS, SsbObservation};
-use crate::receive::{ReceiveError, ReceiverConfig, StreamReceiver};
+use crate::receive::{ReceiveError, ReceiverConfig, StreamReceiver, stream_receiver};
 
 /// Configuration of a sample stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +46,8 @@ pub struct StreamCounts {
 /// Receiver of a stream, with the observations of an incomplete burst.
 pub struct SampleStream {
     clock: StreamClock,
-    receiver: StreamReceiver,
+    offset: TimeOffset,
+    receiver: Box<dyn StreamReceiver>,
     elements: usize,
     bursts: Bursts,
     counts: StreamCounts,
@@ -54,44 +55,51 @@ pub struct SampleStream {
     is_stretch_ended: bool,
 }
 
+/// Time minus sample time.
+#[derive(Debug, Clone, Copy, Default)]
+struct TimeOffset {
+    /// Duration of unreported missing samples before the newest SSB, in seconds.
+    unreported_gap_s: f64,
+    inferred_gaps: u64,
+    /// Offset in seconds, if the caller measures it; it replaces the gaps and interruptions.
+    measured_s: Option<f64>,
+    /// Interruptions that the caller reported, in seconds.
+    interrupted_s: f64,
+}
+
+impl TimeOffset {
+    /// Returns time minus sample time, in seconds.
+    fn value_s(&self) -> f64 {
+        self.measured_s
+            .unwrap_or(self.unreported_gap_s + self.interrupted_s)
+    }
+
+    /// Records the duration of unreported missing samples in seconds, and returns the offset.
+    fn with_gap(&mut self, unreported_gap_s: f64) -> f64 {
+        if unreported_gap_s != self.unreported_gap_s {
+            self.unreported_gap_s = unreported_gap_s;
+            self.inferred_gaps += 1;
+        }
+        self.value_s()
+    }
+}
+
 /// Observations in order of time; the first `held` are valid, the others are reusable memory.
 #[derive(Default)]
 struct Bursts {
     observations: Vec<SsbObservation>,
     held: usize,
-    /// Duration of unreported missing samples before the newest, in seconds.
-    unreported_gap_s: f64,
-    inferred_gaps: u64,
-    /// Time minus sample time in seconds, if the caller measures it; `unreported_gap_s` is not applied
-    /// then.
-    offset_s: Option<f64>,
-    /// Interruptions that the caller reported, in seconds.
-    interrupted_s: f64,
     /// Time before which all SSBs are complete; infinite after the end of a segment.
     passed_until_s: f64,
 }
 
 impl Bursts {
-    fn take(&mut self, observation: &SsbObservation, unreported_gap_s: f64) {
-        if unreported_gap_s != self.unreported_gap_s {
-            (self.unreported_gap_s, self.inferred_gaps) =
-                (unreported_gap_s, self.inferred_gaps + 1);
-        }
-        let correction_s = self.correction_s() - unreported_gap_s;
+    fn take(&mut self, observation: &SsbObservation) {
         match self.observations.get_mut(self.held) {
             Some(room) => room.copy_from(observation),
             None => self.observations.push(observation.clone()),
         }
-        if let Some(taken) = self.observations.get_mut(self.held) {
-            taken.ssb.time_s += correction_s;
-        }
         self.held += 1;
-    }
-
-    /// Returns time minus sample time, in seconds.
-    fn correction_s(&self) -> f64 {
-        self.offset_s
-            .unwrap_or(self.unreported_gap_s + self.interrupted_s)
     }
 }
 
@@ -105,7 +113,8 @@ impl SampleStream {
         Ok(Self {
             clock: StreamClock::new(rate_hz),
             elements: receiver.array.elements.into(),
-            receiver: StreamReceiver::new(receiver, rate_hz, centre_hz)?,
+            receiver: stream_receiver(receiver, rate_hz, centre_hz)?,
+            offset: TimeOffset::default(),
             bursts: Bursts::default(),
             counts: StreamCounts::default(),
             is_stretch_ended: false,
@@ -125,8 +134,8 @@ impl SampleStream {
     /// Returns the counts.
     pub fn counts(&self) -> StreamCounts {
         StreamCounts {
-            inferred_gaps: self.bursts.inferred_gaps,
-            unreported_gap_s: self.bursts.unreported_gap_s,
+            inferred_gaps: self.offset.inferred_gaps,
+            unreported_gap_s: self.offset.unreported_gap_s,
             found: self.receiver.found(),
             ..self.counts
         }
@@ -141,18 +150,18 @@ impl SampleStream {
     /// Returns time minus sample time in seconds: the offset measured by the caller, otherwise the
     /// unreported gaps.
     pub fn correction_s(&self) -> f64 {
-        self.bursts.correction_s()
+        self.offset.value_s()
     }
 
     /// Sets time minus sample time in seconds, for a caller that counts samples and measures their
     /// arrival. It replaces the unreported gaps, which are known modulo the SSB period only.
     pub const fn set_offset_s(&mut self, offset_s: Option<f64>) {
-        self.bursts.offset_s = offset_s;
+        self.offset.measured_s = offset_s;
     }
 
     /// Adds an interruption in seconds that the times of the samples do not report.
     pub fn add_interruption(&mut self, lost_s: f64) {
-        self.bursts.interrupted_s += lost_s;
+        self.offset.interrupted_s += lost_s;
     }
 
     /// Processes the next samples of every antenna; `time_s` is the reception time of the first
@@ -202,13 +211,14 @@ impl SampleStream {
         self.counts.taken_s += (length - left_out) as f64 / self.clock.rate_hz();
         let Self {
             clock,
+            offset,
             receiver,
             bursts,
             ..
         } = self;
-        let time_s = |sample| clock.time_s(sample);
-        receiver.push(new, &time_s, &mut |it, gap_s| bursts.take(it, gap_s))?;
-        bursts.passed_until_s = clock.time_s(receiver.passed_until()) + bursts.correction_s();
+        let mut time_s = |sample, gap_s| clock.time_s(sample) + offset.with_gap(gap_s);
+        receiver.push(new, &mut time_s, &mut |it| bursts.take(it))?;
+        bursts.passed_until_s = clock.time_s(receiver.passed_until()) + offset.value_s();
         Ok(continuity)
     }
 
@@ -224,11 +234,9 @@ impl SampleStream {
     }
 
     fn gap_to(&mut self, sample: u64, clock: &StreamClock) -> Result<(), LiveError> {
-        let (receiver, bursts) = (&mut self.receiver, &mut self.bursts);
-        let time_s = |sample| clock.time_s(sample);
-        receiver.gap_to(sample, &time_s, &mut |it, unreported_gap_s| {
-            bursts.take(it, unreported_gap_s);
-        })?;
+        let (offset, bursts) = (&mut self.offset, &mut self.bursts);
+        let mut time_s = |sample, gap_s| clock.time_s(sample) + offset.with_gap(gap_s);
+        (self.receiver).gap_to(sample, &mut time_s, &mut |it| bursts.take(it))?;
         Ok(())
     }
 

@@ -1,5 +1,5 @@
-//! Reception: a [`StreamReceiver`] of a sample stream, or a [`Receiver`] of windows, tracks the
-//! cells of a site and creates an observation of each of their SSBs.
+//! Reception: a [`Receiver`] of windows, or the receiver of a sample stream, tracks the cells of a
+//! site and creates an observation of each of their SSBs.
 
 pub mod array_view;
 pub mod despread;
@@ -7,4 +7,5 @@ mod ranging;
 mod receiver;
 pub mod wideband;
 
-pub use receiver::{ReceiveError, Receiver, ReceiverConfig, SSB_SAMPLES, StreamReceiver, Window};
+pub use receiver::{ReceiveError, Receiver, ReceiverConfig, SSB_SAMPLES, Window, window_receiver};
+pub(crate) use receiver::{StreamReceiver, stream_receiver};

@@ -1,8 +1,8 @@
 //! Receiver of the vehicle: an [`SsbObservation`] of every SSB of the site's cells.
 //!
 //! [`nr_ssb::receiver`] detects and tracks the cells. [`Receiver`] processes windows at the base
-//! rate (256 samples per symbol) around each burst, as in simulations. [`StreamReceiver`] processes
-//! a sample stream of any rate.
+//! rate (256 samples per symbol) around each burst, as in simulations.
+//! [`SampleStream`](crate::live::SampleStream) processes a sample stream of any rate.
 
 use aoa::DirectionFinder;
 use nr_ssb::grid::{SUBCARRIERS, SYMBOLS};
@@ -127,31 +127,13 @@ pub enum ReceiveError {
     Calibration(usize),
 }
 
-/// Receiver of windows at one frequency.
-pub struct Receiver(Box<dyn DynWindowReceiver>);
-
-impl Receiver {
-    /// Creates a receiver without cells.
-    ///
-    /// # Errors
-    /// [`ReceiveError::Ssb`] or [`ReceiveError::Calibration`] for invalid settings.
-    pub fn new(config: ReceiverConfig) -> Result<Self, ReceiveError> {
-        let ssb_config = config.of_ssbs();
-        for_elements!(config.array.elements, A => {
-            let receiver = WindowReceiver::<A>::new(ssb_config)?;
-            Ok(Self(Box::new((receiver, Observer::<A>::new(config)?))))
-        })
-    }
-
+/// Receiver of windows at one frequency, for any number of antennas.
+pub trait Receiver: Send {
     /// Returns the number of tracked SSBs.
-    pub fn tracked(&self) -> usize {
-        self.0.tracked()
-    }
+    fn tracked(&self) -> usize;
 
     /// Returns the number of windows in which cells were searched for.
-    pub fn searches(&self) -> u64 {
-        self.0.searches()
-    }
+    fn searches(&self) -> u64;
 
     /// Searches for cells if a search is due, and passes every SSB in the window to `take`, in
     /// order of time.
@@ -159,97 +141,6 @@ impl Receiver {
     /// # Errors
     /// [`ReceiveError`] if the number of antennas differs from the configuration, or their lengths
     /// differ.
-    pub fn receive(
-        &mut self,
-        window: &Window<'_>,
-        mut take: impl FnMut(&SsbObservation),
-    ) -> Result<(), ReceiveError> {
-        self.0.receive(window, &mut take)
-    }
-}
-
-/// Receiver of a sample stream at one frequency.
-pub struct StreamReceiver(Box<dyn DynStreamReceiver>);
-
-impl StreamReceiver {
-    /// Creates a receiver without cells, for samples of a rate and centre frequency.
-    ///
-    /// # Errors
-    /// Those of [`Receiver::new`].
-    pub fn new(
-        config: ReceiverConfig,
-        sample_rate_hz: f64,
-        centre_hz: f64,
-    ) -> Result<Self, ReceiveError> {
-        let ssb_config = config.of_ssbs();
-        for_elements!(config.array.elements, A => {
-            let receiver = ssb::StreamReceiver::<A>::new(ssb_config, sample_rate_hz, centre_hz)?;
-            Ok(Self(Box::new((receiver, Observer::<A>::new(config)?))))
-        })
-    }
-
-    /// Returns the number of tracked SSBs.
-    pub fn tracked(&self) -> usize {
-        self.0.tracked()
-    }
-
-    /// Returns tone number `index` of those that are subtracted, the strongest first, at its absolute frequency.
-    pub fn tone(&self, index: usize) -> Option<Tone> {
-        self.0.tone(index)
-    }
-
-    /// Returns the input sample before which all SSBs have been passed on.
-    pub fn passed_until(&self) -> f64 {
-        self.0.passed_until()
-    }
-
-    /// Returns the number of SSBs that a search has detected; all others were received at their
-    /// expected time.
-    pub fn found(&self) -> u64 {
-        self.0.found()
-    }
-
-    /// Processes the next samples and passes every completed SSB to `take`, in order of time.
-    /// `time_s` returns the reception time of an input sample; the index of the first sample is 0.
-    /// `take` also receives the duration of the unreported missing samples before the observation,
-    /// in seconds, which is included in its time.
-    ///
-    /// # Errors
-    /// [`ReceiveError`] if the number of antennas differs from the configuration, or their lengths
-    /// differ.
-    pub fn push(
-        &mut self,
-        antennas: &[&[Complex32]],
-        time_s: &dyn Fn(f64) -> f64,
-        take: &mut dyn FnMut(&SsbObservation, f64),
-    ) -> Result<(), ReceiveError> {
-        self.0.push(antennas, time_s, take)
-    }
-
-    /// Sets the index of the next input sample; the samples before it are missing. Passes on
-    /// pending SSBs.
-    ///
-    /// # Errors
-    /// Those of [`push`](Self::push).
-    pub fn gap_to(
-        &mut self,
-        sample: u64,
-        time_s: &dyn Fn(f64) -> f64,
-        take: &mut dyn FnMut(&SsbObservation, f64),
-    ) -> Result<(), ReceiveError> {
-        self.0.gap_to(sample, time_s, take)
-    }
-
-    /// Removes cells and samples, for a stream that restarts at sample 0.
-    pub fn reset(&mut self) {
-        self.0.reset();
-    }
-}
-
-/// Receiver of windows for any number of antennas.
-trait DynWindowReceiver: Send {
-    fn tracked(&self) -> usize;
-    fn searches(&self) -> u64;
     fn receive(
         &mut self,
         window: &Window<'_>,
@@ -257,7 +148,19 @@ trait DynWindowReceiver: Send {
     ) -> Result<(), ReceiveError>;
 }
 
-impl<const A: usize> DynWindowReceiver for (WindowReceiver<A>, Observer<A>) {
+/// Creates a receiver of windows without cells.
+///
+/// # Errors
+/// [`ReceiveError::Ssb`] or [`ReceiveError::Calibration`] for invalid settings.
+pub fn window_receiver(config: ReceiverConfig) -> Result<Box<dyn Receiver>, ReceiveError> {
+    let ssb_config = config.of_ssbs();
+    for_elements!(config.array.elements, A => {
+        let receiver = WindowReceiver::<A>::new(ssb_config)?;
+        Ok(Box::new((receiver, Observer::<A>::new(config)?)))
+    })
+}
+
+impl<const A: usize> Receiver for (WindowReceiver<A>, Observer<A>) {
     fn tracked(&self) -> usize {
         self.0.tracked()
     }
@@ -272,8 +175,11 @@ impl<const A: usize> DynWindowReceiver for (WindowReceiver<A>, Observer<A>) {
         take: &mut dyn FnMut(&SsbObservation),
     ) -> Result<(), ReceiveError> {
         let (receiver, observer) = self;
-        check_antennas::<A>(window.antennas)?;
         let (start, antennas) = (window.start as i64, window.antennas);
+        let found = antennas.len();
+        if found != A {
+            return Err(ReceiveError::Antennas { found, elements: A });
+        }
         let base_rate_hz = observer.config.spacing.base_rate_hz();
         receiver.receive(&ssb::Window { start, antennas }, &mut |mut seen| {
             let elapsed_s = (seen.ssb.sample_start - start as f64) / base_rate_hz;
@@ -283,28 +189,70 @@ impl<const A: usize> DynWindowReceiver for (WindowReceiver<A>, Observer<A>) {
     }
 }
 
-/// Receiver of a stream for any number of antennas.
-trait DynStreamReceiver: Send {
+/// Receiver of a sample stream at one frequency, for any number of antennas.
+pub(crate) trait StreamReceiver: Send {
+    /// Returns the number of tracked SSBs.
     fn tracked(&self) -> usize;
+
+    /// Returns tone number `index` of those that are subtracted, the strongest first, at its
+    /// absolute frequency.
     fn tone(&self, index: usize) -> Option<Tone>;
+
+    /// Returns the input sample before which all SSBs have been passed on.
     fn passed_until(&self) -> f64;
+
+    /// Returns the number of SSBs that a search has detected; all others were received at their
+    /// expected time.
     fn found(&self) -> u64;
+
+    /// Processes the next samples and passes every completed SSB to `take`, in order of time.
+    /// `time_s` returns the reception time of an input sample, whose index is 0 for the first one.
+    /// Its second argument is the total duration in seconds of missing samples that the caller has
+    /// not reported.
+    ///
+    /// # Errors
+    /// [`ReceiveError`] if the number of antennas differs from the configuration, or their lengths
+    /// differ.
     fn push(
         &mut self,
         antennas: &[&[Complex32]],
-        time_s: &dyn Fn(f64) -> f64,
-        take: &mut dyn FnMut(&SsbObservation, f64),
+        time_s: &mut dyn FnMut(f64, f64) -> f64,
+        take: &mut dyn FnMut(&SsbObservation),
     ) -> Result<(), ReceiveError>;
+
+    /// Sets the index of the next input sample; the samples before it are missing. Passes on
+    /// pending SSBs.
+    ///
+    /// # Errors
+    /// Those of [`push`](Self::push).
     fn gap_to(
         &mut self,
         sample: u64,
-        time_s: &dyn Fn(f64) -> f64,
-        take: &mut dyn FnMut(&SsbObservation, f64),
+        time_s: &mut dyn FnMut(f64, f64) -> f64,
+        take: &mut dyn FnMut(&SsbObservation),
     ) -> Result<(), ReceiveError>;
+
+    /// Removes cells and samples, for a stream that restarts at sample 0.
     fn reset(&mut self);
 }
 
-impl<const A: usize> DynStreamReceiver for (ssb::StreamReceiver<A>, Observer<A>) {
+/// Creates a receiver without cells, for samples of a rate and centre frequency.
+///
+/// # Errors
+/// Those of [`window_receiver`].
+pub(crate) fn stream_receiver(
+    config: ReceiverConfig,
+    sample_rate_hz: f64,
+    centre_hz: f64,
+) -> Result<Box<dyn StreamReceiver>, ReceiveError> {
+    let ssb_config = config.of_ssbs();
+    for_elements!(config.array.elements, A => {
+        let receiver = ssb::StreamReceiver::<A>::new(ssb_config, sample_rate_hz, centre_hz)?;
+        Ok(Box::new((receiver, Observer::<A>::new(config)?)))
+    })
+}
+
+impl<const A: usize> StreamReceiver for (ssb::StreamReceiver<A>, Observer<A>) {
     fn tracked(&self) -> usize {
         self.0.receiver().tracked()
     }
@@ -326,14 +274,13 @@ impl<const A: usize> DynStreamReceiver for (ssb::StreamReceiver<A>, Observer<A>)
     fn push(
         &mut self,
         antennas: &[&[Complex32]],
-        time_s: &dyn Fn(f64) -> f64,
-        take: &mut dyn FnMut(&SsbObservation, f64),
+        time_s: &mut dyn FnMut(f64, f64) -> f64,
+        take: &mut dyn FnMut(&SsbObservation),
     ) -> Result<(), ReceiveError> {
-        check_antennas::<A>(antennas)?;
         let (receiver, observer) = self;
         let ratio = receiver.input_per_output();
         receiver.push(antennas, &mut |mut seen| {
-            observer.observe_in_stream(&mut seen, ratio, time_s, take);
+            take(observer.observe_in_stream(&mut seen, ratio, time_s));
         })?;
         Ok(())
     }
@@ -341,13 +288,13 @@ impl<const A: usize> DynStreamReceiver for (ssb::StreamReceiver<A>, Observer<A>)
     fn gap_to(
         &mut self,
         sample: u64,
-        time_s: &dyn Fn(f64) -> f64,
-        take: &mut dyn FnMut(&SsbObservation, f64),
+        time_s: &mut dyn FnMut(f64, f64) -> f64,
+        take: &mut dyn FnMut(&SsbObservation),
     ) -> Result<(), ReceiveError> {
         let (receiver, observer) = self;
         let ratio = receiver.input_per_output();
         receiver.gap_to(sample, &mut |mut seen| {
-            observer.observe_in_stream(&mut seen, ratio, time_s, take);
+            take(observer.observe_in_stream(&mut seen, ratio, time_s));
         })?;
         Ok(())
     }
@@ -359,14 +306,6 @@ impl<const A: usize> DynStreamReceiver for (ssb::StreamReceiver<A>, Observer<A>)
             clock.reset();
         }
     }
-}
-
-fn check_antennas<const A: usize>(antennas: &[&[Complex32]]) -> Result<(), ReceiveError> {
-    let found = antennas.len();
-    if found == A {
-        return Ok(());
-    }
-    Err(ReceiveError::Antennas { found, elements: A })
 }
 
 /// Converter of received SSBs to observations.
@@ -429,16 +368,17 @@ impl<const A: usize> Observer<A> {
         into
     }
 
+    /// Returns the observation of an SSB in a stream; `ratio` is the number of input samples per
+    /// sample at the base rate.
     fn observe_in_stream(
         &mut self,
         seen: &mut ReceivedBeam<'_, A>,
         ratio: f64,
-        time_s: &dyn Fn(f64) -> f64,
-        take: &mut dyn FnMut(&SsbObservation, f64),
-    ) {
+        time_s: &mut dyn FnMut(f64, f64) -> f64,
+    ) -> &SsbObservation {
         let unreported_gap_s = seen.unreported_gap / self.config.spacing.base_rate_hz();
-        let received_s = time_s(seen.ssb.sample_start * ratio) + unreported_gap_s;
-        take(self.observe(seen, received_s), unreported_gap_s);
+        let received_s = time_s(seen.ssb.sample_start * ratio, unreported_gap_s);
+        self.observe(seen, received_s)
     }
 }
 

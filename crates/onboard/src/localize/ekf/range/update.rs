@@ -167,18 +167,6 @@ impl Ekf {
         Some(self.range_state(number))
     }
 
-    /// Returns the estimated drift of the vehicle's clock, as a rate of the pseudorange (m/s);
-    /// `None` without one-way delays.
-    pub fn clock_drift_mps(&self) -> Option<RangeState> {
-        let model = self.config.ranging.filter(|model| model.is_one_way);
-        model.map(|_| self.range_state(DRIFT))
-    }
-
-    /// Returns the estimated standard deviation of the ranges' noise relative to the specified one.
-    pub fn range_noise_scale(&self) -> f64 {
-        self.range_noise.ratio().sqrt()
-    }
-
     fn range_state(&self, number: usize) -> RangeState {
         let [mean, variance] = self.bias.range_state(number);
         let std = variance.max(0.0).sqrt();
