@@ -19,7 +19,7 @@ use crate::angle_watch::AngleWatch;
 use crate::clock::DriveClock;
 use crate::events::Collapse;
 use crate::gate::{BurstWindows, RxWindow};
-use crate::inbox::{Block, Command, Inbox, Input, Level};
+use crate::inbox::{Command, Inbox, Input, Level};
 use crate::interruption::Interruptions;
 use crate::sink::{Distributor, PoseCause, PoseRecord, Record};
 use crate::state::{self, StateStore};
@@ -104,8 +104,8 @@ pub struct Engine {
     /// Number of gaps that were detected from the SSBs.
     unreported_gaps: u64,
     period_s: f64,
-    /// Samples that are not yet processed by the pipeline.
-    pending: Block,
+    /// Time of the first sample since the last processed SSBs, in seconds.
+    window_s: Option<f64>,
     /// End of each recent block in the time of the stream, and its arrival.
     arrivals: VecDeque<(f64, Instant)>,
     last_pose: Option<(f64, Instant)>,
@@ -148,7 +148,7 @@ impl Engine {
             live: setup.live()?,
             windows: BurstWindows::new(&setup.site),
             period_s: setup.site.ssb.period_s(),
-            pending: Block::default(),
+            window_s: None,
             setup,
             records,
             board,
@@ -261,7 +261,7 @@ impl Engine {
             self.reload_if_requested()?;
             self.tick()?;
         }
-        self.receive(true)?;
+        self.process_bursts(true, None)?;
         self.live.flush()?;
         self.publish_angles(None)?;
         self.save()
@@ -283,8 +283,7 @@ impl Engine {
                 self.watch_samples(came, until_s);
                 let is_over = |[_, end_s]: [f64; 2]| until_s >= end_s;
                 if self.gate.wanted().is_some_and(is_over) {
-                    self.receive(true)?;
-                    self.publish_angles(Some(came))?;
+                    self.process_bursts(true, came)?;
                     self.sleep_until_next(until_s)?;
                 }
             }
@@ -490,7 +489,7 @@ impl Engine {
         self.windows = BurstWindows::new(&setup.site);
         self.period_s = setup.site.ssb.period_s();
         (self.setup, self.live) = (setup, live);
-        self.pending.antennas.iter_mut().for_each(Vec::clear);
+        self.window_s = None;
         self.clocks_differ = false;
         self.interruptions.reset();
         self.unreported_gaps = 0;

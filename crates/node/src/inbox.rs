@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use num_complex::Complex32;
 use onboard::geometry::Pose;
-use onboard::live::{AngleObservation, RangeObservation, contiguity_tolerance_s};
+use onboard::live::{AngleObservation, RangeObservation};
 use onboard::observation::OdometrySample;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -20,7 +20,7 @@ pub const MAX_WAITING_INPUTS: usize = 4096;
 const MAX_REUSED_BUFFERS: usize = 8;
 
 /// Samples of every antenna in the order of the array.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Block {
     /// Sample time of the first sample in seconds.
     pub time_s: f64,
@@ -34,25 +34,6 @@ impl Block {
     /// Returns the number of samples per antenna.
     pub fn length(&self) -> usize {
         self.antennas.first().map_or(0, Vec::len)
-    }
-
-    /// Whether `next` continues these samples without a gap.
-    pub fn continues_in(&self, next: &Self, rate_hz: f64) -> bool {
-        let end_s = self.time_s + self.length() as f64 / rate_hz;
-        let tolerance_s = contiguity_tolerance_s(next.time_s, rate_hz, self.length());
-        (next.time_s - end_s).abs() <= tolerance_s
-    }
-
-    /// Appends the following samples.
-    pub fn append(&mut self, next: &Self) {
-        if self.length() == 0 {
-            self.time_s = next.time_s;
-        }
-        self.offset_s = next.offset_s;
-        self.antennas.resize_with(next.antennas.len(), Vec::new);
-        for (samples, more) in self.antennas.iter_mut().zip(&next.antennas) {
-            samples.extend_from_slice(more);
-        }
     }
 
     fn bytes(&self) -> usize {
@@ -308,33 +289,6 @@ mod tests {
                 .iter()
                 .all(|it| it.is_empty() && it.capacity() > 0)
         );
-    }
-
-    #[test]
-    fn blocks_with_unix_times_are_contiguous_and_a_lost_packet_is_a_gap() {
-        // A Unix time has a resolution of 0.24 µs, a sample takes 0.26 µs.
-        let rate_hz = 3.84e6;
-        let at = |time_s: f64, length: usize| Block {
-            time_s,
-            offset_s: None,
-            antennas: vec![vec![Complex32::ZERO; length]],
-        };
-        for epoch_s in [0.0, 1.7e9, 1_795_722_391.123_456_7] {
-            let (mut sum, mut counted) = (Block::default(), 0_usize);
-            for number in 0..40 {
-                let block = at(epoch_s + counted as f64 / rate_hz, 3840 + 7 * number);
-                assert!(
-                    counted == 0 || sum.continues_in(&block, rate_hz),
-                    "{epoch_s} {number}"
-                );
-                counted += block.length();
-                sum.append(&block);
-            }
-            let packet = 360;
-            let late = at(epoch_s + (counted + packet) as f64 / rate_hz, 3840);
-            let last = at(epoch_s + (counted - 3840) as f64 / rate_hz, 3840);
-            assert!(!last.continues_in(&late, rate_hz), "{epoch_s}");
-        }
     }
 
     #[test]

@@ -1,10 +1,10 @@
-//! Processing of samples: complete windows are given to the pipeline, and samples between windows
-//! are dropped.
+//! Processing of samples: the receiver gets every block, and the pipeline processes the SSBs at the
+//! end of a window or period. Samples between windows are dropped.
 
 use std::time::{Duration, Instant};
 
 use num_complex::Complex32;
-use onboard::live::LiveError;
+use onboard::live::{Continuity, LiveError};
 use onboard::observation::MAX_ELEMENTS;
 
 use super::{ARRIVALS, Engine};
@@ -33,21 +33,28 @@ impl Engine {
             inbox.give_back(block.antennas); // arrived after the gate was closed
             return Ok(());
         }
-        if self.pending.length() > 0 && !self.pending.continues_in(&block, self.rate_hz()) {
-            self.receive(true)?;
-            self.publish_angles(Some(came))?;
-        }
-        self.pending.append(&block);
+        let block_s = block.time_s;
+        let received = self.receive(&block);
         inbox.give_back(block.antennas);
-        if self.gate.wanted().is_none() && end_s - self.pending.time_s >= self.period_s {
-            self.receive(false)?;
-            self.publish_angles(Some(came))?;
+        let start_s = match received {
+            Ok(Continuity::Gap { .. } | Continuity::Restart) => {
+                self.process_bursts(false, came)?;
+                block_s
+            }
+            Ok(_) => self.window_s.unwrap_or(block_s),
+            Err(error) => {
+                self.refused("samples", &error);
+                block_s
+            }
+        };
+        self.window_s = Some(start_s);
+        if self.gate.wanted().is_none() && end_s - start_s >= self.period_s {
+            self.process_bursts(false, came)?;
             self.sleep_until_next(end_s)?;
             if self.gate.wanted().is_some() {
                 // Flush the receiver's delayed SSBs; otherwise they are processed with the next
                 // window.
-                self.receive(true)?;
-                self.publish_angles(Some(came))?;
+                self.process_bursts(true, came)?;
             }
         }
         Ok(())
@@ -86,25 +93,25 @@ impl Engine {
         self.setup.stream.map_or(1.0, |it| it.rate_hz)
     }
 
-    /// Gives the samples of a window or a period to the pipeline in one block, because a cell
-    /// search requires a complete burst.
-    pub(super) fn receive(&mut self, ends: bool) -> Result<(), LiveError> {
+    /// Passes samples to the receiver.
+    fn receive(&mut self, block: &Block) -> Result<Continuity, LiveError> {
         let mut antennas: [&[Complex32]; MAX_ELEMENTS] = [&[]; MAX_ELEMENTS];
-        for (antenna, samples) in antennas.iter_mut().zip(&self.pending.antennas) {
+        for (antenna, samples) in antennas.iter_mut().zip(&block.antennas) {
             *antenna = samples;
         }
-        let antennas = antennas
-            .get(..self.pending.antennas.len())
-            .unwrap_or_default();
-        let mut taken = Ok(());
-        if self.pending.length() > 0 {
-            taken = self.live.receive(self.pending.time_s, antennas).map(drop);
-        }
-        if ends && taken.is_ok() {
-            taken = self.live.end_segment();
-        }
-        self.pending.antennas.iter_mut().for_each(Vec::clear);
-        if let Err(error) = taken {
+        let antennas = antennas.get(..block.antennas.len()).unwrap_or_default();
+        self.live.receive(block.time_s, antennas)
+    }
+
+    /// Processes the received SSBs and publishes the results. `ends`: the window has ended, so that
+    /// no further SSB is expected.
+    pub(super) fn process_bursts(
+        &mut self,
+        ends: bool,
+        came: impl Into<Option<Instant>>,
+    ) -> Result<(), LiveError> {
+        self.window_s = None;
+        if ends && let Err(error) = self.live.end_segment() {
             self.refused("samples", &error);
         }
         self.live.process_until(f64::INFINITY)?;
@@ -114,7 +121,7 @@ impl Engine {
             self.gate.open();
         }
         self.report_clocks();
-        Ok(())
+        self.publish_angles(came.into())
     }
 
     /// Closes the gate until the next required burst.

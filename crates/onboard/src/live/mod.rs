@@ -55,6 +55,6 @@ pub use saved::{MAX_GROWTH_M, Resumption, SavedState};
 pub use start::starting_at;
 pub use status::{Reason, State, Status, TONES};
 pub use stream::{SampleStream, StreamConfig, StreamCounts};
-pub use stream_clock::{Continuity, contiguity_tolerance_s};
+pub use stream_clock::Continuity;
 pub use time_base::ClockStep;
 pub use time_check::{TimeCheck, TimeDefect, TimeVerdict};
