@@ -98,9 +98,13 @@ package: ## Pack the crates for independent use, and test each from its package
 	  cargo test --release --quiet --target-dir target/packaged --manifest-path "$$folder"/$$crate-*/Cargo.toml || exit 2; \
 	done
 
+# With the environment of maturin. Otherwise, clippy and the installation compile pyo3 and numpy again for each other.
+CLIPPY = config=$$(ls -t target/maturin/pyo3-config-*.txt 2>/dev/null | head -n 1); \
+  $${config:+env PYO3_BUILD_EXTENSION_MODULE=1 PYO3_CONFIG_FILE=$(CURDIR)/$$config} cargo clippy
+
 lint: .venv/installed-test ## Check formats, lints and types of both languages
 	cargo fmt --all --check
-	cargo clippy --workspace --all-targets --quiet -- -D warnings
+	$(CLIPPY) --workspace --all-targets --quiet -- -D warnings
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
