@@ -227,10 +227,13 @@ fn mcap_files_are_rotated_and_each_is_complete() {
 fn file_input_is_processed_at_maximum_speed_and_nothing_is_dropped() {
     let folder = scratch("fast");
     // The drive has twice as many samples as the queue holds. Status messages are sent by the time
-    // of the drive, not by real time.
+    // of the drive, not by real time. Without a pose, the search takes most of the time.
     let seconds: u32 = 200;
-    let lines: String = (0..=50 * seconds)
-        .map(|number| odometry(0.02 * f64::from(number)))
+    let pose =
+        json!({"type": "set-pose", "time_s": 0.0, "x_m": 10.0, "y_m": 0.0, "heading_rad": 0.0});
+    let lines: String = [odometry(0.0), format!("{pose}\n")]
+        .into_iter()
+        .chain((1..=50 * seconds).map(|number| odometry(0.02 * f64::from(number))))
         .collect();
     fs::write(folder.join("drive.jsonl"), lines).unwrap();
     let file = folder.join("drive.jsonl").display().to_string();
