@@ -1,33 +1,42 @@
 //! Correlation of the errors of successive angles, which separates scatter from biases.
 //!
-//! Scatter is independent after a wavelength; a bias is almost constant over the same distance. For a pair of
-//! Gaussian errors with equal variance and correlation ρ, the mean of `2ab/(a² + b²)` is `m = (1 − √(1 − ρ²))/ρ`, so that
-//! `ρ = 2m/(1 + m²)` (angle of a bivariate Gaussian; Mardia and Jupp, Directional Statistics, 3.5.6). The statistic does
-//! not depend on the variance, which the level of the bias determines, and an outlier counts at most as much as one pair.
+//! Scatter is independent after a wavelength; a bias is retained over some distance. For a pair of Gaussian errors with equal
+//! variance and correlation ρ, the statistic `s = 2ab/(a² + b²)` has the mean `m(ρ) = (1 − √(1 − ρ²))/ρ` (angle of a
+//! bivariate Gaussian; Mardia and Jupp, Directional Statistics, 3.5.6). It does not depend on the variance, which the level
+//! of the bias determines, and an outlier counts at most as much as one pair. The fraction of the bias is the least-squares
+//! estimate of f in `s = f m(ρ)`, where ρ is the correlation of the jump process for the spacing of the pair.
 
-use super::jump_process::SOON_M;
+use super::jump_process::{SOON_M, VALUE_M};
 
-/// Maximum distance between two angles of a pair (m): the bias is probably unchanged.
-const MAX_SPACING_M: f64 = SOON_M;
+/// Maximum distance between two angles of a pair (m).
+const MAX_SPACING_M: f64 = VALUE_M;
 
-/// Correlation from which on all errors are biases. The jump process has 0.65 for the mean spacing of 0.19 m; the smaller
-/// value counts errors as biases in doubt.
-const OF_BIAS: f64 = 0.5;
+/// Correlation of errors that count as biases only, relative to that of the jump process: in doubt, an error is a bias.
+const OF_BIAS: f64 = 0.75;
 
-/// Mean of the statistic for [`OF_BIAS`]: `(1 − √(1 − ρ²))/ρ`.
-const MEAN_OF_BIAS: f64 = 0.267_949;
+/// Number of pairs that the prior counts as, a wavelength apart: all errors are biases.
+const PRIOR_PAIRS: f64 = 32.0;
+/// Sum over these pairs of the squared mean of the statistic for a bias.
+const PRIOR_SQUARE: f64 = 3.8;
 
-/// Number of pairs that the prior counts as: all errors are biases.
-const PRIOR_PAIRS: u32 = 32;
+/// Number of pairs after which older ones count less, so that the estimate has a memory of some minutes.
+const MAX_PAIRS: f64 = 512.0;
 
-/// Minimum weight of the newest pair, so that the estimate has a memory of some minutes.
-const MIN_WEIGHT: f64 = 1.0 / 512.0;
+/// Returns the mean of the statistic for two errors of a bias `spacing_m` apart.
+fn mean_of_bias(spacing_m: f64) -> f64 {
+    let correlation = [VALUE_M, SOON_M].map(|it| (-spacing_m / it).exp());
+    let correlation = 0.5 * OF_BIAS * correlation.iter().sum::<f64>();
+    (1.0 - (1.0 - correlation * correlation).sqrt()) / correlation
+}
 
 /// Estimate of the correlation, common to all radio heads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorCorrelation {
-    mean: f64,
-    pairs: u32,
+    /// Sums over the pairs of the statistic times its mean for a bias, and of the square of this mean.
+    product: f64,
+    square: f64,
+    /// Number of pairs.
+    pairs: f64,
 }
 
 /// Error of an angle, and where it was measured.
@@ -42,8 +51,9 @@ pub struct AngleError {
 impl ErrorCorrelation {
     /// Estimate before any angle: all errors are biases.
     pub const PRIOR: Self = Self {
-        mean: MEAN_OF_BIAS,
-        pairs: 0,
+        product: PRIOR_SQUARE,
+        square: PRIOR_SQUARE,
+        pairs: PRIOR_PAIRS,
     };
 
     /// Adds an angle of a radio head with the residual before its update. `last` is the previous angle, which is
@@ -60,11 +70,16 @@ impl ErrorCorrelation {
             if spacing_m < wavelength_m {
                 return;
             }
-            let square = before_rad * before_rad + last.residual_rad * last.residual_rad;
-            if spacing_m <= MAX_SPACING_M && square > 0.0 {
-                self.pairs = self.pairs.saturating_add(1);
-                let weight = MIN_WEIGHT.max(f64::from(PRIOR_PAIRS + self.pairs).recip());
-                self.mean += weight * (2.0 * before_rad * last.residual_rad / square - self.mean);
+            let power = before_rad * before_rad + last.residual_rad * last.residual_rad;
+            if spacing_m <= MAX_SPACING_M && power > 0.0 {
+                let (mean, statistic) = (
+                    mean_of_bias(spacing_m),
+                    2.0 * before_rad * last.residual_rad / power,
+                );
+                let kept = (MAX_PAIRS / (self.pairs + 1.0)).min(1.0);
+                self.product = kept * (self.product + mean * statistic);
+                self.square = kept * (self.square + mean * mean);
+                self.pairs = kept * (self.pairs + 1.0);
             }
         }
         *last = Some(after);
@@ -72,8 +87,7 @@ impl ErrorCorrelation {
 
     /// Returns the fraction of the errors' variance that scatter has.
     pub fn white_fraction(&self) -> f64 {
-        let correlation = 2.0 * self.mean / (1.0 + self.mean * self.mean);
-        (1.0 - correlation / OF_BIAS).clamp(0.0, 1.0)
+        (1.0 - self.product / self.square).clamp(0.0, 1.0)
     }
 }
 
@@ -108,24 +122,31 @@ mod tests {
         correlation
     }
 
-    /// The statistic is within ±1, with a variance of at most 1/2. With a weight of 1/512, its mean has a standard
-    /// deviation of √(1/2/1023), of which four are allowed. The slope of ρ by m is at most 2.
+    /// Angles of two radio heads 0.1 m apart. The statistic is within ±1, with a variance of at most 1/2. The mean over the
+    /// last 512 pairs has a standard deviation of √(1/2/1023), of which four are allowed.
     #[test]
-    fn the_correlation_is_that_of_the_errors() {
-        for kept in [0.0, 0.2, 0.4] {
-            let expected = 1.0 - kept / OF_BIAS;
+    fn the_fraction_of_scatter_is_that_of_the_errors() {
+        for kept in [0.01, 0.2, 0.4] {
+            let mean = (1.0 - f64::sqrt(1.0 - kept * kept)) / kept;
+            let expected = 1.0 - mean / mean_of_bias(0.1);
             let white = estimate(0.1, kept, 4000).white_fraction();
-            let scatter = 4.0 * (0.5_f64 / 1023.0).sqrt() * 2.0 / OF_BIAS;
+            let scatter = 4.0 * (0.5_f64 / 1023.0).sqrt() / mean_of_bias(0.1);
             assert!((white - expected).abs() < scatter, "{kept}: {white}");
         }
-        assert_eq!(estimate(0.1, 0.75, 4000).white_fraction(), 0.0);
+        assert_eq!(estimate(0.1, 0.8, 4000).white_fraction(), 0.0);
     }
 
     #[test]
     fn distant_and_close_angles_do_not_count() {
-        for spacing_m in [0.01, 0.5] {
+        for spacing_m in [0.01, 0.8] {
             let correlation = estimate(spacing_m, 0.0, 7);
             assert_eq!(correlation, ErrorCorrelation::PRIOR, "{spacing_m} m");
         }
+    }
+
+    #[test]
+    fn the_prior_is_that_of_pairs_a_wavelength_apart() {
+        let square = PRIOR_PAIRS * mean_of_bias(0.083).powi(2);
+        assert!((PRIOR_SQUARE / square - 1.0).abs() < 0.01, "{square}");
     }
 }
