@@ -16,8 +16,9 @@ use crate::radio_head::RadioHead;
 /// errors repeat.
 const MIN_DRIVEN_M: f64 = 0.5;
 
-/// Distance to the last angle of a radio head below which an angle of a vehicle that stands at its start repeats it (m): an
-/// assumption, above the noise of an odometer at standstill and below the distance between SSBs of a slow vehicle.
+/// Distance to the last angle of a radio head below which an angle of a vehicle that stands at its
+/// start repeats it (m): an assumption, above the noise of an odometer at standstill and below the
+/// distance between SSBs of a slow vehicle.
 const SAME_PLACE_M: f64 = 0.02;
 
 /// Number of coordinates of a pose: position and heading.
@@ -177,7 +178,8 @@ impl RelocalizationTest {
         }
         let number = head.number_in(self.search.heads());
         if let Some(last) = number.and_then(|number| self.last.get_mut(number)) {
-            // The angles of a standing vehicle have one error. Its weight would not decrease while the vehicle drives.
+            // The angles of a standing vehicle have one error. Its weight would not decrease while
+            // the vehicle drives.
             let stands = self.driven_m < MIN_DRIVEN_M;
             if stands && self.given.is_some() && self.driven_m - last.used_m < SAME_PLACE_M {
                 return;

@@ -281,7 +281,6 @@ impl Ekf {
             hypotheses,
             journal,
         );
-        self.update_error_correlation(predicted, &before);
         self.note_update(predicted, measured, &before);
         if mahalanobis2 > self.config.gate {
             return self.verdict(UpdateReason::Outlier, (!is_known).then_some(mahalanobis2));
@@ -297,29 +296,6 @@ impl Ekf {
         }
     }
 
-    /// Updates the correlation of the angles' errors; `before` is the state before the update.
-    fn update_error_correlation(
-        &mut self,
-        predicted: &PredictedMeasurement,
-        before: &[f64; STATES],
-    ) {
-        let residual_rad = predicted.innovation.residual;
-        let after = AngleError {
-            residual_rad: residual_rad - self.corrected_rad(predicted, before),
-            place_m: predicted.place_m,
-        };
-        let wavelength_m = self.config.array.wavelength_m;
-        if let Some(head) = self.heads.get_mut(predicted.head) {
-            (self.error_correlation).add(&mut head.last_error, wavelength_m, residual_rad, after);
-        }
-    }
-
-    /// Returns the correction of a predicted angle by an update (rad); `before` is the state before it.
-    fn corrected_rad(&self, predicted: &PredictedMeasurement, before: &[f64; STATES]) -> f64 {
-        let states = self.belief.mean.iter().zip(before).zip(&predicted.row);
-        states.map(|((now, before), by)| by * (now - before)).sum()
-    }
-
     /// Returns the time-correlated noise of the angles with its estimated fraction.
     pub(super) fn correlated_noise(&self) -> CorrelatedNoise {
         let mut bias = self.config.correlated_noise;
@@ -329,27 +305,41 @@ impl Ekf {
         bias
     }
 
-    /// Updates the time-correlated fraction of a radio head's noise; `before` is the state before
-    /// the update.
-    fn update_white_fraction(&mut self, predicted: &PredictedMeasurement, before: &[f64; STATES]) {
+    /// Updates the time-correlated fraction of the noise, if it is estimated, and the correlation of
+    /// the errors, if the bias of the angle is; `before` is the state before the update.
+    fn update_noise(&mut self, predicted: &PredictedMeasurement, before: &[f64; STATES]) {
         let stated = self.config.correlated_noise;
-        if !(stated.is_found && stated.share > 0.0) {
-            return; // the fraction is not estimated
+        let finds_fraction = stated.is_found && stated.share > 0.0;
+        let finds_bias = predicted.hypotheses.is_some();
+        if !finds_fraction && !finds_bias {
+            return;
         }
-        let corrected_rad = self.corrected_rad(predicted, before);
+        let states = self.belief.mean.iter().zip(before).zip(&predicted.row);
+        let corrected_rad: f64 = states.map(|((now, before), by)| by * (now - before)).sum();
+        let before_rad = predicted.innovation.residual;
+        let after_rad = before_rad - corrected_rad;
+        let wavelength_m = self.config.array.wavelength_m;
         let Some(head) = self.heads.get_mut(predicted.head) else {
             return;
         };
-        let is_correlated = stated.steps(predicted.elapsed_s, predicted.moved) < 1.0;
-        let mut residual = Residual {
-            residual_rad: predicted.innovation.residual,
-            variance: predicted.own_variance,
-        };
-        if let (true, Some(last)) = (is_correlated, &head.last_residual) {
-            self.white.see(last, &residual);
+        if finds_fraction {
+            let is_correlated = stated.steps(predicted.elapsed_s, predicted.moved) < 1.0;
+            let residual = |residual_rad| Residual {
+                residual_rad,
+                variance: predicted.own_variance,
+            };
+            if let (true, Some(last)) = (is_correlated, &head.last_residual) {
+                self.white.see(last, &residual(before_rad));
+            }
+            head.last_residual = Some(residual(after_rad));
         }
-        residual.residual_rad -= corrected_rad;
-        head.last_residual = Some(residual);
+        if finds_bias {
+            let after = AngleError {
+                residual_rad: after_rad,
+                place_m: predicted.place_m,
+            };
+            (self.error_correlation).add(&mut head.last_error, wavelength_m, before_rad, after);
+        }
     }
 
     /// Records the time and position of an update with a radio head, and estimates its noise from
@@ -360,7 +350,7 @@ impl Ekf {
         measured: &AngleMeasurement,
         before: &[f64; STATES],
     ) {
-        self.update_white_fraction(predicted, before);
+        self.update_noise(predicted, before);
         self.keep_bounds();
         if let Some(head) = self.heads.get_mut(predicted.head) {
             head.kind = measured.kind;
