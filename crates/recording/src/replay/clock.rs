@@ -99,9 +99,7 @@ pub fn angle_time_offset(given: &Drive<'_>) -> Result<Option<AngleTimeOffset>, R
     let filter_std_s = EkfConfig::new(&given.site, vehicle).angle_time_offset_std_s;
     // The offset is searched for, so that it must not be a filter state as well.
     given.vehicle.to_mut().receiver.angle_time_offset_std_s = Some(0.0);
-    // A drive that agrees with its specified start needs no offset. A filter with an uncertain start is far from linear at first,
-    // and its likelihood without an offset can be too small.
-    let as_stated = screened(&given)?;
+    let as_stated = given.clone();
     doubt(&given.site, given.vehicle.to_mut());
     let of = |late_s: f64| {
         let mut corrected = given.clone();
@@ -118,7 +116,12 @@ pub fn angle_time_offset(given: &Drive<'_>) -> Result<Option<AngleTimeOffset>, R
         return Ok(None);
     };
     let at_best = at_best.relative_log_likelihood;
-    let log_odds = at_best - in_time.max(log_likelihood(as_stated));
+    let mut log_odds = at_best - in_time;
+    if log_odds >= DOUBT_LOG_ODDS {
+        // A drive that agrees with its specified start needs no offset. A filter with an uncertain
+        // start is far from linear at first, and its likelihood without an offset can be too small.
+        log_odds = log_odds.min(at_best - log_likelihood(screened(&as_stated)?));
+    }
     if log_odds < DOUBT_LOG_ODDS {
         return Ok(None);
     }
