@@ -411,8 +411,8 @@ fn main() {
     if wants("seeds") && only.is_none() {
         street::ten_odometers(&data.join("street"));
     }
-    if wants("begins") && only.is_none() {
-        street::begins(&data.join("street"));
+    if wants("starts") && only.is_none() {
+        street::starts(&data.join("street"));
     }
 }
 

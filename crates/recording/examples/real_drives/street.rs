@@ -140,21 +140,21 @@ pub fn ten_odometers(folder: &Path) {
 }
 
 /// Locates the street without a road from starts along it, with two odometers each.
-pub fn begins(folder: &Path) {
+pub fn starts(folder: &Path) {
     let base = Drive::read(folder, "angles.csv", "odometry.csv");
     let end_s = base.truth.last().map_or(0.0, |last| last.time_s);
-    let mut begin_s = 0.0;
-    while begin_s < 0.75 * end_s {
-        let drives = (0..2).map(|seed| from(begin_s, with_odometry(&base, seed)));
-        summary(&format!("from {begin_s:4.1} s"), STREET, drives);
-        begin_s += 2.0;
+    let mut start_s = 0.0;
+    while start_s < 0.75 * end_s {
+        let drives = (0..2).map(|seed| from(start_s, with_odometry(&base, seed)));
+        summary(&format!("from {start_s:4.1} s"), STREET, drives);
+        start_s += 2.0;
     }
 }
 
-/// Returns the part of the drive that begins at `begin_s` (s) at its true pose.
-fn from(begin_s: f64, mut drive: Drive) -> Drive {
+/// Returns the part of the drive from `start_s` (s) on; the start is its true pose.
+fn from(start_s: f64, mut drive: Drive) -> Drive {
     let odometry = &mut drive.odometry.samples;
-    odometry.retain(|it| it.time_s >= begin_s);
+    odometry.retain(|it| it.time_s >= start_s);
     let first_s = odometry[0].time_s;
     (drive.angles.angles).retain(|it| it.measured.time_s > first_s);
     drive.start = drive.true_pose(first_s).unwrap();
