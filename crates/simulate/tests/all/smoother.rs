@@ -112,8 +112,9 @@ fn smoothed_drives_are_more_accurate_and_consistent() {
 #[test]
 fn the_last_smoothed_pose_equals_the_filtered_pose() {
     let yaw = value("{ noise_rad_per_sqrt_s = 1e-3 }");
-    // The covariance with integrity monitoring also includes alternative hypotheses. Here they are
-    // excluded, or improbable at the end of this drive: biases, outliers and a noisier odometer.
+    // The covariance with integrity monitoring also includes alternative hypotheses. Here biases
+    // and outliers are excluded. The part of the noisier odometer is proportional to its prior.
+    let part = |prior: f64| 0.01 * prior / 3e-6;
     let precise = [
         ("vehicle.array.mounting_std_rad", 0.0.into()),
         ("vehicle.array.phase_std_rad", 0.0.into()),
@@ -129,8 +130,8 @@ fn the_last_smoothed_pose_equals_the_filtered_pose() {
         (vec![], 0.0),
         (vec![("vehicle.gyroscope", yaw)], 0.0),
         (vec![("vehicle.localizer.map", Value::from(false))], 0.0),
-        (precise.to_vec(), 1e-6),
-        (rarely_noisy, 0.01),
+        (precise.to_vec(), part(1e-9)),
+        (rarely_noisy, part(3e-6)),
         (vec![("vehicle.integrity", value("{}"))], 1.0),
     ] {
         let scenario = changed("paper-real-odometry-2", changes);
