@@ -6,9 +6,9 @@ independent and normal, so that
     Λ(θ) = ½ Σ ν(θ)² / S + ½ Σ (θ − θ₀)² / σ₀²
 
 is the negative logarithm of the posterior of the parameters θ, over all angles of all drives
-(Schweppe 1965; Ljung, System Identification, 7.4). Gauss–Newton finds its minimum; the derivatives
-of ν are central differences, each a replay of every drive. The road, if any, and the start poses
-define the frame.
+(Schweppe 1965; Ljung, System Identification, 7.4). Gauss–Newton finds its minimum. The derivatives
+of ν are differences, each a replay of every drive, so that they are only computed again after a
+large step. The road, if any, and the start poses define the frame.
 
 Multipath correlates the innovations, so that a sum over all of them counts information repeatedly.
 The sum is divided by tr(H⁻¹J)/p: H is the information about p parameters for independent
@@ -51,9 +51,11 @@ MOST_ITERATIONS = 20
 BLOCKS = 10
 # Convergence: maximum step of a parameter relative to its standard deviation.
 STILL = 0.05
+# Maximum step, in the same unit, for which the derivatives remain valid.
+LINEAR = 1.0
 # Probability that the site plan is displaced against the road.
 OFFSET_KEY = "integrity.fault_probability.site_frame_offset"
-# Steps of the central differences: small against the curvature, large against rounding.
+# Steps of the differences: small against the curvature, large against rounding.
 STEP_M, STEP_RAD = 0.02, 2e-4
 
 
@@ -314,31 +316,32 @@ class _Problem:
         found = list(self.pool.map(drive, range(len(self.drives))))
         self.done += 1
         if self.progress is not None:
-            most = MOST_ITERATIONS * (2 * len(values) + 4)
+            most = MOST_ITERATIONS * (len(values) + 4)
             self.progress(min(self.done, most), most)
         return found
 
-    def misfit(self, values: Numbers, used: list[Flags], inflation: float) -> float:
+    def slopes(self, values: Numbers, used: list[Flags], met: list[Met]) -> list[Numbers]:
+        """Returns the derivatives of each drive's innovations, shape (parameters, angles)."""
+        columns = []
+        for step in np.diag(self.model.steps):
+            ahead = self.meet(values + step, np.zeros_like(values), used)
+            both = zip(ahead, met, strict=True)
+            columns.append([wrapped(a[0] - b[0]) / step.sum() for a, b in both])
+        return [np.stack(of_drive) for of_drive in zip(*columns, strict=True)]
+
+    def misfit(self, values: Numbers, met: list[Met], inflation: float) -> float:
         """Returns 2 Λ(θ) up to a constant."""
         prior = float(np.sum(((values - self.model.before) / self.model.stds_before) ** 2))
-        met = self.meet(values, np.zeros_like(values), used)
         return prior + sum(_normalised(*each) for each in met) / inflation
 
-    def linearised(self, values: Numbers, used: list[Flags]) -> tuple[Numbers, Numbers, float]:
+    def linearised(
+        self, values: Numbers, met: list[Met], slopes: list[Numbers]
+    ) -> tuple[Numbers, Numbers, float]:
         """Returns gradient and Gauss–Newton Hessian of Λ(θ), and the variance inflation."""
-        exact = np.zeros_like(values)
-        met = self.meet(values, exact, used)
-        slopes = []
-        for step in np.diag(self.model.steps):
-            ahead = self.meet(values + step, exact, used)
-            behind = self.meet(values - step, exact, used)
-            both = zip(ahead, behind, strict=True)
-            slopes.append([wrapped(a[0] - b[0]) / (2.0 * step.sum()) for a, b in both])
         prior = np.diag(self.model.stds_before**-2.0)
         information, squared = np.zeros_like(prior), np.zeros_like(prior)
         gradient = np.zeros_like(values)
-        for index, (residual, variance, counted) in enumerate(met):
-            jacobian = np.stack([slope[index] for slope in slopes])
+        for (residual, variance, counted), jacobian in zip(met, slopes, strict=True):
             kept = counted & np.isfinite(jacobian).all(axis=0) & np.isfinite(residual)
             weighted = jacobian[:, kept] / variance[kept]
             information += weighted @ jacobian[:, kept].T
@@ -358,24 +361,28 @@ class _Problem:
 def _identify(problem: _Problem) -> Survey:
     model = problem.model
     values, stds = model.before.copy(), model.stds_before.copy()
-    iterations, moved = 0, math.inf
+    exact = np.zeros_like(values)
+    iterations, moved, since = 0, math.inf, math.inf
     while iterations < MOST_ITERATIONS and moved > STILL:
         iterations += 1
         # Exclude outliers with respect to the present uncertainty.
         used = [each[2] for each in problem.meet(values, stds, None)]
-        gradient, information, inflation = problem.linearised(values, used)
+        met = problem.meet(values, exact, used)
+        if since > LINEAR:
+            slopes, since = problem.slopes(values, used, met), 0.0
+        gradient, information, inflation = problem.linearised(values, met, slopes)
         covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
         stds = np.sqrt(np.diag(covariance))
         step = -covariance @ gradient
-        here = problem.misfit(values, used, inflation)
-        while (
-            np.max(np.abs(step) / stds) > STILL
-            and problem.misfit(values + step, used, inflation) > here
-        ):
+        here = problem.misfit(values, met, inflation)
+        while (moved := float(np.max(np.abs(step) / stds))) > STILL:
+            there = problem.meet(values + step, exact, used)
+            if problem.misfit(values + step, there, inflation) <= here:
+                break
             step = 0.5 * step
         values = values + step
-        moved = float(np.max(np.abs(step) / stds))
-    met = problem.meet(values, np.zeros_like(values), used)
+        since += moved
+    met = problem.meet(values, exact, used)
     counted = sum(int(each[2].sum()) for each in met)
     learnt = stds < LEARNT * model.stds_before
     # Accept both coordinates of a position, or none.
