@@ -1,6 +1,6 @@
 """All texts are plain technical English: a reject list of words and of sentence openings.
 
-Texts are prose, comments, docstrings and messages; `notes/` and quotations are excluded.
+Texts are prose, comments, docstrings and messages; quotations are excluded.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from conftest import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
-# Files without prose of the project, and pages that keep the wording of their time.
-EXCLUDED = ("notes/", "target/", ".venv/", "tests/house/test_language.py")
+# Files without prose of the project.
+EXCLUDED = ("target/", ".venv/", "tests/house/test_language.py")
 
 # Words that a reader of the field does not understand at first reading, or that have a name.
 REJECTED_WORDS = re.compile(
