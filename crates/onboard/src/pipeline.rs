@@ -601,7 +601,8 @@ impl Pipeline {
             return;
         };
         let time_s = ssb.time_s - self.angle_time_offset_s;
-        let delay = (!ranging.is_first_path_uncertain).then(|| {
+        let is_first_path_certain = !ranging.is_first_path_uncertain;
+        let delay = is_first_path_certain.then(|| {
             let range_m = SPEED_OF_LIGHT_MPS * ranging.delay_s;
             let noise_m = SPEED_OF_LIGHT_MPS * ranging.delay_noise_sigma_s;
             let sigma_m = SPEED_OF_LIGHT_MPS * ranging.delay_sigma_s;
@@ -611,8 +612,8 @@ impl Pipeline {
             }
         });
         // A rate derived from carrier phases contains the same information as the phases.
-        let uses_rate = using.range_rate && !(using.carrier_phase && ranging.is_rate_of_phases);
-        let rate = uses_rate.then(|| {
+        let is_new = !(using.carrier_phase && ranging.is_rate_of_phases);
+        let rate = (is_first_path_certain && using.range_rate && is_new).then(|| {
             let (rate_mps, sigma_mps) = (ranging.rate_mps, ranging.rate_sigma_mps);
             RangeMeasurement::range_rate(time_s, rate_mps, sigma_mps, ranging.rate_interval_s)
         });

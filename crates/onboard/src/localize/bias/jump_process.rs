@@ -172,9 +172,9 @@ impl JumpProcess {
         predicted_levels
     }
 
-    /// Whether the bias is probably so large that the angles contain almost no information.
-    pub fn is_large(&self) -> bool {
-        self.levels.iter().skip(LARGE).sum::<f64>() > 0.5
+    /// Returns the probability that the bias is so large that the angles contain almost no information.
+    pub fn large_probability(&self) -> f64 {
+        self.levels.iter().skip(LARGE).sum()
     }
 
     /// Returns the jump hypotheses of an angle with the innovation `seen` without bias. `value_rad`

@@ -147,8 +147,14 @@ impl MultipathBias {
     /// information.
     pub fn is_large(&self, head: usize) -> bool {
         self.bias(head).is_some_and(|error| {
-            error.size.is_large() || error.mean_rad * error.mean_rad > MAX_VARIANCE
+            error.size.large_probability() > 0.5 || error.mean_rad * error.mean_rad > MAX_VARIANCE
         })
+    }
+
+    /// Returns the probability that the level of a radio head's bias is large; 0 if its bias is not estimated.
+    pub fn large_probability(&self, head: usize) -> f64 {
+        self.bias(head)
+            .map_or(0.0, |error| error.size.large_probability())
     }
 
     /// Returns the variance (rad²) of an angle without bias that is expected to reduce the state's

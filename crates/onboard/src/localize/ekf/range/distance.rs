@@ -36,10 +36,12 @@ impl Ekf {
             (offset, 1.0),
         ];
         // Noise is independent from one range to the next, multipath is not.
-        let (noise, scatter) = (sigma_m * sigma_m, measured.scatter_m * measured.scatter_m);
+        let noise = sigma_m * sigma_m;
+        let scatter = measured.scatter_m * measured.scatter_m + seen.blocked.variance();
         let variance = noise + scatter;
         let independent_fraction = independent(seen.travelled_m, SHARED_M).max(MIN_FRACTION);
-        let shift_m = state_m(CLOCK) + seen.lag_s * state_m(DRIFT) + state_m(offset);
+        let shift_m =
+            seen.blocked.late_m() + state_m(CLOCK) + seen.lag_s * state_m(DRIFT) + state_m(offset);
         let mut predicted = self.predicted(
             &seen,
             measured.quantity,

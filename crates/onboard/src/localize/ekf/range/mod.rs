@@ -1,6 +1,7 @@
 //! Updates with ranges, range rates and carrier phases: one file per kind with prediction,
 //! Jacobian, noise and offset.
 
+mod blocked_path;
 mod carrier_phase;
 mod distance;
 mod noise;

@@ -1,6 +1,7 @@
 //! Prediction that ranges, carrier phases and range rates share: the line of sight at the time of
 //! the measurement, and the distance with its second-order terms.
 
+use super::blocked_path::BlockedPath;
 use crate::gaussian::Innovation;
 use crate::geometry::Pose;
 use crate::localize::bias::{HeadState, RangeTerms};
@@ -47,6 +48,7 @@ pub(super) struct Sighted<'a> {
     pub pose: Pose,
     pub frame: RoadFrame,
     pub sight: LineOfSight,
+    pub blocked: BlockedPath,
     /// Time of the measurement (s).
     pub time_s: f64,
     /// Time since the newest odometry (s).
@@ -106,6 +108,12 @@ impl Ekf {
         };
         let sight = LineOfSight::new(&head.known, pose, &frame, &mean, &antenna)
             .ok_or(UpdateReason::Unusable)?;
+        // Without an angle of the radio head, its level is only a prior.
+        let probability = if head.last_update_m.is_finite() {
+            self.bias.large_probability(index)
+        } else {
+            0.0
+        };
         let lag_s = if self.odometry.is_some() {
             (measured.time_s - self.time_s()).max(0.0)
         } else {
@@ -120,6 +128,7 @@ impl Ekf {
             pose,
             frame,
             sight,
+            blocked: BlockedPath { probability },
             time_s: measured.time_s,
             lag_s,
             clock_ratio: self.clock_noise.ratio(),

@@ -82,7 +82,7 @@ impl Ekf {
             measured.value - expected_mps,
             row,
             terms,
-            sigma_mps * sigma_mps,
+            sigma_mps * sigma_mps + seen.blocked.rate_variance(),
             [1.0, model_variance],
         ))
     }

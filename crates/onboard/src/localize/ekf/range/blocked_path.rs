@@ -1,0 +1,66 @@
+//! Blocked first path of a radio head: its delays are late, and its range rates are those of a reflection.
+//!
+//! One SSB does not show that its first path is blocked, but successive angles do: without a line of sight, their bias is
+//! large. The probability of a large bias is therefore the probability of a blocked first path. The additional distance
+//! of a blocked path has an exponential distribution. Mean and variance of the resulting mixture are exact.
+
+/// Mean and standard deviation of the additional distance (m): those of the delays in UMi whose angles have a large bias
+/// (notes/experiments.md).
+const LATE_M: f64 = 6.0;
+
+/// Standard deviation of the error of a range rate (m/s): fading of a reflection turns the carrier phase.
+const RATE_STD_MPS: f64 = 5.0;
+
+/// First path that is blocked with a probability.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockedPath {
+    pub probability: f64,
+}
+
+impl BlockedPath {
+    /// Returns the expected additional distance (m).
+    pub fn late_m(self) -> f64 {
+        self.probability * LATE_M
+    }
+
+    /// Returns the variance of the additional distance (m²).
+    pub fn variance(self) -> f64 {
+        self.probability * (2.0 - self.probability) * LATE_M * LATE_M
+    }
+
+    /// Returns the variance of the error of a range rate (m²/s²).
+    pub fn rate_variance(self) -> f64 {
+        self.probability * RATE_STD_MPS * RATE_STD_MPS
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::Exp1;
+
+    use super::*;
+
+    /// The fourth moment of an exponential distribution is 24, so that the mean square of 100,000 draws has a standard
+    /// deviation of at most √(24 / 100,000) = 1.5 % of the squared mean distance, of which four are allowed.
+    #[test]
+    fn mean_and_variance_are_those_of_the_mixture() {
+        const DRAWS: u32 = 100_000;
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        for probability in [0.0, 0.3, 1.0] {
+            let (mut sum, mut square) = (0.0, 0.0);
+            for _ in 0..DRAWS {
+                let blocked = random.random::<f64>() < probability;
+                let late: f64 = random.sample(Exp1);
+                let late_m = if blocked { LATE_M * late } else { 0.0 };
+                sum += late_m / f64::from(DRAWS);
+                square += late_m * late_m / f64::from(DRAWS);
+            }
+            let blocked = BlockedPath { probability };
+            let within = 0.06 * LATE_M * LATE_M;
+            assert!((blocked.late_m() - sum).abs() < 0.06 * LATE_M, "{sum}");
+            assert!((blocked.variance() + sum * sum - square).abs() < within);
+        }
+    }
+}
