@@ -51,7 +51,7 @@ fn main() -> Result<()> {
     let keys = keys.collect::<Result<Vec<_>>>()?;
     println!("{runs} runs, seeds {seeds:?}, {keys:?}");
     println!(
-        "scenario          channel  fault      ok %  unavail %  beyond   runs  99 % (m)  95 % (m)  90 % (m)  worst (m)  silent (s)  level/error"
+        "scenario          channel  fault      ok %  unavail %  beyond   runs  99 % (m)  95 % (m)  90 % (m)  worst (m)  silent (s)  level/error  RMS (m)"
     );
     for name in list(2, "yard") {
         for channel in list(3, "nominal") {
@@ -214,10 +214,15 @@ fn print(name: &str, channel: &str, fault: &str, driven: &[Campaign]) {
     for campaign in driven {
         errors.merge(&campaign.errors);
     }
+    let squares = || {
+        let runs = driven.iter().flat_map(|it| &it.runs);
+        runs.map(|run| run.rms_error_m * run.rms_error_m)
+    };
+    let mean_square = squares().sum::<f64>() / squares().count() as f64;
     let share = |count: usize| 100.0 * count as f64 / total.epochs.max(1) as f64;
     let p = |q| errors.quantile_m(q).unwrap_or(f64::NAN);
     println!(
-        "{name:17} {channel:8} {fault:8} {:6.1} {:10.2}  {:.1e}  {affected:4}  {:8.2}  {:8.2}  {:8.2}  {:9.2}  {:10.1}  {:6.1}",
+        "{name:17} {channel:8} {fault:8} {:6.1} {:10.2}  {:.1e}  {affected:4}  {:8.2}  {:8.2}  {:8.2}  {:9.2}  {:10.1}  {:11.1}  {:7.3}",
         share(total.ok),
         share(total.unavailable),
         total.risk(),
@@ -227,5 +232,6 @@ fn print(name: &str, channel: &str, fault: &str, driven: &[Campaign]) {
         total.worst_m,
         total.longest_silence_s,
         total.median_ratio(),
+        mean_square.sqrt(),
     );
 }

@@ -1,8 +1,13 @@
 //! Blocked first path of a radio head: its delays are late, and its range rates are those of a reflection.
 //!
 //! One SSB does not show that its first path is blocked, but successive angles do: without a line of sight, their bias is
-//! large. The probability of a large bias is therefore the probability of a blocked first path. The additional distance
-//! of a blocked path has an exponential distribution. Mean and variance of the resulting mixture are exact.
+//! large. The probability of a large bias is therefore the probability of a blocked first path, less the part that a large
+//! bias has with a line of sight. The additional distance of a blocked path has an exponential distribution. Mean and
+//! variance of the resulting mixture are exact.
+
+/// Probability of a large bias with a line of sight, because the level may have changed since the last angles. Without it,
+/// delays in a site with lines of sight have little weight (notes/experiments.md).
+const WITH_LINE_OF_SIGHT: f64 = 0.05;
 
 /// Mean and standard deviation of the additional distance (m): those of the delays in UMi whose angles have a large bias
 /// (notes/experiments.md).
@@ -14,10 +19,18 @@ const RATE_STD_MPS: f64 = 5.0;
 /// First path that is blocked with a probability.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BlockedPath {
-    pub probability: f64,
+    probability: f64,
 }
 
 impl BlockedPath {
+    /// Creates the path of a radio head whose angles have a large bias with this probability.
+    pub fn new(large_bias_probability: f64) -> Self {
+        let beyond = (large_bias_probability - WITH_LINE_OF_SIGHT) / (1.0 - WITH_LINE_OF_SIGHT);
+        Self {
+            probability: beyond.max(0.0),
+        }
+    }
+
     /// Returns the expected additional distance (m).
     pub fn late_m(self) -> f64 {
         self.probability * LATE_M
@@ -41,6 +54,13 @@ mod tests {
     use rand_distr::Exp1;
 
     use super::*;
+
+    #[test]
+    fn a_large_bias_means_a_blocked_path_and_a_line_of_sight_changes_no_delay() {
+        assert_eq!(BlockedPath::new(WITH_LINE_OF_SIGHT).variance(), 0.0);
+        assert_eq!(BlockedPath::new(0.0).late_m(), 0.0);
+        assert_eq!(BlockedPath::new(1.0).late_m(), LATE_M);
+    }
 
     /// The fourth moment of an exponential distribution is 24, so that the mean square of 100,000 draws has a standard
     /// deviation of at most √(24 / 100,000) = 1.5 % of the squared mean distance, of which four are allowed.

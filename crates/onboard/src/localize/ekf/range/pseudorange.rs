@@ -109,7 +109,7 @@ impl Ekf {
         let sight = LineOfSight::new(&head.known, pose, &frame, &mean, &antenna)
             .ok_or(UpdateReason::Unusable)?;
         // Without an angle of the radio head, its level is only a prior.
-        let probability = if head.last_update_m.is_finite() {
+        let large_bias_probability = if head.last_update_m.is_finite() {
             self.bias.large_probability(index)
         } else {
             0.0
@@ -128,7 +128,7 @@ impl Ekf {
             pose,
             frame,
             sight,
-            blocked: BlockedPath { probability },
+            blocked: BlockedPath::new(large_bias_probability),
             time_s: measured.time_s,
             lag_s,
             clock_ratio: self.clock_noise.ratio(),
