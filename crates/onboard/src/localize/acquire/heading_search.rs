@@ -99,6 +99,8 @@ impl HeadingSearch {
         }
         self.solution += range_density(&predicted).ln();
         for it in &mut self.filters {
+            // Only the solution is updated with angles, and the likelihoods are comparable for equal variances.
+            it.ekf.copy_blocked_paths(solution);
             let predicted = it.ekf.predict_range(head, measured);
             if let Ok(predicted) = &predicted {
                 it.log_likelihood += range_density(predicted).ln();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::config::EkfConfig;
 use super::odometer::{SampleInterval, SpeedJumps};
-use super::range::RangeNoise;
+use super::range::{BlockedPath, RangeNoise};
 use super::state::{
     ANGLE_TIME_OFFSET, Belief, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
@@ -46,6 +46,8 @@ pub(super) struct Head {
     pub last_residual: Option<Residual>,
     /// Error of the last angle that a wavelength separates from the previous one.
     pub last_error: Option<AngleError>,
+    /// First path at the last used angle.
+    pub blocked: BlockedPath,
     /// Distance driven at the last used range (m).
     pub last_range_m: f64,
     /// Number of successive rejected ranges.
@@ -64,6 +66,7 @@ impl Head {
             last_update_rad: f64::NEG_INFINITY,
             last_residual: None,
             last_error: None,
+            blocked: BlockedPath::NEVER,
             last_range_m: f64::NEG_INFINITY,
             rejected_ranges: 0,
         }

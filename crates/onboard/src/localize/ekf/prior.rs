@@ -106,6 +106,13 @@ impl Ekf {
         self.error_correlation = other.error_correlation;
     }
 
+    /// Sets the probabilities of blocked first paths to those of another filter of the same radio heads.
+    pub(in crate::localize) fn copy_blocked_paths(&mut self, other: &Self) {
+        for (mine, theirs) in self.heads.iter_mut().zip(&other.heads) {
+            mine.blocked = theirs.blocked;
+        }
+    }
+
     /// Returns a copy that expects the specified noise of the angles.
     pub(in crate::localize) fn nominal(&self) -> Self {
         let mut ekf = self.clone();

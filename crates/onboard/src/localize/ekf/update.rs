@@ -3,6 +3,7 @@
 use super::angle_model::{AngleModel, locate};
 use super::config::CorrelatedNoise;
 use super::filter::{Ekf, Head};
+use super::range::BlockedPath;
 use super::state::{ACROSS, ALONG, ANGLE_TIME_OFFSET, HEADING, SCALE, STATES, YAW_RATE_BIAS};
 use super::white_noise_fraction::Residual;
 use crate::gaussian::{Innovation, with_outliers};
@@ -352,7 +353,9 @@ impl Ekf {
     ) {
         self.update_noise(predicted, before);
         self.keep_bounds();
+        let blocked = BlockedPath::new(self.bias.large_probability(predicted.head));
         if let Some(head) = self.heads.get_mut(predicted.head) {
+            head.blocked = blocked;
             head.kind = measured.kind;
             head.last_update_m = predicted.place_m;
             head.last_update_s = measured.time_s;

@@ -23,7 +23,8 @@ impl ModeFilter {
 }
 
 impl Bank {
-    /// Updates with a range.
+    /// Updates with a range. All hypotheses have the nominal probability of a blocked first path. Otherwise, a filter far
+    /// from the position expects a blocked path, and ranges are no evidence against it.
     pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
         if let Some(number) = head.number_in(&self.heads) {
             self.watch(number);
@@ -53,6 +54,7 @@ impl Bank {
         }
         let predicted = self.nominal.predict_range(head, measured);
         for it in &mut self.modes {
+            it.ekf.copy_blocked_paths(&self.nominal);
             it.update_range(&predicted, head, measured);
         }
         let most = (self.modes.iter()).fold(LikelihoodRatio::NONE, |most, it| most.max(it.ratio));

@@ -17,12 +17,15 @@ const LATE_M: f64 = 6.0;
 const RATE_STD_MPS: f64 = 5.0;
 
 /// First path that is blocked with a probability.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct BlockedPath {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::localize::ekf) struct BlockedPath {
     probability: f64,
 }
 
 impl BlockedPath {
+    /// First path that is certainly not blocked.
+    pub const NEVER: Self = Self { probability: 0.0 };
+
     /// Creates the path of a radio head whose angles have a large bias with this probability.
     pub fn new(large_bias_probability: f64) -> Self {
         let beyond = (large_bias_probability - WITH_LINE_OF_SIGHT) / (1.0 - WITH_LINE_OF_SIGHT);

@@ -9,6 +9,7 @@ mod pseudorange;
 mod range_rate;
 mod update;
 
+pub(super) use blocked_path::BlockedPath;
 pub(super) use noise::RangeNoise;
 pub(in crate::localize) use pseudorange::PredictedRange;
 pub use update::RangeState;

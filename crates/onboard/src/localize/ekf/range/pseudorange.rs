@@ -108,12 +108,6 @@ impl Ekf {
         };
         let sight = LineOfSight::new(&head.known, pose, &frame, &mean, &antenna)
             .ok_or(UpdateReason::Unusable)?;
-        // Without an angle of the radio head, its level is only a prior.
-        let large_bias_probability = if head.last_update_m.is_finite() {
-            self.bias.large_probability(index)
-        } else {
-            0.0
-        };
         let lag_s = if self.odometry.is_some() {
             (measured.time_s - self.time_s()).max(0.0)
         } else {
@@ -128,7 +122,7 @@ impl Ekf {
             pose,
             frame,
             sight,
-            blocked: BlockedPath::new(large_bias_probability),
+            blocked: head.blocked,
             time_s: measured.time_s,
             lag_s,
             clock_ratio: self.clock_noise.ratio(),
