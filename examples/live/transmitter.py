@@ -25,7 +25,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import zmq
-from scipy.signal import resample_poly
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -246,7 +245,12 @@ class RawTransmitter:
 
     def _integers(self, samples: NDArray[np.float32]) -> bytes:
         """Interleaved samples of all antennas, [antenna, sample, part], at the higher rate."""
-        finer = resample_poly(samples, self.times, 1, axis=1) if self.times > 1 else samples
+        finer = samples
+        if self.times > 1:
+            # This import takes a second.
+            from scipy.signal import resample_poly
+
+            finer = resample_poly(samples, self.times, 1, axis=1)
         scaled = np.clip(np.rint(finer * FULL_SCALE), -FULL_SCALE, FULL_SCALE - 1)
         return scaled.astype("<i2").transpose(1, 0, 2).tobytes()
 
