@@ -140,16 +140,20 @@ impl Propagation for RicianPropagation {
                 match self.model {
                     ScatterModel::PerAntenna => {
                         if let Some(gain) = gains.get_mut(number / per_antenna) {
-                            *gain += wave;
+                            // Assignment operators of complex numbers are not inlined.
+                            let sum = *gain + wave;
+                            *gain = sum;
                         }
                     }
                     ScatterModel::Rays => {
                         for (gain, response) in gains.iter_mut().zip(&response) {
-                            *gain += wave * response;
+                            let sum = *gain + wave * response;
+                            *gain = sum;
                         }
                     }
                 }
-                wave *= turn;
+                let next = wave * turn;
+                wave = next;
             }
         }
         if !self.dispersive && into.len() > elements {

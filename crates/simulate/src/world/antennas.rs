@@ -49,8 +49,9 @@ impl Antennas {
             Shape::Row { element_rad } => {
                 let step = phasor(element_rad * towards[0]);
                 for gain in gains {
-                    *gain += wave;
-                    wave *= step;
+                    // Assignment operators of complex numbers are not inlined.
+                    let (sum, next) = (*gain + wave, wave * step);
+                    (*gain, wave) = (sum, next);
                 }
             }
             Shape::Other(manifold) => manifold.add(wave, towards, gains),

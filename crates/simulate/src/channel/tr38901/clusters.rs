@@ -189,9 +189,12 @@ impl Clusters {
             let turn_step = phasor(-TAU * step_hz * group.delay_s);
             for gains in into.chunks_exact_mut(elements) {
                 for (gain, sum) in gains.iter_mut().zip(&*sum) {
-                    *gain += turn * sum;
+                    // Assignment operators of complex numbers are not inlined.
+                    let next = *gain + turn * sum;
+                    *gain = next;
                 }
-                turn *= turn_step;
+                let next = turn * turn_step;
+                turn = next;
             }
         }
     }
