@@ -58,7 +58,7 @@ fn most_affected(runs: usize, risk: f64) -> usize {
 
 #[test]
 fn nominal_runs_are_ok_and_within_the_protection_level() {
-    let runs = 16;
+    let runs = 10;
     let summaries = summaries(&scenario(Vec::new()), runs);
     let affected = (summaries.iter())
         .filter(|run| run.beyond > run.ok / 100)

@@ -149,6 +149,8 @@ fn scatter_with_a_delay_spread_is_averaged_over_the_band_and_included_in_sigma()
             ("site.ssb.subcarrier_spacing_khz", Value::from(30.0)),
             ("channel.delay_spread_ns", Value::from(spread_ns)),
             ("channel.rays", Value::from(64)),
+            // Every second SSB: successive ones are less than a wavelength apart.
+            ("vehicle.wake_up.interval_ms", Value::from(40.0)),
         ];
         let scenario = scenario("iq", k_db, &more);
         let mut all = errors(&scenario, &drive(&scenario, 1));
@@ -198,9 +200,14 @@ fn faults_have_equal_effects_on_samples_and_snapshots() {
         "{ kind = \"stuck-antenna\", antennas = [2] }",
     ] {
         let of = |fidelity| {
+            // A fault displaces every angle, so that half of the road suffices.
             let more = [
                 ("faults", fault(what)),
                 ("site.radio_heads[0].eirp_dbm", Value::from(20.0)),
+                (
+                    "site.road.segments",
+                    value("[{ length_m = 40.0, turn_rad = 0.05 }]"),
+                ),
             ];
             let scenario = scenario(fidelity, 60.0, &more);
             let errors = errors(&scenario, &drive(&scenario, 1));
@@ -252,7 +259,8 @@ fn several_cells_with_blind_snapshots_and_poor_hardware_are_located() {
 
 #[test]
 fn samples_are_reproducible_and_differ_between_runs() {
-    let scenario = scenario("iq", 20.0, &[]);
+    let short = value("[{ length_m = 10.0 }]");
+    let scenario = scenario("iq", 20.0, &[("site.road.segments", short)]);
     let (a, b, c) = (
         drive(&scenario, 1),
         drive(&scenario, 1),

@@ -307,7 +307,7 @@ fn a_drive_is_reproducible_and_works_with_samples() {
         let short = [
             (
                 "site.road.polyline_m",
-                common::value("[[-140.0, 0.0], [-110.0, 0.0]]"),
+                common::value("[[-140.0, 0.0], [-125.0, 0.0]]"),
             ),
             ("motion.stops", common::value("[]")),
             ("channel.model", model.into()),
