@@ -6,7 +6,12 @@
 use std::sync::Arc;
 
 pub use rustfft::Fft;
-use rustfft::{FftDirection, FftPlanner};
+use rustfft::FftDirection;
+#[cfg(not(test))]
+use rustfft::FftPlanner as Planner;
+// The code of AVX and SSE is half of the build time of the unit tests.
+#[cfg(test)]
+use rustfft::FftPlannerScalar as Planner;
 
 /// Returns the plan of an unnormalised forward transform of `length` samples.
 ///
@@ -28,5 +33,5 @@ pub fn inverse(length: usize) -> Arc<dyn Fft<f32>> {
 
 #[inline(never)]
 fn plan(length: usize, direction: FftDirection) -> Arc<dyn Fft<f32>> {
-    FftPlanner::new().plan_fft(length, direction)
+    Planner::new().plan_fft(length, direction)
 }
