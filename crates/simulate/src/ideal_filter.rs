@@ -91,35 +91,3 @@ impl IdealFilter {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use crate::bound::Bound;
-    use crate::scenario::Scenario;
-    use onboard::settings::{Shipped, TomlFile};
-
-    #[test]
-    fn errors_have_the_reported_covariance() {
-        let scenario = Scenario::from_library("paper-real-odometry-2", &Shipped).unwrap();
-        let filter = Bound::new(&scenario).unwrap().ideal_filter(200);
-        let runs = 4000;
-        let mut sums = vec![[0.0; 3]; filter.points.len()];
-        for run in 0..runs {
-            for (sums, drawn) in sums.iter_mut().zip(filter.run(3, run)) {
-                let [a, b] = drawn.error_m;
-                for (sum, product) in sums.iter_mut().zip([a * a, a * b, b * b]) {
-                    *sum += product / runs as f64;
-                }
-            }
-        }
-        // The first position is an exact start with zero covariance.
-        for (point, [aa, ab, bb]) in filter.points.iter().zip(sums).skip(1) {
-            let [[paa, pab], [_, pbb]] = point.covariance_m2;
-            // Tolerance: four standard deviations of the sample covariance of Gaussian numbers.
-            let tolerance = |variance: f64| 4.0 * (variance / runs as f64).sqrt();
-            assert!((aa - paa).abs() < tolerance(2.0 * paa * paa));
-            assert!((bb - pbb).abs() < tolerance(2.0 * pbb * pbb));
-            assert!((ab - pab).abs() < tolerance(paa * pbb + pab * pab));
-        }
-    }
-}
