@@ -131,13 +131,15 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         let trace = covariance.power() * covariance.weight() * N as f64;
         let powers: Vec<f64> = self.grid.iter().map(|(_, a)| power(matrix, a)).collect();
         let ascend_from_best = |allowed: &dyn Fn(&Direction) -> bool| {
-            let allowed = self
-                .grid
-                .iter()
-                .zip(&powers)
-                .filter(|(point, _)| allowed(&point.0));
-            let best = allowed.max_by(|a, b| a.1.total_cmp(b.1))?;
-            Some(self.ascend(matrix, trace, best.0.0))
+            let mut best: Option<(f64, Direction)> = None;
+            for ((direction, _), power) in self.grid.iter().zip(&powers) {
+                // Whether a direction is allowed takes longer to compute than its power.
+                let is_better = best.is_none_or(|(most, _)| power.total_cmp(&most).is_ge());
+                if is_better && allowed(direction) {
+                    best = Some((*power, *direction));
+                }
+            }
+            best.map(|(_, direction)| self.ascend(matrix, trace, direction))
         };
         let mut best = ascend_from_best(&|_| true).ok_or(Error::Singular)?;
         let mut other = ascend_from_best(&|direction| best.is_far_from(direction));
