@@ -58,6 +58,8 @@ const DELAY_FLOOR: f64 = 0.1;
 /// Minimum noise relative to the signal for the powers of the paths, −20 dB. With −10 dB, a blocked
 /// first path is not distinguished from K = 5 dB.
 const POWER_FLOOR: f64 = 1e-2;
+/// Exponents below this value give zero.
+const MIN_EXPONENT: f64 = -746.0;
 /// Number of delays of a grid.
 const GRID: usize = 17;
 /// Maximum number of grids, each finer than the previous one.
@@ -336,6 +338,8 @@ struct Search<'a, const A: usize> {
     /// Power of a resource element relative to noise, mean over the antennas.
     power: f64,
     prior: [[f64; FACTORS]; SPREADS],
+    /// K factors of the prior, as power ratios.
+    factors: [f64; FACTORS],
 }
 
 /// Log-likelihoods of every delay spread and K factor.
@@ -353,6 +357,7 @@ impl<'a, const A: usize> Search<'a, A> {
             excess: 1.0,
             power: (direct / A as f64 - 1.0).max(1.0) / known,
             prior: prior(base_rate_hz),
+            factors: std::array::from_fn(k_factor),
         }
     }
 
@@ -405,8 +410,8 @@ impl<'a, const A: usize> Search<'a, A> {
         let mut gains = [[[0.0; MODES]; FACTORS]; SPREADS];
         let mut losses = [[0.0; FACTORS]; SPREADS];
         for (spread, (values, _)) in self.basis.spreads.iter().enumerate() {
-            for factor in 0..FACTORS {
-                let density = self.power / k_factor(factor);
+            for (factor, k) in self.factors.iter().enumerate() {
+                let density = self.power / k;
                 for (gain, value) in gains[spread][factor].iter_mut().zip(values) {
                     let level = density * value;
                     *gain = level / (1.0 + level);
@@ -459,11 +464,13 @@ impl<'a, const A: usize> Search<'a, A> {
             let delay = step * index as f64;
             let (mut density, mut evidence) = (0.0, 0.0);
             for (row, prior) in likelihoods.iter().zip(&self.prior) {
-                for (factor, (likelihood, prior)) in row.iter().zip(prior).enumerate() {
+                for ((likelihood, prior), k) in row.iter().zip(prior).zip(self.factors) {
                     let exponent = likelihood - largest;
+                    if INDEPENDENT * exponent < MIN_EXPONENT {
+                        continue;
+                    }
                     let root = (INDEPENDENT * exponent).exp();
                     let weight = root * prior;
-                    let k = k_factor(factor);
                     let share = k / (1.0 + k);
                     density += weight;
                     evidence += exponent.exp() * prior;
