@@ -3,7 +3,8 @@
 //! Ranges do not measure the heading, so that a filter with a wrong heading rejects them as soon as
 //! the vehicle moves. Filters with headings in eight directions therefore run next to the solution
 //! for the first metres, and after the solution is lost. The most probable one replaces the
-//! solution if its ranges are certainly more probable.
+//! solution if its ranges are certainly more probable. The search ends at the first angle, which
+//! measures the heading.
 
 use std::f64::consts::TAU;
 
@@ -99,8 +100,6 @@ impl HeadingSearch {
         }
         self.solution += range_density(&predicted).ln();
         for it in &mut self.filters {
-            // Only the solution is updated with angles, and the likelihoods are comparable for equal variances.
-            it.ekf.copy_blocked_paths(solution);
             let predicted = it.ekf.predict_range(head, measured);
             if let Ok(predicted) = &predicted {
                 it.log_likelihood += range_density(predicted).ln();

@@ -209,6 +209,9 @@ clone_in_place! {
         test: Option<RelocalizationTest>,
         /// Search for the heading with ranges, while it runs.
         heading: Option<HeadingSearch>,
+        /// Whether angles were received. They measure the heading, so that no search with ranges is
+        /// necessary, which would ignore the angles.
+        has_angles: bool,
         rests_until_s: f64,
         recovered: Option<Recovered>,
         keeps_journal: bool,
@@ -265,6 +268,7 @@ impl Relocalizer {
             consistency: ConsistencyMonitor::new(heads),
             test: None,
             heading: None,
+            has_angles: false,
             rests_until_s: f64::NEG_INFINITY,
             recovered: None,
             keeps_journal: false,
@@ -334,7 +338,8 @@ impl Relocalizer {
         };
         let ekf = solution.ekf();
         let Some(search) = &self.heading else {
-            if solution.is_contradicted() && now_s >= self.rests_until_s {
+            let is_contradicted = solution.is_contradicted() && !self.has_angles;
+            if is_contradicted && now_s >= self.rests_until_s {
                 self.heading = HeadingSearch::new(ekf, &self.drive_config.heads, NEARBY_M);
                 self.rests_until_s = now_s + REST_S;
             }
@@ -526,6 +531,7 @@ impl Localizer for Relocalizer {
         measured: &AngleMeasurement,
     ) -> Result<UpdateResult, BoxError> {
         let now_s = measured.time_s;
+        (self.heading, self.has_angles) = (None, true);
         if let Some(search) = &mut self.search {
             if !search.is_due(head, now_s) {
                 // Not used is not rejected.
