@@ -6,6 +6,7 @@ use onboard::geometry::Pose;
 use onboard::localize::{Localizer, built_in};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
+use onboard::range::RangeMeasurement;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -55,8 +56,12 @@ struct Drive {
 impl Drive {
     /// Creates a drive that starts at the origin with a configured start.
     fn new(start: Pose) -> Self {
+        Self::with(VEHICLE, start)
+    }
+
+    fn with(vehicle: &str, start: Pose) -> Self {
         let site = Site::from_toml(SITE, "hall", &Shipped).unwrap();
-        let vehicle = Vehicle::from_toml(VEHICLE, "robot", &Shipped).unwrap();
+        let vehicle = Vehicle::from_toml(vehicle, "robot", &Shipped).unwrap();
         Self {
             heads: RadioHead::received_by(&site, &vehicle),
             localizer: built_in(&site, &vehicle, start).unwrap(),
@@ -169,4 +174,26 @@ fn no_search_runs_after_a_restart() {
         "{after_s}"
     );
     assert!(drive.localizer.recovered().is_none() && drive.error_m() < 0.1);
+}
+
+/// The ranges are those of the opposite heading. The search for the heading compares ranges only, and angles contradict its
+/// result.
+#[test]
+fn ranges_do_not_replace_a_heading_that_angles_measure() {
+    let vehicle = format!("{VEHICLE}[ranging]\nkind = 'two-way'\nsigma_m = 0.1\n");
+    let mut drive = Drive::with(&vehicle, Pose::default());
+    while drive.time_s() < 20.0 {
+        drive.wind(drive.time_s() + 5.0 * STEP_S, 0.0);
+        let opposite = Pose {
+            x_m: -drive.truth.x_m,
+            y_m: -drive.truth.y_m,
+            ..drive.truth
+        };
+        for head in drive.heads.clone() {
+            let range_m = opposite.point().distance_m(head.position);
+            let measured = RangeMeasurement::range(drive.time_s(), range_m, Some(0.1));
+            drive.localizer.update_range(&head, &measured).unwrap();
+        }
+        assert!(drive.error_m() < 0.5, "{}", drive.error_m());
+    }
 }
