@@ -18,11 +18,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import polars as pl
 
-from access_av import Scenario, ray_paths, simulate
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-CARRIER_MHZ = 3750.0
+import street_site
+from access_av import Scenario, simulate
+
 WANDERS_NS = (0.0, 0.05)
 WITHOUT_ROAD = {
     "vehicle.localizer.map": False,
@@ -32,20 +33,8 @@ WITHOUT_ROAD = {
 
 def scenario_file(street: Path, folder: Path, interval_ms: float) -> Path:
     """Writes site, paths and scenario of the street; returns the scenario file."""
-    heads = pl.read_csv(street / "landmarks.csv").rows()
-    road = (street / "road.toml").read_text().split("[track]", 1)[1]
-    rows = "".join(
-        f"[[radio_heads]]\npci = {pci}\nssb_index = {index}\nposition_m = [{x}, {y}, {z}]\n"
-        f"clock_group = 1\nclock_offset_std_ns = 50.0\nclock_frequency_std_ppb = 20.0\n"
-        for index, (pci, x, y, z) in enumerate(heads)
-    )
-    (folder / "street.toml").write_text(
-        f'name = "street"\ncarrier_mhz = {CARRIER_MHZ}\nrician_k_db = 10.0\n'
-        f"[ssb]\nsubcarrier_spacing_khz = 30.0\n[road]\n{road}\n{rows}"
-    )
-    site = str(folder / "street.toml")
-    paths = street / "paths.parquet"
-    ray_paths.import_paths(paths, site, folder / "street.npz", carrier_mhz=CARRIER_MHZ)
+    clock = "clock_group = 1\nclock_offset_std_ns = 50.0\nclock_frequency_std_ppb = 20.0\n"
+    street_site.write(street, folder, rician_k_db=10.0, of_each_head=clock)
     file = folder / "drive.toml"
     file.write_text(
         'name = "drive"\nsite = "street.toml"\nfidelity = "iq"\n'

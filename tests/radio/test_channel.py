@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+import street_site
 from access_av import Scenario, Site, bound, channel, columns, ray_paths, simulate
 from conftest import ROOT
 
@@ -236,22 +237,7 @@ def test_the_street_can_be_simulated(tmp_path: Path, data: Path) -> None:
     street = data / "street"
     if not street.is_dir():
         pytest.skip("no ray-traced street among the reference data")
-    heads = pl.read_csv(street / "landmarks.csv").rows()
-    road = (street / "road.toml").read_text().split("[track]", 1)[1]
-    rows = "".join(
-        f"[[radio_heads]]\npci = {pci}\nssb_index = {index}\nposition_m = [{x}, {y}, {z}]\n"
-        for index, (pci, x, y, z) in enumerate(heads)
-    )
-    text = (
-        'name = "street"\ncarrier_mhz = 3750.0\nrician_k_db = 0.0\n'
-        f"[ssb]\nsubcarrier_spacing_khz = 30.0\n[road]\n{road}\n{rows}"
-    )
-    (tmp_path / "street.toml").write_text(text)
-    found = ray_paths.import_paths(
-        street / "paths.parquet", str(tmp_path / "street.toml"), tmp_path / "street.npz",
-        carrier_mhz=3750.0,
-    )  # fmt: skip
-    assert found["places"] > 1500
+    assert street_site.write(street, tmp_path, rician_k_db=0.0) > 1500
     (tmp_path / "drive.toml").write_text(
         'name = "drive"\nsite = "street.toml"\n'
         '[vehicle]\nextends = "carrier"\nname = "street"\n'

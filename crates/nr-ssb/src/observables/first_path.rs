@@ -58,7 +58,7 @@ const DELAY_FLOOR: f64 = 0.1;
 /// Minimum noise relative to the signal for the powers of the paths, −20 dB. With −10 dB, a blocked
 /// first path is not distinguished from K = 5 dB.
 const POWER_FLOOR: f64 = 1e-2;
-/// Exponents below this value give zero.
+/// Exponents below this value give zero: the smallest positive `f64` is e^−744.4.
 const MIN_EXPONENT: f64 = -746.0;
 /// Number of delays of a grid.
 const GRID: usize = 17;

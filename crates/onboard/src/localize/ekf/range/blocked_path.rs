@@ -13,7 +13,8 @@ const WITH_LINE_OF_SIGHT: f64 = 0.05;
 /// (notes/experiments.md).
 const LATE_M: f64 = 6.0;
 
-/// Standard deviation of the error of a range rate (m/s): fading of a reflection turns the carrier phase.
+/// Standard deviation of the error of a range rate (m/s): fading of a reflection turns the carrier phase. An
+/// assumption; 5 and 10 m/s give equal errors (notes/experiments.md).
 const RATE_STD_MPS: f64 = 5.0;
 
 /// First path that is blocked with a probability.
