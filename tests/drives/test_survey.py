@@ -79,7 +79,7 @@ def test_displaced_radio_head_and_array_are_estimated(logged: Path) -> None:
     heads = json.loads(found.site.to_json())["radio_heads"]
     assert heads[2]["position_m"] == [310.0, 85.0, 7.0]
     assert heads[0]["position_m"][0] == by_key["radio_heads[0].position_m[0]"].found
-    # The specified noise is conservative: the innovations are within the model.
+    # The specified noise is conservative, and dependent angles have increased variances.
     assert 0.3 < found.nis < 1.1
     # The plan is displaced with a lower probability than before (0.01). The vehicle file has it.
     assert found.site_frame_offset is not None
@@ -158,11 +158,15 @@ def test_the_command_reports_parameters_that_were_not_estimated_or_do_not_fit(
     assert all(row[1] == "m" and row[3:] == ["–", "not", "determined"] for row in rows)
     twice = access_av(*arguments, short, "--site", "yard")
     assert (twice.code, "given twice" in twice.err) == (2, True)
+    # A standing vehicle cannot distinguish a wrong mounting from a bias, but a drive can.
     turned = Vehicle.load(str(short / "vehicle.toml")).with_overrides(
         {"array.mounting_rad": 1.57, "array.mounting_std_rad": 0.01}
     )
     (tmp_path / "turned.toml").write_text(turned.to_toml())
-    done = access_av(*arguments[:3], "--site", "yard", "--vehicle", tmp_path / "turned.toml")
+    done = access_av(
+        *("record", "survey", logged / "0", "--site", "yard"),
+        *("--vehicle", tmp_path / "turned.toml"),
+    )
     assert "are outliers and were not used" in done.err
 
 

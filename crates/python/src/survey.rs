@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
+use onboard::gaussian::Innovation;
 use onboard::observation::SsbDetection;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -86,8 +87,10 @@ impl LoggedDrive {
     ///
     /// Returns
     /// -------
-    /// residual_rad, variance_rad2 : array of float, shape (n,)
-    ///     Innovation of the electrical angle and its variance; NaN if there is none.
+    /// residual_rad, variance_rad2 : array of float, shape (n, 2)
+    ///     Innovations of each electrical angle and their variances: for a multipath bias that is
+    ///     retained, and for one that is drawn again, each weighted with its probability; an
+    ///     infinite variance is no information. NaN for an angle that was not processed.
     /// used : array of bool, shape (n,)
     ///     Mask of the used angles.
     ///
@@ -116,14 +119,18 @@ impl LoggedDrive {
                 innovations(&site, &vehicle, &self.odometry, angles, used.as_deref())
             })
             .map_err(replay_error)?;
-        let number = |value: fn(&InnovationRecord) -> f64| {
-            let of = move |it: &Option<InnovationRecord>| it.as_ref().map_or(f64::NAN, value);
-            PyArray1::from_iter(py, met.iter().map(of))
+        let number = |value: fn(&Innovation) -> f64| {
+            let both = move |it: &Option<InnovationRecord>| {
+                it.map_or([f64::NAN; 2], |it| {
+                    it.evidence.given_bias.map(|it| value(&it))
+                })
+            };
+            PyArray1::from_iter(py, met.iter().flat_map(both)).reshape([met.len(), 2])
         };
         let used = met.iter().map(|it| it.is_some_and(|it| it.used));
         (
-            number(|it| it.innovation.residual),
-            number(|it| it.innovation.variance),
+            number(|it| it.residual)?,
+            number(|it| it.variance)?,
             PyArray1::from_iter(py, used),
         )
             .into_pyobject(py)

@@ -140,7 +140,7 @@ def survey(
             )
     say(
         f"{found.used} of {found.angles} angles used; mean normalized innovation squared "
-        f"{found.nis:.2f} (expected: 1)"
+        f"{found.nis:.2f} (correct model: at most 1)"
     )
     if found.site_frame_offset is not None:
         say(

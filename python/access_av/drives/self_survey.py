@@ -10,9 +10,18 @@ is the negative logarithm of the posterior of the parameters θ, over all angles
 of ν are differences, each a replay of every drive, so that they are only computed again after a
 large step. The road, if any, and the start poses define the frame.
 
-Multipath correlates the innovations, so that a sum over all of them counts information repeatedly.
-The sum is divided by tr(H⁻¹J)/p: H is the information about p parameters for independent
-innovations, and J is the sum of g gᵀ over blocks of a drive with gradients g (Pauli, Racugno and
+The tracker estimates a multipath bias of each radio head, which is retained or drawn again at an
+angle. The minimum is found by expectation maximisation (Dempster, Laird and Rubin 1977): an angle
+contributes one ν for each of both hypotheses, and its 1 / S is the expected one. The hypotheses are
+missing data, so that the observed information is smaller than the complete one,
+
+    Hᵢⱼ = Σ ∂ᵢν ∂ⱼ(ν / S),
+
+with the derivatives of S (Louis 1982). The covariance follows from the observed information.
+
+Multipath that this model does not describe correlates the innovations, so that a sum over all of
+them counts information repeatedly. The sum is divided by tr(H⁻¹J)/p: H is the information about p
+parameters, and J is the sum of g gᵀ over blocks of a drive with gradients g (Pauli, Racugno and
 Ventura, Statistica Sinica 21, 2011). The factor is at least 1.
 """
 
@@ -43,10 +52,14 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.float64]
     Flags = NDArray[np.bool_]
     Met = tuple[Numbers, Numbers, Flags]
+    Single = NDArray[np.float32]
+    Slopes = tuple[Single, Numbers]
 
 # Maximum ratio of posterior and prior standard deviation of a surveyed parameter.
 LEARNT = 0.7
 MOST_ITERATIONS = 20
+# Iterations of most surveys, for the progress.
+USUAL_ITERATIONS = 6
 # Blocks per drive, each long against the correlation of multipath.
 BLOCKS = 10
 # Convergence: maximum step of a parameter relative to its standard deviation.
@@ -130,7 +143,8 @@ class Survey(Result):
     angles, used
         Number of angles, and number without outliers.
     nis
-        Mean normalized innovation squared; 1 for a correct model.
+        Mean normalized innovation squared, given the estimated biases; at most 1 for a correct
+        model, because dependent angles have increased variances.
     iterations
         Number of Gauss–Newton steps.
     origin
@@ -214,7 +228,7 @@ def survey(
     threads
         Number of worker threads. Default: all cores.
     progress
-        Called with the number of completed replays and their maximum.
+        Called with the number of completed replays and their expected number.
 
     Raises
     ------
@@ -316,46 +330,100 @@ class _Problem:
         found = list(self.pool.map(drive, range(len(self.drives))))
         self.done += 1
         if self.progress is not None:
-            most = MOST_ITERATIONS * (len(values) + 4)
-            self.progress(min(self.done, most), most)
+            expected = USUAL_ITERATIONS * (len(values) + 4)
+            self.progress(self.done, max(expected, self.done + 1))
         return found
 
-    def slopes(self, values: Numbers, used: list[Flags], met: list[Met]) -> list[Numbers]:
-        """Returns the derivatives of each drive's innovations, shape (parameters, angles)."""
-        columns = []
+    def slopes(self, values: Numbers, used: list[Flags], met: list[Met]) -> list[Slopes]:
+        """Returns ∂ν of each drive, shape (parameters, angles, 2), and Σ ∂ᵢν ∂ⱼ(ν / S)."""
+        of_drives: list[list[tuple[Single, Single]]] = [[] for _ in met]
         for step in np.diag(self.model.steps):
             ahead = self.meet(values + step, np.zeros_like(values), used)
-            both = zip(ahead, met, strict=True)
-            columns.append([wrapped(a[0] - b[0]) / step.sum() for a, b in both])
-        return [np.stack(of_drive) for of_drive in zip(*columns, strict=True)]
+            for columns, (there, after, _), (here, before, counted) in zip(
+                of_drives, ahead, met, strict=True
+            ):
+                change = np.where(counted[:, None], wrapped(there - here), 0.0)
+                score = np.where(counted[:, None], (here + change) / after - here / before, 0.0)
+                columns.append(
+                    (
+                        np.nan_to_num(change / step.sum()).astype(np.float32),
+                        np.nan_to_num(score / step.sum()).astype(np.float32),
+                    )
+                )
+        return [_slopes(columns) for columns in of_drives]
 
-    def misfit(self, values: Numbers, met: list[Met], inflation: float) -> float:
-        """Returns 2 Λ(θ) up to a constant."""
-        prior = float(np.sum(((values - self.model.before) / self.model.stds_before) ** 2))
-        return prior + sum(_normalised(*each) for each in met) / inflation
+    def increase(
+        self, values: Numbers, step: Numbers, here: list[Met], there: list[Met], inflation: float
+    ) -> float:
+        """Returns the change of 2 Λ(θ) by a step, with the variances before the step."""
+        model = self.model
+        before, after = (
+            float(np.sum(((at - model.before) / model.stds_before) ** 2))
+            for at in (values, values + step)
+        )
+        by_angles = 0.0
+        for (residual, variance, used), (moved, _, _) in zip(here, there, strict=True):
+            squares = (moved[used] ** 2 - residual[used] ** 2) / variance[used]
+            by_angles += float(np.nansum(squares))
+        return after - before + by_angles / inflation
 
-    def linearised(
-        self, values: Numbers, met: list[Met], slopes: list[Numbers]
-    ) -> tuple[Numbers, Numbers, float]:
-        """Returns gradient and Gauss–Newton Hessian of Λ(θ), and the variance inflation."""
-        prior = np.diag(self.model.stds_before**-2.0)
-        information, squared = np.zeros_like(prior), np.zeros_like(prior)
-        gradient = np.zeros_like(values)
-        for (residual, variance, counted), jacobian in zip(met, slopes, strict=True):
-            kept = counted & np.isfinite(jacobian).all(axis=0) & np.isfinite(residual)
-            weighted = jacobian[:, kept] / variance[kept]
-            information += weighted @ jacobian[:, kept].T
-            gradients = weighted * residual[kept]
+    def linearised(self, met: list[Met], slopes: list[Slopes]) -> _Linearised:
+        """Sums the drives' contributions to Λ(θ) without the prior."""
+        count = len(self.model.keys)
+        complete, observed, squared = (np.zeros((count, count)) for _ in range(3))
+        gradient = np.zeros(count)
+        for (residual, variance, counted), (jacobian, of_drive) in zip(met, slopes, strict=True):
+            kept = counted & np.isfinite(residual).all(axis=1)
+            rows = jacobian[:, kept].reshape(count, -1).astype(np.float64)
+            weighted = rows / variance[kept].ravel()
+            complete += weighted @ rows.T
+            observed += of_drive
+            gradients = weighted * residual[kept].ravel()
             gradient += gradients.sum(axis=1)
             for block in np.array_split(gradients, BLOCKS, axis=1):
                 squared += np.outer(block.sum(axis=1), block.sum(axis=1))
+        prior = np.diag(self.model.stds_before**-2.0)
+        return _Linearised(gradient, complete, _limited(observed, complete + prior), squared, prior)
+
+
+@dataclass(frozen=True)
+class _Linearised:
+    """Gradient and information of the drives, J of the variance inflation, prior information."""
+
+    gradient: Numbers
+    complete: Numbers
+    observed: Numbers
+    squared: Numbers
+    prior: Numbers
+
+    def inflated(self, information: Numbers) -> tuple[Numbers, float]:
+        """Returns the covariance of the parameters for an information, and the inflation."""
         # Parameters that the drives do not determine count neither in the numerator nor in p.
-        posterior = np.linalg.inv(information + prior)
+        posterior = np.linalg.inv(information + self.prior)
         determined = np.trace(posterior @ information)
-        ratio = np.trace(posterior @ squared) / determined if determined > 0.0 else 1.0
+        ratio = np.trace(posterior @ self.squared) / determined if determined > 0.0 else 1.0
         inflation = max(1.0, float(ratio))
-        gradient = gradient / inflation + prior @ (values - self.model.before)
-        return gradient, information / inflation + prior, inflation
+        covariance = np.linalg.inv(information / inflation + self.prior)
+        return np.asarray(covariance, dtype=np.float64), inflation
+
+
+def _slopes(columns: list[tuple[Single, Single]]) -> Slopes:
+    jacobian, scores = (np.stack(each) for each in zip(*columns, strict=True))
+    product = np.einsum("ian,jan->ij", jacobian, scores, dtype=np.float64)
+    return jacobian, 0.5 * (product + product.T)
+
+
+def _limited(observed: Numbers, complete: Numbers) -> Numbers:
+    """Returns the observed information, limited to the range from zero to the complete one.
+
+    Uncertain biases are missing data, so that the information about the parameters is within this
+    range (Louis, J. Royal Statistical Society B 44, 1982); differences may be outside.
+    """
+    root = np.linalg.cholesky(complete)
+    inverse = np.linalg.inv(root)
+    shares, axes = np.linalg.eigh(inverse @ observed @ inverse.T)
+    whitened = root @ axes
+    return np.asarray((whitened * np.clip(shares, 0.0, 1.0)) @ whitened.T, dtype=np.float64)
 
 
 def _identify(problem: _Problem) -> Survey:
@@ -370,19 +438,22 @@ def _identify(problem: _Problem) -> Survey:
         met = problem.meet(values, exact, used)
         if since > LINEAR:
             slopes, since = problem.slopes(values, used, met), 0.0
-        gradient, information, inflation = problem.linearised(values, met, slopes)
-        covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+        linear = problem.linearised(met, slopes)
+        covariance, inflation = linear.inflated(linear.complete)
         stds = np.sqrt(np.diag(covariance))
+        gradient = linear.gradient / inflation + linear.prior @ (values - model.before)
         step = -covariance @ gradient
-        here = problem.misfit(values, met, inflation)
         while (moved := float(np.max(np.abs(step) / stds))) > STILL:
             there = problem.meet(values + step, exact, used)
-            if problem.misfit(values + step, there, inflation) <= here:
+            if problem.increase(values, step, met, there, inflation) <= 0.0:
                 break
             step = 0.5 * step
         values = values + step
         since += moved
     met = problem.meet(values, exact, used)
+    linear = problem.linearised(met, problem.slopes(values, used, met))
+    covariance = linear.inflated(linear.observed)[0]
+    stds = np.sqrt(np.diag(covariance))
     counted = sum(int(each[2].sum()) for each in met)
     learnt = stds < LEARNT * model.stds_before
     # Accept both coordinates of a position, or none.
@@ -403,7 +474,6 @@ def _identify(problem: _Problem) -> Survey:
             covariance[positions, positions],
             written[positions],
             written_stds[positions],
-            nis,
         )
         vehicle = vehicle.with_overrides({OFFSET_KEY: offset})
     columns = (model.keys, model.before, model.stds_before, values, stds)
@@ -424,5 +494,5 @@ def _identify(problem: _Problem) -> Survey:
 
 
 def _normalised(residual: Numbers, variance: Numbers, used: Flags) -> float:
-    kept = used & np.isfinite(residual)
+    kept = used & np.isfinite(residual).all(axis=1)
     return float(np.sum(residual[kept] ** 2 / variance[kept]))

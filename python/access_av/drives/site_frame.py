@@ -43,7 +43,6 @@ def displacement_probability(
     covariance: Numbers,
     written: Numbers,
     written_stds: Numbers,
-    nis: float = 1.0,
 ) -> float:
     """Returns the probability that the surveyed positions have a common offset beyond their σ.
 
@@ -58,27 +57,20 @@ def displacement_probability(
         Estimates from the drives, shape (2n,), and their covariance, shape (2n, 2n).
     written, written_stds
         Positions and standard deviations of the surveyed site file, shape (2n,).
-    nis
-        Mean normalized innovation squared. A value above 1 reduces the information of the drives.
     """
     if prior == 0.0:
         return 0.0
     known = np.diag(stds_before**-2.0)
-    by_drives = np.linalg.inv(covariance) - known
-    excess = max(nis, 1.0)
-    pull = (by_drives @ (found - before) + known @ (found - before)) / excess
-    spread = np.linalg.inv(known + by_drives / excess)
-    found = before + spread @ pull
     shift = np.tile(np.eye(2), (len(before) // 2, 1))
     towards = shift.T @ known @ (found - before)
-    information = shift.T @ known @ shift - shift.T @ known @ spread @ known @ shift
+    information = shift.T @ known @ shift - shift.T @ known @ covariance @ known @ shift
     of_offset = np.linalg.inv(information + np.eye(2) / OFFSET_STD_M**2)
     # Bayes factor, limited so that its exponential is finite.
     exponent = min(0.5 * float(towards @ of_offset @ towards), 300.0)
     growth = float(np.linalg.det(np.eye(2) + OFFSET_STD_M**2 * information))
     odds = prior / (1.0 - prior) * math.exp(exponent) / math.sqrt(growth)
     # Offset of the written positions given D, averaged over the radio heads.
-    gain = shift.T @ spread @ known @ shift / (len(before) / 2)
+    gain = shift.T @ covariance @ known @ shift / (len(before) / 2)
     mean_m = shift.T @ (found - written) / (len(before) / 2) + gain @ of_offset @ towards
     stds_m = np.sqrt(np.diag(gain @ of_offset @ gain.T))
     limit_m = NOT_COVERED * float(np.sqrt(np.mean(written_stds**2) / (len(before) / 2)))

@@ -22,6 +22,7 @@ pub use choose::built_in;
 pub use dead_reckoning::DeadReckoning;
 pub use ekf::Ekf;
 pub use localizer::{Localizer, Recovered, copy_into};
+pub use modes::AngleEvidence;
 pub use out_of_sequence::{AngleUpdate, HISTORY_S, OutOfSequenceBuffer, RangeUpdate};
 pub use output::{
     InitialPose, Integrity, IntegrityState, OdometryResult, PoseEstimate, SelectedHypothesis,

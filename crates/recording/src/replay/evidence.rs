@@ -90,9 +90,9 @@ impl Evidence {
         for (Step { met, .. }, logged) in steps.iter().zip(angles.iter()) {
             let sigma_rad = with_phase(logged, &measurand).measured.phase_sigma_rad;
             evidence.log_likelihood += log_likelihood(met.as_ref(), sigma_rad);
-            let relative = met.as_ref().map(|it| it.relative_log_likelihood);
+            let relative = met.as_ref().map(|it| it.evidence.relative_log_likelihood);
             evidence.relative_log_likelihood += relative.unwrap_or(UNUSABLE);
-            let misfits = |met: &InnovationRecord| met.innovation.mahalanobis2() > FITS;
+            let misfits = |met: &InnovationRecord| met.evidence.innovation.mahalanobis2() > FITS;
             let head = evidence.heads.entry(head_of(logged)).or_default();
             for count in [&mut evidence.all, head] {
                 count.angles += 1;
@@ -108,7 +108,7 @@ impl Evidence {
 /// Returns the log-likelihood of an angle in units of its standard deviation, so that it does not
 /// depend on the unit of the angle.
 fn log_likelihood(met: Option<&InnovationRecord>, sigma_rad: f64) -> f64 {
-    let density = met.map_or(0.0, |met| met.innovation.density());
+    let density = met.map_or(0.0, |met| met.evidence.innovation.density());
     (sigma_rad * with_outliers(density, OUTLIERS)).ln()
 }
 

@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use onboard::gaussian::Innovation;
 use onboard::geometry::Pose;
 use onboard::localize::ekf::EkfConfig;
-use onboard::localize::{self, Ekf, InitialPose, Localizer};
+use onboard::localize::{self, AngleEvidence, Ekf, InitialPose, Localizer};
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Check, Site, Vehicle};
 
@@ -14,13 +13,10 @@ use super::stated::with_phase;
 use crate::angle_log::LoggedAngle;
 use crate::odometry::OdometryLog;
 
-/// Innovation of an angle in the localizer.
+/// Evidence of an angle in the localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InnovationRecord {
-    /// Innovation of the electrical angle (rad).
-    pub innovation: Innovation,
-    /// Log-likelihood relative to an angle that is predicted exactly; see [`Ekf::relative_log_likelihood`].
-    pub relative_log_likelihood: f64,
+    pub evidence: AngleEvidence,
     /// Whether the localizer used the angle.
     pub used: bool,
 }
@@ -129,18 +125,14 @@ pub fn replay_angles(
         };
         let sends = |head: &&RadioHead| head.sends(logged.ssb.pci, logged.ssb.ssb_index);
         if let Some(head) = heads.iter().find(sends) {
-            let innovation = ekf.and_then(|ekf| {
-                let relative = ekf.relative_log_likelihood(head, &measured);
-                Some((ekf.innovation(head, &measured)?, relative))
-            });
+            let evidence = ekf.and_then(|ekf| ekf.angle_evidence(head, &measured));
             let wanted = used.is_none_or(|used| used.get(index).copied().unwrap_or(false));
             let accepted = wanted
                 && (localizer.update(head, &measured))
                     .map_err(ReplayError::Custom)?
                     .accepted;
-            step.met = innovation.map(|(innovation, relative_log_likelihood)| InnovationRecord {
-                innovation,
-                relative_log_likelihood,
+            step.met = evidence.map(|evidence| InnovationRecord {
+                evidence,
                 used: accepted,
             });
         }

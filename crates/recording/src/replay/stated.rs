@@ -31,8 +31,7 @@ pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
     let receiver = &mut vehicle.receiver;
     // Angles of a differential drive with reflections resemble those of a lost drive, so that the
     // two would be confused.
-    let is_unstated = receiver.correlated_noise_fraction.is_none();
-    let may_be_found = is_unstated && vehicle.drive == DriveKind::Road;
+    let may_be_found = vehicle.drive == DriveKind::Road;
     (receiver.multipath_bias_probability).get_or_insert(if may_be_found { UNKNOWN } else { 0.0 });
     receiver
         .correlated_noise_fraction

@@ -127,6 +127,19 @@ pub struct JumpHypotheses {
     pub narrowing: f64,
 }
 
+impl JumpHypotheses {
+    /// Returns the innovation given each hypothesis, with the expected inverse variance, weighted with the probability
+    /// of the hypothesis (E-step of expectation maximisation; Dempster, Laird and Rubin, J. Royal Statistical Society
+    /// B 39, 1977). The variance is infinite without information about the state.
+    pub fn innovations(&self, without_bias: &Innovation) -> [Innovation; 2] {
+        [&self.kept, &self.redrawn].map(|it| Innovation {
+            residual: it.residual,
+            variance: (it.share * it.gain).recip(),
+            ..*without_bias
+        })
+    }
+}
+
 /// Returns mean and variance over the levels.
 fn moments(weights: &[f64; LEVELS], values: &[f64; LEVELS]) -> (f64, f64) {
     let mean = covariance(weights, values, &[1.0; LEVELS]).1;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::gaussian::with_outliers;
+use crate::gaussian::{Innovation, with_outliers};
 use crate::localize::bias::share;
 use crate::localize::ekf::{Ekf, PredictedMeasurement, PredictedRange};
 use crate::localize::output::UpdateReason;
@@ -10,12 +10,48 @@ use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
 use crate::range::RangeMeasurement;
 
+/// Evidence of an angle about the state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AngleEvidence {
+    /// Innovation of the electrical angle (rad), without the time-correlated bias.
+    pub innovation: Innovation,
+    /// Innovation given that the bias is retained, and that it is drawn again; the variances include the probability
+    /// of either. If no bias is estimated, the first has an infinite variance, and the second is `innovation`.
+    pub given_bias: [Innovation; 2],
+    /// Log-likelihood, minus that of an exactly predicted angle with its own noise only. If biases are estimated, the
+    /// likelihood includes them. Angles within 2 m of travel are then weighted by their independent fraction.
+    pub relative_log_likelihood: f64,
+}
+
 impl Ekf {
-    /// Returns the log-likelihood of an angle, minus that of an exactly predicted angle with its own
-    /// noise only. If biases are estimated, the likelihood includes them. Angles within 2 m of
-    /// travel are then weighted by their independent fraction.
-    pub fn relative_log_likelihood(&self, head: &RadioHead, measured: &AngleMeasurement) -> f64 {
-        log_likelihood(self, &self.predict_measurement(head, measured))
+    /// Returns what an angle says about the state before its update; `None` if it cannot be predicted.
+    pub fn angle_evidence(
+        &self,
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> Option<AngleEvidence> {
+        let predicted = self.predict_measurement(head, measured);
+        let relative_log_likelihood = log_likelihood(self, &predicted);
+        let predicted = predicted.ok().filter(|predicted| !predicted.excluded)?;
+        let innovation = predicted.innovation;
+        let given_bias = match &predicted.hypotheses {
+            Some(jumps) => jumps.innovations(&innovation),
+            None => {
+                let variance = f64::INFINITY;
+                [
+                    Innovation {
+                        variance,
+                        ..innovation
+                    },
+                    innovation,
+                ]
+            }
+        };
+        Some(AngleEvidence {
+            innovation,
+            given_bias,
+            relative_log_likelihood,
+        })
     }
 
     /// Returns the log-likelihood of a range in metres; 0 if the range is unusable.

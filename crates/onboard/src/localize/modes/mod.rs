@@ -10,6 +10,7 @@ mod subsets;
 mod table;
 
 pub(in crate::localize) use bank::{Bank, EVENT_EPOCHS, EVENT_S};
+pub use likelihood::AngleEvidence;
 pub(in crate::localize) use likelihood::{
     CERTAIN, log_likelihood, log_likelihood_as_stated, range_density,
 };
