@@ -94,11 +94,10 @@ impl Ekf {
 
     /// Sets the white fraction of the angles' noise, the correlation of their errors and the noise of the ranges to those
     /// of another filter of the same receiver.
-    pub(in crate::localize) const fn copy_noise_state(&mut self, other: &Self) {
+    pub(in crate::localize) fn copy_noise_state(&mut self, other: &Self) {
         self.white = other.white;
         self.copy_error_correlation(other);
-        self.range_noise = other.range_noise;
-        self.clock_noise = other.clock_noise;
+        self.copy_range_noise(other);
     }
 
     /// Sets the correlation of the angles' errors to that of another filter.
@@ -106,8 +105,11 @@ impl Ekf {
         self.error_correlation = other.error_correlation;
     }
 
-    /// Sets the probabilities of blocked first paths to those of another filter of the same radio heads.
-    pub(in crate::localize) fn copy_blocked_paths(&mut self, other: &Self) {
+    /// Sets the noise of ranges and clocks, and the probabilities of blocked first paths, to those of another filter of the
+    /// same radio heads.
+    pub(in crate::localize) fn copy_range_noise(&mut self, other: &Self) {
+        self.range_noise = other.range_noise;
+        self.clock_noise = other.clock_noise;
         for (mine, theirs) in self.heads.iter_mut().zip(&other.heads) {
             mine.blocked = theirs.blocked;
         }

@@ -23,8 +23,10 @@ impl ModeFilter {
 }
 
 impl Bank {
-    /// Updates with a range. All hypotheses have the nominal probability of a blocked first path. Otherwise, a filter far
-    /// from the position expects a blocked path, and ranges are no evidence against it.
+    /// Updates with a range. All hypotheses have the nominal noise of ranges and clocks, and the nominal probability of a
+    /// blocked first path. Otherwise, a filter that follows the delays would estimate less noise, and accurate range rates
+    /// would be evidence for it. A filter far from the position would expect a blocked path, and ranges would be no evidence
+    /// against it.
     pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
         if let Some(number) = head.number_in(&self.heads) {
             self.watch(number);
@@ -54,7 +56,7 @@ impl Bank {
         }
         let predicted = self.nominal.predict_range(head, measured);
         for it in &mut self.modes {
-            it.ekf.copy_blocked_paths(&self.nominal);
+            it.ekf.copy_range_noise(&self.nominal);
             it.update_range(&predicted, head, measured);
         }
         let most = (self.modes.iter()).fold(LikelihoodRatio::NONE, |most, it| most.max(it.ratio));
@@ -62,5 +64,65 @@ impl Bank {
             it.ratio.limit_by(most);
         }
         self.nominal.update_predicted_range(predicted)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    use super::super::table::trip::trip;
+    use super::*;
+    use crate::localize::output::SelectedHypothesis;
+    use crate::observation::OdometrySample;
+    use crate::range::RangeModel;
+    use crate::settings::{ArraySettings, IntegritySettings, RangingKind, RangingSettings};
+
+    const STEP_S: f64 = 0.1;
+    const SPEED_MPS: f64 = 4.0;
+
+    /// The nominal filter receives delays with a clock error of 3 m, and the filter of slip receives exact delays, so that
+    /// it estimates less noise. A rate that both filters predict equally well is no evidence.
+    #[test]
+    fn less_estimated_noise_is_no_evidence_for_a_mode() {
+        let (heads, road, mut ekf) = trip();
+        let settings = RangingSettings {
+            kind: RangingKind::OneWay,
+            ..RangingSettings::default()
+        };
+        ekf.begin_ranging(RangeModel::new(&settings, &ArraySettings::default(), 0.08));
+        let mut bank = Bank::new(&ekf, &heads, &IntegritySettings::default(), 0.0);
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        for step in 1..100 {
+            let time_s = f64::from(step) * STEP_S;
+            bank.odometry(&OdometrySample {
+                time_s,
+                distance_m: SPEED_MPS * time_s,
+                speed_mps: SPEED_MPS,
+                yaw_rate_radps: None,
+            });
+            let clock_m = 3.0 * random.sample::<f64, _>(StandardNormal);
+            let truth = road.pose(SPEED_MPS * time_s).point();
+            for head in &heads {
+                let delay = |late_m: f64| {
+                    let range_m = head.distance_m(truth, 0.0) + late_m;
+                    RangeMeasurement::range(time_s, range_m, Some(0.3))
+                };
+                bank.nominal.update_range(head, &delay(clock_m));
+                for it in &mut bank.modes {
+                    it.ekf.update_range(head, &delay(0.0));
+                }
+            }
+        }
+        let log_odds = |bank: &Bank| bank.mode(SelectedHypothesis::WheelSlip).unwrap().0.ln();
+        let before = log_odds(&bank);
+        let time_s = bank.nominal.time_s();
+        for head in &heads {
+            bank.update_range(head, &RangeMeasurement::range_rate(time_s, 0.0, 0.1, 1e-4));
+        }
+        let evidence = log_odds(&bank) - before;
+        assert!(evidence.abs() < 0.05, "{evidence}");
     }
 }
