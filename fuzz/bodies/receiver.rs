@@ -112,10 +112,10 @@ fn receive(spacing_index: usize, frequency_known: bool, antennas: &[&[Complex32]
             );
             assert!(ssb.cfo_hz.abs() <= config.spacing.hz());
             assert_eq!(ssb.measurements().len(), antennas.len());
-            if let Ok(mut tracker) = Tracker::<1>::new(&config, ssb) {
+            if let Ok(mut tracker) = Tracker::new(&config, ssb) {
                 for expected in [ssb.sample_start, ssb.sample_start + 3.0, 1e30] {
                     // An error and an empty result are both valid.
-                    if let Ok(Some(tracked)) = tracker.track(&[antennas[0]], 0.0, expected, true) {
+                    if let Ok(Some(tracked)) = tracker.track(antennas, 0.0, expected, true) {
                         assert!((-20.0..samples as f64).contains(&tracked.sample_start));
                         assert!(tracked.cfo_hz.is_finite());
                     }

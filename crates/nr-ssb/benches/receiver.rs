@@ -41,12 +41,11 @@ fn track_one_ssb_of_4_antennas(bencher: divan::Bencher, decode_pbch: bool) {
     let mut searcher = Searcher::new(config.clone()).unwrap();
     let slices = air::slices(&samples);
     let cell = searcher.search(&slices).unwrap()[0].clone();
-    let mut tracker = Tracker::<4>::new(&config, &cell).unwrap();
-    let antennas = std::array::from_fn(|antenna| slices[antenna]);
+    let mut tracker = Tracker::new(&config, &cell).unwrap();
     let start = cell.sample_start;
     bencher.bench_local(|| {
         tracker
-            .track(divan::black_box(&antennas), 0.0, start, decode_pbch)
+            .track(divan::black_box(&slices), 0.0, start, decode_pbch)
             .unwrap()
             .is_some()
     });
@@ -59,9 +58,8 @@ fn observe_one_ssb_of_4_antennas(bencher: divan::Bencher) {
     let mut searcher = Searcher::new(config.clone()).unwrap();
     let slices = air::slices(&samples);
     let cell = searcher.search(&slices).unwrap()[0].clone();
-    let mut tracker = Tracker::<4>::new(&config, &cell).unwrap();
-    let antennas = std::array::from_fn(|antenna| slices[antenna]);
-    let tracked = tracker.track(&antennas, 0.0, cell.sample_start, false);
+    let mut tracker = Tracker::new(&config, &cell).unwrap();
+    let tracked = tracker.track(&slices, 0.0, cell.sample_start, false);
     let ssb = tracked.unwrap().unwrap();
     bencher.bench_local(|| tracker.observe(divan::black_box(&ssb)).is_some());
 }

@@ -12,7 +12,7 @@ mod air;
 
 use air::{Cell, add_noise, rng, silence, slices};
 use nr_ssb::SubcarrierSpacing::{self, Khz15, Khz30};
-use nr_ssb::receiver::{Receiver, ReceiverConfig, Window, WindowReceiver};
+use nr_ssb::receiver::{ReceivedBeam, Receiver, ReceiverConfig, Window, WindowReceiver};
 use nr_ssb::{Complex32, Lmax};
 
 const ANTENNAS: usize = 2;
@@ -86,7 +86,7 @@ fn trial(
         oscillator_ppm: VEHICLE_PPM.min(widest_ppm),
         ..config
     };
-    let mut windows = WindowReceiver::<ANTENNAS>::new(of_vehicle).unwrap();
+    let mut windows = WindowReceiver::new(of_vehicle).unwrap();
     let mut received = [(Receptions::new(), 0), (Receptions::new(), 0)];
     let mut note = |which: usize, sample_start: f64, ssb_index: u8| {
         let (right, wrong) = &mut received[which];
@@ -102,8 +102,9 @@ fn trial(
             let ends = [block, block + 1].map(|it| (it * 10_000).min(antennas[0].len()));
             let blocks: Vec<&[Complex32]> =
                 antennas.iter().map(|it| &it[ends[0]..ends[1]]).collect();
-            let mut take =
-                |ssb: &nr_ssb::receiver::TrackedSsb| note(0, ssb.sample_start, ssb.ssb_index);
+            let mut take = |beam: ReceivedBeam<'_>| {
+                note(0, beam.ssb.sample_start, beam.ssb.ssb_index);
+            };
             stream.push(&blocks, &mut take).unwrap();
         }
         // The receiver is on only around the burst.
@@ -121,7 +122,7 @@ fn trial(
             .unwrap();
     }
     stream
-        .finish(&mut |ssb| note(0, ssb.sample_start, ssb.ssb_index))
+        .finish(&mut |beam| note(0, beam.ssb.sample_start, beam.ssb.ssb_index))
         .unwrap();
     received
 }

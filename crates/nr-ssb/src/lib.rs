@@ -64,13 +64,13 @@
 //! # let config = SearchConfig { ssb_freq_hz: Some(3_700.8e6), ..SearchConfig::new(SubcarrierSpacing::Khz30, 2) };
 //! # let found = Searcher::new(config.clone())?.search(&antennas)?.to_vec();
 //!
-//! let mut tracker = Tracker::<2>::new(&config, &found[0])?;
+//! let mut tracker = Tracker::new(&config, &found[0])?;
 //! // The window that begins 20 ms after the first one holds the same beam again.
 //! let period = 0.02 * 7.68e6;
 //! let tracked = tracker.track(&antennas, period, tracker.expected_start(period), false)?;
 //! let tracked = tracked.expect("the cell is still there");
 //! assert_eq!(tracked.ssb_index, 1);
-//! let [first, second] = tracked.blocks[0];
+//! let [first, second] = [0, 1].map(|antenna| tracked.blocks[0][antenna]);
 //! assert!(((second / first).arg().to_degrees() - 90.0).abs() < 0.1);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

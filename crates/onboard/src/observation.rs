@@ -113,9 +113,6 @@ pub struct SsbObservation {
     pub noise_variance: Option<f64>,
     /// Carrier frequency offset in Hz.
     pub cfo_hz: f64,
-    /// Whether the SSB is the first of its beam after a search detected it. It is processed alone,
-    /// because the other SSBs of its burst may have been processed before the search ended.
-    pub is_first: bool,
     /// Delay, range rate, carrier phase and power, if the receiver measures them.
     pub ranging: Option<SsbRanging>,
     elements: usize,
@@ -136,7 +133,6 @@ impl SsbObservation {
             },
             noise_variance: None,
             cfo_hz: 0.0,
-            is_first: false,
             ranging: None,
             elements,
             values: Vec::with_capacity(elements * MAX_SNAPSHOTS),
@@ -157,18 +153,9 @@ impl SsbObservation {
     pub fn restart(&mut self, ssb: SsbDetection) {
         self.ssb = ssb;
         self.noise_variance = None;
-        (self.cfo_hz, self.is_first) = (0.0, false);
+        self.cfo_hz = 0.0;
         self.ranging = None;
         self.values.clear();
-    }
-
-    /// Copies another observation without allocation.
-    pub fn copy_from(&mut self, other: &Self) {
-        self.values.clone_from(&other.values);
-        (self.ssb, self.noise_variance) = (other.ssb, other.noise_variance);
-        (self.cfo_hz, self.is_first) = (other.cfo_hz, other.is_first);
-        self.ranging = other.ranging;
-        self.elements = other.elements;
     }
 
     /// Returns the number of antennas.

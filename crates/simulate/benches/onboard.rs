@@ -11,7 +11,7 @@ use onboard::localize::ekf::EkfConfig;
 use onboard::localize::{AngleMeasurement, Ekf, MeasurementKind};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
-use onboard::receive::{ReceiverConfig, Window, window_receiver};
+use onboard::receive::{Receiver, ReceiverConfig, Window};
 use onboard::settings::{IntegritySettings, Shipped, Site, TomlFile, Vehicle};
 use rand_distr::{Distribution, StandardNormal};
 use simulate::random::{Purpose, Streams};
@@ -69,7 +69,7 @@ fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
         .unwrap();
     let samples = samples(&site);
     let antennas: [&[Complex32]; ANTENNAS] = std::array::from_fn(|n| samples[n].as_slice());
-    let mut receiver = window_receiver(ReceiverConfig {
+    let mut receiver = Receiver::new(ReceiverConfig {
         search_every_s: f64::INFINITY,
         measures_ranging: false,
         ..ReceiverConfig::new(&site, &vehicle)

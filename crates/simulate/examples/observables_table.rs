@@ -131,7 +131,7 @@ fn received(
         decode_pbch: false,
         ..ReceiverConfig::new(ssb_freq_hz, spacing, ANTENNAS)
     };
-    let mut receiver = WindowReceiver::<ANTENNAS>::new(config)?;
+    let mut receiver = WindowReceiver::new(config)?;
     let snrs_db = vec![snr_db; channels.len()];
     let wavelength_m = SPEED_OF_LIGHT_MPS / ssb_freq_hz;
     let state = |time_s: f64| path.at(time_s);

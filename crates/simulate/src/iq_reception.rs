@@ -1,7 +1,7 @@
 //! Reception of simulated IQ samples with the receiver of the vehicle.
 
 use onboard::observation::{SsbDetection, SsbObservation};
-use onboard::receive::{Receiver, ReceiverConfig, Window, window_receiver};
+use onboard::receive::{Receiver, ReceiverConfig, Window};
 use onboard::{BoxError, SsbInput, SsbSource};
 
 use crate::channel::{HeadChannel, IqAir};
@@ -13,7 +13,7 @@ use crate::world::{Path, VehicleState};
 /// Signal synthesis and receiver of one run.
 pub struct IqReception {
     air: IqAir,
-    receiver: Box<dyn Receiver>,
+    receiver: Receiver,
     observations: Vec<SsbObservation>,
 }
 
@@ -42,7 +42,7 @@ impl IqReception {
         let config = ReceiverConfig::new(&scenario.site, &scenario.vehicle);
         Ok(Self {
             air: IqAir::new(scenario, streams)?,
-            receiver: window_receiver(config)?,
+            receiver: Receiver::new(config)?,
             observations: Vec::new(),
         })
     }

@@ -14,7 +14,7 @@ use num_complex::{Complex32, Complex64};
 
 use crate::dsp::base_rate::{SYMBOL_FFT, SYMBOL_SAMPLES};
 use crate::dsp::demodulate::BACK_OFF;
-use crate::dsp::received_grid::ReceivedGrid;
+use crate::dsp::received_grid::{PerAntenna, ReceivedGrid};
 use crate::dsp::timing;
 use crate::numeric::phasors::wrap;
 use crate::standard::grid::{SYMBOLS, SsbGrid, pss_indices};
@@ -24,12 +24,12 @@ const ITERATIONS: usize = 3;
 
 /// Amplitudes of one SSB by a matched filter over all known resource elements, with their
 /// uncertainty.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Elements<const A: usize> {
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Elements {
     /// Amplitude of a resource element at every antenna, at the centre of the known elements.
-    pub(crate) amplitudes: [Complex64; A],
+    pub(crate) amplitudes: PerAntenna<Complex64>,
     /// Noise variance of every amplitude.
-    pub(crate) variance: [f64; A],
+    pub(crate) variance: PerAntenna<f64>,
     /// Frequency offset in excess of the demodulator's, in cycles per sample.
     pub(crate) excess_cycles: f64,
     /// Time of the known elements' centre after the PSS, in samples.
@@ -45,18 +45,18 @@ fn window_centre(symbol: usize) -> f64 {
     (symbol * SYMBOL_SAMPLES) as f64 + 0.5 * (SYMBOL_FFT - 1) as f64 - BACK_OFF as f64
 }
 
-impl<const A: usize> Elements<A> {
+impl Elements {
     /// Combines the despread blocks of an SSB, whose phase advances by `phase_step` per symbol due
     /// to the carrier resets.
     pub(crate) fn new(
-        blocks: &[[Complex64; A]; SYMBOLS],
-        noise_variance: &[f64; A],
+        blocks: &[PerAntenna<Complex64>; SYMBOLS],
+        noise_variance: &[f64],
         reference: &SsbGrid,
         phase_step: f64,
     ) -> Self {
         let sums = Sums::new(reference);
         let centre = sums.time / sums.count;
-        let mut sum = [Complex64::ZERO; A];
+        let mut sum: PerAntenna<_> = noise_variance.iter().map(|_| Complex64::ZERO).collect();
         let mut excess = 0.0;
         for _ in 0..=ITERATIONS {
             let (mut slope, mut curvature) = (0.0, 0.0);
@@ -83,8 +83,8 @@ impl<const A: usize> Elements<A> {
                 excess -= slope / curvature;
             }
         }
-        let amplitudes = sum.map(|sum| sum / sums.count);
-        let variance = noise_variance.map(|noise| noise / sums.count);
+        let amplitudes: PerAntenna<_> = sum.iter().map(|sum| sum / sums.count).collect();
+        let variance: PerAntenna<_> = noise_variance.iter().map(|it| it / sums.count).collect();
         let signal = amplitudes.iter().zip(&variance);
         let energy: f64 = signal
             .map(|(h, noise)| h.norm_sqr() / noise.max(f64::MIN_POSITIVE) - 1.0)
@@ -105,10 +105,10 @@ impl<const A: usize> Elements<A> {
 /// due to noise, from PSS and SSS alone. They have the same subcarriers, so that a channel that varies
 /// over the subcarriers changes their phases equally. `delay` is the residual delay in samples, `snr`
 /// the sum over the antennas of the signal-to-noise ratio of a resource element.
-pub(crate) fn offset_by_sync<const A: usize>(
+pub(crate) fn offset_by_sync(
     grids: &[ReceivedGrid],
     reference: &SsbGrid,
-    noise_variance: &[f64; A],
+    noise_variance: &[f64],
     delay: f64,
     phase_step: f64,
     snr: f64,

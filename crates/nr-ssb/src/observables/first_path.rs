@@ -20,6 +20,7 @@ use std::sync::LazyLock;
 use num_complex::{Complex32, Complex64};
 
 use crate::dsp::base_rate::SYMBOL_FFT;
+use crate::dsp::received_grid::PerAntenna;
 use crate::standard::grid::SUBCARRIERS;
 
 /// Number of groups of subcarriers, eight each: a delay of three samples changes the phase within a
@@ -146,20 +147,20 @@ impl FirstPath {
     /// Returns the posterior from the received elements times the conjugated known ones, summed over the
     /// symbols, for each antenna; the noise variance of an element of each antenna; the delay of a
     /// single path in the rows, in samples, with its variance due to noise.
-    pub(crate) fn follow<const A: usize>(
+    pub(crate) fn follow(
         &mut self,
         rows: &[[Complex32; SUBCARRIERS]],
-        noise_variance: &[f64; A],
+        noise_variance: &[f64],
         with_pbch: bool,
         single: f64,
         single_variance: f64,
         base_rate_hz: f64,
     ) -> Posterior {
         let basis = &BASES[usize::from(with_pbch)];
-        let mut elements = [[Complex64::ZERO; GROUPS]; A];
-        for ((slot, row), noise) in elements.iter_mut().zip(rows).zip(noise_variance) {
-            *slot = basis.whitened(row, *noise);
-        }
+        let rows = rows.iter().zip(noise_variance);
+        let elements = rows
+            .map(|(row, noise)| basis.whitened(row, *noise))
+            .collect();
         let search = Search::new(basis, elements, single, base_rate_hz);
         let powers = search.with_floor(POWER_FLOOR);
         let multi = powers.run(single, single_variance);
@@ -199,12 +200,12 @@ impl Posterior {
 }
 
 /// Returns Σ |z|² over the antennas.
-fn energy<const A: usize>(elements: &[Row; A]) -> f64 {
+fn energy(elements: &[Row]) -> f64 {
     elements.iter().flatten().map(Complex64::norm_sqr).sum()
 }
 
 /// Returns Σ |directᴴ z|² over the antennas, without the delay.
-fn project<const A: usize>(elements: &[Row; A], basis: &Basis, delay: f64) -> f64 {
+fn project(elements: &[Row], basis: &Basis, delay: f64) -> f64 {
     let ramp = ramp(delay);
     let on = |row: &Row| -> f64 {
         let terms = row.iter().zip(&ramp).zip(&basis.direct);
@@ -328,10 +329,10 @@ fn remove(from: &mut Row, unit: &Row) {
 }
 
 /// Search for the first path of one SSB.
-struct Search<'a, const A: usize> {
+struct Search<'a> {
     basis: &'a Basis,
     /// Elements with unit noise, which includes the minimum noise.
-    elements: [Row; A],
+    elements: PerAntenna<Row>,
     total: f64,
     /// Noise variance relative to that of the receiver.
     excess: f64,
@@ -345,17 +346,17 @@ struct Search<'a, const A: usize> {
 /// Log-likelihoods of every delay spread and K factor.
 type Likelihoods = [[f64; FACTORS]; SPREADS];
 
-impl<'a, const A: usize> Search<'a, A> {
+impl<'a> Search<'a> {
     /// Creates a search in elements with unit noise; `single` is the delay of a single path.
-    fn new(basis: &'a Basis, elements: [Row; A], single: f64, base_rate_hz: f64) -> Self {
+    fn new(basis: &'a Basis, elements: PerAntenna<Row>, single: f64, base_rate_hz: f64) -> Self {
         let direct = project(&elements, basis, single);
         let known: f64 = basis.root.iter().map(|it| it * it).sum();
         Self {
             basis,
             total: energy(&elements),
+            power: (direct / elements.len() as f64 - 1.0).max(1.0) / known,
             elements,
             excess: 1.0,
-            power: (direct / A as f64 - 1.0).max(1.0) / known,
             prior: prior(base_rate_hz),
             factors: std::array::from_fn(k_factor),
         }
@@ -365,7 +366,8 @@ impl<'a, const A: usize> Search<'a, A> {
     fn with_floor(&self, floor: f64) -> Self {
         let excess = (self.power * floor).max(1.0);
         let scale = excess.sqrt().recip();
-        let elements = self.elements.map(|row| row.map(|element| element * scale));
+        let rows = self.elements.iter();
+        let elements: PerAntenna<Row> = rows.map(|row| row.map(|it| it * scale)).collect();
         Self {
             total: energy(&elements),
             elements,
@@ -415,7 +417,7 @@ impl<'a, const A: usize> Search<'a, A> {
                 for (gain, value) in gains[spread][factor].iter_mut().zip(values) {
                     let level = density * value;
                     *gain = level / (1.0 + level);
-                    losses[spread][factor] += A as f64 * level.ln_1p();
+                    losses[spread][factor] += self.elements.len() as f64 * level.ln_1p();
                 }
             }
         }
@@ -429,15 +431,13 @@ impl<'a, const A: usize> Search<'a, A> {
         losses: &Likelihoods,
     ) -> Likelihoods {
         let ramp = ramp(delay);
-        let mut turned = [[Complex64::ZERO; GROUPS]; A];
         let mut misfit = self.total;
-        for (slot, row) in turned.iter_mut().zip(&self.elements) {
+        let mut turned = self.elements.clone();
+        for row in &mut turned {
             let mut direct = Complex64::ZERO;
-            for (((slot, z), turn), e) in
-                slot.iter_mut().zip(row).zip(&ramp).zip(&self.basis.direct)
-            {
-                *slot = z * turn;
-                direct += *slot * e.re;
+            for ((z, turn), e) in row.iter_mut().zip(&ramp).zip(&self.basis.direct) {
+                *z *= turn;
+                direct += *z * e.re;
             }
             misfit -= direct.norm_sqr();
         }

@@ -27,6 +27,8 @@ pub mod range_rate;
 
 use num_complex::Complex64;
 
+use crate::dsp::received_grid::PerAntenna;
+
 use carrier_phase::CarrierPhase;
 use delay::Delay;
 use power::Power;
@@ -49,22 +51,22 @@ pub struct Observables {
 }
 
 /// Observables with the amplitude of every antenna.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ArrayObservables<const A: usize> {
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArrayObservables {
     /// Observables.
     pub observables: Observables,
     /// Complex amplitude of a resource element at every antenna, with the phase of
     /// [`CarrierPhase`], in the scale of an unnormalised DFT.
-    pub amplitudes: [Complex64; A],
+    pub amplitudes: PerAntenna<Complex64>,
     /// Noise variance of every amplitude.
-    pub amplitude_variance: [f64; A],
+    pub amplitude_variance: PerAntenna<f64>,
 }
 
-impl<const A: usize> ArrayObservables<A> {
+impl ArrayObservables {
     /// Returns the carrier phase at the reference point of an array, for the response of every
     /// antenna to the direction of the first path, and its standard deviation, both in rad. The
     /// standard deviation includes multipath.
-    pub fn phase_for_response(&self, response: &[Complex64; A]) -> (f64, f64) {
+    pub fn phase_for_response(&self, response: &[Complex64]) -> (f64, f64) {
         let (mut sum, mut variance, mut power) = (Complex64::ZERO, 0.0, 0.0);
         for ((y, noise), weight) in self
             .amplitudes

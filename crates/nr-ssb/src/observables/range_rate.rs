@@ -15,6 +15,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use num_complex::Complex64;
 
+use crate::dsp::received_grid::PerAntenna;
 use crate::numeric::phasors::wrap;
 
 /// Speed of light in m/s.
@@ -95,14 +96,14 @@ impl RangeRate {
 }
 
 /// Frequency offset and amplitudes of one SSB.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Instant<const A: usize> {
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Instant {
     /// Reference time in seconds.
     pub(crate) time_s: f64,
     /// Complex amplitude of each antenna at the reference time.
-    pub(crate) amplitudes: [Complex64; A],
+    pub(crate) amplitudes: PerAntenna<Complex64>,
     /// Variance of each amplitude due to noise.
-    pub(crate) variance: [f64; A],
+    pub(crate) variance: PerAntenna<f64>,
     /// Variance of the phase due to multipath, at one antenna.
     pub(crate) multipath: f64,
     /// Frequency offset within the SSB in Hz.
@@ -113,21 +114,21 @@ pub(crate) struct Instant<const A: usize> {
 
 /// Range rate of one beam.
 #[derive(Debug, Clone)]
-pub(crate) struct RateTracker<const A: usize> {
+pub(crate) struct RateTracker {
     carrier_hz: f64,
-    previous: Option<Previous<A>>,
+    previous: Option<Previous>,
 }
 
 #[derive(Debug, Clone)]
-struct Previous<const A: usize> {
-    instant: Instant<A>,
+struct Previous {
+    instant: Instant,
     /// Most accurate estimate of the frequency offset in Hz.
     frequency_hz: f64,
     /// Variance of this estimate (Hz²).
     variance: f64,
 }
 
-impl<const A: usize> RateTracker<A> {
+impl RateTracker {
     pub(crate) const fn new(carrier_hz: f64) -> Self {
         Self {
             carrier_hz,
@@ -147,10 +148,10 @@ impl<const A: usize> RateTracker<A> {
     }
 
     /// Processes the next SSB.
-    pub(crate) fn follow(&mut self, instant: Instant<A>) -> RangeRate {
+    pub(crate) fn follow(&mut self, instant: Instant) -> RangeRate {
         let wavelength_m = LIGHT_M_S / self.carrier_hz;
-        let own_variance =
-            instant.frequency_variance + self.multipath_variance(instant.multipath) / A as f64;
+        let own_variance = instant.frequency_variance
+            + self.multipath_variance(instant.multipath) / instant.variance.len() as f64;
         let mut rate = RangeRate {
             frequency_hz: instant.frequency_hz,
             sigma_hz: own_variance.sqrt(),
@@ -206,30 +207,37 @@ impl<const A: usize> RateTracker<A> {
 
 /// Returns the phase of `next` relative to `previous`, and its variance: noise, multipath, and the
 /// disagreement of the antennas due to a turn of the array.
-fn phase_change<const A: usize>(previous: &Instant<A>, next: &Instant<A>) -> (f64, f64) {
+fn phase_change(previous: &Instant, next: &Instant) -> (f64, f64) {
     let (mut product, mut energies) = (Complex64::ZERO, [0.0; 2]);
-    for antenna in 0..A {
-        let weight = 1.0 / (previous.variance[antenna] + next.variance[antenna]).max(1e-300);
-        let (a, b) = (previous.amplitudes[antenna], next.amplitudes[antenna]);
+    let antennas = next.variance.len() as f64;
+    let variances = || {
+        previous
+            .variance
+            .iter()
+            .zip(&next.variance)
+            .map(|(a, b)| a + b)
+    };
+    let amplitudes = previous.amplitudes.iter().zip(&next.amplitudes);
+    for ((a, b), variance) in amplitudes.zip(variances()) {
+        let weight = 1.0 / variance.max(1e-300);
         product += a.conj() * b * weight;
         energies[0] += a.norm_sqr() * weight;
         energies[1] += b.norm_sqr() * weight;
     }
     // Each weight is the inverse of the sum of both variances. The noise of one amplitude is its
     // own share of this sum.
-    let share = |of: &Instant<A>| {
-        let total: f64 = (0..A)
-            .map(|i| of.variance[i] / (previous.variance[i] + next.variance[i]).max(1e-300))
-            .sum();
-        total / A as f64
+    let share = |of: &Instant| {
+        let shares = of.variance.iter().zip(variances());
+        let total: f64 = shares.map(|(own, sum)| own / sum.max(1e-300)).sum();
+        total / antennas
     };
     let [first, second] = energies.map(|it| it.max(1e-300));
     let relative = share(previous) / first + share(next) / second;
     let noise = 0.5 * relative;
     let coherence = (product.norm_sqr() / (first * second)).clamp(1e-6, 1.0);
-    let expected = DISAGREEMENT * (A as f64 - 1.0) * relative;
-    let disagreement = (1.0 / coherence - 1.0 - expected).max(0.0) / A as f64;
-    let multipath = (previous.multipath + next.multipath) / A as f64;
+    let expected = DISAGREEMENT * (antennas - 1.0) * relative;
+    let disagreement = (1.0 / coherence - 1.0 - expected).max(0.0) / antennas;
+    let multipath = (previous.multipath + next.multipath) / antennas;
     (product.arg(), noise + multipath + disagreement)
 }
 

@@ -8,10 +8,10 @@ use crate::track::{TrackError, Tracker};
 const MISSES: u32 = 8;
 
 /// Tracked beam. Positions are in samples at the base rate.
-pub(super) struct Beam<const A: usize> {
+pub(super) struct Beam {
     pub pci: Pci,
     pub ssb_index: u8,
-    pub tracker: Tracker<A>,
+    pub tracker: Tracker,
     /// Expected start of the next SSB, in samples.
     pub next_start: f64,
     /// Number of periods between the last received SSB and the expected one.
@@ -22,7 +22,7 @@ pub(super) struct Beam<const A: usize> {
     pub is_followed: bool,
 }
 
-impl<const A: usize> Beam<A> {
+impl Beam {
     pub fn new(config: &SearchConfig, found: &DetectedSsb) -> Result<Self, TrackError> {
         Ok(Self {
             pci: found.pci,

@@ -4,9 +4,8 @@
 //! [`search_every_s`](ReceiverConfig::search_every_s), unless all known
 //! [`beams`](ReceiverConfig::beams) are received. Between searches, SSBs are received at their
 //! expected times only. [`WindowReceiver`] does this for windows of samples at the base rate.
-//! [`StreamReceiver`] adds the [front end](crate::front_end), for samples of any rate in blocks of
-//! any length, with gaps. [`Receiver`] is the variant for a number of antennas that is known at run
-//! time.
+//! [`Receiver`] adds the [front end](crate::front_end), for samples of any rate in blocks of any
+//! length, with gaps.
 //!
 //! ```
 //! # use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
@@ -24,19 +23,21 @@
 //! let mut beams = Vec::new();
 //! for _ in 0..3 {
 //!     // A period of 20 ms.
-//!     receiver.push(&[&sent, &quarter_turn], &mut |ssb| {
+//!     receiver.push(&[&sent, &quarter_turn], &mut |mut beam| {
+//!         let ssb = beam.tracked_ssb();
 //!         let turn = ssb.channel[1][120] / ssb.channel[0][120];
 //!         assert!((turn.arg().to_degrees() - 90.0).abs() < 0.1);
 //!         beams.push((ssb.pci.get(), ssb.ssb_index, ssb.tracked));
 //!     })?;
 //! }
-//! receiver.finish(&mut |ssb| beams.push((ssb.pci.get(), ssb.ssb_index, ssb.tracked)))?;
+//! receiver.finish(&mut |beam| {
+//!     beams.push((beam.ssb.pci.get(), beam.ssb.ssb_index, beam.is_followed));
+//! })?;
 //! assert_eq!(beams[..2], [(601, 1, false), (601, 6, false)]);
 //! assert_eq!(beams[2..], [(601, 1, true), (601, 6, true), (601, 1, true), (601, 6, true)]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod any_antennas;
 mod beam;
 mod config;
 mod error;
@@ -44,9 +45,8 @@ mod stream;
 mod tracked_ssb;
 mod window;
 
-pub use any_antennas::Receiver;
 pub use config::ReceiverConfig;
 pub use error::ReceiverError;
-pub use stream::StreamReceiver;
+pub use stream::Receiver;
 pub use tracked_ssb::TrackedSsb;
 pub use window::{ReceivedBeam, Window, WindowReceiver};

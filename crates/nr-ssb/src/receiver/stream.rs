@@ -6,6 +6,7 @@ use super::config::ReceiverConfig;
 use super::error::ReceiverError;
 use super::window::{GUARD, ReceivedBeam, Window, WindowReceiver};
 use crate::dsp::base_rate::SSB_SAMPLES;
+use crate::dsp::received_grid::PerAntenna;
 use crate::input::front_end::FrontEnd;
 
 /// Duration of the samples that are searched together (s).
@@ -14,15 +15,15 @@ const SEARCHED_S: f64 = 0.005;
 /// Number of samples required after the start of an SSB.
 const BEYOND: f64 = SSB_SAMPLES as f64 + GUARD;
 
-/// Front end and [`WindowReceiver`] for samples of any rate, in blocks of any length. The results
-/// do not depend on the block boundaries.
-pub struct StreamReceiver<const A: usize> {
-    receiver: WindowReceiver<A>,
+/// Receiver of samples of any rate, in blocks of any length: front end and [`WindowReceiver`]. The
+/// results do not depend on the block boundaries. See the [module](super).
+pub struct Receiver {
+    windows: WindowReceiver,
     front_end: FrontEnd,
     /// Number of samples that are searched together, at the base rate.
     stretch: i64,
     /// Samples at the base rate that may still be processed; the index of the first one is `start`.
-    base: [Vec<Complex32>; A],
+    base: Vec<Vec<Complex32>>,
     start: i64,
     /// Index of the next input sample.
     next_input: u64,
@@ -30,7 +31,7 @@ pub struct StreamReceiver<const A: usize> {
     searched: i64,
 }
 
-impl<const A: usize> StreamReceiver<A> {
+impl Receiver {
     /// Creates FFT plans and buffers. `centre_frequency_hz` is the frequency at 0 Hz of the
     /// samples.
     ///
@@ -44,11 +45,12 @@ impl<const A: usize> StreamReceiver<A> {
         let search = &config.search;
         let ssb_freq_hz = search.ssb_freq_hz.unwrap_or(centre_frequency_hz);
         let (offset_hz, scs_hz) = (ssb_freq_hz - centre_frequency_hz, search.spacing.hz());
+        let front_end = FrontEnd::new(sample_rate_hz, offset_hz, scs_hz, search.antennas)?;
         let mut made = Self {
-            front_end: FrontEnd::new(sample_rate_hz, offset_hz, scs_hz, search.antennas)?,
             stretch: (SEARCHED_S * search.spacing.base_rate_hz()).round() as i64,
-            receiver: WindowReceiver::new(config)?,
-            base: std::array::from_fn(|_| Vec::new()),
+            base: vec![Vec::new(); search.antennas],
+            windows: WindowReceiver::of_stream(config, front_end.input_per_output())?,
+            front_end,
             start: 0,
             next_input: 0,
             searched: 0,
@@ -58,8 +60,8 @@ impl<const A: usize> StreamReceiver<A> {
     }
 
     /// Returns the receiver of windows.
-    pub const fn receiver(&self) -> &WindowReceiver<A> {
-        &self.receiver
+    pub const fn windows(&self) -> &WindowReceiver {
+        &self.windows
     }
 
     /// Returns the number of input samples per sample at the base rate, the unit of SSB positions.
@@ -70,7 +72,7 @@ impl<const A: usize> StreamReceiver<A> {
     /// Returns the sample at the base rate before which all SSBs of tracked beams have been passed
     /// on. A burst is complete once its last beam has been.
     pub fn passed_until(&self) -> f64 {
-        let next_start = self.receiver.next_start();
+        let next_start = self.windows.next_start();
         if next_start.is_finite() {
             next_start
         } else {
@@ -86,7 +88,7 @@ impl<const A: usize> StreamReceiver<A> {
     pub fn push(
         &mut self,
         antennas: &[&[Complex32]],
-        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
+        take: &mut dyn FnMut(ReceivedBeam<'_>),
     ) -> Result<(), ReceiverError> {
         self.front_end.push(antennas, &mut self.base)?;
         self.next_input += antennas.first().map_or(0, |it| it.len()) as u64;
@@ -101,7 +103,7 @@ impl<const A: usize> StreamReceiver<A> {
     pub fn gap_to(
         &mut self,
         sample: u64,
-        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
+        take: &mut dyn FnMut(ReceivedBeam<'_>),
     ) -> Result<(), ReceiverError> {
         self.end_segment(take)?;
         self.resume_at(sample);
@@ -113,19 +115,13 @@ impl<const A: usize> StreamReceiver<A> {
     ///
     /// # Errors
     /// Those of [`push`](Self::push).
-    pub fn finish(
-        &mut self,
-        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
-    ) -> Result<(), ReceiverError> {
+    pub fn finish(&mut self, take: &mut dyn FnMut(ReceivedBeam<'_>)) -> Result<(), ReceiverError> {
         self.end_segment(take)?;
         self.resume_at(self.next_input);
         Ok(())
     }
 
-    fn end_segment(
-        &mut self,
-        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
-    ) -> Result<(), ReceiverError> {
+    fn end_segment(&mut self, take: &mut dyn FnMut(ReceivedBeam<'_>)) -> Result<(), ReceiverError> {
         self.front_end.finish(&mut self.base);
         for samples in &mut self.base {
             samples.extend([Complex32::ZERO; GUARD as usize]);
@@ -142,15 +138,14 @@ impl<const A: usize> StreamReceiver<A> {
 
     /// Removes beams and samples, for a restarted stream.
     pub fn reset(&mut self) {
-        let mut rest: [Vec<Complex32>; A] = std::array::from_fn(|_| Vec::new());
-        self.front_end.finish(&mut rest);
-        self.receiver.reset();
+        self.front_end.finish(&mut self.base);
+        self.windows.reset();
         self.resume_at(0);
     }
 
     /// Returns the index after the last sample.
     fn end(&self) -> i64 {
-        self.start + self.base[0].len() as i64
+        self.start + self.base.first().map_or(0, Vec::len) as i64
     }
 
     /// Continues at this sample of the base rate, after silence. An SSB may begin at it.
@@ -167,19 +162,20 @@ impl<const A: usize> StreamReceiver<A> {
     fn process(
         &mut self,
         is_end: bool,
-        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
+        take: &mut dyn FnMut(ReceivedBeam<'_>),
     ) -> Result<(), ReceiverError> {
         let end = self.end();
         loop {
             let last = end as f64 - BEYOND;
-            let next_start = self.receiver.next_start();
+            let next_start = self.windows.next_start();
             let mut stretch_end = self.searched + self.stretch;
             if is_end && stretch_end as f64 > last {
                 stretch_end = last.floor() as i64;
             }
-            let slices = self.base.each_ref().map(Vec::as_slice);
-            let window = |from: i64, to: i64| {
-                slices.map(|it| it.get(from as usize..to as usize).unwrap_or_default())
+            let window = |from: i64, to: i64| -> PerAntenna<&[Complex32]> {
+                let part = from as usize..to as usize;
+                let samples = self.base.iter().map(|it| it.get(part.clone()));
+                samples.map(Option::unwrap_or_default).collect()
             };
             if stretch_end > self.searched
                 && stretch_end as f64 <= last
@@ -187,23 +183,21 @@ impl<const A: usize> StreamReceiver<A> {
             {
                 let start = self.searched - GUARD as i64;
                 let to = stretch_end + BEYOND as i64;
-                let antennas = window(start - self.start, to - self.start);
-                let antennas = antennas.as_slice();
+                let antennas = &window(start - self.start, to - self.start);
                 let window = Window { start, antennas };
-                self.receiver.measure_tones(&window);
-                if self.receiver.searches_at(self.searched as f64) {
-                    self.receiver.search(&window)?;
+                self.windows.measure_tones(&window);
+                if self.windows.searches_at(self.searched as f64) {
+                    self.windows.search(&window)?;
                 }
                 self.searched = stretch_end;
             } else if next_start <= last {
-                let (start, antennas) = (self.start, slices.as_slice());
-                self.receiver
-                    .track_next(&Window { start, antennas }, take)?;
+                let (start, antennas) = (self.start, &window(0, end - self.start));
+                self.windows.track_next(&Window { start, antennas }, take)?;
             } else {
                 break;
             }
         }
-        let next_start = self.receiver.next_start().min(end as f64).floor() as i64;
+        let next_start = self.windows.next_start().min(end as f64).floor() as i64;
         let from = self.searched.min(next_start) - GUARD as i64 - 1;
         let gone = (from - self.start).clamp(0, end - self.start);
         for samples in &mut self.base {

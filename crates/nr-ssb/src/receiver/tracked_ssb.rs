@@ -55,23 +55,23 @@ pub struct TrackedSsb {
     pub tracked: bool,
 }
 
-impl TrackedSsb {
-    /// Converts a received SSB; `ratio` is the number of input samples per sample at the base rate.
-    pub(super) fn new<const A: usize>(seen: &mut ReceivedBeam<'_, A>, ratio: f64) -> Self {
-        let ssb = seen.ssb;
-        let observed = seen.tracker.observe(ssb);
+impl ReceivedBeam<'_> {
+    /// Computes channel and observables of the SSB. Sample positions are at the input's rate.
+    pub fn tracked_ssb(&mut self) -> TrackedSsb {
+        let (ssb, ratio) = (self.ssb, self.input_per_output);
+        let observed = self.tracker.observe(ssb);
         let observables = observed.as_ref().map(|it| {
             let mut at_input = it.observables;
             at_input.delay.first_path_start *= ratio;
             at_input.phase.reference_start *= ratio;
             at_input
         });
-        let mut channel = vec![[Complex32::ZERO; SUBCARRIERS]; A];
-        let channel_covariance = seen.tracker.channel(ssb.residual_delay, &mut channel);
-        Self {
+        let mut channel = vec![[Complex32::ZERO; SUBCARRIERS]; ssb.noise_variance.len()];
+        let channel_covariance = self.tracker.channel(ssb.residual_delay, &mut channel);
+        TrackedSsb {
             pci: ssb.pci,
             ssb_index: ssb.ssb_index,
-            lmax: Some(seen.tracker.lmax()),
+            lmax: Some(self.tracker.lmax()),
             half_frame: ssb.half_frame,
             payload: ssb.payload,
             sample_start: ssb.sample_start * ratio,
@@ -83,9 +83,9 @@ impl TrackedSsb {
             noise_variance: ssb.noise_variance.to_vec(),
             measurements: ssb.measurements.to_vec(),
             observables,
-            amplitudes: observed.map_or_else(Vec::new, |it| it.amplitudes.to_vec()),
+            amplitudes: (observed.as_ref()).map_or_else(Vec::new, |it| it.amplitudes.to_vec()),
             amplitude_variance: observed.map_or_else(Vec::new, |it| it.amplitude_variance.to_vec()),
-            tracked: seen.is_followed,
+            tracked: self.is_followed,
         }
     }
 }

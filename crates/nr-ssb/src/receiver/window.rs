@@ -12,6 +12,7 @@ use super::beam::Beam;
 use super::config::ReceiverConfig;
 use super::error::ReceiverError;
 use crate::dsp::base_rate::SSB_SAMPLES;
+use crate::dsp::received_grid::PerAntenna;
 use crate::dsp::tones::Tone;
 use crate::search::{SearchError, Searcher};
 use crate::track::{Tracker, TrackerOutput};
@@ -55,24 +56,27 @@ impl Window<'_> {
 }
 
 /// Received SSB and its tracker, which stores the received elements.
-pub struct ReceivedBeam<'a, const A: usize> {
+pub struct ReceivedBeam<'a> {
     /// Result of the tracker.
-    pub ssb: &'a TrackerOutput<A>,
+    pub ssb: &'a TrackerOutput,
     /// Its tracker.
-    pub tracker: &'a mut Tracker<A>,
+    pub tracker: &'a mut Tracker,
     /// Whether the SSB was received at its expected time; `false` for the first one after a search.
     pub is_followed: bool,
     /// Unreported missing samples before the SSB at the base rate, modulo the period: all beams
     /// deviated from their period at once. They are not part of `sample_start`.
     pub unreported_gap: f64,
+    /// Number of input samples per sample at the base rate.
+    pub input_per_output: f64,
 }
 
 /// Tracks the beams at one frequency in windows of samples, which may be parts of a stream or
 /// surround each burst.
-pub struct WindowReceiver<const A: usize> {
+pub struct WindowReceiver {
     config: ReceiverConfig,
+    input_per_output: f64,
     searcher: Searcher,
-    beams: Vec<Beam<A>>,
+    beams: Vec<Beam>,
     /// Start of the last search, in samples.
     search_begun: f64,
     /// End of the last search, in samples.
@@ -90,18 +94,22 @@ pub struct WindowReceiver<const A: usize> {
     cleaned: Vec<Vec<Complex32>>,
 }
 
-impl<const A: usize> WindowReceiver<A> {
+impl WindowReceiver {
     /// Creates a receiver without beams.
     ///
     /// # Errors
-    /// [`ReceiverError::Search`] for an invalid configuration, or one for another number of
-    /// antennas than `A`.
+    /// [`ReceiverError::Search`] for an invalid configuration.
     pub fn new(config: ReceiverConfig) -> Result<Self, ReceiverError> {
+        Self::of_stream(config, 1.0)
+    }
+
+    /// Creates a receiver without beams, for a stream with this number of input samples per sample
+    /// at the base rate.
+    pub(super) fn of_stream(
+        config: ReceiverConfig,
+        input_per_output: f64,
+    ) -> Result<Self, ReceiverError> {
         config.check()?;
-        let (given, expected) = (config.search.antennas, A);
-        if given != expected {
-            return Err(SearchError::AntennaCount { given, expected }.into());
-        }
         Ok(Self {
             searcher: Searcher::new(config.search.clone())?,
             beams: Vec::new(),
@@ -112,7 +120,8 @@ impl<const A: usize> WindowReceiver<A> {
             failed_searches: 0,
             unreported_gap: 0.0,
             tones_measured: f64::NEG_INFINITY,
-            cleaned: vec![Vec::with_capacity(BEFORE + AFTER); A],
+            cleaned: vec![Vec::with_capacity(BEFORE + AFTER); config.search.antennas],
+            input_per_output,
             config,
         })
     }
@@ -169,7 +178,7 @@ impl<const A: usize> WindowReceiver<A> {
     pub fn receive(
         &mut self,
         window: &Window<'_>,
-        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
+        take: &mut dyn FnMut(ReceivedBeam<'_>),
     ) -> Result<(), ReceiverError> {
         self.measure_tones(window);
         if self.searches_at(window.start as f64) {
@@ -213,7 +222,7 @@ impl<const A: usize> WindowReceiver<A> {
     fn all_received(&mut self) -> bool {
         let (beams, known) = (&self.beams, &self.config.beams);
         let comes = |known: &(u16, u8)| {
-            let is_it = |it: &&Beam<A>| (it.pci.get(), it.ssb_index) == *known;
+            let is_it = |it: &&Beam| (it.pci.get(), it.ssb_index) == *known;
             (beams.iter().find(is_it)).is_some_and(|it| it.tracker.misses() == 0)
         };
         let all_received = !known.is_empty() && known.iter().all(comes);
@@ -277,7 +286,7 @@ impl<const A: usize> WindowReceiver<A> {
             let mut found = found.clone();
             found.sample_start += window.start as f64;
             let same =
-                |beam: &&mut Beam<A>| (beam.pci, beam.ssb_index) == (found.pci, found.ssb_index);
+                |beam: &&mut Beam| (beam.pci, beam.ssb_index) == (found.pci, found.ssb_index);
             match self.beams.iter_mut().find(same) {
                 Some(beam) if beam.tracker.misses() > 0 => {
                     let off = beam.found(&found, period);
@@ -303,19 +312,19 @@ impl<const A: usize> WindowReceiver<A> {
     pub(super) fn track_next(
         &mut self,
         window: &Window<'_>,
-        take: &mut dyn FnMut(ReceivedBeam<'_, A>),
+        take: &mut dyn FnMut(ReceivedBeam<'_>),
     ) -> Result<bool, ReceiverError> {
-        let antennas = <&[&[Complex32]; A]>::try_from(window.antennas).map_err(|_| {
-            let (given, expected) = (window.antennas.len(), A);
-            SearchError::AntennaCount { given, expected }
-        })?;
+        let (given, expected) = (window.antennas.len(), self.config.search.antennas);
+        if given != expected {
+            return Err(SearchError::AntennaCount { given, expected }.into());
+        }
         let period = self.config.period();
         let first = window.start as f64 + GUARD;
         let last = window.end() - SSB_SAMPLES as f64 - GUARD;
         for beam in &mut self.beams {
             beam.skip_to(first, period);
         }
-        let by_start = |(_, a): &(usize, &mut Beam<A>), (_, b): &(usize, &mut Beam<A>)| {
+        let by_start = |(_, a): &(usize, &mut Beam), (_, b): &(usize, &mut Beam)| {
             a.next_start.total_cmp(&b.next_start)
         };
         let next = self.beams.iter_mut().enumerate().min_by(by_start);
@@ -324,8 +333,8 @@ impl<const A: usize> WindowReceiver<A> {
         };
         let (mut start, decode) = (window.start as f64, self.config.decode_pbch);
         let canceller = &mut self.searcher.canceller;
-        let cleaned: [&[Complex32]; A];
-        let mut antennas = antennas;
+        let cleaned: PerAntenna<&[Complex32]>;
+        let mut antennas = window.antennas;
         if canceller.is_needed() {
             // Subtract the tones from a copy of the samples around the SSB.
             let place = (beam.next_start - start) as usize;
@@ -336,9 +345,7 @@ impl<const A: usize> WindowReceiver<A> {
                 copy.extend_from_slice(samples.get(from..to).unwrap_or_default());
             }
             canceller.subtract(&mut self.cleaned, 0);
-            let copies = &self.cleaned;
-            cleaned =
-                std::array::from_fn(|antenna| copies.get(antenna).map_or(&[][..], Vec::as_slice));
+            cleaned = self.cleaned.iter().map(Vec::as_slice).collect();
             antennas = &cleaned;
             start += from as f64;
         }
@@ -354,6 +361,7 @@ impl<const A: usize> WindowReceiver<A> {
                 tracker: &mut beam.tracker,
                 is_followed,
                 unreported_gap: self.unreported_gap,
+                input_per_output: self.input_per_output,
             });
         } else {
             beam.skip(1.0, period);

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use crate::dsp::base_rate::SYMBOL_SAMPLES;
+use crate::dsp::received_grid::PerAntenna;
 use crate::numeric::phasors::wrap;
 use crate::search::DetectedSsb;
 use crate::standard::grid::SYMBOLS;
@@ -37,16 +38,15 @@ impl FrequencyLoop {
 
     /// Updates the frequency offset, after a time in seconds, with the phase between PSS and SSS,
     /// weighted by its noise.
-    pub(super) fn follow<const A: usize>(
+    pub(super) fn follow(
         &mut self,
         elapsed_s: f64,
-        blocks: &[[Complex64; A]; SYMBOLS],
-        noise: &[f64; A],
+        blocks: &[PerAntenna<Complex64>; SYMBOLS],
+        noise: &[f64],
     ) {
         let (mut turn, mut snr) = (Complex64::ZERO, 0.0);
-        for antenna in 0..A {
-            let weight = 1.0 / noise[antenna].max(1e-30);
-            let (pss, sss) = (blocks[0][antenna], blocks[2][antenna]);
+        for ((pss, sss), noise) in blocks[0].iter().zip(&blocks[2]).zip(noise) {
+            let weight = 1.0 / noise.max(1e-30);
             turn += pss.conj() * sss * weight;
             snr += (0.5 * (pss.norm_sqr() + sss.norm_sqr()) * weight - 1.0).max(0.1);
         }

@@ -20,6 +20,7 @@ mod observe;
 mod output;
 mod tracker;
 
+pub use crate::dsp::received_grid::{PerAntenna, ReceivedGrid};
 pub use error::TrackError;
 pub use output::TrackerOutput;
 pub use tracker::Tracker;

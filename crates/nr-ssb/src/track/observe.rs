@@ -17,14 +17,14 @@ use crate::standard::numerology::SubcarrierSpacing;
 const DMRS_ONLY: u16 = 60;
 
 /// Observables of one beam.
-pub(super) struct Observer<const A: usize> {
+pub(super) struct Observer {
     base_rate_hz: f64,
     resets: CarrierResets,
     first_path: FirstPath,
-    rate: RateTracker<A>,
+    rate: RateTracker,
 }
 
-impl<const A: usize> Observer<A> {
+impl Observer {
     pub(super) fn new(spacing: SubcarrierSpacing, carrier_hz: f64) -> Self {
         Self {
             base_rate_hz: spacing.base_rate_hz(),
@@ -42,11 +42,11 @@ impl<const A: usize> Observer<A> {
     /// Computes the observables of an SSB with its demodulation in a window.
     pub(super) fn observe(
         &mut self,
-        ssb: &TrackerOutput<A>,
+        ssb: &TrackerOutput,
         acquirer: &Acquirer,
         demodulation: &Alignment,
         window_start: f64,
-    ) -> ArrayObservables<A> {
+    ) -> ArrayObservables {
         let elements = Elements::new(
             &ssb.blocks,
             &ssb.noise_variance,
@@ -82,7 +82,9 @@ impl<const A: usize> Observer<A> {
         // Refer the phase to the centre of the known elements, and remove the carrier resets.
         let turn =
             rotation(demodulation.cfo_cycles, elements.centre) * self.resets.removal(ssb.ssb_index);
-        let amplitudes = elements.amplitudes.map(|amplitude| amplitude * turn);
+        let mut amplitudes = elements.amplitudes;
+        amplitudes.iter_mut().for_each(|it| *it *= turn);
+        let antennas = amplitudes.len() as f64;
         let reference_start = window_start + demodulation.start as f64 + elements.centre;
         // The quadrature component of the other paths.
         let phase_multipath = 0.5 * posterior.diffuse;
@@ -112,8 +114,8 @@ impl<const A: usize> Observer<A> {
         let frequency_variance = covariance[2][2] * self.base_rate_hz * self.base_rate_hz;
         let range_rate = self.rate.follow(Instant {
             time_s: reference_start / self.base_rate_hz,
-            amplitudes,
-            variance: elements.variance,
+            amplitudes: amplitudes.clone(),
+            variance: elements.variance.clone(),
             multipath: phase_multipath,
             frequency_hz,
             frequency_variance,
@@ -127,7 +129,7 @@ impl<const A: usize> Observer<A> {
             .sum();
         let known: u16 = ssb.pilots.iter().sum();
         let power = Power::new(
-            level / A as f64 / full_scale,
+            level / antennas / full_scale,
             elements.snr,
             known.into(),
             posterior.share,
@@ -143,7 +145,7 @@ impl<const A: usize> Observer<A> {
         }
         covariance[0][0] = delay.sigma_s * delay.sigma_s;
         covariance[1][1] = phase.sigma_rad * phase.sigma_rad;
-        covariance[2][2] += self.rate.multipath_variance(phase_multipath) / A as f64;
+        covariance[2][2] += self.rate.multipath_variance(phase_multipath) / antennas;
         ArrayObservables {
             observables: Observables {
                 delay,

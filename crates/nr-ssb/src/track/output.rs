@@ -2,14 +2,15 @@
 
 use num_complex::Complex64;
 
+use crate::dsp::received_grid::PerAntenna;
 use crate::one_ssb::measure::Measurement;
 use crate::standard::grid::SYMBOLS;
 use crate::standard::message::payload::BchPayload;
 use crate::standard::pci::Pci;
 
-/// SSB of a tracked cell, received by `A` antennas.
+/// SSB of a tracked cell.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TrackerOutput<const A: usize> {
+pub struct TrackerOutput {
     /// Physical cell identity.
     pub pci: Pci,
     /// SSB index (beam) from the DM-RS; in a burst set of 64 the three high bits from its time.
@@ -27,15 +28,15 @@ pub struct TrackerOutput<const A: usize> {
     /// summed over the subcarriers after the compensation of the delay, divided by the square root
     /// of the number of pilots. The noise variance is that of a resource element, in the scale of
     /// an unnormalised DFT.
-    pub blocks: [[Complex64; A]; SYMBOLS],
+    pub blocks: [PerAntenna<Complex64>; SYMBOLS],
     /// Delay in samples of the SSB relative to `received`; it is compensated in the blocks.
     pub residual_delay: f64,
     /// Number of pilots of each block: 127, 60, 151, 60; with the PBCH 127, 240, 223, 240.
     pub pilots: [u16; SYMBOLS],
     /// Noise variance of a resource element, for each antenna.
-    pub noise_variance: [f64; A],
+    pub noise_variance: PerAntenna<f64>,
     /// SS-RSRP, SS-RSRQ and SS-SINR of each antenna.
-    pub measurements: [Measurement; A],
+    pub measurements: PerAntenna<Measurement>,
     /// Payload of the PBCH, if its decoding was requested and its CRC is correct.
     pub payload: Option<BchPayload>,
 }

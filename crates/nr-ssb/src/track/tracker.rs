@@ -16,6 +16,7 @@ use super::output::TrackerOutput;
 use crate::dsp::alignment::Alignment;
 use crate::dsp::base_rate::{CYCLIC_PREFIX, SYMBOL_FFT};
 use crate::dsp::channel_covariance::ChannelCovariance;
+use crate::dsp::received_grid::{PerAntenna, ReceivedGrid};
 use crate::dsp::timing;
 use crate::numeric::decibel::decibel;
 use crate::observables::ArrayObservables;
@@ -43,7 +44,7 @@ const NEAR: f64 = 0.5;
 const PHASE_SPREAD: f64 = (TAU * 60.0 / SYMBOL_FFT as f64) * (TAU * 60.0 / SYMBOL_FFT as f64);
 
 /// Tracker of one cell. It owns all plans and buffers.
-pub struct Tracker<const A: usize> {
+pub struct Tracker {
     pci: Pci,
     index: SsbIndex,
     base_rate_hz: f64,
@@ -54,24 +55,19 @@ pub struct Tracker<const A: usize> {
     clock: ClockLoop,
     misses: u32,
     /// Observables, if the carrier frequency is known.
-    observer: Option<Observer<A>>,
+    observer: Option<Observer>,
     /// Demodulation of the last SSB, in a window whose first sample has the index `window_start`.
     demodulation: Alignment,
     window_start: f64,
 }
 
-impl<const A: usize> Tracker<A> {
+impl Tracker {
     /// Creates a tracker of a cell that a search with this configuration detected.
     ///
     /// # Errors
-    /// [`SearchError`] for an invalid configuration, or one for another number of antennas than
-    /// `A`.
+    /// [`SearchError`] for an invalid configuration.
     pub fn new(config: &SearchConfig, cell: &DetectedSsb) -> Result<Self, TrackError> {
         config.check()?;
-        if config.antennas != A {
-            let (given, expected) = (config.antennas, A);
-            return Err(SearchError::AntennaCount { given, expected }.into());
-        }
         let base_rate_hz = config.spacing.base_rate_hz();
         let carrier_hz = config.ssb_freq_hz;
         let likely = likely_lmax(config.spacing, carrier_hz).likely;
@@ -80,9 +76,9 @@ impl<const A: usize> Tracker<A> {
             pci: cell.pci,
             index: SsbIndex::new(lmax, config.spacing, cell.ssb_index),
             base_rate_hz,
-            acquirer: Acquirer::new(base_rate_hz, carrier_hz, A, 0.0),
+            acquirer: Acquirer::new(base_rate_hz, carrier_hz, config.antennas, 0.0),
             decoder: BroadcastDecoder::new(config.spacing, Some(lmax), carrier_hz),
-            beams: Beams::new(cell.pci, A),
+            beams: Beams::new(cell.pci, config.antennas),
             frequency: FrequencyLoop::new(cell, base_rate_hz),
             clock: ClockLoop::new(cell.sample_start, cell.cfo_hz, carrier_hz, base_rate_hz),
             misses: 0,
@@ -131,14 +127,19 @@ impl<const A: usize> Tracker<A> {
     /// are uncertain. Returns `None` if the SSB is not detected, or its beam is ambiguous.
     ///
     /// # Errors
-    /// [`TrackError::Window`] if the window does not contain the expected SSB.
+    /// [`TrackError::Window`] if the window does not contain the expected SSB, and
+    /// [`SearchError::AntennaCount`] for another number of antennas than configured.
     pub fn track(
         &mut self,
-        antennas: &[&[Complex32]; A],
+        antennas: &[&[Complex32]],
         window_start: f64,
         expected_start: f64,
         decode_pbch: bool,
-    ) -> Result<Option<TrackerOutput<A>>, TrackError> {
+    ) -> Result<Option<TrackerOutput>, TrackError> {
+        let (given, expected) = (antennas.len(), self.acquirer.grids.len());
+        if given != expected {
+            return Err(SearchError::AntennaCount { given, expected }.into());
+        }
         let expected = expected_start - window_start;
         let reach = DEVIATIONS * self.clock.deviation(expected_start) + OTHER_PATH;
         let steps = ((reach - REACH as f64) / STEP)
@@ -183,7 +184,7 @@ impl<const A: usize> Tracker<A> {
         tracked.cfo_hz = self.cfo_hz();
         // Delay variance of a single path, by the SNR of all pilots and antennas together.
         let pilots: u16 = tracked.pilots.iter().sum();
-        let snr = 10.0_f64.powf(0.1 * tracked.snr_db) * A as f64 * f64::from(pilots);
+        let snr = 10.0_f64.powf(0.1 * tracked.snr_db) * given as f64 * f64::from(pilots);
         let variance = 0.5 / (PHASE_SPREAD * snr.max(1.0));
         let late = tracked.sample_start - expected_start;
         self.clock.follow(expected_start, late, variance);
@@ -191,7 +192,7 @@ impl<const A: usize> Tracker<A> {
     }
 
     /// Demodulates the SSB that begins at `place` in the window, if it is within the window.
-    fn demodulated(&mut self, antennas: &[&[Complex32]; A], place: f64) -> Option<Alignment> {
+    fn demodulated(&mut self, antennas: &[&[Complex32]], place: f64) -> Option<Alignment> {
         let pss_start = place + CYCLIC_PREFIX as f64;
         if pss_start.is_nan() || pss_start < 0.0 {
             return None;
@@ -209,11 +210,10 @@ impl<const A: usize> Tracker<A> {
         Some(alignment)
     }
 
-    /// Returns the received resource elements of one antenna, `[symbol][subcarrier]`, of the last
-    /// SSB. The predicted delay and frequency offset are compensated; [`TrackerOutput::residual_delay`]
+    /// Returns the received resource elements of every antenna of the last SSB. The predicted delay and frequency offset are compensated; [`TrackerOutput::residual_delay`]
     /// is not.
-    pub fn received(&self, antenna: usize) -> Option<&[[Complex32; SUBCARRIERS]; SYMBOLS]> {
-        self.acquirer.grids.get(antenna)
+    pub fn received(&self) -> &[ReceivedGrid] {
+        &self.acquirer.grids
     }
 
     /// Returns the known resource elements of the last SSB, zero elsewhere: the least-squares
@@ -246,7 +246,7 @@ impl<const A: usize> Tracker<A> {
 
     /// Returns delay, carrier phase, range rate and power of the last SSB, which [`track`](Self::track)
     /// returned; `None` without a carrier frequency. Each SSB is passed once, in order of time.
-    pub fn observe(&mut self, ssb: &TrackerOutput<A>) -> Option<ArrayObservables<A>> {
+    pub fn observe(&mut self, ssb: &TrackerOutput) -> Option<ArrayObservables> {
         let observer = self.observer.as_mut()?;
         Some(observer.observe(ssb, &self.acquirer, &self.demodulation, self.window_start))
     }
@@ -259,10 +259,10 @@ impl<const A: usize> Tracker<A> {
     /// Processes the demodulated grids.
     fn measure(
         &mut self,
-        antennas: &[&[Complex32]; A],
+        antennas: &[&[Complex32]],
         mut alignment: Alignment,
         decode_pbch: bool,
-    ) -> Option<TrackerOutput<A>> {
+    ) -> Option<TrackerOutput> {
         let phases = alignment.symbol_phases();
         let mut travelled = 0.0;
         let mut found = self.beams.identify(&self.acquirer.grids, &phases)?;
@@ -297,7 +297,7 @@ impl<const A: usize> Tracker<A> {
         estimate.estimate_noise();
         let delay = timing::refine_combined(&estimate.rows, found.delay);
         let (blocks, pilots) = despread(grids, reference, delay);
-        let noise_variance = std::array::from_fn(|antenna| estimate.noise_variance[antenna]);
+        let noise_variance: PerAntenna<f64> = estimate.noise_variance.iter().copied().collect();
         // Samples that are not finite, or far too large, must not change the state.
         if !(blocks.iter().flatten().all(|block| block.is_finite())
             && noise_variance.iter().all(|noise| noise.is_finite()))
@@ -308,13 +308,14 @@ impl<const A: usize> Tracker<A> {
         alignment.shift(delay)?;
         let known: f64 = pilots.iter().map(|count| f64::from(*count)).sum();
         let mut snr = 0.0;
-        let measurements = std::array::from_fn(|antenna| {
+        let measurements = grids.iter().zip(&noise_variance).enumerate();
+        let measurements = measurements.map(|(antenna, (grid, &noise))| {
             let energy: f64 = blocks.iter().map(|block| block[antenna].norm_sqr()).sum();
-            let noise = noise_variance[antenna];
             let power = ((energy - SYMBOLS as f64 * noise) / known).max(0.0);
-            snr += power / noise.max(1e-30) / A as f64;
-            measure(&grids[antenna], power, noise)
+            snr += power / noise.max(1e-30) / antennas.len() as f64;
+            measure(grid, power, noise)
         });
+        let measurements = measurements.collect();
         self.demodulation = demodulation;
         let half_frame = match (payload, self.index.lmax()) {
             (Some(BchPayload { half_frame, .. }), _) => Some(half_frame),

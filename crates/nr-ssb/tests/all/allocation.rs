@@ -58,18 +58,17 @@ fn warm_tracking_allocates_nothing() {
     let slices = air::slices(&samples);
     let mut searcher = Searcher::new(config.clone()).unwrap();
     let cell = searcher.search(&slices).unwrap()[0].clone();
-    let mut tracker = Tracker::<4>::new(&config, &cell).unwrap();
-    let antennas = std::array::from_fn(|antenna| slices[antenna]);
+    let mut tracker = Tracker::new(&config, &cell).unwrap();
     let start = cell.sample_start;
     // SSB at the expected time, without and with the PBCH; near the expected time; and missing.
     let silent = vec![vec![nr_ssb::Complex32::ZERO; 76_800]; 4];
-    let nothing = std::array::from_fn(|antenna| silent[antenna].as_slice());
+    let nothing = air::slices(&silent);
     let mut visit = || {
         for (window, expected, decode_pbch, there) in [
-            (&antennas, start, false, true),
-            (&antennas, start, true, true),
-            (&antennas, start + 5.0, false, true),
-            (&antennas, start + 5_000.0, false, false),
+            (&slices, start, false, true),
+            (&slices, start, true, true),
+            (&slices, start + 5.0, false, true),
+            (&slices, start + 5_000.0, false, false),
             (&nothing, start, false, false),
         ] {
             let seen = tracker.track(window, 0.0, expected, decode_pbch).unwrap();

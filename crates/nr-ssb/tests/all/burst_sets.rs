@@ -53,12 +53,11 @@ fn sixty_four_beams_of_frequency_range_2_are_received() {
             ..SearchConfig::new(spacing, ANTENNAS)
         };
         let window = slices(&antennas);
-        let window: &[_; ANTENNAS] = window.as_slice().try_into().unwrap();
-        let mut tracker = Tracker::<ANTENNAS>::new(&config, &ssbs[0]).unwrap();
+        let mut tracker = Tracker::new(&config, &ssbs[0]).unwrap();
         for pair in cell.ssb_indices.windows(2) {
             let samples = cell.ssb_start(pair[1]) - cell.ssb_start(pair[0]);
             let expected = tracker.expected_start(samples);
-            let tracked = tracker.track(window, 0.0, expected, false).unwrap();
+            let tracked = tracker.track(&window, 0.0, expected, false).unwrap();
             assert_eq!(tracked.unwrap().ssb_index, pair[1], "{spacing:?}");
         }
     }

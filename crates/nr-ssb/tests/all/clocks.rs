@@ -72,7 +72,7 @@ impl Drifting {
     }
 
     /// Returns the tracker after a search in period 0 with an approximate oscillator offset.
-    fn tracker(&mut self) -> Tracker<4> {
+    fn tracker(&mut self) -> Tracker {
         let (antennas, window_start) = self.window(0.0);
         let scs = self.cell.spacing.hz();
         let config = SearchConfig {
@@ -102,9 +102,9 @@ struct Tally {
 
 impl Tally {
     /// Tracks the beam of period `number`, `periods` after the last received one.
-    fn track(&mut self, air: &mut Drifting, tracker: &mut Tracker<4>, number: f64, periods: f64) {
+    fn track(&mut self, air: &mut Drifting, tracker: &mut Tracker, number: f64, periods: f64) {
         let (antennas, window_start) = air.window(number);
-        let windows = std::array::from_fn(|antenna| antennas[antenna].as_slice());
+        let windows = air::slices(&antennas);
         let expected = tracker.expected_start(periods * air.period);
         let seen = tracker
             .track(&windows, window_start, expected, false)
@@ -194,7 +194,7 @@ fn a_displaced_ssb_is_identified_correctly_or_not_at_all() {
         let snr_db = [0.0, 12.0, 25.0][trial % 3];
         let mut air = Drifting::new(SubcarrierSpacing::Khz30, 0.0, 0.02, snr_db, trial as u64);
         let (antennas, window_start) = air.window(1.0);
-        let windows = std::array::from_fn(|antenna| antennas[antenna].as_slice());
+        let windows = air::slices(&antennas);
         for (step, named) in named.iter_mut().enumerate() {
             let mut tracker = air.tracker();
             let expected = air.start(1.0) + step as f64 - 12.0 + 0.037 * trial as f64;

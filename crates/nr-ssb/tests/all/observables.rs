@@ -3,9 +3,8 @@
 
 use nr_ssb::observables::delay::Multipath;
 use nr_ssb::observables::range_rate::RateSource;
-use nr_ssb::receiver::{ReceiverConfig, StreamReceiver};
+use nr_ssb::receiver::{ReceivedBeam, Receiver, ReceiverConfig};
 use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
-use num_complex::Complex64;
 
 use crate::air;
 use crate::moving::{Echoes, Error, Moving, SsbErrors, summary};
@@ -158,16 +157,15 @@ fn receive_with_gaps(gaps: &[(usize, usize)]) -> Vec<Phases> {
         })
         .collect();
     let config = ReceiverConfig::new(cell.ssb_freq_hz, spacing, 2);
-    let mut receiver =
-        StreamReceiver::<2>::new(config, rate_hz, cell.ssb_freq_hz - offset_hz).unwrap();
+    let mut receiver = Receiver::new(config, rate_hz, cell.ssb_freq_hz - offset_hz).unwrap();
     let mut found = Vec::new();
-    let mut take = |seen: nr_ssb::receiver::ReceivedBeam<'_, 2>| {
+    let mut take = |seen: ReceivedBeam<'_>| {
         let observed = seen.tracker.observe(seen.ssb).unwrap();
         let start = observed.observables.delay.first_path_start;
         found.push((
             seen.ssb.ssb_index,
             start,
-            observed.amplitudes.map(Complex64::arg),
+            [0, 1].map(|antenna| observed.amplitudes[antenna].arg()),
         ));
     };
     let mut from = 0;

@@ -2,7 +2,7 @@
 
 use crate::air::{Cell, add_noise, raised, rng, silence, slices};
 use nr_ssb::receiver::{
-    Receiver, ReceiverConfig, StreamReceiver, TrackedSsb, Window, WindowReceiver,
+    ReceivedBeam, Receiver, ReceiverConfig, TrackedSsb, Window, WindowReceiver,
 };
 use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
 
@@ -44,17 +44,15 @@ fn tracked_ssbs(
 ) -> Vec<TrackedSsb> {
     let mut receiver = Receiver::new(config, RATE_HZ, 3.6e9 - 2e6).unwrap();
     let mut tracked_ssbs = Vec::new();
+    let mut take = |mut beam: ReceivedBeam<'_>| tracked_ssbs.push(beam.tracked_ssb());
     for first in (0..samples[0].len()).step_by(block) {
         let end = samples[0].len().min(first + block);
         let slices: Vec<&[Complex32]> = samples.iter().map(|it| &it[first..end]).collect();
-        receiver
-            .push(&slices, &mut |ssb| tracked_ssbs.push(ssb.clone()))
-            .unwrap();
+        receiver.push(&slices, &mut take).unwrap();
     }
-    receiver
-        .finish(&mut |ssb| tracked_ssbs.push(ssb.clone()))
-        .unwrap();
-    assert_eq!(receiver.tracked(), 0);
+    receiver.finish(&mut take).unwrap();
+    receiver.reset();
+    assert_eq!(receiver.windows().tracked(), 0);
     tracked_ssbs
 }
 
@@ -164,7 +162,7 @@ fn an_oscillator_error_of_20_ppm_is_found_within_three_bursts_of_the_longest_per
         };
         let rate_hz = spacing.base_rate_hz();
         let period = 0.16 * rate_hz * (1.0 + 1e-6 * ppm);
-        let mut receiver = WindowReceiver::<2>::new(config).unwrap();
+        let mut receiver = WindowReceiver::new(config).unwrap();
         let mut beams = Vec::new();
         for number in 0..5 {
             // The receiver is on around the bursts only.
@@ -203,7 +201,7 @@ fn unreported_gaps_are_inferred_from_the_beams() {
         lost_after_s: 10.0,
         ..ReceiverConfig::new(cell.ssb_freq_hz, SPACING, 3)
     };
-    let mut receiver = StreamReceiver::<3>::new(config, RATE_HZ, 3.6e9 - 2e6).unwrap();
+    let mut receiver = Receiver::new(config, RATE_HZ, 3.6e9 - 2e6).unwrap();
     // Remove 7 ms in the third period, then repeat all periods so that the search restarts.
     let cut = (0.05 * RATE_HZ) as usize..(0.057 * RATE_HZ) as usize;
     let mut unreported_gap = Vec::new();

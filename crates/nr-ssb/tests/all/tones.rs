@@ -171,7 +171,8 @@ fn both_receivers_track_through_tones_and_report_them() {
 
         let mut errors = Vec::new();
         let at_hz = [SPACING.base_rate_hz(), cell.ssb_freq_hz];
-        let reported = receivers::stream(config.clone(), at_hz, &samples, &mut |ssb| {
+        let reported = receivers::stream(config.clone(), at_hz, &samples, &mut |mut beam| {
+            let ssb = beam.tracked_ssb();
             let both = ssb.channel[0].iter().zip(&ssb.channel[1]);
             let both: Complex32 = both.map(|(a, b)| a.conj() * b).sum();
             errors.push(error(Complex64::new(both.re.into(), both.im.into())));
@@ -182,9 +183,9 @@ fn both_receivers_track_through_tones_and_report_them() {
 
         let mut errors = Vec::new();
         let first = (cell.delay as usize).saturating_sub(300);
-        let reported = receivers::windows::<2>(config, (first, 3), &samples, &mut |seen| {
+        let reported = receivers::windows(config, (first, 3), &samples, &mut |seen| {
             let blocks = seen.ssb.blocks.iter();
-            errors.push(error(blocks.map(|[a, b]| a.conj() * b).sum()));
+            errors.push(error(blocks.map(|it| it[0].conj() * it[1]).sum()));
         });
         assert_eq!(reported.len(), tones, "window, {above_ssb_db} dB");
         assert_eq!(errors.len(), 3, "window, {above_ssb_db} dB");
@@ -212,8 +213,8 @@ fn a_stream_of_a_wide_band_is_tracked_through_tones() {
         let config = ReceiverConfig::new(cell.ssb_freq_hz, SPACING, 2);
         let at_hz = [rate_hz, cell.ssb_freq_hz - offset_hz];
         let mut starts = Vec::new();
-        let reported = receivers::stream(config, at_hz, &wide, &mut |ssb| {
-            starts.push(0.5 * ssb.sample_start);
+        let reported = receivers::stream(config, at_hz, &wide, &mut |beam| {
+            starts.push(beam.ssb.sample_start);
         });
         let first = cell.ssb_start(cell.ssb_indices[0]);
         assert_eq!(starts.len(), 3, "{above_ssb_db} dB");

@@ -2,14 +2,14 @@
 
 use nr_ssb::Tone;
 use nr_ssb::front_end::FrontEndError;
-use nr_ssb::receiver::ReceiverError;
+use nr_ssb::receiver::{ReceivedBeam, Receiver, ReceiverError};
 use num_complex::Complex32;
 
 use super::error::LiveError;
 use super::stream_clock::{Continuity, StreamClock};
 use crate::burst::first_burst;
 use crate::observation::{BURST_S, MAX_ELEMENTS, SsbObservation};
-use crate::receive::{ReceiveError, ReceiverConfig, StreamReceiver, stream_receiver};
+use crate::receive::{Observer, ReceiveError, ReceiverConfig};
 
 /// Configuration of a sample stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,9 +46,7 @@ pub struct StreamCounts {
 /// Receiver of a stream, with the observations of an incomplete burst.
 pub struct SampleStream {
     clock: StreamClock,
-    offset: TimeOffset,
-    receiver: Box<dyn StreamReceiver>,
-    elements: usize,
+    receiver: Receiver,
     bursts: Bursts,
     counts: StreamCounts,
     /// Whether the caller ended the last segment, so that the following gap is deliberate.
@@ -85,8 +83,9 @@ impl TimeOffset {
 }
 
 /// Observations in order of time; the first `held` are valid, the others are reusable memory.
-#[derive(Default)]
 struct Bursts {
+    observer: Observer,
+    offset: TimeOffset,
     observations: Vec<SsbObservation>,
     held: usize,
     /// Time before which all SSBs are complete; infinite after the end of a segment.
@@ -94,12 +93,18 @@ struct Bursts {
 }
 
 impl Bursts {
-    fn take(&mut self, observation: &SsbObservation) {
-        match self.observations.get_mut(self.held) {
-            Some(room) => room.copy_from(observation),
-            None => self.observations.push(observation.clone()),
+    /// Appends the observation of a received SSB; `clock` determines its time.
+    fn take(&mut self, mut beam: ReceivedBeam<'_>, clock: &StreamClock) {
+        let offset_s = self.offset.with_gap(self.observer.unreported_gap_s(&beam));
+        let time_s = clock.time_s(beam.ssb.sample_start * beam.input_per_output) + offset_s;
+        if self.held == self.observations.len() {
+            let elements = self.observer.config().array.elements;
+            self.observations.push(SsbObservation::new(elements.into()));
         }
-        self.held += 1;
+        if let Some(room) = self.observations.get_mut(self.held) {
+            self.observer.observe(&mut beam, time_s, room);
+            self.held += 1;
+        }
     }
 }
 
@@ -110,12 +115,17 @@ impl SampleStream {
     /// [`LiveError::Receive`] for an invalid rate, frequency or array.
     pub fn new(config: StreamConfig, receiver: ReceiverConfig) -> Result<Self, LiveError> {
         let StreamConfig { rate_hz, centre_hz } = config;
+        let ssbs = Receiver::new(receiver.of_ssbs(), rate_hz, centre_hz);
         Ok(Self {
             clock: StreamClock::new(rate_hz),
-            elements: receiver.array.elements.into(),
-            receiver: stream_receiver(receiver, rate_hz, centre_hz)?,
-            offset: TimeOffset::default(),
-            bursts: Bursts::default(),
+            receiver: ssbs.map_err(ReceiveError::from)?,
+            bursts: Bursts {
+                observer: Observer::new(receiver)?,
+                offset: TimeOffset::default(),
+                observations: Vec::new(),
+                held: 0,
+                passed_until_s: 0.0,
+            },
             counts: StreamCounts::default(),
             is_stretch_ended: false,
         })
@@ -123,20 +133,22 @@ impl SampleStream {
 
     /// Returns the number of tracked SSBs.
     pub fn tracked(&self) -> usize {
-        self.receiver.tracked()
+        self.receiver.windows().tracked()
     }
 
     /// Returns tone number `index` of those that are subtracted, the strongest first, at its absolute frequency.
     pub fn tone(&self, index: usize) -> Option<Tone> {
-        self.receiver.tone(index)
+        let mut tone = self.receiver.windows().tones().nth(index)?;
+        tone.frequency_hz += self.bursts.observer.config().ssb_freq_hz;
+        Some(tone)
     }
 
     /// Returns the counts.
     pub fn counts(&self) -> StreamCounts {
         StreamCounts {
-            inferred_gaps: self.offset.inferred_gaps,
-            unreported_gap_s: self.offset.unreported_gap_s,
-            found: self.receiver.found(),
+            inferred_gaps: self.bursts.offset.inferred_gaps,
+            unreported_gap_s: self.bursts.offset.unreported_gap_s,
+            found: self.bursts.observer.found(),
             ..self.counts
         }
     }
@@ -150,18 +162,18 @@ impl SampleStream {
     /// Returns time minus sample time in seconds: the offset measured by the caller, otherwise the
     /// unreported gaps.
     pub fn correction_s(&self) -> f64 {
-        self.offset.value_s()
+        self.bursts.offset.value_s()
     }
 
     /// Sets time minus sample time in seconds, for a caller that counts samples and measures their
     /// arrival. It replaces the unreported gaps, which are known modulo the SSB period only.
     pub const fn set_offset_s(&mut self, offset_s: Option<f64>) {
-        self.offset.measured_s = offset_s;
+        self.bursts.offset.measured_s = offset_s;
     }
 
     /// Adds an interruption in seconds that the times of the samples do not report.
     pub fn add_interruption(&mut self, lost_s: f64) {
-        self.offset.interrupted_s += lost_s;
+        self.bursts.offset.interrupted_s += lost_s;
     }
 
     /// Processes the next samples of every antenna; `time_s` is the reception time of the first
@@ -174,10 +186,10 @@ impl SampleStream {
         time_s: f64,
         antennas: &[&[Complex32]],
     ) -> Result<Continuity, LiveError> {
-        let (found, elements) = (antennas.len(), self.elements);
-        if found != elements {
-            return Err(ReceiveError::Antennas { found, elements }.into());
-        }
+        self.bursts
+            .observer
+            .config()
+            .check_antennas(antennas.len())?;
         let length = antennas.first().map_or(0, |samples| samples.len());
         if let Some(other) = antennas.iter().find(|samples| samples.len() != length) {
             let (first, other) = (length, other.len());
@@ -200,6 +212,7 @@ impl SampleStream {
                 self.counts.restarts += 1;
                 self.gap_to(before.next(), &before)?;
                 self.receiver.reset();
+                self.bursts.observer.reset();
             }
         }
         self.is_stretch_ended = false;
@@ -207,18 +220,13 @@ impl SampleStream {
         for (new, samples) in new.iter_mut().zip(antennas) {
             *new = samples.get(left_out..).unwrap_or_default();
         }
-        let new = new.get(..elements).unwrap_or_default();
+        let new = new.get(..antennas.len()).unwrap_or_default();
         self.counts.taken_s += (length - left_out) as f64 / self.clock.rate_hz();
-        let Self {
-            clock,
-            offset,
-            receiver,
-            bursts,
-            ..
-        } = self;
-        let mut time_s = |sample, gap_s| clock.time_s(sample) + offset.with_gap(gap_s);
-        receiver.push(new, &mut time_s, &mut |it| bursts.take(it))?;
-        bursts.passed_until_s = clock.time_s(receiver.passed_until()) + offset.value_s();
+        let (clock, receiver, bursts) = (&self.clock, &mut self.receiver, &mut self.bursts);
+        let pushed = receiver.push(new, &mut |beam| bursts.take(beam, clock));
+        pushed.map_err(ReceiveError::from)?;
+        let passed = receiver.passed_until() * receiver.input_per_output();
+        bursts.passed_until_s = clock.time_s(passed) + bursts.offset.value_s();
         Ok(continuity)
     }
 
@@ -234,10 +242,9 @@ impl SampleStream {
     }
 
     fn gap_to(&mut self, sample: u64, clock: &StreamClock) -> Result<(), LiveError> {
-        let (offset, bursts) = (&mut self.offset, &mut self.bursts);
-        let mut time_s = |sample, gap_s| clock.time_s(sample) + offset.with_gap(gap_s);
-        (self.receiver).gap_to(sample, &mut time_s, &mut |it| bursts.take(it))?;
-        Ok(())
+        let bursts = &mut self.bursts;
+        let gap = (self.receiver).gap_to(sample, &mut |beam| bursts.take(beam, clock));
+        Ok(gap.map_err(ReceiveError::from)?)
     }
 
     /// Returns the SSBs of the first burst, if it is complete.
@@ -246,10 +253,7 @@ impl SampleStream {
         let held = held.unwrap_or_default();
         match held.first() {
             Some(first) if first.ssb.time_s + BURST_S <= self.bursts.passed_until_s => {
-                let number = first_burst(held);
-                let alone = held.iter().take(number).position(|it| it.is_first);
-                let number = alone.map_or(number, |place| place.max(1));
-                held.get(..number).unwrap_or_default()
+                held.get(..first_burst(held)).unwrap_or_default()
             }
             _ => &[],
         }

@@ -1,4 +1,4 @@
-//! Angle of one SSB, for any supported number of antennas.
+//! Array response and angle of one SSB, for any supported number of antennas.
 //!
 //! This module is part of the crate because the estimators of every number of antennas are compiled
 //! here anyway.
@@ -7,7 +7,10 @@ use aoa::{
     AngleEstimate, Array, Calibration, DirectionEstimate, DirectionFinder,
     maximum_likelihood_pilots,
 };
+use nr_ssb::SsbGrid;
+use nr_ssb::grid::SUBCARRIERS;
 use nr_ssb::search::ReceivedElements;
+use nr_ssb::track::ReceivedGrid;
 use num_complex::Complex64;
 
 use super::despread::Despread;
@@ -66,8 +69,32 @@ pub struct View {
     pub blocks: Vec<Vec<Complex64>>,
 }
 
-/// Estimator of the angle of SSBs from a search or a receiver.
+/// Received resource elements of one SSB.
+#[derive(Debug, Clone, Copy)]
+pub struct SsbElements<'a> {
+    /// Elements of every antenna.
+    pub received: &'a [ReceivedGrid],
+    /// Known elements, zero elsewhere.
+    pub known: &'a SsbGrid,
+    /// Noise variance of an element, for each antenna.
+    pub noise_variance: &'a [f64],
+    /// Delay that is not yet compensated, in samples.
+    pub delay: f64,
+}
+
+/// Symbol of the SSB that contains the PBCH only.
+const PBCH_SYMBOL: usize = 1;
+
+/// Estimator of the array response and angle of SSBs from a search or a receiver.
 pub trait ArrayView: Send + Sync {
+    /// Passes calibrated array responses of an SSB with unit noise power to `take`: the line of sight
+    /// if the channel varies over the band, otherwise one response per symbol with pilots.
+    fn responses(&self, ssb: &SsbElements<'_>, pilots: Pilots, take: &mut dyn FnMut(&[Complex64]));
+
+    /// Passes `count` calibrated resource elements of the PBCH to `take`, as snapshots of an unknown
+    /// signal.
+    fn snapshots(&self, ssb: &SsbElements<'_>, count: usize, take: &mut dyn FnMut(&[Complex64]));
+
     /// Returns the angle of an SSB, using all its known resource elements as pilots.
     fn view(&self, ssb: &ReceivedElements<'_>) -> Option<View>;
 
@@ -122,6 +149,13 @@ impl<const A: usize> Viewer<A> {
         self.calibration.gains().map(|gain| scale / gain)
     }
 
+    /// Returns the calibrated sums over the known elements, with unit noise variance.
+    fn despread(&self, ssb: &SsbElements<'_>, pilots: Pilots) -> Option<Despread<A>> {
+        let received = ssb.received.first_chunk::<A>()?.each_ref();
+        let gains = self.gains(ssb.noise_variance);
+        Some(Despread::new(received, ssb.known, pilots, ssb.delay).scaled(&gains))
+    }
+
     /// Returns the angle from the blocks `used`, together with all blocks.
     fn seen(&self, used: &[[Complex64; A]], blocks: &[[Complex64; A]]) -> Option<View> {
         let angle = if let Some(finder) = &self.finder {
@@ -136,10 +170,37 @@ impl<const A: usize> Viewer<A> {
 }
 
 impl<const A: usize> ArrayView for Viewer<A> {
-    fn view(&self, ssb: &ReceivedElements<'_>) -> Option<View> {
-        let elements = ssb.elements.first_chunk::<A>()?.each_ref();
+    fn responses(&self, ssb: &SsbElements<'_>, pilots: Pilots, take: &mut dyn FnMut(&[Complex64])) {
+        let Some(despread) = self.despread(ssb, pilots) else {
+            return;
+        };
+        match line_of_sight(&despread, self.finder.as_ref()) {
+            Some(direct) => take(&direct.block),
+            None => despread.blocks().for_each(|block| take(&block)),
+        }
+    }
+
+    fn snapshots(&self, ssb: &SsbElements<'_>, count: usize, take: &mut dyn FnMut(&[Complex64])) {
         let gains = self.gains(ssb.noise_variance);
-        let despread = Despread::new(elements, ssb.known, Pilots::Ssb, 0.0).scaled(&gains);
+        for number in 0..count {
+            let subcarrier = number * SUBCARRIERS / count;
+            let mut snapshot = gains;
+            for (value, grid) in snapshot.iter_mut().zip(ssb.received) {
+                let element = grid[PBCH_SYMBOL][subcarrier];
+                *value *= Complex64::new(element.re.into(), element.im.into());
+            }
+            take(&snapshot);
+        }
+    }
+
+    fn view(&self, ssb: &ReceivedElements<'_>) -> Option<View> {
+        let elements = SsbElements {
+            received: ssb.elements,
+            known: ssb.known,
+            noise_variance: ssb.noise_variance,
+            delay: 0.0,
+        };
+        let despread = self.despread(&elements, Pilots::Ssb)?;
         let blocks: Vec<[Complex64; A]> = despread.blocks().collect();
         let direct = line_of_sight(&despread, self.finder.as_ref()).map(|direct| [direct.block]);
         self.seen(direct.as_ref().map_or(&blocks[..], |block| block), &blocks)

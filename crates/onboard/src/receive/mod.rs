@@ -7,5 +7,5 @@ mod ranging;
 mod receiver;
 pub mod wideband;
 
-pub use receiver::{ReceiveError, Receiver, ReceiverConfig, SSB_SAMPLES, Window, window_receiver};
-pub(crate) use receiver::{StreamReceiver, stream_receiver};
+pub(crate) use receiver::Observer;
+pub use receiver::{ReceiveError, Receiver, ReceiverConfig, SSB_SAMPLES, Window};

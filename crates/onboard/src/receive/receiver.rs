@@ -4,19 +4,13 @@
 //! rate (256 samples per symbol) around each burst, as in simulations.
 //! [`SampleStream`](crate::live::SampleStream) processes a sample stream of any rate.
 
-use aoa::DirectionFinder;
-use nr_ssb::grid::{SUBCARRIERS, SYMBOLS};
 use nr_ssb::receiver::{self as ssb, ReceivedBeam, ReceiverError, WindowReceiver};
-use nr_ssb::track::{Tracker, TrackerOutput};
-use nr_ssb::{Complex32, SubcarrierSpacing, Tone};
+use nr_ssb::{Complex32, SubcarrierSpacing};
 use num_complex::Complex64;
 use thiserror::Error;
 
-use super::despread::Despread;
+use super::array_view::{ArraySetup, ArrayView, SsbElements, array_view};
 use super::ranging::RangingClock;
-use super::wideband::line_of_sight;
-use crate::elements::for_elements;
-use crate::manifold::ArrayManifold;
 use crate::observation::{SsbDetection, SsbObservation};
 use crate::settings::{ArraySettings, Pilots, Site, Vehicle};
 
@@ -78,8 +72,17 @@ impl ReceiverConfig {
         }
     }
 
+    /// Returns an error unless samples have the configured number of antennas.
+    pub(crate) fn check_antennas(&self, found: usize) -> Result<(), ReceiveError> {
+        let elements = self.array.elements.into();
+        if found != elements {
+            return Err(ReceiveError::Antennas { found, elements });
+        }
+        Ok(())
+    }
+
     /// Returns the configuration of the SSB receiver.
-    fn of_ssbs(&self) -> ssb::ReceiverConfig {
+    pub(crate) fn of_ssbs(&self) -> ssb::ReceiverConfig {
         let antennas = self.array.elements.into();
         let widest_ppm = ssb::ReceiverConfig::widest_ppm(self.ssb_freq_hz, self.spacing);
         ssb::ReceiverConfig {
@@ -119,21 +122,40 @@ pub enum ReceiveError {
         /// Configured number of antennas.
         elements: usize,
     },
-    /// The antennas do not form an array.
+    /// The antennas do not form an array, or a channel gain is zero or not finite.
     #[error(transparent)]
     Array(#[from] aoa::Error),
-    /// A channel gain is zero or not finite.
-    #[error("gain of channel {0} is not a finite number other than zero")]
-    Calibration(usize),
 }
 
-/// Receiver of windows at one frequency, for any number of antennas.
-pub trait Receiver: Send {
+/// Receiver of windows at one frequency.
+pub struct Receiver {
+    windows: WindowReceiver,
+    observer: Observer,
+    observation: SsbObservation,
+}
+
+impl Receiver {
+    /// Creates a receiver of windows without cells.
+    ///
+    /// # Errors
+    /// [`ReceiveError::Ssb`] or [`ReceiveError::Array`] for invalid settings.
+    pub fn new(config: ReceiverConfig) -> Result<Self, ReceiveError> {
+        Ok(Self {
+            windows: WindowReceiver::new(config.of_ssbs())?,
+            observation: SsbObservation::new(config.array.elements.into()),
+            observer: Observer::new(config)?,
+        })
+    }
+
     /// Returns the number of tracked SSBs.
-    fn tracked(&self) -> usize;
+    pub fn tracked(&self) -> usize {
+        self.windows.tracked()
+    }
 
     /// Returns the number of windows in which cells were searched for.
-    fn searches(&self) -> u64;
+    pub const fn searches(&self) -> u64 {
+        self.windows.searches()
+    }
 
     /// Searches for cells if a search is due, and passes every SSB in the window to `take`, in
     /// order of time.
@@ -141,318 +163,114 @@ pub trait Receiver: Send {
     /// # Errors
     /// [`ReceiveError`] if the number of antennas differs from the configuration, or their lengths
     /// differ.
-    fn receive(
-        &mut self,
-        window: &Window<'_>,
-        take: &mut dyn FnMut(&SsbObservation),
-    ) -> Result<(), ReceiveError>;
-}
-
-/// Creates a receiver of windows without cells.
-///
-/// # Errors
-/// [`ReceiveError::Ssb`] or [`ReceiveError::Calibration`] for invalid settings.
-pub fn window_receiver(config: ReceiverConfig) -> Result<Box<dyn Receiver>, ReceiveError> {
-    let ssb_config = config.of_ssbs();
-    for_elements!(config.array.elements, A => {
-        let receiver = WindowReceiver::<A>::new(ssb_config)?;
-        Ok(Box::new((receiver, Observer::<A>::new(config)?)))
-    })
-}
-
-impl<const A: usize> Receiver for (WindowReceiver<A>, Observer<A>) {
-    fn tracked(&self) -> usize {
-        self.0.tracked()
-    }
-
-    fn searches(&self) -> u64 {
-        self.0.searches()
-    }
-
-    fn receive(
+    pub fn receive(
         &mut self,
         window: &Window<'_>,
         take: &mut dyn FnMut(&SsbObservation),
     ) -> Result<(), ReceiveError> {
-        let (receiver, observer) = self;
         let (start, antennas) = (window.start as i64, window.antennas);
-        let found = antennas.len();
-        if found != A {
-            return Err(ReceiveError::Antennas { found, elements: A });
-        }
-        let base_rate_hz = observer.config.spacing.base_rate_hz();
-        receiver.receive(&ssb::Window { start, antennas }, &mut |mut seen| {
-            let elapsed_s = (seen.ssb.sample_start - start as f64) / base_rate_hz;
-            take(observer.observe(&mut seen, window.time_s + elapsed_s));
+        self.observer.config.check_antennas(antennas.len())?;
+        let base_rate_hz = self.observer.config.spacing.base_rate_hz();
+        let window_of_ssbs = ssb::Window { start, antennas };
+        self.windows.receive(&window_of_ssbs, &mut |mut beam| {
+            let elapsed_s = (beam.ssb.sample_start - start as f64) / base_rate_hz;
+            let time_s = window.time_s + elapsed_s;
+            self.observer
+                .observe(&mut beam, time_s, &mut self.observation);
+            take(&self.observation);
         })?;
         Ok(())
-    }
-}
-
-/// Receiver of a sample stream at one frequency, for any number of antennas.
-pub(crate) trait StreamReceiver: Send {
-    /// Returns the number of tracked SSBs.
-    fn tracked(&self) -> usize;
-
-    /// Returns tone number `index` of those that are subtracted, the strongest first, at its
-    /// absolute frequency.
-    fn tone(&self, index: usize) -> Option<Tone>;
-
-    /// Returns the input sample before which all SSBs have been passed on.
-    fn passed_until(&self) -> f64;
-
-    /// Returns the number of SSBs that a search has detected; all others were received at their
-    /// expected time.
-    fn found(&self) -> u64;
-
-    /// Processes the next samples and passes every completed SSB to `take`, in order of time.
-    /// `time_s` returns the reception time of an input sample, whose index is 0 for the first one.
-    /// Its second argument is the total duration in seconds of missing samples that the caller has
-    /// not reported.
-    ///
-    /// # Errors
-    /// [`ReceiveError`] if the number of antennas differs from the configuration, or their lengths
-    /// differ.
-    fn push(
-        &mut self,
-        antennas: &[&[Complex32]],
-        time_s: &mut dyn FnMut(f64, f64) -> f64,
-        take: &mut dyn FnMut(&SsbObservation),
-    ) -> Result<(), ReceiveError>;
-
-    /// Sets the index of the next input sample; the samples before it are missing. Passes on
-    /// pending SSBs.
-    ///
-    /// # Errors
-    /// Those of [`push`](Self::push).
-    fn gap_to(
-        &mut self,
-        sample: u64,
-        time_s: &mut dyn FnMut(f64, f64) -> f64,
-        take: &mut dyn FnMut(&SsbObservation),
-    ) -> Result<(), ReceiveError>;
-
-    /// Removes cells and samples, for a stream that restarts at sample 0.
-    fn reset(&mut self);
-}
-
-/// Creates a receiver without cells, for samples of a rate and centre frequency.
-///
-/// # Errors
-/// Those of [`window_receiver`].
-pub(crate) fn stream_receiver(
-    config: ReceiverConfig,
-    sample_rate_hz: f64,
-    centre_hz: f64,
-) -> Result<Box<dyn StreamReceiver>, ReceiveError> {
-    let ssb_config = config.of_ssbs();
-    for_elements!(config.array.elements, A => {
-        let receiver = ssb::StreamReceiver::<A>::new(ssb_config, sample_rate_hz, centre_hz)?;
-        Ok(Box::new((receiver, Observer::<A>::new(config)?)))
-    })
-}
-
-impl<const A: usize> StreamReceiver for (ssb::StreamReceiver<A>, Observer<A>) {
-    fn tracked(&self) -> usize {
-        self.0.receiver().tracked()
-    }
-
-    fn tone(&self, index: usize) -> Option<Tone> {
-        let mut tone = self.0.receiver().tones().nth(index)?;
-        tone.frequency_hz += self.1.config.ssb_freq_hz;
-        Some(tone)
-    }
-
-    fn passed_until(&self) -> f64 {
-        self.0.passed_until() * self.0.input_per_output()
-    }
-
-    fn found(&self) -> u64 {
-        self.1.found
-    }
-
-    fn push(
-        &mut self,
-        antennas: &[&[Complex32]],
-        time_s: &mut dyn FnMut(f64, f64) -> f64,
-        take: &mut dyn FnMut(&SsbObservation),
-    ) -> Result<(), ReceiveError> {
-        let (receiver, observer) = self;
-        let ratio = receiver.input_per_output();
-        receiver.push(antennas, &mut |mut seen| {
-            take(observer.observe_in_stream(&mut seen, ratio, time_s));
-        })?;
-        Ok(())
-    }
-
-    fn gap_to(
-        &mut self,
-        sample: u64,
-        time_s: &mut dyn FnMut(f64, f64) -> f64,
-        take: &mut dyn FnMut(&SsbObservation),
-    ) -> Result<(), ReceiveError> {
-        let (receiver, observer) = self;
-        let ratio = receiver.input_per_output();
-        receiver.gap_to(sample, &mut |mut seen| {
-            take(observer.observe_in_stream(&mut seen, ratio, time_s));
-        })?;
-        Ok(())
-    }
-
-    fn reset(&mut self) {
-        let (receiver, observer) = self;
-        receiver.reset();
-        if let Some(clock) = &mut observer.ranging {
-            clock.reset();
-        }
     }
 }
 
 /// Converter of received SSBs to observations.
-struct Observer<const A: usize> {
+pub(crate) struct Observer {
     config: ReceiverConfig,
-    calibration: [Complex64; A],
-    /// Direction finder of a non-linear array.
-    finder: Option<DirectionFinder<ArrayManifold<A>, A>>,
+    view: Box<dyn ArrayView>,
     /// Clock of the delays, if they are measured.
     ranging: Option<RangingClock>,
-    observation: SsbObservation,
     /// Number of SSBs that a search has detected.
     found: u64,
 }
 
-impl<const A: usize> Observer<A> {
-    fn new(config: ReceiverConfig) -> Result<Self, ReceiveError> {
-        let calibration = config.array.calibration();
-        let unusable = |gain: &Complex64| !gain.norm_sqr().is_normal();
-        if let Some(channel) = calibration.iter().position(unusable) {
-            return Err(ReceiveError::Calibration(channel));
-        }
-        let found = calibration.len();
-        let manifold = config.array.manifold::<A>()?;
-        let calibration = <[Complex64; A]>::try_from(calibration);
-        let calibration = calibration.map_err(|_| ReceiveError::Antennas { found, elements: A })?;
+impl Observer {
+    /// Creates a converter.
+    ///
+    /// # Errors
+    /// [`ReceiveError::Array`] for invalid settings.
+    pub fn new(config: ReceiverConfig) -> Result<Self, ReceiveError> {
+        let elements = config.array.elements.into();
+        let setup = ArraySetup {
+            shape: config.array.shape.clone(),
+            spacing_wavelengths: config.array.spacing_wavelengths,
+            calibration: Some(config.array.calibration()),
+        };
+        let view = array_view(elements, &setup)?;
+        let found = elements;
         Ok(Self {
-            calibration,
-            finder: manifold.map(ArrayManifold::finder).transpose()?,
+            view: view.ok_or(ReceiveError::Antennas { found, elements })?,
             ranging: (config.measures_ranging)
                 .then(|| RangingClock::new(config.spacing, config.ssb_freq_hz, config.period_s))
                 .flatten(),
-            observation: SsbObservation::new(A),
             found: 0,
             config,
         })
     }
 
-    /// Returns the observation of a received SSB with its reception time.
-    fn observe(&mut self, seen: &mut ReceivedBeam<'_, A>, time_s: f64) -> &SsbObservation {
-        self.found += u64::from(!seen.is_followed);
-        let ranging = self.ranging.as_mut().and_then(|clock| {
-            let observed = seen.tracker.observe(seen.ssb)?;
-            let gap_s = seen.unreported_gap / self.config.spacing.base_rate_hz();
-            clock.ranging(seen.ssb.ssb_index, &observed.observables, gap_s)
-        });
-        let (config, finder) = (&self.config, self.finder.as_ref());
-        let (tracker, ssb) = (&*seen.tracker, seen.ssb);
-        let into = &mut self.observation;
-        fill(
-            into,
-            config,
-            &self.calibration,
-            finder,
-            tracker,
-            ssb,
-            time_s,
-        );
-        into.ranging = ranging;
-        into
+    /// Returns the configuration.
+    pub const fn config(&self) -> &ReceiverConfig {
+        &self.config
     }
 
-    /// Returns the observation of an SSB in a stream; `ratio` is the number of input samples per
-    /// sample at the base rate.
-    fn observe_in_stream(
-        &mut self,
-        seen: &mut ReceivedBeam<'_, A>,
-        ratio: f64,
-        time_s: &mut dyn FnMut(f64, f64) -> f64,
-    ) -> &SsbObservation {
-        let unreported_gap_s = seen.unreported_gap / self.config.spacing.base_rate_hz();
-        let received_s = time_s(seen.ssb.sample_start * ratio, unreported_gap_s);
-        self.observe(seen, received_s)
+    /// Returns the number of SSBs that a search has detected; all others were received at their
+    /// expected time.
+    pub const fn found(&self) -> u64 {
+        self.found
     }
-}
 
-/// Fills an observation of a tracked SSB: unit noise power, calibrated channels.
-fn fill<const A: usize>(
-    into: &mut SsbObservation,
-    config: &ReceiverConfig,
-    calibration: &[Complex64; A],
-    finder: Option<&DirectionFinder<ArrayManifold<A>, A>>,
-    tracker: &Tracker<A>,
-    seen: &TrackerOutput<A>,
-    time_s: f64,
-) {
-    into.restart(SsbDetection {
-        pci: seen.pci.get(),
-        ssb_index: seen.ssb_index,
-        time_s,
-        snr_db: seen.snr_db,
-    });
-    into.cfo_hz = seen.cfo_hz;
-    let noise = seen.noise_variance.iter().sum::<f64>() / A as f64;
-    let scale = noise.max(f64::MIN_POSITIVE).sqrt().recip();
-    let gains = calibration.map(|gain| scale / gain);
-    if config.pilots == Pilots::Blind {
-        return fill_blind(into, config, tracker, gains);
-    }
-    let Some(elements) = received(tracker) else {
-        return;
-    };
-    into.noise_variance = Some(1.0);
-    let delay = seen.residual_delay;
-    let despread = Despread::new(elements, tracker.known(), config.pilots, delay).scaled(&gains);
-    if let Some(direct) = line_of_sight(&despread, finder) {
-        into.push(&direct.block);
-        return;
-    }
-    for block in despread.blocks() {
-        into.push(&block);
-    }
-}
-
-/// Returns the received signal of every antenna for the last SSB.
-fn received<const A: usize>(
-    tracker: &Tracker<A>,
-) -> Option<[&[[Complex32; SUBCARRIERS]; SYMBOLS]; A]> {
-    let mut elements = [tracker.received(0)?; A];
-    for (antenna, grid) in elements.iter_mut().enumerate() {
-        *grid = tracker.received(antenna)?;
-    }
-    Some(elements)
-}
-
-/// Fills resource elements of the PBCH as snapshots of an unknown signal.
-fn fill_blind<const A: usize>(
-    into: &mut SsbObservation,
-    config: &ReceiverConfig,
-    tracker: &Tracker<A>,
-    gains: [Complex64; A],
-) {
-    /// Symbol of the SSB that contains the PBCH only.
-    const PBCH_SYMBOL: usize = 1;
-    let Some(elements) = received(tracker) else {
-        return;
-    };
-    for number in 0..config.snapshots {
-        let subcarrier = number * SUBCARRIERS / config.snapshots.max(1);
-        let mut snapshot = gains;
-        for (value, grid) in snapshot.iter_mut().zip(elements) {
-            let element = grid[PBCH_SYMBOL]
-                .get(subcarrier)
-                .copied()
-                .unwrap_or_default();
-            *value *= Complex64::new(element.re.into(), element.im.into());
+    /// Restarts the clock of the delays.
+    pub fn reset(&mut self) {
+        if let Some(clock) = &mut self.ranging {
+            clock.reset();
         }
-        into.push(&snapshot);
+    }
+
+    /// Returns the duration of unreported missing samples before an SSB, in seconds.
+    pub fn unreported_gap_s(&self, beam: &ReceivedBeam<'_>) -> f64 {
+        beam.unreported_gap / self.config.spacing.base_rate_hz()
+    }
+
+    /// Fills the observation of a received SSB with its reception time: unit noise power,
+    /// calibrated channels.
+    pub fn observe(&mut self, beam: &mut ReceivedBeam<'_>, time_s: f64, into: &mut SsbObservation) {
+        self.found += u64::from(!beam.is_followed);
+        let gap_s = self.unreported_gap_s(beam);
+        let ssb = beam.ssb;
+        into.restart(SsbDetection {
+            pci: ssb.pci.get(),
+            ssb_index: ssb.ssb_index,
+            time_s,
+            snr_db: ssb.snr_db,
+        });
+        into.cfo_hz = ssb.cfo_hz;
+        into.ranging = self.ranging.as_mut().and_then(|clock| {
+            let observed = beam.tracker.observe(ssb)?;
+            clock.ranging(ssb.ssb_index, &observed.observables, gap_s)
+        });
+        let elements = SsbElements {
+            received: beam.tracker.received(),
+            known: beam.tracker.known(),
+            noise_variance: &ssb.noise_variance,
+            delay: ssb.residual_delay,
+        };
+        let (view, pilots, count) = (&self.view, self.config.pilots, self.config.snapshots);
+        into.noise_variance = (pilots != Pilots::Blind).then_some(1.0);
+        let mut take = |snapshot: &[Complex64]| {
+            into.push(snapshot);
+        };
+        match pilots {
+            Pilots::Blind => view.snapshots(&elements, count, &mut take),
+            _ => view.responses(&elements, pilots, &mut take),
+        }
     }
 }

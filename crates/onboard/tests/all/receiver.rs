@@ -7,7 +7,7 @@ use onboard::burst::Burst;
 use onboard::geometry::Pose;
 use onboard::observation::{OdometrySample, SsbObservation};
 use onboard::range::RangeQuantity;
-use onboard::receive::{Receiver, ReceiverConfig, Window, window_receiver};
+use onboard::receive::{Receiver, ReceiverConfig, Window};
 use onboard::settings::{
     ArraySettings, Pilots, Platform, SPEED_OF_LIGHT_MPS, Shipped, Site, TomlFile, Vehicle,
 };
@@ -50,13 +50,13 @@ impl Air {
         }
     }
 
-    fn receiver(&self) -> Box<dyn Receiver> {
+    fn receiver(&self) -> Receiver {
         self.receiver_of(&[])
     }
 
     /// Returns a receiver with known beams.
-    fn receiver_of(&self, beams: &[u8]) -> Box<dyn Receiver> {
-        window_receiver(self.config(beams)).unwrap()
+    fn receiver_of(&self, beams: &[u8]) -> Receiver {
+        Receiver::new(self.config(beams)).unwrap()
     }
 
     fn config(&self, beams: &[u8]) -> ReceiverConfig {
@@ -75,7 +75,7 @@ impl Air {
     }
 
     /// Returns the beams that the receiver reports for burst `number`.
-    fn received(&self, receiver: &mut Box<dyn Receiver>, number: u32) -> Vec<u8> {
+    fn received(&self, receiver: &mut Receiver, number: u32) -> Vec<u8> {
         let observed = self.observed(receiver, number);
         let mut beams: Vec<u8> = observed.iter().map(|it| it.ssb.ssb_index).collect();
         beams.sort_unstable();
@@ -83,7 +83,7 @@ impl Air {
     }
 
     /// Returns the observations of burst `number`.
-    fn observed(&self, receiver: &mut Box<dyn Receiver>, number: u32) -> Vec<SsbObservation> {
+    fn observed(&self, receiver: &mut Receiver, number: u32) -> Vec<SsbObservation> {
         let rate_hz = self.cell.spacing.base_rate_hz();
         let begin = (1000.0 + f64::from(number) * PERIOD_S * rate_hz) * (1.0 + 1e-6 * self.ppm);
         let start = begin.floor() - 200.0;
@@ -230,7 +230,7 @@ fn ranging_air() -> Air {
 #[test]
 fn delays_and_rates_follow_the_clock() {
     let air = ranging_air();
-    let mut receiver = window_receiver(ReceiverConfig {
+    let mut receiver = Receiver::new(ReceiverConfig {
         measures_ranging: true,
         ..air.config(&[])
     })
@@ -293,7 +293,7 @@ fn delays_measured_by_the_receiver_update_the_filter() {
         let site = Site::from_toml(&site, "site", &Shipped).unwrap();
         let vehicle = Vehicle::from_toml(&vehicle, "vehicle", &Shipped).unwrap();
         let platform = Platform::from_library(&vehicle.platform.name, &Shipped).unwrap();
-        let mut receiver = window_receiver(ReceiverConfig {
+        let mut receiver = Receiver::new(ReceiverConfig {
             measures_ranging: vehicle.has_one_way_ranging(),
             ..air.config(&[])
         })

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use nr_ssb::receiver::{Receiver as Core, ReceiverConfig, ReceiverError, TrackedSsb};
+use nr_ssb::receiver::{ReceivedBeam, Receiver as Core, ReceiverConfig, ReceiverError};
 use num_complex::{Complex32, Complex64};
 use pyo3::prelude::*;
 use recording::scan::{ArrayView, array_view};
@@ -138,7 +138,9 @@ impl Receiver {
     ///     Delayed SSBs; see `push`.
     fn finish(&self, py: Python<'_>) -> PyResult<Vec<Py<Cell>>> {
         self.process(py, |receiver, take| {
-            receiver.finish(take).map_err(receiver_error)
+            receiver.finish(take).map_err(receiver_error)?;
+            receiver.reset();
+            Ok(())
         })
     }
 
@@ -148,8 +150,9 @@ impl Receiver {
     fn tones(&self, py: Python<'_>) -> Vec<(f64, f64)> {
         py.detach(|| {
             let receiver = self.core.lock().unwrap_or_else(PoisonError::into_inner);
+            let receiver = receiver.windows();
             let ssb_freq_hz = receiver.config().search.ssb_freq_hz.unwrap_or_default();
-            let tones = receiver.tones().into_iter();
+            let tones = receiver.tones();
             tones
                 .map(|tone| (ssb_freq_hz + tone.frequency_hz, tone.power_dbfs))
                 .collect()
@@ -159,7 +162,7 @@ impl Receiver {
     fn __repr__(&self, py: Python<'_>) -> String {
         py.detach(|| {
             let receiver = self.core.lock().unwrap_or_else(PoisonError::into_inner);
-            let search = &receiver.config().search;
+            let search = &receiver.windows().config().search;
             format!(
                 "Receiver(ssb_freq_hz={:.0}, scs_khz={}, antennas={})",
                 search.ssb_freq_hz.unwrap_or_default(),
@@ -175,18 +178,19 @@ impl Receiver {
     fn process(
         &self,
         py: Python<'_>,
-        call: impl FnOnce(&mut Core, &mut dyn FnMut(&TrackedSsb)) -> PyResult<()> + Send,
+        call: impl FnOnce(&mut Core, &mut dyn FnMut(ReceivedBeam<'_>)) -> PyResult<()> + Send,
     ) -> PyResult<Vec<Py<Cell>>> {
         let cells = py.detach(|| {
             let mut receiver = self.core.lock().unwrap_or_else(PoisonError::into_inner);
-            let search = &receiver.config().search;
+            let search = &receiver.windows().config().search;
             let (ssb_freq_hz, spacing) = (search.ssb_freq_hz.unwrap_or_default(), search.spacing);
-            let base = receiver.sample_rate_hz() / spacing.base_rate_hz();
+            let base = receiver.input_per_output();
             let mut cells = Vec::new();
-            call(&mut receiver, &mut |ssb| {
+            call(&mut receiver, &mut |mut beam| {
+                let ssb = beam.tracked_ssb();
                 let view = self.view.as_ref();
                 let view = view.and_then(|it| it.of_blocks(&ssb.blocks, &ssb.noise_variance));
-                cells.push(Cell::of_tracked(ssb, ssb_freq_hz, spacing, base, view));
+                cells.push(Cell::of_tracked(&ssb, ssb_freq_hz, spacing, base, view));
             })?;
             PyResult::Ok(cells)
         })?;

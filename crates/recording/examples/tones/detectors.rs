@@ -87,27 +87,19 @@ fn stream(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
     let config = ReceiverConfig::new(scene.cell.ssb_freq_hz, SPACING, samples.len());
     let at_hz = [scene.rate_hz(), scene.centre_hz()];
     let mut found = Vec::new();
-    let tones = receivers::stream(config, at_hz, samples, &mut |ssb| {
-        found.push((ssb.pci.get(), ssb.sample_start / scene.factor as f64));
+    let tones = receivers::stream(config, at_hz, samples, &mut |beam| {
+        found.push((beam.ssb.pci.get(), beam.ssb.sample_start));
     });
     let tones = tones.iter().map(|it| it.frequency_hz + scene.offset_hz);
     scene.detected(&found, tones.collect())
 }
 
 fn window(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
-    match samples.len() {
-        1 => window_of::<1>(scene, samples),
-        2 => window_of::<2>(scene, samples),
-        _ => window_of::<4>(scene, samples),
-    }
-}
-
-fn window_of<const A: usize>(scene: &Scene, samples: &[Vec<Complex32>]) -> Detected {
-    let config = ReceiverConfig::new(scene.cell.ssb_freq_hz, SPACING, A);
+    let config = ReceiverConfig::new(scene.cell.ssb_freq_hz, SPACING, samples.len());
     let first = (scene.cell.delay as usize).saturating_sub(300);
     let mut found = Vec::new();
-    let tones = receivers::windows::<A>(config, (first, scene.bursts), samples, &mut |seen| {
-        found.push((seen.ssb.pci.get(), seen.ssb.sample_start));
+    let tones = receivers::windows(config, (first, scene.bursts), samples, &mut |beam| {
+        found.push((beam.ssb.pci.get(), beam.ssb.sample_start));
     });
     let tones = tones.iter().map(|it| it.frequency_hz).collect();
     scene.detected(&found, tones)

@@ -142,7 +142,7 @@ pub struct Moving {
     grid: SsbGrid,
     ofdm: Ofdm,
     echoes: Option<Echoes>,
-    tracker: Option<Tracker<ANTENNAS>>,
+    tracker: Option<Tracker>,
     /// Pseudorange at time zero, in seconds.
     pseudorange_s: f64,
     /// Rate of the pseudorange, in seconds per second.
@@ -272,11 +272,10 @@ impl Moving {
         let seen = observed.observables;
         let [delay_bound, phase_bound, frequency_bound] = self.bounds;
 
-        let response = std::array::from_fn(|antenna| {
-            let gain = self.cell.gains[antenna];
-            Complex64::new(gain.re.into(), gain.im.into())
-        });
-        let (phase_rad, phase_sigma_rad) = observed.phase_for_response(&response);
+        let response = self.cell.gains.iter();
+        let response = response.map(|gain| Complex64::new(gain.re.into(), gain.im.into()));
+        let (phase_rad, phase_sigma_rad) =
+            observed.phase_for_response(&response.collect::<Vec<_>>());
         let turn = phase_rad - self.phase(seen.phase.reference_start);
         let wavelength_m = LIGHT_M_S / SSB_FREQ_HZ;
         let frequency_bound = match seen.range_rate.source {
@@ -319,7 +318,7 @@ fn detected(
     cell: &air::Cell,
     samples: &[Vec<Complex32>],
     start: f64,
-) -> Option<Tracker<ANTENNAS>> {
+) -> Option<Tracker> {
     let mut searcher = Searcher::new(config.clone()).unwrap();
     let found = searcher.search(&air::slices(samples)).unwrap();
     let mut found = found.iter().find(|it| it.pci.get() == cell.pci)?.clone();
