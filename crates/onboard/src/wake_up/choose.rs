@@ -4,7 +4,6 @@ use super::adaptive::Adaptive;
 use super::controller::Controller;
 use super::due::Due;
 use super::fixed::FixedInterval;
-use super::gated::Gated;
 use super::policy::WakeUpPolicy;
 use super::uncertainty::UncertaintyDriven;
 use crate::energy::EnergyModel;
@@ -50,7 +49,9 @@ pub fn built_in(
     };
     Ok(match vehicle.wake_up_policy() {
         WakeUpSettings::Fixed(settings) => Box::new(FixedInterval::new(constant(&settings)?)),
-        WakeUpSettings::Pid(settings) => Box::new(Adaptive::new(controlled(&settings, "wake_up")?)),
+        WakeUpSettings::Pid(settings) => {
+            Box::new(Adaptive::new(controlled(&settings, "wake_up")?, None))
+        }
         WakeUpSettings::Gated(settings) => {
             let (due, shortest_s) = match settings.trigger {
                 TriggerSettings::Fixed(due) => (constant(&due)?, interval_s(due.interval_ms)?),
@@ -69,7 +70,8 @@ pub fn built_in(
                 }
                 None => f64::INFINITY,
             };
-            Box::new(Gated::new(due, settings.snr_set_point, latest_s))
+            let threshold = (settings.snr_set_point, latest_s);
+            Box::new(Adaptive::new(due, Some(threshold)))
         }
         WakeUpSettings::Uncertainty(settings) => {
             let cost = wake_up_cost(vehicle, platform)?;

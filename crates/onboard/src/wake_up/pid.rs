@@ -1,5 +1,5 @@
 //! The paper's Algorithm 1. Its inputs are in `controller.rs`, and `adaptive.rs` is its wake-up
-//! policy. Deferring an estimate until a better SSB is another policy, in `gated.rs`.
+//! policy, which optionally defers an estimate until a better SSB.
 
 use crate::settings::PidSettings;
 
