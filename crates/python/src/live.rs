@@ -323,7 +323,7 @@ impl Live {
             Continuity::First => "first",
             Continuity::Contiguous => "contiguous",
             Continuity::Gap { .. } => "gap",
-            Continuity::Overlap { .. } => "overlap",
+            Continuity::Overlap => "overlap",
             Continuity::Restart => "restart",
         })
     }

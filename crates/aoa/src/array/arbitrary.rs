@@ -67,23 +67,6 @@ impl<const N: usize> ArbitraryArray<N> {
         }))
     }
 
-    /// Creates a horizontal rectangular array. Rows of `columns` elements are parallel to x and
-    /// follow one another along y. The last row may be shorter.
-    ///
-    /// # Errors
-    /// See [`ArbitraryArray::new`].
-    pub fn rectangular(columns: usize, spacing_wavelengths: f64) -> Result<Self, Error> {
-        let columns = columns.max(1);
-        Self::new(std::array::from_fn(|n| {
-            let (row, column) = (n / columns, n % columns);
-            [
-                spacing_wavelengths * column as f64,
-                spacing_wavelengths * row as f64,
-                0.0,
-            ]
-        }))
-    }
-
     /// Replaces the channel gains by measured ones.
     #[must_use]
     pub const fn with_calibration(mut self, calibration: Calibration<N>) -> Self {

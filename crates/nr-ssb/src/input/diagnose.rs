@@ -52,13 +52,6 @@ pub struct ChannelDiagnosis {
     pub faults: Vec<Fault>,
 }
 
-impl ChannelDiagnosis {
-    /// Whether there are no faults.
-    pub fn is_healthy(&self) -> bool {
-        self.faults.is_empty()
-    }
-}
-
 /// Diagnoses every channel of a recording.
 pub fn diagnose(channels: &[&[Complex32]]) -> Vec<ChannelDiagnosis> {
     let powers: Vec<f64> = channels.iter().map(|samples| power_dbfs(samples)).collect();
@@ -164,7 +157,7 @@ mod tests {
             .map(|x| x * Complex32::new(0.0, 2.0))
             .collect();
         let found = diagnose(&[&healthy, &broken, &silent, &weak, &clipped, &duplicate]);
-        assert!(found[0].is_healthy(), "{found:?}");
+        assert!(found[0].faults.is_empty(), "{found:?}");
         assert_eq!(found[1].faults, [Fault::NotFinite { samples: 1 }]);
         assert_eq!(found[2].faults, [Fault::Silent]);
         assert!(

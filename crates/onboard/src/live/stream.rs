@@ -200,7 +200,7 @@ impl SampleStream {
         let (continuity, left_out) = self.clock.block(time_s, length);
         match continuity {
             Continuity::First | Continuity::Contiguous => {}
-            Continuity::Overlap { .. } => self.counts.overlaps += 1,
+            Continuity::Overlap => self.counts.overlaps += 1,
             Continuity::Gap { lost_s } => {
                 if !self.is_stretch_ended {
                     self.counts.gaps += 1;

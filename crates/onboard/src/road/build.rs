@@ -285,22 +285,6 @@ mod tests {
     }
 
     #[test]
-    fn a_road_that_crosses_itself_keeps_its_branch() {
-        let eight = [
-            [0.0, 0.0],
-            [100.0, 0.0],
-            [100.0, 50.0],
-            [50.0, 50.0],
-            [50.0, -50.0],
-        ];
-        let road = Road::from_polyline(&eight.map(Point::from), 5.0, 5.0).unwrap();
-        let crossing = Point::new(50.0, 0.1);
-        assert!((road.project_near(crossing, 48.0, 10.0).along_m - 50.0).abs() < 1e-6);
-        let later_m = road.length_m() - 50.0;
-        assert!((road.project_near(crossing, later_m, 10.0).along_m - later_m).abs() < 0.2);
-    }
-
-    #[test]
     fn adjacent_unsurveyed_segments_are_one_gap_in_either_direction() {
         let segments = [(40.0, true), (10.0, false), (20.0, false), (30.0, true)];
         let segments = segments.map(|(length_m, surveyed)| Segment {
@@ -370,7 +354,7 @@ mod tests {
         fn projection_inverts_the_offset(along_m in 0.0..205.0_f64, lateral_m in -4.0..4.0_f64) {
             let road = winding();
             let place = road.pose(along_m).offset_left(lateral_m).point();
-            let back = road.project_near(place, along_m, 30.0);
+            let back = road.project(place);
             prop_assert!((back.along_m - along_m).abs() < 1e-6);
             prop_assert!((back.lateral_m - lateral_m).abs() < 1e-6);
         }

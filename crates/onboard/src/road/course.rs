@@ -139,18 +139,6 @@ impl Road {
 
     /// Returns the projection of a point onto the nearest point of the road.
     pub fn project(&self, point: Point) -> Projection {
-        self.project_between(point, f64::NEG_INFINITY, f64::INFINITY)
-    }
-
-    /// Returns the projection of a point onto the road within `window_m` of `near_m` along it.
-    /// Where a road crosses itself, this selects the branch of the vehicle.
-    pub fn project_near(&self, point: Point, near_m: f64, window_m: f64) -> Projection {
-        self.project_between(point, near_m - window_m, near_m + window_m)
-    }
-
-    fn project_between(&self, point: Point, from_m: f64, to_m: f64) -> Projection {
-        let first = self.piece_index(from_m);
-        let last = self.piece_index(to_m);
         let (mut best, mut best_m) = (
             Projection {
                 along_m: 0.0,
@@ -158,7 +146,7 @@ impl Road {
             },
             f64::INFINITY,
         );
-        for piece in self.pieces.get(first..=last).unwrap_or_default() {
+        for piece in &self.pieces {
             let (local_m, distance_m) = piece.nearest(point);
             if distance_m < best_m {
                 best_m = distance_m;

@@ -70,6 +70,9 @@ pub struct Decoder {
 impl Default for Decoder {
     /// Creates a decoder with a list of 8 paths, and a second attempt with 32 paths if no path has
     /// a correct CRC.
+    ///
+    /// At −8 dB per resource element the block error rate is 0.8 % with a list of 8, and 0.2 % with
+    /// the second attempt. Only failed decodings take its time.
     fn default() -> Self {
         Self {
             retry: Some(ListDecoder::with_list_of::<32>()),
@@ -85,20 +88,6 @@ impl Decoder {
     /// [`Error::ListSize`] unless `list_size` is 1 to 32.
     pub fn new(list_size: usize) -> Result<Self, Error> {
         ListDecoder::new(list_size).map(Self::of)
-    }
-
-    /// Adds a second attempt with a list of `list_size` paths if no path has a correct CRC.
-    ///
-    /// At −8 dB per resource element the block error rate is 0.8 % with a list of 8, and 0.2 % with
-    /// a second attempt of 32. Only failed decodings take the time of the second attempt.
-    ///
-    /// # Errors
-    /// [`Error::ListSize`] unless `list_size` is 1 to 32.
-    pub fn retry_with(self, list_size: usize) -> Result<Self, Error> {
-        Ok(Self {
-            retry: Some(ListDecoder::new(list_size)?),
-            ..self
-        })
     }
 
     fn of(list: ListDecoder) -> Self {
