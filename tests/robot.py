@@ -96,10 +96,12 @@ def robot(
     duration_s: float = 90.0,
     seed: int = 1,
     speed_mps: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+    epoch_s: float = 0.0,
 ) -> Robot:
     """A drive through the hall, forwards and backwards, with turns on the spot.
 
-    ``speed_mps`` replaces the default speed; it is a function of the time (s).
+    ``speed_mps`` replaces the default speed; it is a function of the time (s). ``epoch_s`` is the
+    time of the start.
     """
     rng = np.random.default_rng(seed)
     step_s = 1 / RATE_HZ
@@ -129,4 +131,5 @@ def robot(
         rows, schema=["time_s", "pci", "phase_rad", "phase_sigma_rad"], orient="row"
     )
     truth = pl.DataFrame({"time_s": time_s, "x_m": x, "y_m": y, "heading_rad": heading})
-    return Robot(odometry, angles, truth, (float(x[0]), float(y[0]), float(heading[0])))
+    tables = [it.with_columns(it["time_s"] + epoch_s) for it in (odometry, angles, truth)]
+    return Robot(*tables, (float(x[0]), float(y[0]), float(heading[0])))

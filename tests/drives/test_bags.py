@@ -29,11 +29,7 @@ IMU_HZ = 100.0
 @pytest.fixture(scope="module")
 def driven() -> Robot:
     """Times since 1970, as in a robot's log."""
-    made = robot(DURATION_S)
-    for table in ("odometry", "angles", "truth"):
-        rows = getattr(made, table)
-        setattr(made, table, rows.with_columns(rows["time_s"] + EPOCH_S))
-    return made
+    return robot(DURATION_S, epoch_s=EPOCH_S)
 
 
 def odometry(driven: Robot, *, yaw: bool = False, heading: bool = False) -> list[bag.Message]:

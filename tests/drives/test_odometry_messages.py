@@ -54,11 +54,7 @@ class Fields:
 
 @pytest.fixture(scope="module")
 def driven() -> Robot:
-    made = robot(DURATION_S)
-    for table in ("odometry", "angles", "truth"):
-        rows = getattr(made, table)
-        setattr(made, table, rows.with_columns(rows["time_s"] + EPOCH_S))
-    return made
+    return robot(DURATION_S, epoch_s=EPOCH_S)
 
 
 @pytest.fixture(scope="module")

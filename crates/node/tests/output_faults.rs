@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 use recording::{OdometryIssue, read_odometry_mcap, read_tum};
 use serde_json::{Value, json};
 
-use common::{odometry, scratch};
+use common::{odometry, scratch, spawn};
 
 /// Interval of the odometry.
 const PERIOD: Duration = Duration::from_millis(20);
@@ -96,16 +96,7 @@ impl Running {
         let settings = format!(
             "name = \"test\"\nmessages = [\"-\"]\npage.listen = \"127.0.0.1:0\"\n{outputs}\n"
         );
-        fs::write(folder.join("node.toml"), settings).unwrap();
-        let mut process = Command::new(env!("CARGO_BIN_EXE_access-av-node"))
-            .args(["--site", "yard", "--vehicle", "tugger"])
-            .arg(folder.join("node.toml"))
-            .envs(environment.iter().copied())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let mut process = spawn(folder, &settings, environment, Stdio::piped());
         let mut errors = BufReader::new(process.stderr.take().unwrap());
         let mut line = String::new();
         errors.read_line(&mut line).unwrap();

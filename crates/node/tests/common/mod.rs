@@ -15,6 +15,21 @@ pub fn scratch(name: &str) -> PathBuf {
     folder
 }
 
+/// Starts a node for the shipped yard and tugger with piped standard input and output.
+pub fn spawn(folder: &Path, settings: &str, environment: &[(&str, &str)], errors: Stdio) -> Child {
+    let file = folder.join("node.toml");
+    fs::write(&file, settings).unwrap();
+    Command::new(env!("CARGO_BIN_EXE_access-av-node"))
+        .args(["--site", "yard", "--vehicle", "tugger"])
+        .arg(file)
+        .envs(environment.iter().copied())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(errors)
+        .spawn()
+        .unwrap()
+}
+
 /// A node with input by newline JSON and JSON output to its standard output, for the shipped yard and tugger.
 pub struct Node {
     pub process: Child,
@@ -41,16 +56,7 @@ impl Node {
         let settings = format!(
             "name = \"test\"\npace = {pace:?}\nmessages = [{messages:?}]\n{more}\n[output.json]\naddress = \"-\"\n"
         );
-        fs::write(folder.join("node.toml"), settings).unwrap();
-        let mut process = Command::new(env!("CARGO_BIN_EXE_access-av-node"))
-            .args(["--site", "yard", "--vehicle", "tugger"])
-            .arg(folder.join("node.toml"))
-            .envs(environment.iter().copied())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
+        let mut process = spawn(folder, &settings, environment, Stdio::null());
         let lines = BufReader::new(process.stdout.take().unwrap());
         Self { process, lines }
     }

@@ -1,31 +1,10 @@
 //! Keys of settings files that were renamed.
 
-use onboard::settings::{Library, NamedText, SettingsError, Shipped, TomlFile, Vehicle};
+use crate::settings::Shelf;
+use onboard::settings::{SettingsError, Shipped, TomlFile, Vehicle};
 
-/// Library with one file in addition to the shipped ones, which has an old key.
-struct WithOldFile;
-
-impl Library for WithOldFile {
-    fn text(
-        &self,
-        what: &'static str,
-        shipped: &[(&'static str, &'static str)],
-        name: &str,
-        referrer: &str,
-    ) -> Result<NamedText, SettingsError> {
-        if name != "old" {
-            return Shipped.text(what, shipped, name, referrer);
-        }
-        Ok(NamedText {
-            origin: "old".to_owned(),
-            text: "name = 'old'\nreceiver.lateness_s = 0.01".to_owned(),
-        })
-    }
-
-    fn points_m(&self, name: &str, referrer: &str) -> Result<Vec<[f64; 2]>, SettingsError> {
-        Shipped.points_m(name, referrer)
-    }
-}
+/// File with an old key.
+const OLD: Shelf = Shelf(&[("old", "name = 'old'\nreceiver.lateness_s = 0.01")]);
 
 /// Returns the file, the old key and the new key of the error.
 fn refusal(outcome: Result<Vehicle, SettingsError>) -> [String; 3] {
@@ -36,7 +15,7 @@ fn refusal(outcome: Result<Vehicle, SettingsError>) -> [String; 3] {
 }
 
 fn vehicle(text: &str) -> Result<Vehicle, SettingsError> {
-    Vehicle::from_toml(text, "vehicle.toml", &WithOldFile)
+    Vehicle::from_toml(text, "vehicle.toml", &OLD)
 }
 
 #[test]

@@ -7,7 +7,7 @@ use onboard::settings::{
 };
 
 /// Files in memory, in addition to the shipped ones.
-struct Shelf(&'static [(&'static str, &'static str)]);
+pub struct Shelf(pub &'static [(&'static str, &'static str)]);
 
 impl Library for Shelf {
     fn text(

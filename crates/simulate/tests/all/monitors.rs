@@ -29,15 +29,31 @@ fn first_leg(length_m: f64) -> Scenario {
 
 /// Returns the first 70 s of the yard with a fault.
 fn with(what: FaultKind) -> Scenario {
+    with_fault(first_leg(200.0), [FROM_S, UNTIL_S], what)
+}
+
+/// Returns the scenario with a fault between two times in seconds.
+fn with_fault(nominal: Scenario, [from_s, until_s]: [f64; 2], what: FaultKind) -> Scenario {
     let fault = FaultSettings {
-        from_s: FROM_S,
-        until_s: UNTIL_S,
+        from_s,
+        until_s,
         what,
     };
     Scenario {
         faults: vec![fault],
-        ..first_leg(200.0)
+        ..nominal
     }
+}
+
+/// Returns the first step with a fault, which is frozen odometry.
+fn first_frozen(run: &RunRecord) -> &Step {
+    let first = run.steps.iter().find(|it| !it.faults.is_empty()).unwrap();
+    assert!(
+        first.faults.contains(Fault::OdometryFrozen),
+        "{:?}",
+        first.faults
+    );
+    first
 }
 
 fn is_ok(step: &Step) -> bool {
@@ -105,15 +121,7 @@ fn the_state_is_ok_again_within_ten_seconds_after_a_fault_of_the_odometry() {
     const FROM_S: f64 = 60.0;
     const UNTIL_S: f64 = 75.0;
     for what in [FaultKind::OdometerStopped, FaultKind::OdometerFrozen] {
-        let fault = FaultSettings {
-            from_s: FROM_S,
-            until_s: UNTIL_S,
-            what,
-        };
-        let scenario = Scenario {
-            faults: vec![fault],
-            ..first_leg(400.0)
-        };
+        let scenario = with_fault(first_leg(400.0), [FROM_S, UNTIL_S], what);
         for run in drives(&scenario, 5, 1) {
             let after = run.steps.iter().filter(|it| it.time_s > UNTIL_S);
             let ok_s = after.clone().find(|it| is_ok(it)).unwrap().time_s - UNTIL_S;
@@ -130,15 +138,11 @@ fn a_vehicle_that_is_lost_without_odometry_is_located_again() {
     // Without odometry, the filter does not follow the bend at 92 s.
     const FROM_S: f64 = 88.0;
     const UNTIL_S: f64 = 103.0;
-    let fault = FaultSettings {
-        from_s: FROM_S,
-        until_s: UNTIL_S,
-        what: FaultKind::OdometerStopped,
-    };
-    let scenario = Scenario {
-        faults: vec![fault],
-        ..shipped("campus-handover")
-    };
+    let scenario = with_fault(
+        shipped("campus-handover"),
+        [FROM_S, UNTIL_S],
+        FaultKind::OdometerStopped,
+    );
     let simulation = Simulation::on_its_platform(&scenario).unwrap();
     let drive = simulation.until(120.0);
     let run = drive.run(402, 0, &|_| Ok(Custom::default())).unwrap();
@@ -164,22 +168,13 @@ fn a_departure_that_the_odometry_misses_is_detected_by_the_angles() {
         + 500;
     let leaves = nominal.steps.windows(2).skip(stop).position(moves).unwrap() + stop;
     let leaves_s = nominal.steps[leaves].time_s;
-    let fault = FaultSettings {
-        from_s: leaves_s - 4.0,
-        until_s: leaves_s + 15.0,
-        what: FaultKind::OdometerStopped,
-    };
-    let scenario = Scenario {
-        faults: vec![fault],
-        ..first_leg(200.0)
-    };
+    let scenario = with_fault(
+        first_leg(200.0),
+        [leaves_s - 4.0, leaves_s + 15.0],
+        FaultKind::OdometerStopped,
+    );
     for run in drives(&scenario, 5, 1) {
-        let first = run.steps.iter().find(|it| !it.faults.is_empty()).unwrap();
-        assert!(
-            first.faults.contains(Fault::OdometryFrozen),
-            "{:?}",
-            first.faults
-        );
+        let first = first_frozen(&run);
         // The vehicle accelerates with 0.5 m/s² at 50 m or more from the radio heads.
         let moved_m = nominal.steps[leaves]
             .truth
@@ -208,22 +203,13 @@ fn odometry_held_at_its_speed_is_detected_while_the_vehicle_brakes() {
     let stop_s = pairs.find(|it| stands(it)).unwrap()[0].time_s;
     let (cruise_mps, braking_mps2) = (15.0 / 3.6, 0.5);
     let from_s = stop_s - cruise_mps / braking_mps2;
-    let fault = FaultSettings {
-        from_s,
-        until_s: from_s + 20.0,
-        what: FaultKind::OdometerHeld,
-    };
-    let scenario = Scenario {
-        faults: vec![fault],
-        ..first_leg(200.0)
-    };
+    let scenario = with_fault(
+        first_leg(200.0),
+        [from_s, from_s + 20.0],
+        FaultKind::OdometerHeld,
+    );
     for run in drives(&scenario, 5, 1) {
-        let first = run.steps.iter().find(|it| !it.faults.is_empty()).unwrap();
-        assert!(
-            first.faults.contains(Fault::OdometryFrozen),
-            "{:?}",
-            first.faults
-        );
+        let first = first_frozen(&run);
         let since_s = first.time_s - from_s;
         // The radio heads are 50 m away, so that their angles change slowly.
         assert!(since_s > 0.0 && since_s < 5.0, "{since_s}");
