@@ -16,6 +16,7 @@ use crate::odometry::OdometryLog;
 /// Evidence of an angle in the localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InnovationRecord {
+    /// Innovation and likelihood before the update.
     pub evidence: AngleEvidence,
     /// Whether the localizer used the angle.
     pub used: bool,

@@ -20,8 +20,8 @@ const NO_SCATTER_DB: f64 = 200.0;
 
 /// Returns the site and vehicle for angles whose specified standard deviation is the total error.
 /// The site's scatter is not added. Angles to one radio head within a second or a metre are not
-/// independent, unless the receiver's settings specify otherwise. For a road vehicle without
-/// specified correlated errors, these errors are estimated while driving.
+/// independent, unless the receiver's settings specify otherwise. For a road vehicle, errors that are correlated over
+/// metres (multipath) are estimated while driving, unless their probability is specified.
 pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
     let site = Site {
         rician_k_db: NO_SCATTER_DB,
@@ -31,8 +31,8 @@ pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
     let receiver = &mut vehicle.receiver;
     // Angles of a differential drive with reflections resemble those of a lost drive, so that the
     // two would be confused.
-    let may_be_found = vehicle.drive == DriveKind::Road;
-    (receiver.multipath_bias_probability).get_or_insert(if may_be_found { UNKNOWN } else { 0.0 });
+    let is_road = vehicle.drive == DriveKind::Road;
+    (receiver.multipath_bias_probability).get_or_insert(if is_road { UNKNOWN } else { 0.0 });
     receiver
         .correlated_noise_fraction
         .get_or_insert(USUAL_SHARE);

@@ -335,6 +335,31 @@ mod tests {
         assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
     }
 
+    /// The score of the mixture, `−d ln p / dr`, is the sum of `r / S` over both innovations (Fisher's identity).
+    #[test]
+    fn the_innovations_have_the_score_of_the_mixture() {
+        let process = JumpProcess::new(0.75);
+        let hypotheses = |residual: f64| {
+            let seen = Innovation {
+                residual,
+                variance: 0.01,
+                measurement_variance: 0.01,
+            };
+            // Beyond the correlation distance of the short-lived error.
+            let jumps = process.jump_hypotheses(&Dependence::of_bias(0.5), &seen, 0.2, 0.01);
+            (jumps.innovations(&seen), jumps.density.ln())
+        };
+        for residual in [-1.0, 0.05, 0.3, 2.0] {
+            let step = 1e-5;
+            let [less, more] = [-step, step].map(|by| hypotheses(residual + by).1);
+            let score: f64 = (hypotheses(residual).0.iter())
+                .map(|it| it.residual / it.variance)
+                .sum();
+            let difference = -(more - less) / (2.0 * step);
+            assert!((score - difference).abs() < 1e-6, "{score} {difference}");
+        }
+    }
+
     #[test]
     fn an_almost_forgotten_bias_has_finite_moments() {
         let weights = [1e-230, 2e-230, 1e-230, 0.0];

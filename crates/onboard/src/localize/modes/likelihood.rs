@@ -34,19 +34,14 @@ impl Ekf {
         let relative_log_likelihood = log_likelihood(self, &predicted);
         let predicted = predicted.ok().filter(|predicted| !predicted.excluded)?;
         let innovation = predicted.innovation;
-        let given_bias = match &predicted.hypotheses {
-            Some(jumps) => jumps.innovations(&innovation),
-            None => {
-                let variance = f64::INFINITY;
-                [
-                    Innovation {
-                        variance,
-                        ..innovation
-                    },
-                    innovation,
-                ]
-            }
+        let without_information = Innovation {
+            variance: f64::INFINITY,
+            ..innovation
         };
+        let given_bias = (predicted.hypotheses.as_ref())
+            .map_or([without_information, innovation], |jumps| {
+                jumps.innovations(&innovation)
+            });
         Some(AngleEvidence {
             innovation,
             given_bias,
