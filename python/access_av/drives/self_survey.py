@@ -52,8 +52,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.float64]
     Flags = NDArray[np.bool_]
     Met = tuple[Numbers, Numbers, Flags]
-    Single = NDArray[np.float32]
-    Slopes = tuple[Single, Numbers]
+    Slopes = tuple[NDArray[np.float32], Numbers]
 
 # Maximum ratio of posterior and prior standard deviation of a surveyed parameter.
 LEARNT = 0.7
@@ -336,21 +335,21 @@ class _Problem:
 
     def slopes(self, values: Numbers, used: list[Flags], met: list[Met]) -> list[Slopes]:
         """Returns ∂ν of each drive, shape (parameters, angles, 2), and Σ ∂ᵢν ∂ⱼ(ν / S)."""
-        of_drives: list[list[tuple[Single, Single]]] = [[] for _ in met]
-        for step in np.diag(self.model.steps):
+        shapes = [(len(values), *residual.shape) for residual, _, _ in met]
+        of_drives = [(np.empty(it, np.float32), np.empty(it, np.float32)) for it in shapes]
+        for row, step in enumerate(np.diag(self.model.steps)):
             ahead = self.meet(values + step, np.zeros_like(values), used)
-            for columns, (there, after, _), (here, before, counted) in zip(
+            for (jacobian, scores), (there, after, _), (here, before, counted) in zip(
                 of_drives, ahead, met, strict=True
             ):
                 change = np.where(counted[:, None], wrapped(there - here), 0.0)
                 score = np.where(counted[:, None], (here + change) / after - here / before, 0.0)
-                columns.append(
-                    (
-                        np.nan_to_num(change / step.sum()).astype(np.float32),
-                        np.nan_to_num(score / step.sum()).astype(np.float32),
-                    )
-                )
-        return [_slopes(columns) for columns in of_drives]
+                jacobian[row] = np.nan_to_num(change / step.sum())
+                scores[row] = np.nan_to_num(score / step.sum())
+        return [
+            (jacobian, np.einsum("ian,jan->ij", jacobian, scores, dtype=np.float64))
+            for jacobian, scores in of_drives
+        ]
 
     def increase(
         self, values: Numbers, step: Numbers, here: list[Met], there: list[Met], inflation: float
@@ -383,7 +382,8 @@ class _Problem:
             for block in np.array_split(gradients, BLOCKS, axis=1):
                 squared += np.outer(block.sum(axis=1), block.sum(axis=1))
         prior = np.diag(self.model.stds_before**-2.0)
-        return _Linearised(gradient, complete, _limited(observed, complete + prior), squared, prior)
+        observed = _limited(0.5 * (observed + observed.T), complete + prior)
+        return _Linearised(gradient, complete, observed, squared, prior)
 
 
 @dataclass(frozen=True)
@@ -405,12 +405,6 @@ class _Linearised:
         inflation = max(1.0, float(ratio))
         covariance = np.linalg.inv(information / inflation + self.prior)
         return np.asarray(covariance, dtype=np.float64), inflation
-
-
-def _slopes(columns: list[tuple[Single, Single]]) -> Slopes:
-    jacobian, scores = (np.stack(each) for each in zip(*columns, strict=True))
-    product = np.einsum("ian,jan->ij", jacobian, scores, dtype=np.float64)
-    return jacobian, 0.5 * (product + product.T)
 
 
 def _limited(observed: Numbers, complete: Numbers) -> Numbers:
