@@ -210,8 +210,8 @@ impl Tracker {
         Some(alignment)
     }
 
-    /// Returns the received resource elements of every antenna of the last SSB. The predicted delay and frequency offset are compensated; [`TrackerOutput::residual_delay`]
-    /// is not.
+    /// Returns the received resource elements of every antenna of the last SSB. The predicted delay
+    /// and frequency offset are compensated; [`TrackerOutput::residual_delay`] is not.
     pub fn received(&self) -> &[ReceivedGrid] {
         &self.acquirer.grids
     }
