@@ -91,7 +91,8 @@ fn an_unverified_angle_is_weighted_by_its_likelihood() {
     let after = |off_rad: f64, resolved: bool| {
         let (mut tracker, head) = tracker();
         // The predicted angle plus a small deviation.
-        let residual_rad = tracker.innovation(&head, &precise).unwrap().residual;
+        let evidence = tracker.angle_evidence(&head, &precise).unwrap();
+        let residual_rad = evidence.innovation.residual;
         let measured = AngleMeasurement {
             phase_rad: off_rad - residual_rad,
             resolved,

@@ -318,7 +318,8 @@ mod tests {
                     snr_db: 20.0,
                     resolved: true,
                 };
-                let predicted_rad = -exact.innovation(head, &measured).unwrap().residual;
+                let evidence = exact.angle_evidence(head, &measured).unwrap();
+                let predicted_rad = -evidence.innovation.residual;
                 let noise: f64 = random.sample(StandardNormal);
                 measured.phase_rad = wrap_angle(predicted_rad + SIGMA_RAD * noise);
                 let ssb = SsbDetection {

@@ -12,8 +12,8 @@ use crate::angle_log::LoggedAngle;
 /// and a laser with cautious specifications) have 0.08 to 0.2.
 const USUAL_SHARE: f64 = 0.25;
 
-/// Prior probability of errors that are correlated over metres, if the scatter is unknown.
-const UNKNOWN: f64 = 0.75;
+/// Prior probability of errors that are correlated over metres, if it is not specified.
+const USUAL_PROBABILITY: f64 = 0.75;
 
 /// Rician K factor (dB) without scatter.
 const NO_SCATTER_DB: f64 = 200.0;
@@ -32,7 +32,11 @@ pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
     // Angles of a differential drive with reflections resemble those of a lost drive, so that the
     // two would be confused.
     let is_road = vehicle.drive == DriveKind::Road;
-    (receiver.multipath_bias_probability).get_or_insert(if is_road { UNKNOWN } else { 0.0 });
+    (receiver.multipath_bias_probability).get_or_insert(if is_road {
+        USUAL_PROBABILITY
+    } else {
+        0.0
+    });
     receiver
         .correlated_noise_fraction
         .get_or_insert(USUAL_SHARE);

@@ -57,14 +57,6 @@ fn forecast_steps(reading_m: f64) -> (usize, Reading) {
 }
 
 impl Ekf {
-    /// Returns the innovation of an angle; `None` if there is none.
-    pub fn innovation(&self, head: &RadioHead, measured: &AngleMeasurement) -> Option<Innovation> {
-        self.predict_measurement(head, measured)
-            .ok()
-            .filter(|predicted| !predicted.excluded)
-            .map(|predicted| predicted.innovation)
-    }
-
     /// Returns the innovation of an angle to an excluded radio head, for a filter without estimated biases; it counts as
     /// an update.
     pub(in crate::localize) fn innovation_of_excluded(
