@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::config::EkfConfig;
 use super::odometer::{SampleInterval, SpeedJumps};
-use super::range::{BlockedPath, RangeNoise};
+use super::range::{BlockedPath, LatePath, RangeNoise};
 use super::state::{
     ANGLE_TIME_OFFSET, Belief, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
@@ -48,7 +48,9 @@ pub(super) struct Head {
     pub last_error: Option<AngleError>,
     /// First path at the last used angle.
     pub blocked: BlockedPath,
-    /// Distance driven at the last used range (m).
+    /// First path according to the ranges, if there are no angles.
+    pub late: LatePath,
+    /// Distance driven at the last range (m) that was used, or late because of a blocked path.
     pub last_range_m: f64,
     /// Number of successive rejected ranges.
     pub rejected_ranges: u16,
@@ -67,6 +69,7 @@ impl Head {
             last_residual: None,
             last_error: None,
             blocked: BlockedPath::NEVER,
+            late: LatePath::PRIOR,
             last_range_m: f64::NEG_INFINITY,
             rejected_ranges: 0,
         }

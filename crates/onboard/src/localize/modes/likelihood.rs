@@ -52,7 +52,9 @@ impl Ekf {
     /// Returns the log-likelihood of a range in metres; 0 if the range is unusable.
     pub fn range_log_likelihood(&self, head: &RadioHead, measured: &RangeMeasurement) -> f64 {
         let predicted = self.predict_range(head, measured);
-        predicted.map_or(0.0, |it| range_density(&it).ln())
+        predicted.map_or(0.0, |it| {
+            outlier_or_gaussian(&it, self.late_probability(&it)).ln()
+        })
     }
 }
 
@@ -206,7 +208,14 @@ const OUTLIER_SPAN_M: f64 = 100.0;
 
 /// Returns the probability density of a range (1/m): Gaussian, or a uniformly distributed outlier.
 pub(in crate::localize) fn range_density(predicted: &PredictedRange) -> f64 {
-    OUTLIERS / OUTLIER_SPAN_M + (1.0 - OUTLIERS) * predicted.innovation.density()
+    outlier_or_gaussian(predicted, OUTLIERS)
+}
+
+/// Returns the probability density of a range (1/m) with this fraction of outliers. The density of an outlier is uniform:
+/// the ranges of a blocked path are late by nearly the same distance, so that with another density, each of them would be
+/// evidence for a position.
+fn outlier_or_gaussian(predicted: &PredictedRange, outliers: f64) -> f64 {
+    outliers / OUTLIER_SPAN_M + (1.0 - outliers) * predicted.innovation.density()
 }
 
 /// Returns the variance (rad²) of an angle without the state covariance, for the first angle of a

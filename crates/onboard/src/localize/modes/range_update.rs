@@ -28,6 +28,10 @@ impl Bank {
     /// would be evidence for it. A filter far from the position would expect a blocked path, and ranges would be no evidence
     /// against it.
     pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
+        let predicted = self.nominal.predict_range(head, measured);
+        if let Some(late) = self.nominal.reject_late_range(&predicted) {
+            return late;
+        }
         if let Some(number) = head.number_in(&self.heads) {
             self.watch(number);
             for subset in self.subsets.iter_mut() {
@@ -54,7 +58,6 @@ impl Bank {
                 subset.ekf.note_range(&predicted);
             }
         }
-        let predicted = self.nominal.predict_range(head, measured);
         for it in &mut self.modes {
             it.ekf.copy_range_noise(&self.nominal);
             it.update_range(&predicted, head, measured);

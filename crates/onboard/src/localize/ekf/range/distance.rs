@@ -11,7 +11,7 @@ use crate::range::RangeMeasurement;
 /// Correlation distance of the error of a delay due to multipath (m). The fading of the first path
 /// decorrelates within a metre, but the delays of the reflections and a blocked line of sight remain
 /// for tens of metres.
-const SHARED_M: f64 = 20.0;
+pub(super) const SHARED_M: f64 = 20.0;
 
 /// Minimum independent fraction of multipath. At standstill there is no new information, but the variance
 /// must remain finite.
@@ -36,7 +36,7 @@ impl Ekf {
             (offset, 1.0),
         ];
         // Noise is independent from one range to the next, multipath is not.
-        let noise = sigma_m * sigma_m;
+        let noise = sigma_m * sigma_m * self.late_variance_ratio();
         let scatter = measured.scatter_m * measured.scatter_m + seen.blocked.variance();
         let variance = noise + scatter;
         let independent_fraction = independent(seen.travelled_m, SHARED_M).max(MIN_FRACTION);

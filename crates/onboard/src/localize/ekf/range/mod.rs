@@ -4,12 +4,14 @@
 mod blocked_path;
 mod carrier_phase;
 mod distance;
+mod late_path;
 mod noise;
 mod pseudorange;
 mod range_rate;
 mod update;
 
 pub(super) use blocked_path::BlockedPath;
+pub(super) use late_path::LatePath;
 pub(super) use noise::RangeNoise;
 pub(in crate::localize) use pseudorange::PredictedRange;
 pub use update::RangeState;

@@ -1,8 +1,9 @@
 //! Update with a range, range rate or carrier phase: gate, jumps, Kalman update.
 
+use super::distance::SHARED_M;
 use super::pseudorange::PredictedRange;
-use crate::localize::bias::{CLOCK, DRIFT, HeadState, RANGE_SCALE};
-use crate::localize::ekf::filter::Ekf;
+use crate::localize::bias::{CLOCK, DRIFT, HeadState, RANGE_SCALE, independent};
+use crate::localize::ekf::filter::{Ekf, Head};
 use crate::localize::output::{UpdateReason, UpdateResult};
 use crate::radio_head::RadioHead;
 use crate::range::{RangeMeasurement, RangeQuantity};
@@ -38,7 +39,55 @@ impl Ekf {
 
     /// Updates state and range states with a range, range rate or carrier phase.
     pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
-        self.update_predicted_range(self.predict_range(head, measured))
+        let predicted = self.predict_range(head, measured);
+        if let Some(late) = self.reject_late_range(&predicted) {
+            return late;
+        }
+        self.update_predicted_range(predicted)
+    }
+
+    /// Updates the path of a radio head with a predicted two-way range. Returns the verdict if the path is probably blocked,
+    /// so that the range must not be used. There is no verdict with angles, which are the better evidence for a blocked path,
+    /// nor with delays: if the vehicle's clock is late, all of them are.
+    pub(in crate::localize) fn reject_late_range(
+        &mut self,
+        predicted: &Result<PredictedRange, UpdateReason>,
+    ) -> Option<UpdateResult> {
+        let predicted = predicted.as_ref().ok()?;
+        let has_angles = self.heads.iter().any(|it| it.last_update_s.is_finite());
+        let is_one_way = self.config.ranging.is_some_and(|model| model.is_one_way);
+        if has_angles || is_one_way || predicted.quantity != RangeQuantity::Range {
+            return None;
+        }
+        let head = self.heads.get_mut(predicted.index)?;
+        // An offset beyond its specified standard deviation is no blocked path.
+        let was_clear = head.last_range_m.is_finite();
+        let changed = path_changed(head, predicted);
+        head.late.update(&predicted.innovation, changed);
+        if !(was_clear && head.late.is_blocked()) {
+            return None;
+        }
+        self.note_range(predicted);
+        Some(self.verdict(
+            UpdateReason::Outlier,
+            Some(predicted.innovation.mahalanobis2()),
+        ))
+    }
+
+    /// Returns the probability that the first path of a predicted range is blocked, according to the ranges before it.
+    pub(in crate::localize) fn late_probability(&self, predicted: &PredictedRange) -> f64 {
+        let head = self.heads.get(predicted.index);
+        head.map_or(0.0, |head| head.late.before(path_changed(head, predicted)))
+    }
+
+    /// Returns the variance ratio due to ranges that are late, but not late enough to be detected: with a fraction f of blocked
+    /// paths, standard deviations are divided by 1 - f. An assumption; NEES in notes/experiments.md.
+    pub(super) fn late_variance_ratio(&self) -> f64 {
+        let blocked = (self.heads.iter())
+            .filter(|it| it.late.is_blocked())
+            .count();
+        let clear = (self.heads.len() - blocked).max(1) as f64 / self.heads.len() as f64;
+        1.0 / (clear * clear)
     }
 
     /// Updates with a predicted measurement.
@@ -172,4 +221,9 @@ impl Ekf {
         let std = variance.max(0.0).sqrt();
         RangeState { mean, std }
     }
+}
+
+/// Returns the probability that a path has another state since the previous range of its radio head.
+fn path_changed(head: &Head, predicted: &PredictedRange) -> f64 {
+    independent((predicted.place_m - head.last_range_m).abs(), SHARED_M)
 }
