@@ -13,58 +13,22 @@ from access_av.statistics import (
     Consistency,
     Integrity,
     ObtainedRisk,
-    beta_quantile,
     bootstrap_interval,
-    chi_squared_quantile,
     clopper_pearson,
     exceedance,
     mean_nees,
     nees,
     nees_band,
     percentiles,
-    stanford_counts,
-    wilson,
 )
 from access_av.statistics.paired import paired_difference, paired_mean
-
-
-@pytest.mark.parametrize(
-    ("probability", "freedom", "value"),
-    # Tables of the chi-squared distribution; with 2 degrees of freedom −2 ln(1 − p).
-    [
-        (0.95, 1, 3.841459),
-        (0.025, 2, 0.05063562),
-        (0.975, 2, 7.377759),
-        (0.5, 4, 3.356694),
-        (0.99, 10, 23.209251),
-        (0.001, 10, 1.478743),
-        (0.025, 200, 162.727983),
-        (0.975, 200, 241.057896),
-        (0.975, 20_000, 20_393.88),
-    ],
-)
-def test_chi_squared_quantiles_equal_tabulated_values(
-    probability: float, freedom: float, value: float
-) -> None:
-    assert chi_squared_quantile(probability, freedom) == pytest.approx(value, rel=1e-6)
-
-
-def test_beta_quantiles_equal_closed_forms() -> None:
-    # I_x(1, b) = 1 − (1 − x)^b, I_x(a, 1) = x^a, and the symmetric case.
-    assert beta_quantile(0.3, 1, 7) == pytest.approx(1 - 0.7 ** (1 / 7), rel=1e-11)
-    assert beta_quantile(0.3, 9, 1) == pytest.approx(0.3 ** (1 / 9), rel=1e-11)
-    assert beta_quantile(0.5, 40, 40) == pytest.approx(0.5, rel=1e-11)
-    # 1e6 epochs, where a sum over the binomial would never end.
-    assert beta_quantile(0.975, 1, 1e6) == pytest.approx(-math.log(0.025) / 1e6, rel=1e-5)
 
 
 @pytest.mark.parametrize("wrong", [0.0, 1.0, -0.1, math.nan])
 def test_unusable_probabilities_are_refused(wrong: float) -> None:
     for refuse in (
-        lambda: chi_squared_quantile(wrong, 2),
-        lambda: beta_quantile(wrong, 1, 1),
+        lambda: nees_band(1, probability=wrong),
         lambda: clopper_pearson(1, 2, probability=wrong),
-        lambda: wilson(1, 2, probability=wrong),
         lambda: bootstrap_interval([1.0], np.mean, probability=wrong),
     ):
         with pytest.raises(ValueError, match="probability"):
@@ -72,13 +36,12 @@ def test_unusable_probabilities_are_refused(wrong: float) -> None:
 
 
 def test_intervals_of_proportions_equal_published_examples() -> None:
-    # Clopper and Pearson, Wilson: the worked examples of Agresti and Coull (1998) and of R's
-    # binom.test and prop.test.
+    # Worked examples of Agresti and Coull (1998) and of R's binom.test.
     assert clopper_pearson(0, 10) == pytest.approx((0.0, 0.3084971), abs=1e-6)
     assert clopper_pearson(10, 10) == pytest.approx((0.6915029, 1.0), abs=1e-6)
     assert clopper_pearson(2, 20) == pytest.approx((0.0123485, 0.3169827), abs=1e-6)
-    assert wilson(2, 20) == pytest.approx((0.0278665, 0.3010336), abs=1e-6)
-    assert wilson(0, 10) == pytest.approx((0.0, 0.2775328), abs=1e-6)
+    # 1e6 epochs: 1 − 0.025^(1/n).
+    assert clopper_pearson(0, 10**6)[1] == pytest.approx(-math.log(0.025) / 1e6, rel=1e-5)
     for successes, trials in ((3, 2), (-1, 2), (0, 0)):
         with pytest.raises(ValueError, match="trial"):
             clopper_pearson(successes, trials)
@@ -274,23 +237,6 @@ def test_exceedance_intervals_use_runs_instead_of_epochs() -> None:
     assert low == 0.0
     assert high in (0.1, 0.15, 0.2)
     assert found.run_interval == pytest.approx((0.0012651, 0.2487328), abs=1e-6)
-
-
-def test_stanford_regions_are_counted_by_error_and_level() -> None:
-    table = guarded(
-        (0.5, 1.0, "ok"),
-        (1.0, 1.0, "ok"),
-        (1.2, 1.0, "ok"),
-        (2.0, 1.0, "ok"),
-        (1.6, 1.5, "ok"),
-        (1.6, 2.0, "degraded"),
-        (3.0, 2.0, "degraded"),
-        (9.0, None, None),
-    )
-    assert stanford_counts(table, alert_limit_m=1.5) == {
-        "nominal": 2, "misleading": 1, "hazardous": 2, "unavailable": 1,
-        "unavailable_misleading": 1,
-    }  # fmt: skip
 
 
 def test_alarm_statistics_equal_a_manual_count() -> None:

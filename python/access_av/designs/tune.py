@@ -20,7 +20,7 @@ from access_av.designs.search import suggested
 from access_av.designs.space import Dimension, Space
 from access_av.errors import InputError
 from access_av.settings import as_dict
-from access_av.statistics.distributions import student_quantile
+from access_av.statistics.paired import half_width
 from access_av.statistics.percentiles import column
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ def _rated(
     count, square_m2 = driven.square_m2.size, driven.rms_m**2
     if with_margin and count > 1:
         spread_m2 = float(np.std(driven.square_m2, ddof=1))
-        square_m2 += student_quantile(0.975, count - 1) * spread_m2 / np.sqrt(count)
+        square_m2 += half_width(spread_m2, count) / np.sqrt(count)
     [error] = driven.percentiles([limits.percent], of_seen=True)
     error_m = error.high if with_margin and error.high is not None else error.value
     row = {

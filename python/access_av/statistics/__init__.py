@@ -19,16 +19,14 @@ from access_av.statistics.consistency import (
     nees,
     nees_band,
 )
-from access_av.statistics.distributions import beta_quantile, chi_squared_quantile
 from access_av.statistics.extremes import ObtainedRisk, exceedance
-from access_av.statistics.integrity import Integrity, stanford_counts
+from access_av.statistics.integrity import Integrity
 from access_av.statistics.paired import paired_difference
 from access_av.statistics.percentiles import Percentile, percentiles
-from access_av.statistics.proportions import clopper_pearson, wilson
+from access_av.statistics.proportions import clopper_pearson
 
 __all__ = [
-    "Alarms", "Consistency", "Integrity", "ObtainedRisk", "Percentile", "beta_quantile",
-    "bootstrap_interval", "chi_squared_quantile", "clopper_pearson", "exceedance",
-    "horizontal_error_m", "mean_nees", "nees", "nees_band", "paired_difference", "percentiles",
-    "stanford_counts", "wilson",
+    "Alarms", "Consistency", "Integrity", "ObtainedRisk", "Percentile", "bootstrap_interval",
+    "clopper_pearson", "exceedance", "horizontal_error_m", "mean_nees", "nees", "nees_band",
+    "paired_difference", "percentiles",
 ]  # fmt: skip

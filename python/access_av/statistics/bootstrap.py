@@ -57,8 +57,7 @@ def bootstrap_interval(
     rows = np.asarray(runs, dtype=np.float64)
     if rows.ndim == 0 or len(rows) == 0 or resamples < 1:
         raise ValueError("an interval needs at least one run and one resample")
-    if not 0.0 < probability < 1.0:
-        raise ValueError(f"`probability` is {probability}; it must be above 0 and below 1")
+    check_probability(probability)
     rng = np.random.default_rng(seed)
     draws = rng.integers(0, len(rows), (resamples, len(rows)))
     values = np.sort(
@@ -68,3 +67,9 @@ def bootstrap_interval(
     )
     outside = int(0.5 * (1.0 - probability) * resamples)
     return float(values[outside]), float(values[-1 - outside])
+
+
+def check_probability(probability: float) -> None:
+    """Rejects a coverage that is not above 0 and below 1."""
+    if not 0.0 < probability < 1.0:
+        raise ValueError(f"`probability` is {probability}; it must be above 0 and below 1")

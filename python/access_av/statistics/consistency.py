@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 
 import polars as pl
 
-from access_av.statistics.bootstrap import bootstrap_interval
-from access_av.statistics.distributions import chi_squared_quantile
+from access_av.statistics.bootstrap import bootstrap_interval, check_probability
 
 if TYPE_CHECKING:
     import numpy as np
@@ -104,9 +103,14 @@ def nees_band(
     """
     if runs < 1:
         raise ValueError(f"`runs` is {runs}; it must be at least 1")
+    check_probability(probability)
+    from scipy.special import gammaincinv  # here, because its import is slow
+
     tail = 0.5 * (1.0 - probability)
+    # Quantiles of chi-squared by the regularized incomplete gamma function (NIST DLMF 8.2.4).
     low, high = (
-        chi_squared_quantile(share, runs * dimensions) / runs for share in (tail, 1.0 - tail)
+        2.0 * float(gammaincinv(0.5 * runs * dimensions, share)) / runs
+        for share in (tail, 1.0 - tail)
     )
     return low, high
 

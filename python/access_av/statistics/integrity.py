@@ -142,53 +142,6 @@ class Integrity:
         return Integrity.of_runs(counts, self.median_level_over_error)
 
 
-def stanford_counts(trajectories: pl.DataFrame, alert_limit_m: float) -> dict[str, int]:
-    """Returns the number of epochs in each region of the Stanford diagram (error and level).
-
-    ``nominal``: error ≤ level ≤ limit. ``misleading``: level < error ≤ limit. ``hazardous``
-    (hazardously misleading): level ≤ limit < error. ``unavailable``: level > limit, error ≤ level.
-    ``unavailable_misleading``: level > limit, error > level (Tossaint, Samson, Toran,
-    Ventura-Traveset, Hernández-Pajares, Juan, Sanz and Ramos-Bosch, The Stanford–ESA integrity
-    diagram, Navigation 54, 2007).
-
-    Parameters
-    ----------
-    trajectories
-        Columns ``trajectories`` of :mod:`access_av.columns`; steps without a protection level are
-        ignored.
-    alert_limit_m
-        Alert limit.
-
-    Examples
-    --------
-    >>> trajectories = pl.DataFrame(
-    ...     {
-    ...         "run": [0, 0, 0],
-    ...         "error_x_m": [0.1, 0.9, 2.0],
-    ...         "error_y_m": [0.0, 0.0, 0.0],
-    ...         "protection_level_m": [0.5, 0.5, 0.5],
-    ...         "integrity": ["ok", "ok", "ok"],
-    ...     }
-    ... )
-    >>> counts = stanford_counts(trajectories, alert_limit_m=1.5)
-    >>> counts["nominal"], counts["misleading"], counts["hazardous"]
-    (1, 1, 1)
-    """
-    error, level = pl.col("error_m"), pl.col("protection_level_m")
-    held, vouched = error <= level, level <= alert_limit_m
-    regions = {
-        "nominal": vouched & held,
-        "misleading": vouched & ~held & (error <= alert_limit_m),
-        "hazardous": vouched & (error > alert_limit_m),
-        "unavailable": ~vouched & held,
-        "unavailable_misleading": ~vouched & ~held,
-    }
-    counts = _stated(trajectories).select(
-        region.sum().alias(name) for name, region in regions.items()
-    )
-    return {name: int(count) for name, count in counts.row(0, named=True).items()}
-
-
 def _stated(trajectories: pl.DataFrame) -> pl.DataFrame:
     """Returns the steps with a protection level, and their ``error_m``."""
     return trajectories.filter(pl.col("protection_level_m").is_not_null()).select(

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av.statistics.distributions import student_quantile
 from access_av.statistics.proportions import clopper_pearson
 
 if TYPE_CHECKING:
@@ -210,8 +209,10 @@ def resampled(
 
 def _beyond(runs: int) -> float:
     """Returns the share of the resamples outside each end of a 95 % interval."""
+    from scipy.special import stdtrit  # here, because its import is slow
+
     freedom = runs - 1
-    t = student_quantile(0.975, freedom) * math.sqrt(runs / freedom)
+    t = float(stdtrit(freedom, 0.975)) * math.sqrt(runs / freedom)
     return 0.5 * math.erfc(t / math.sqrt(2.0))
 
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from statistics import NormalDist
 from typing import TYPE_CHECKING
 
-from access_av.statistics.bootstrap import bootstrap_interval
-from access_av.statistics.distributions import beta_quantile
+from access_av.statistics.bootstrap import bootstrap_interval, check_probability
 
 if TYPE_CHECKING:
     import numpy as np
@@ -41,33 +38,18 @@ def clopper_pearson(
     >>> [round(end, 4) for end in clopper_pearson(5, 10)]
     [0.1871, 0.8129]
     """
-    _check(successes, trials, probability)
-    tail = 0.5 * (1.0 - probability)
-    low = beta_quantile(tail, successes, trials - successes + 1) if successes else 0.0
-    failures = trials - successes
-    high = beta_quantile(1.0 - tail, successes + 1, failures) if failures else 1.0
+    if not 0 <= successes <= trials or trials < 1:
+        raise ValueError(
+            f"{successes} of {trials}: there must be at least one trial, and at most as many "
+            f"successes as trials"
+        )
+    check_probability(probability)
+    from scipy.special import betaincinv  # here, because its import is slow
+
+    tail, failures = 0.5 * (1.0 - probability), trials - successes
+    low = float(betaincinv(successes, failures + 1, tail)) if successes else 0.0
+    high = float(betaincinv(successes + 1, failures, 1.0 - tail)) if failures else 1.0
     return low, high
-
-
-def wilson(successes: int, trials: int, *, probability: float = 0.95) -> tuple[float, float]:
-    """Returns the score interval of a proportion: shorter, with correct mean coverage.
-
-    ``(p + z²/2n ± z·sqrt(p(1 − p)/n + z²/4n²)) / (1 + z²/n)`` with the normal quantile z of
-    ``(1 + probability) / 2`` (Wilson, Journal of the American Statistical Association 22, 1927).
-    The parameters are those of :func:`clopper_pearson`.
-
-    Examples
-    --------
-    >>> [round(end, 4) for end in wilson(5, 10)]
-    [0.2366, 0.7634]
-    """
-    _check(successes, trials, probability)
-    z = NormalDist().inv_cdf(0.5 * (1.0 + probability))
-    share, spread = successes / trials, z * z / trials
-    middle = share + 0.5 * spread
-    half = z * math.sqrt((share * (1.0 - share) + 0.25 * spread) / trials)
-    scale = 1.0 + spread
-    return max(0.0, (middle - half) / scale), min(1.0, (middle + half) / scale)
 
 
 def share_interval(shares: NDArray[np.float64], independent: int) -> tuple[float, float]:
@@ -96,13 +78,3 @@ def share_interval(shares: NDArray[np.float64], independent: int) -> tuple[float
         least, most = bootstrap_interval(shares)
         low, high = min(low, least), max(high, most)
     return low, max(high, share)
-
-
-def _check(successes: int, trials: int, probability: float) -> None:
-    if not 0 <= successes <= trials or trials < 1:
-        raise ValueError(
-            f"{successes} of {trials}: there must be at least one trial, and at most as many "
-            f"successes as trials"
-        )
-    if not 0.0 < probability < 1.0:
-        raise ValueError(f"`probability` is {probability}; it must be above 0 and below 1")
