@@ -71,18 +71,19 @@ def test_sobol_indices_of_a_known_function_are_estimated() -> None:
         counts_as = 0.1 * (3.0 * one + 2.0 * one * two + np.sign(choice) + noise)
         margin = counts_as / (1.0 - np.abs(counts_as))
         found = sobol(drawn(margin, points, dimensions), runs=1, seed=draw)
-        for each in found.indices:
-            if each.dimension not in expected:
-                assert each.total < 0.01, "it is idle"
+        for each in found.indices.iter_rows(named=True):
+            if each["dimension"] not in expected:
+                assert each["total"] < 0.01, "it is idle"
                 continue
-            first, total = (value / whole for value in expected[each.dimension])
+            first, total = (value / whole for value in expected[each["dimension"]])
             compared += 2
-            covered += each.first_low - 1e-9 <= first <= each.first_high + 1e-9
-            covered += each.total_low <= total <= each.total_high
-            assert abs(each.total - total) < 0.05
-            assert each.total_high - each.total_low < 0.1
-        assert found.explained["c"] == pytest.approx(1.0 - 0.25 / whole, abs=0.02)
-        assert found.holds["c"] == pytest.approx(np.mean(margin >= 0.0))
+            covered += each["first_low"] - 1e-9 <= first <= each["first_high"] + 1e-9
+            covered += each["total_low"] <= total <= each["total_high"]
+            assert abs(each["total"] - total) < 0.05
+            assert each["total_high"] - each["total_low"] < 0.1
+        [share, explained] = found.claims.select("share_met", "explained_variance").row(0)
+        assert explained == pytest.approx(1.0 - 0.25 / whole, abs=0.02)
+        assert share == pytest.approx(np.mean(margin >= 0.0))
     # 95 % intervals: fewer than 45 of 60 in them has a probability below 1e-6.
     assert compared == 60
     assert covered >= 45, covered

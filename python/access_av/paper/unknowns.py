@@ -11,7 +11,7 @@ environments with these polynomials ("fast bPCE": Marelli and Sudret, Structural
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -21,8 +21,6 @@ import polars as pl
 from access_av.paper.statements import stated_claims
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from access_av.paper.outcome import Numbers
     from access_av.paper.sampled_interpretations import Sample
 
@@ -36,99 +34,57 @@ STANDS_OUT = 3.0
 
 
 @dataclass(frozen=True)
-class Index:
-    """Sensitivity of a claim's margin to a parameter, as fractions of the margin's variance.
-
-    Columns ``sensitivity`` of :mod:`access_av.columns`.
-    """
-
-    claim: str
-    dimension: str
-    first: float
-    total: float
-    first_low: float
-    first_high: float
-    total_low: float
-    total_high: float
-
-    @property
-    def half_width(self) -> float:
-        """Half of the width of the 95 % interval of the total index."""
-        return 0.5 * (self.total_high - self.total_low)
-
-
-@dataclass(frozen=True)
 class Unknowns:
     """Sobol indices of all claims, and the share of the parameter space in which each claim holds.
 
     Attributes
     ----------
-    holds, holds_interval
-        Share of the parameter space by claim, with its 95 % interval.
-    explained
-        Share of the margin's variance that the expansion explains, by claim.
+    indices
+        Shares of the variance of each claim's margin, one row per claim and parameter; columns
+        ``sensitivity`` of :mod:`access_av.columns`.
+    claims
+        Share of the parameter space that meets each claim; columns ``sensitivity_claims``.
     sample
         The drawn interpretations and their margins, from which all other values follow.
     """
 
-    indices: list[Index]
-    holds: Mapping[str, float]
-    holds_interval: Mapping[str, tuple[float, float]]
-    explained: Mapping[str, float]
-    interpretations: int
+    indices: pl.DataFrame
+    claims: pl.DataFrame
     runs: int
     sample: Sample
 
     @property
-    def matter(self) -> list[Index]:
+    def matter(self) -> pl.DataFrame:
         """Returns total indices of at least :data:`MATTERS`, for claims with evidence.
 
         Claims by construction and by arithmetic are excluded.
         """
-        stated = stated_claims()
-        return [
-            each
-            for each in self.indices
-            if each.total >= MATTERS and "evidence" not in stated[each.claim]
-        ]
+        open_claims = [name for name, entry in stated_claims().items() if "evidence" not in entry]
+        return self.indices.filter(pl.col("total") >= MATTERS, pl.col("claim").is_in(open_claims))
 
     def tables(self) -> dict[str, pl.DataFrame]:
         """Indices, shares and sample; columns of :mod:`access_av.columns` by these names."""
         sample = self.sample
-        points = [sample.values(index) for index in range(self.interpretations)]
-        rows = [
-            {
-                "interpretation_index": index,
-                "environment_index": int(sample.world[index]),
-                "dimension": dimension.key,
-                "coordinate": float(sample.coordinates[index, d]),
-                "num_choices": len(dimension.choices),
-                "drawn_value": str(points[index][dimension.key]),
-            }
-            for index in range(self.interpretations)
-            for d, dimension in enumerate(sample.dimensions)
-        ]
-        margins = [
-            {"interpretation_index": index, "claim": claim, "margin": float(margin)}
-            for claim, of_claim in sample.margins.items()
-            for index, margin in enumerate(of_claim)
-        ]
-        shares = [
-            {
-                "claim": claim,
-                "share_met": share,
-                "share_met_low": self.holds_interval[claim][0],
-                "share_met_high": self.holds_interval[claim][1],
-                "explained_variance": self.explained.get(claim),
-            }
-            for claim, share in self.holds.items()
-        ]
+        count, dimensions = sample.coordinates.shape
+        points = [sample.values(index) for index in range(count)]
+        each = sample.dimensions * count
+        drawn = {
+            "interpretation_index": np.repeat(np.arange(count), dimensions),
+            "environment_index": np.repeat(sample.world, dimensions),
+            "dimension": [it.key for it in each],
+            "coordinate": sample.coordinates.ravel(),
+            "num_choices": [len(it.choices) for it in each],
+            "drawn_value": [str(point[it.key]) for point in points for it in sample.dimensions],
+        }
+        margins = {
+            "interpretation_index": np.tile(np.arange(count), len(sample.margins)),
+            "claim": np.repeat(list(sample.margins), count),
+            "margin": np.concatenate(list(sample.margins.values())),
+        }
         return {
-            "sensitivity": pl.DataFrame([asdict(each) for each in self.indices]),
-            "sensitivity_claims": pl.DataFrame(
-                shares, schema_overrides={"explained_variance": pl.Float64}
-            ),
-            "sensitivity_sample": pl.DataFrame(rows),
+            "sensitivity": self.indices,
+            "sensitivity_claims": self.claims,
+            "sensitivity_sample": pl.DataFrame(drawn),
             "sensitivity_margins": pl.DataFrame(margins),
         }
 
@@ -154,27 +110,36 @@ def sobol(sample: Sample, runs: int, *, seed: int = 0, count: int = RESAMPLES) -
         rows = np.concatenate([rows_of[i] for i in rng.integers(0, len(worlds), len(worlds))])
         drawn.append([fit.indices(values[rows], margin[rows]) for fit, values, margin in claims])
         shares.append(held[rows].mean(axis=0))
-    of_claim = [fit.indices(values, margin) for fit, values, margin in claims]
-    low, high = np.quantile(drawn, (0.025, 0.975), axis=0)
-    least, most = np.quantile(shares, (0.025, 0.975), axis=0)
-    indices = [
-        Index(
-            claim,
-            dimension.key,
-            *(float(of_claim[c][which, d]) for which in (0, 1)),
-            *(float(end[c, which, d]) for which in (0, 1) for end in (low, high)),
-        )
-        for c, claim in enumerate(names)
-        for d, dimension in enumerate(sample.dimensions)
-    ]
+    # Shape (claims, first and total, dimensions).
+    shape = (len(names), 2, len(levels))
+    middle = np.reshape([fit.indices(values, margin) for fit, values, margin in claims], shape)
+    ends = np.quantile(np.reshape(drawn, (count, *shape)), (0.025, 0.975), axis=0)
+    low, high = np.quantile(shares, (0.025, 0.975), axis=0)
+    of_kind = dict(enumerate(("first", "total")))
+    explained = {name: fit.explained for name, fit in zip(names, fits, strict=True)}
     return Unknowns(
-        indices=indices,
-        holds={name: float(held[:, i].mean()) for i, name in enumerate(sample.margins)},
-        holds_interval={
-            name: (float(least[i]), float(most[i])) for i, name in enumerate(sample.margins)
-        },
-        explained={name: fit.explained for name, fit in zip(names, fits, strict=True)},
-        interpretations=len(sample.coordinates),
+        indices=pl.DataFrame(
+            {
+                "claim": np.repeat(np.array(names, dtype=np.str_), len(levels)),
+                "dimension": [dimension.key for dimension in sample.dimensions] * len(names),
+                **{name: middle[:, kind].ravel() for kind, name in of_kind.items()},
+                **{
+                    f"{name}_{end}": values[:, kind].ravel()
+                    for kind, name in of_kind.items()
+                    for end, values in zip(("low", "high"), ends, strict=True)
+                },
+            }
+        ),
+        claims=pl.DataFrame(
+            {
+                "claim": list(sample.margins),
+                "share_met": held.mean(axis=0),
+                "share_met_low": low,
+                "share_met_high": high,
+                "explained_variance": [explained.get(name) for name in sample.margins],
+            },
+            schema_overrides={"explained_variance": pl.Float64},
+        ),
         runs=runs,
         sample=sample,
     )

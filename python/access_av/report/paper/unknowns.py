@@ -38,13 +38,14 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
     specs["sobol"] = _index_chart(found)
     specs["share"] = _share_chart(found)
     ranges = [{"Unspecified parameter": it.label, "Range": it.range_text} for it in DIMENSIONS]
-    widest = max((each.half_width for each in found.matter), default=0.0)
+    matter = found.matter
+    widest = matter.select(0.5 * (pl.col("total_high") - pl.col("total_low")).max()).item() or 0.0
     widths = (
-        f"For claims that are neither by arithmetic nor by construction, {len(found.matter)} total "
+        f"For claims that are neither by arithmetic nor by construction, {matter.height} total "
         f"indices are {MATTERS:g} or more; their 95 % intervals are at most ± {widest:.3f} wide."
     )
     return (
-        f"<p>{found.interpretations} interpretations of {found.runs} runs each, drawn from the "
+        f"<p>{len(found.sample.world)} interpretations of {found.runs} runs each, drawn from the "
         "ranges below. A total index of 0.6 means: 60 % of the variance of the claim's margin "
         "involves this parameter, alone or together with others. Cells below "
         f"{LEAST_TOTAL:.0%} are left empty; “unexplained” is the share of the variance that the "
@@ -68,18 +69,19 @@ def _index_chart(found: Unknowns) -> Spec:
     labels = {each.key: each.label for each in DIMENSIONS}
     rows = [
         {
-            "claim": _short(each.claim),
-            "dimension": labels[each.dimension],
-            "total": round(each.total, 3),
-            "first": round(each.first, 3),
-            "interval": f"{each.total_low:.2f} … {each.total_high:.2f}",
+            "claim": _short(each["claim"]),
+            "dimension": labels[each["dimension"]],
+            "total": round(each["total"], 3),
+            "first": round(each["first"], 3),
+            "interval": f"{each['total_low']:.2f} … {each['total_high']:.2f}",
         }
-        for each in found.indices
+        for each in found.indices.iter_rows(named=True)
     ]
+    explained = found.claims.select("claim", "explained_variance").drop_nulls()
     rows += [
         {"claim": _short(claim), "dimension": "unexplained", "total": round(1.0 - share, 3),
          "first": 0.0, "interval": ""}
-        for claim, share in found.explained.items()
+        for claim, share in explained.iter_rows()
     ]  # fmt: skip
     table = pl.DataFrame(rows).filter(pl.col("total") >= LEAST_TOTAL)
     order = [*labels.values(), "unexplained"]
@@ -106,14 +108,12 @@ def _index_chart(found: Unknowns) -> Spec:
 
 
 def _share_chart(found: Unknowns) -> Spec:
-    rows = pl.DataFrame(
-        [
-            (_short(claim), share, *found.holds_interval[claim])
-            for claim, share in found.holds.items()
-        ],
-        schema=["claim", "share", "low", "high"],
-        orient="row",
-    ).with_columns(pl.col(pl.Float64).round(4))
+    rows = found.claims.select(
+        pl.col("claim").map_elements(_short, return_dtype=pl.String),
+        share=pl.col("share_met").round(4),
+        low=pl.col("share_met_low").round(4),
+        high=pl.col("share_met_high").round(4),
+    )
     base = alt.Chart(rows).encode(
         y=alt.Y("claim:N", sort=None, title=None, axis=alt.Axis(labelLimit=170)),
         tooltip=["claim:N", "share:Q", "low:Q", "high:Q"],
