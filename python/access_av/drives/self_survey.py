@@ -30,7 +30,7 @@ from __future__ import annotations
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,7 +42,7 @@ from access_av.drives.site_frame import displacement_probability
 from access_av.errors import InputError
 from access_av.settings import as_dict
 from access_av.signal.manifold import wrapped
-from access_av.tables.result import Origin, Result, origin
+from access_av.tables.result import Result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -146,8 +146,6 @@ class Survey(Result):
         model, because dependent angles have increased variances.
     iterations
         Number of Gauss–Newton steps.
-    origin
-        Version and commit that computed it. Not compared.
     """
 
     parameters: list[Parameter]
@@ -159,7 +157,6 @@ class Survey(Result):
     used: int
     nis: float
     iterations: int
-    origin: Origin = field(default_factory=origin, compare=False)
 
     def table(self) -> pl.DataFrame:
         """Returns one row per parameter; columns ``access_av.columns.TABLES["survey"]``."""

@@ -29,7 +29,7 @@ from access_av.paper.outcome import Drives, Outcome
 from access_av.paper.statements import METHODS, paper_numbers
 from access_av.settings import as_dict
 from access_av.statistics.percentiles import as_columns, names
-from access_av.tables.result import Origin, Result, origin
+from access_av.tables.result import Result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -110,8 +110,8 @@ class Evaluation(Result):
         Whether the energies per estimate were fitted to the paper; otherwise those of the platform.
     freedoms
         Degrees of freedom of the fit, of :data:`access_av.paper.energy_fit.FREEDOMS`.
-    duration_s, origin
-        Computing time; version and commit. Not compared.
+    duration_s
+        Computing time. Not compared.
     """
 
     interpretation: Interpretation
@@ -125,7 +125,6 @@ class Evaluation(Result):
     refitted: bool
     duration_s: float = field(default=0.0, compare=False)
     freedoms: tuple[str, ...] = energy_fit.SHIPPED
-    origin: Origin = field(default_factory=origin, compare=False)
 
     def __repr__(self) -> str:
         return (

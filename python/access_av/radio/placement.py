@@ -6,7 +6,7 @@ import math
 import os
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ from access_av.run import service_levels
 from access_av.run.error_bound import along_route, p90_m
 from access_av.settings import as_dict
 from access_av.tables import validation
-from access_av.tables.result import Origin, Result, origin
+from access_av.tables.result import Result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -50,8 +50,6 @@ class Plan(Result):
         One row per mast, added alone; columns ``radio_heads`` of :mod:`access_av.columns`.
     verdicts
         Service levels that the bound permits with the new radio heads.
-    origin
-        Version and commit that computed it. Not compared.
     """
 
     scenario: _core.Scenario
@@ -60,7 +58,6 @@ class Plan(Result):
     chosen: list[str]
     ranking: pl.DataFrame
     verdicts: list[service_levels.Verdict]
-    origin: Origin = field(default_factory=origin, compare=False)
 
 
 def plan(

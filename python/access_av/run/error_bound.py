@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from access_av.errors import InputError
 from access_av.run import service_levels
 from access_av.settings import as_dict
 from access_av.tables.columns import TABLES
-from access_av.tables.result import Origin, Result, origin
+from access_av.tables.result import Result
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -57,7 +57,6 @@ class ErrorBound(Result):
     map_step_m: float
     map_num_angles: float
     map_heading_std_rad: float
-    origin: Origin = field(default_factory=origin, compare=False)
 
     def __repr__(self) -> str:
         median_m = float(self.route.select(pl.col("bound_m").median()).item())

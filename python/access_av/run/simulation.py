@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,7 @@ from access_av.statistics.integrity import Integrity
 from access_av.statistics.percentiles import Percentile, column
 from access_av.tables.columns import TABLES
 from access_av.tables.numbers import number
-from access_av.tables.result import Origin, Result, origin
+from access_av.tables.result import Result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -65,8 +65,6 @@ class Simulation(Result):
         pose. ``None`` unless kept.
     scenario, seed
         Simulated scenario and seed, which reproduce the result.
-    origin
-        Version and commit that simulated it. Not compared.
     """
 
     steps: pl.DataFrame
@@ -79,7 +77,6 @@ class Simulation(Result):
     levels_m: NDArray[np.float32] | None = None
     scenario: Scenario | None = None
     seed: int | None = None
-    origin: Origin = field(default_factory=origin, compare=False)
 
     def __repr__(self) -> str:
         name = "" if self.scenario is None else f"{self.scenario.name}, "

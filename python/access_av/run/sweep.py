@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
@@ -12,7 +12,7 @@ from access_av._core import Scenario
 from access_av.errors import InputError
 from access_av.run.difference import Difference, difference
 from access_av.run.simulation import Simulation, simulate
-from access_av.tables.result import Origin, Result, origin
+from access_av.tables.result import Result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -42,8 +42,6 @@ class Sweep(Result):
         Swept keys, seed of all combinations, and number of runs of each.
     percent
         Percentile of the table and of :meth:`plot`.
-    origin
-        Version and commit.
     """
 
     table: pl.DataFrame
@@ -53,7 +51,6 @@ class Sweep(Result):
     seed: int
     runs: int
     percent: float
-    origin: Origin = field(default_factory=origin, compare=False)
 
     def __repr__(self) -> str:
         keys = ", ".join(self.values[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
@@ -13,7 +13,7 @@ from access_av.statistics.percentiles import with_ends
 from access_av.study import economy
 from access_av.study.points import OK_MARGIN, OWN, Point, own_mode
 from access_av.study.targets import table as targets_table
-from access_av.tables.result import Origin, Result, origin
+from access_av.tables.result import Result
 from access_av.verdicts import Judgement
 
 if TYPE_CHECKING:
@@ -52,8 +52,6 @@ class Study(Result):
         Values that are equal to the template's or the default.
     example_run
         Steps of the first run with the nominal channel.
-    origin
-        Version and commit that computed it. Not compared.
     """
 
     plant: _core.Plant
@@ -71,7 +69,6 @@ class Study(Result):
     ways: dict[str, Way]
     unverified: list[Unverified]
     example_run: Simulation
-    origin: Origin = field(default_factory=origin, compare=False)
 
     @property
     def scenario(self) -> _core.Scenario:

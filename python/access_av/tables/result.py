@@ -8,7 +8,7 @@ import io
 import json
 import math
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from importlib.metadata import version
@@ -56,12 +56,20 @@ def origin() -> Origin:
     return Origin(version("access-av"), commit())
 
 
+@dataclass(frozen=True, eq=False)
 class Result:
     """Base class of results: a frozen dataclass whose fields are data.
 
     Two results are equal if all fields are equal that a dataclass compares. Version and commit are
     not compared, so that a result equals one that another version reproduced.
+
+    Attributes
+    ----------
+    origin
+        Version and commit that computed the result.
     """
+
+    origin: Origin = field(default_factory=origin, compare=False, repr=False, kw_only=True)
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
