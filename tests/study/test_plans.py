@@ -269,7 +269,7 @@ def test_an_array_of_a_block_with_heads_is_resolved(empty: Drawing, tmp_path: Pa
     empty.model.add_blockref("GATE", (1, 0), dxfattribs=attributes)
     expected = [(1.0, 0.0, 5.0), (1.0, 8.0, 5.0), (31.0, 0.0, 5.0), (31.0, 8.0, 5.0)]
     assert heads_of(empty, tmp_path) == expected
-    drawn = dxf.read(tmp_path / "heads.dxf", heads_layer="heads", scale_m=1.0)
+    drawn = dxf.read(tmp_path / "heads.dxf", "heads", "heads", 1.0)
     assert list(drawn.skipped.values()) == [2], drawn.skipped
 
 
@@ -287,7 +287,7 @@ def test_block_arrays_without_end_are_rejected(
     file = tmp_path / "bomb.dxf"
     empty.document.saveas(file)
     with pytest.raises(InputError, match="more than 2000 entities"):
-        dxf.read(file, walls_layer="WALLS", scale_m=1.0)
+        dxf.read(file, "walls", "WALLS", 1.0)
 
 
 def test_every_entity_of_a_layer_of_walls_is_imported_or_counted(
@@ -314,7 +314,7 @@ def test_every_entity_of_a_layer_of_walls_is_imported_or_counted(
         mesh.vertices, mesh.faces = [(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 1, 2)]
     file = tmp_path / "walls.dxf"
     empty.document.saveas(file)
-    drawn = dxf.read(file, walls_layer="walls", scale_m=1.0)
+    drawn = dxf.read(file, "walls", "walls", 1.0)
     counted = {what.rsplit(": ", 1)[1]: count for what, count in drawn.skipped.items()}
     assert counted == {
         "LINE (drawn twice)": 1,
@@ -388,7 +388,7 @@ def test_curves_that_do_not_form_one_road_are_rejected(
     file = tmp_path / "road.dxf"
     empty.document.saveas(file)
     with pytest.raises(InputError, match=said):
-        dxf.read(file, road_layer="ROAD", scale_m=1.0)
+        dxf.read(file, "road", "ROAD", 1.0)
 
 
 def test_a_digitized_circle_keeps_its_shape(empty: Drawing, tmp_path: Path) -> None:
@@ -398,7 +398,7 @@ def test_a_digitized_circle_keeps_its_shape(empty: Drawing, tmp_path: Path) -> N
     empty.model.add_lwpolyline(points, dxfattribs={"layer": "ROAD"})
     file = tmp_path / "road.dxf"
     empty.document.saveas(file)
-    drawn = dxf.read(file, road_layer="ROAD", scale_m=1.0)
+    drawn = dxf.read(file, "road", "ROAD", 1.0)
     assert apart_m(np.array(drawn.road_m), points) < SAME_M
     assert drawn.bends == 1
 
@@ -522,7 +522,7 @@ def test_files_other_than_drawings_are_rejected(tmp_path: Path, data: bytes) -> 
     file = tmp_path / "plant.dxf"
     file.write_bytes(data)
     with pytest.raises(InputError, match=r"plant\.dxf: "):
-        dxf.read(file, road_layer="ROAD", scale_m=1.0)
+        dxf.read(file, "road", "ROAD", 1.0)
 
 
 def test_integers_beyond_the_float_range_are_rejected(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from access_av.errors import InputError
@@ -15,7 +16,7 @@ from access_av.site_files.dxf_layer import Layer, TooManyError, layer_of
 from access_av.tables.results_directory import regular
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
     from pathlib import Path
 
 
@@ -91,14 +92,7 @@ def metres_per_unit(points: tuple[float, float, float, float], length_m: float) 
     return length_m / drawn
 
 
-def read(
-    path: Path,
-    *,
-    road_layer: str | None = None,
-    heads_layer: str | None = None,
-    walls_layer: str | None = None,
-    scale_m: float | None = None,
-) -> Drawn:
+def read(path: Path, what: str, name: str, scale_m: float | None) -> Drawn:
     """Reads curves as the road, points or block references as radio heads, lines as walls.
 
     The curves of the road join at their ends. Arcs of a road without kinks remain arcs; otherwise
@@ -110,8 +104,8 @@ def read(
     ----------
     path
         The drawing.
-    road_layer, heads_layer, walls_layer
-        Layers; ``None`` for none.
+    what, name
+        ``road``, ``heads`` or ``walls``, and its layer.
     scale_m
         Metres per unit of the drawing. The unit in the drawing itself is often wrong and has to be
         confirmed.
@@ -119,7 +113,7 @@ def read(
     Returns
     -------
     Drawn
-        ``skipped`` counts every entity of the layers that was not imported, by type.
+        ``skipped`` counts every entity of the layer that was not imported, by type.
 
     Raises
     ------
@@ -131,16 +125,12 @@ def read(
     if scale_m is None:
         raise InputError(f"{path}: {_unconfirmed(drawing)}")
     reader = _Reader(path, drawing, scale_m)
+    readers = {"road": reader.road, "heads": reader.heads, "walls": reader.walls}
     try:
-        start, segments, points = (
-            ((0.0, 0.0, 0.0), [], []) if road_layer is None else reader.road(road_layer)
-        )
-        heads = [] if heads_layer is None else reader.heads(heads_layer)
-        walls = [] if walls_layer is None else reader.walls(walls_layer)
+        found = readers[what](name)
     except TooManyError as error:
         raise InputError(f"{path}: {error}") from error
-    skipped = {**reader.skipped, **removed}
-    return Drawn(points, start, segments, heads, walls, skipped, reader.notes)
+    return replace(found, skipped={**reader.skipped, **removed}, notes=reader.notes)
 
 
 def _load(path: Path) -> tuple[Any, dict[str, int]]:
@@ -187,7 +177,7 @@ class _Reader:
         self.skipped: Counter[str] = Counter()
         self.notes: list[str] = []
 
-    def road(self, name: str) -> tuple[tuple[float, float, float], Sequence[Any], Sequence[Point]]:
+    def road(self, name: str) -> Drawn:
         """Returns the road: all curves of a layer, joined."""
         layer = Layer(name)
         found = list(self._curves(layer, ROAD_SAGITTA_M))
@@ -211,10 +201,10 @@ class _Reader:
             )
         smooth = curves.segments(joined)
         if smooth is not None:
-            return (*smooth, [])
-        return (0.0, 0.0, 0.0), [], curves.flatten(joined, ROAD_SAGITTA_M)
+            return Drawn(start=smooth[0], segments=smooth[1])
+        return Drawn(road_m=curves.flatten(joined, ROAD_SAGITTA_M))
 
-    def heads(self, name: str) -> list[Head]:
+    def heads(self, name: str) -> Drawn:
         """Returns the radio heads: points and block references of a layer."""
         layer = Layer(name, whole=("POINT", "INSERT"))
         found = []
@@ -234,9 +224,9 @@ class _Reader:
                 f"must be points or blocks. {self._held(layer, name)}"
             )
         self._report(layer, name)
-        return found
+        return Drawn(heads=found)
 
-    def walls(self, name: str) -> list[list[Point]]:
+    def walls(self, name: str) -> Drawn:
         """Returns the walls: curves of a layer, without duplicates."""
         layer = Layer(name)
         walls: dict[tuple[tuple[int, int], ...], list[Point]] = {}
@@ -252,7 +242,7 @@ class _Reader:
                 f"walls must be one of them. {self._held(layer, name)}"
             )
         self._report(layer, name)
-        return list(walls.values())
+        return Drawn(walls_m=list(walls.values()))
 
     def _curves(self, layer: Layer, sagitta_m: float) -> Iterator[tuple[str, list[Vertex]]]:
         """Returns curves with their types."""

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 # Point spacing of an exported road (m): a bend of 5 m radius is exact to a millimetre.
 WRITTEN_STEP_M = 0.2
+# Attributes of `Drawn` that contain a part of a plant.
+PARTS = {"road": ("road_m", "start", "segments"), "heads": ("heads",), "walls": ("walls_m",)}
 
 
 @dataclass(frozen=True)
@@ -127,33 +129,24 @@ class _Files:
 
     def add(self, drawn: Drawn, path: Path, what: str) -> Drawn:
         """Adds the road, the radio heads or the walls of a file."""
-        ending = _ending(path)
-        if ending == "geojson":
-            held = self.maps[path]
-            if what == "road":
-                return replace(drawn, road_m=held.road())
-            if what == "heads":
-                return replace(drawn, heads=held.heads())
-            return replace(drawn, walls_m=held.walls())
-        if ending == "csv" and what == "road":
-            return replace(drawn, road_m=csv_file.read_road(path).road_m)
-        if ending == "csv" and what == "heads":
-            return replace(drawn, heads=csv_file.read_heads(path).heads)
-        if ending != "dxf":
-            csv = "" if what == "walls" else ".csv, "
-            raise InputError(f"{path}: its name must end in {csv}.geojson, .json or .dxf")
-        layer = {f"{what}_layer": getattr(self.options, f"{what}_layer")}
-        found = dxf.read(path, **layer, scale_m=self.options.scale_m)
-        drawn = replace(
+        found = self._read(path, what)
+        return replace(
             drawn,
+            **{name: getattr(found, name) for name in PARTS[what]},
             skipped={**drawn.skipped, **found.skipped},
             notes=[*drawn.notes, *(it for it in found.notes if it not in drawn.notes)],
         )
-        if what == "road":
-            return replace(drawn, road_m=found.road_m, start=found.start, segments=found.segments)
-        if what == "heads":
-            return replace(drawn, heads=found.heads)
-        return replace(drawn, walls_m=found.walls_m)
+
+    def _read(self, path: Path, what: str) -> Drawn:
+        ending, options = _ending(path), self.options
+        if ending == "geojson":
+            return Drawn(**{PARTS[what][0]: getattr(self.maps[path], what)()})
+        if ending == "csv" and what != "walls":
+            return csv_file.read_road(path) if what == "road" else csv_file.read_heads(path)
+        if ending == "dxf":
+            return dxf.read(path, what, getattr(options, f"{what}_layer"), options.scale_m)
+        csv = "" if what == "walls" else ".csv, "
+        raise InputError(f"{path}: its name must end in {csv}.geojson, .json or .dxf")
 
 
 def _ending(path: Path) -> str:
