@@ -35,7 +35,6 @@ SAMPLE_SIGMA = 0.5
 # farther away are left out: there, differences of delays determine only a direction.
 GRID = 7
 BEYOND = 0.5
-ITERATIONS = 40
 # Squared error (in variances) by which another position may fit worse to be an alternative: 3 σ.
 ALTERNATIVE = 9.0
 # Minimum distance of an alternative position (m), and in standard deviations.
@@ -185,29 +184,19 @@ class _Problem:
 
     def solved(self, start: Numbers) -> tuple[float, Numbers]:
         """Returns squared error and solution from an initial position (Levenberg–Marquardt)."""
+        from scipy.optimize import least_squares  # here, because its import is slow
+
         place = start.astype(float)
         if self.has_clock:
             residual, _ = self.linearized(np.append(place, 0.0))
             place = np.append(place, float(np.mean(residual * self.std_m)))
-        damping = 1e-3
-        residual, rows = self.linearized(place)
-        cost = float(residual @ residual)
-        for _ in range(ITERATIONS):
-            normal = rows.T @ rows
-            step = np.linalg.solve(
-                normal + damping * np.diag(np.diag(normal) + 1e-12), rows.T @ residual
-            )
-            tried = place + step
-            residual_tried, rows_tried = self.linearized(tried)
-            cost_tried = float(residual_tried @ residual_tried)
-            if cost_tried <= cost:
-                place, residual, rows, cost = tried, residual_tried, rows_tried, cost_tried
-                damping = max(damping / 10.0, 1e-9)
-                if float(np.abs(step[:2]).max()) < 1e-6:
-                    break
-            else:
-                damping *= 10.0
-        return cost, place
+        found = least_squares(
+            lambda it: self.linearized(it)[0],
+            place,
+            lambda it: -self.linearized(it)[1],
+            method="lm",
+        )
+        return 2.0 * float(found.cost), found.x
 
 
 def _best(
