@@ -14,7 +14,7 @@ from access_av.device.platform import Figure, Platform
 from access_av.errors import InputError
 from access_av.paper import ablation, freedoms, own_design, run_tables
 from access_av.paper import chosen as chosen_otherwise
-from access_av.paper.claims import Claim, check_claims, with_seeds
+from access_av.paper.claims import Claim, with_seeds
 from access_av.paper.driver import Driver
 from access_av.paper.energy_fit import fit_energy
 from access_av.paper.evaluation import (
@@ -151,9 +151,7 @@ class Study:
             ),
         }
         if self.fit_options:
-            tables["fit_degrees_of_freedom"] = pl.DataFrame(
-                [each.as_row() for each in self.fit_options]
-            )
+            tables["fit_degrees_of_freedom"] = rows(self.fit_options)
         if self.effects:
             tables["assumptions"] = rows(self.effects)
         if self.sensitivity is not None:
@@ -262,15 +260,15 @@ def study(
             sensitivity = sobol(drawn, drives)
         with work.stage() as tick:
             effects = chosen_otherwise.effects(driver, progress=tick)
-    judgements = {seed: judged(evaluations, stated)}
+    judgements = {seed: [it for each in evaluations for it in freedoms.judged(each, stated)]}
     for other in other_seeds:
         again = Driver(platform, runs, other, threads, count=0)
-        found: list[Evaluation] = []
+        found: list[Claim] = []
         with work.stage() as tick:
-            for interpretation, plan in evaluated:
-                found.append(evaluate_with(again, interpretation, plan))
-                tick(len(found), len(evaluated))
-        judgements[other] = judged(found, stated)
+            for number, (interpretation, plan) in enumerate(evaluated, start=1):
+                found += freedoms.judged(evaluate_with(again, interpretation, plan), stated)
+                tick(number, len(evaluated))
+        judgements[other] = found
     claims = with_seeds(judgements) if seeds > 1 else judgements[seed]
     shown = _shown(evaluations)
     del driver.traces[1:]
@@ -318,23 +316,6 @@ def _costs(
     costs += [driver.runs * len(seen)] * other_seeds
     tracked = own_design.simulations(driver.platform)
     return [*costs, driver.runs * (len(ablation.FRONT_MS) + TRACKER_COST * tracked)]
-
-
-def judged(
-    evaluations: Sequence[Evaluation], stated: Mapping[str, Any] | None = None
-) -> list[Claim]:
-    """Returns the claims under every interpretation."""
-    return [
-        claim
-        for each in evaluations
-        for claim in check_claims(
-            each.outcome,
-            interpretation=each.interpretation.name,
-            chosen=each.interpretation.chosen,
-            freedoms=each.freedoms,
-            stated=stated,
-        )
-    ]
 
 
 def fit_platform(

@@ -15,7 +15,6 @@ from access_av.paper.claims import (
     REPRODUCED,
     Claim,
 )
-from access_av.paper.energy_fit import FREEDOMS
 from access_av.paper.freedoms import met_halves
 from access_av.paper.statements import of_claim
 from access_av.tables.numbers import value_text
@@ -146,12 +145,12 @@ def bought_text(study: Study) -> str:
         return ""
     titles = {group.interpretation.name: group.interpretation.title for group in found}
     for each in study.fit_options:
-        if each.both:
-            named = ", ".join(f"“{titles[name]}”" for name in each.both)
-            extra = FREEDOMS[each.freedoms[-1]].says
+        if each.keep_both:
+            named = ", ".join(f"“{titles[name]}”" for name in each.keep_both.split(", "))
             return (
-                f"Under {named} both hold with one more parameter of the energy fit: {extra}. The "
-                "only reason for this parameter is the figure that it reproduces."
+                f"Under {named} both hold with one more parameter of the energy fit: "
+                f"{each.freedom}. The only reason for this parameter is the figure that it "
+                "reproduces."
             )
     return "Both hold with no set of parameters of the energy fit."
 

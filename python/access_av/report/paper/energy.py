@@ -78,8 +78,8 @@ def freedoms(study: Study) -> str:
         return "<p>The energies are those of the platform file; none was fitted.</p>"
     titles = {each.interpretation.name: each.interpretation.title for each in study.evaluations}
 
-    def named(interpretations: tuple[str, ...]) -> str:
-        return "; ".join(titles[name] for name in interpretations) or "none"
+    def named(interpretations: str) -> str:
+        return "; ".join(titles[name] for name in interpretations.split(", ") if name) or "none"
 
     title = study.shown.interpretation.title
     counted = f"“{title}”: reproduced / agree by construction / by arithmetic"
@@ -87,14 +87,15 @@ def freedoms(study: Study) -> str:
         {
             "Degree of freedom": Html(
                 ("" if index == 0 else "and ")
-                + escape(each.says)
+                + escape(each.freedom)
                 + (" <b>(used for the verdicts)</b>" if each.is_shipped else "")
             ),
-            "Parameters: free / solved": f"{each.free} / {each.solved}",
-            counted: f"{each.reproduced} / {each.by_construction} / {each.by_arithmetic}",
+            "Parameters: free / solved": f"{each.free_numbers} / {each.solved_numbers}",
+            counted: f"{each.claims_reproduced} / {each.agree_by_construction} / "
+            f"{each.agree_by_arithmetic}",
             "Average saving / %": number(each.average_saving_percent, 1),
-            "Energy claims met by": named(each.energy),
-            "Both claim groups met by": named(each.both),
+            "Energy claims met by": named(each.keep_energy),
+            "Both claim groups met by": named(each.keep_both),
         }
         for index, each in enumerate(study.fit_options)
     ]
