@@ -69,5 +69,4 @@ def balance(
 
 
 def _shown(values: Range) -> str:
-    ends = (values.low, values.central, values.high)
-    return low_to_high(f"{end:,.0f}" if abs(end) >= 1000.0 else f"{end:.3g}" for end in ends)
+    return low_to_high(f"{end:,.0f}" if abs(end) >= 1000.0 else f"{end:.3g}" for end in values.ends)

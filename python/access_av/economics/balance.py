@@ -239,6 +239,8 @@ def _grid(figures: Mapping[str, Any]) -> Range:
 def _range(table: Mapping[str, Any], key: str) -> Range:
     """Reads one number, or a low, central and high value."""
     value = table.get(key.rpartition(".")[2])
+    if isinstance(value, Range):
+        return value
     try:
         ends: list[Any] = (
             [value[name] for name in ("low", "central", "high")]

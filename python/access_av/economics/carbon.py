@@ -24,6 +24,11 @@ class Range:
     central: float
     high: float
 
+    @property
+    def ends(self) -> tuple[float, float, float]:
+        """Low, central and high value."""
+        return self.low, self.central, self.high
+
     @classmethod
     def read(cls, entry: Mapping[str, float]) -> Range:
         """Returns the range of an entry of the file."""

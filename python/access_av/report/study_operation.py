@@ -11,10 +11,10 @@ from access_av.report.study_parts import (
     in_points,
     joules_range,
     lost,
+    low_to_high,
     numbered,
     ok,
     sources,
-    watts,
 )
 from access_av.run.assumptions import energy_boundary
 from access_av.settings import as_dict
@@ -106,9 +106,7 @@ def _rivals(study: Study) -> str:
                 f"{study.percent:g} % within": f"{it.point.error_m:.3f} m",
                 "error difference": small(f"{delta:+.3f} m", f"{low:+.3f} to {high:+.3f} m"),
                 "energy difference, a trip": f"{it.delta_j:+.3g} J",
-                "of the fleet’s day": "–"
-                if it.day_share is None
-                else f"{100.0 * it.day_share:+.2g} %",
+                "of the fleet’s day": f"{100.0 * it.day_share:+.2g} %",
                 "state ok": ok(it.point.driven)
                 if it.ok_delta is None
                 else small(ok(it.point.driven), in_points(it.ok_delta)),
@@ -186,7 +184,9 @@ def _points(study: Study, point: Point) -> str:
             "Power mode": f"{it.mode} {it.mode_name}",
             f"{study.percent:g} % within": f"{it.error_m:.3f} m",
             "a trip, above idle": joules_range(economy.trip_j(it)),
-            "idle / W": "–" if it.idle_w is None else watts(it.idle_w),
+            "idle / W": "–"
+            if it.idle_w is None
+            else low_to_high(f"{power_w:.3g}" for power_w in it.idle_w.ends),
             "Wh a fleet’s day, with idle": "–"
             if (idle_wh := (day := economy.day(study.plant, it)).idle_wh) is None
             else ends(day.trips_wh.plus(idle_wh)),

@@ -9,7 +9,7 @@ from access_av.tables.numbers import unsigned_zero
 from access_av.verdicts import NotOk
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
     from access_av.economics.carbon import Range
     from access_av.run.runs import Runs
@@ -78,7 +78,7 @@ def digits(value: float) -> str:
 
 def ends(values: Range) -> str:
     """Returns a range as text, low to high."""
-    return low_to_high(map(digits, (values.low, values.central, values.high)))
+    return low_to_high(map(digits, values.ends))
 
 
 def low_to_high(texts: Iterable[str]) -> str:
@@ -101,11 +101,6 @@ def joules(value: float) -> str:
 def joules_range(values: Range) -> str:
     """Returns a range of an energy as text."""
     return f"{ends(values)} J"
-
-
-def watts(power_w: Mapping[str, float]) -> str:
-    """Returns a range of a power as text."""
-    return low_to_high(f"{power_w[extent]:.3g}" for extent in ("low", "value", "high"))
 
 
 def numbered(study: Study) -> list[tuple[int, Point]]:

@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 
 from access_av.device.platform import Platform
+from access_av.economics.carbon import Range
 from access_av.run.pairs import ErrorSamples
 from access_av.run.simulation import simulate
 from access_av.settings import platform_name, ssb_period_s
@@ -30,7 +31,7 @@ PER_RUN = ("errors_m", "levels_m", "aoa_estimates", "bursts_received", "seeds")
 
 @dataclass(frozen=True)
 class Energy:
-    """Mean energy of a trip in joules, at one end of the ranges of the figures.
+    """Mean energy of a trip in joules, low to high by the ranges of the figures.
 
     Attributes
     ----------
@@ -40,14 +41,14 @@ class Energy:
         Idle energy of the board if the platform counts it, otherwise 0.
     """
 
-    estimates_j: float
-    listening_j: float
-    idle_j: float
+    estimates_j: Range
+    listening_j: Range
+    idle_j: Range
 
     @property
-    def total_j(self) -> float:
+    def total_j(self) -> Range:
         """Sum of the three energies."""
-        return self.estimates_j + self.listening_j + self.idle_j
+        return self.estimates_j.plus(self.listening_j).plus(self.idle_j)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -91,7 +92,7 @@ class Runs(ErrorSamples):
         if self.has_own_estimator:
             return self.own_energy_j
         energy = self.energy()
-        return None if energy is None else energy["value"].total_j
+        return None if energy is None else energy.total_j.central
 
     def first(self, runs: int) -> Runs:
         """Returns the first `runs` runs, for paired comparisons."""
@@ -113,8 +114,8 @@ class Runs(ErrorSamples):
 
     def energy(
         self, platform: Platform | None = None, vehicle: _core.Vehicle | None = None
-    ) -> dict[str, Energy] | None:
-        """Energy of a trip by ``low``, ``value`` and ``high``; ``None`` without a figure.
+    ) -> Energy | None:
+        """Energy of a trip; ``None`` without a figure.
 
         ``vehicle`` may differ from that of the scenario if its runs are identical.
         """
@@ -125,13 +126,14 @@ class Runs(ErrorSamples):
         estimates, bursts_received = (
             round(float(it.mean())) for it in (self.aoa_estimates, self.bursts_received)
         )
-        found = {}
-        for extent in EXTENTS:
-            parts = core.energy_j(vehicle, estimates, bursts_received, self.duration_s, extent)
-            if parts is None:
-                return None
-            found[extent] = Energy(*parts[:3])
-        return found
+        found = [
+            core.energy_j(vehicle, estimates, bursts_received, self.duration_s, extent)
+            for extent in EXTENTS
+        ]
+        known = [parts[:3] for parts in found if parts is not None]
+        if len(known) < len(EXTENTS):
+            return None
+        return Energy(*(Range(*ends) for ends in zip(*known, strict=True)))
 
     def table(self) -> pl.DataFrame:
         """Returns one row per run and epoch: columns ``position_errors``."""

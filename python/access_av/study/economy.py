@@ -99,15 +99,13 @@ def day(plant: _core.Plant, point: Point) -> Day:
     switched_on_h = fleet["vehicles"] * fleet["hours_per_day"]
     return Day(
         trips_wh=trip_j(point).scaled(trips / 3600.0),
-        idle_wh=None if point.idle_w is None else Range.read(point.idle_w).scaled(switched_on_h),
+        idle_wh=None if point.idle_w is None else point.idle_w.scaled(switched_on_h),
     )
 
 
 def trip_j(point: Point) -> Range:
     """Returns the energy of a trip in joules, low to high, without the idle energy of the board."""
-    return Range.read(
-        {extent: energy.estimates_j + energy.listening_j for extent, energy in point.energy.items()}
-    )
+    return point.energy.estimates_j.plus(point.energy.listening_j)
 
 
 def composition(point: Point, day_of: Day, fleet: Mapping[str, Any]) -> dict[str, float]:
@@ -116,10 +114,9 @@ def composition(point: Point, day_of: Day, fleet: Mapping[str, Any]) -> dict[str
     Keys: ``estimates``, ``receiver``, and ``idle`` if the platform has a figure.
     """
     trips = fleet["vehicles"] * fleet["trips_per_day"]
-    energy = point.energy["value"]
     parts = {
-        "estimates": energy.estimates_j * trips / 3600.0,
-        "receiver": energy.listening_j * trips / 3600.0,
+        "estimates": point.energy.estimates_j.central * trips / 3600.0,
+        "receiver": point.energy.listening_j.central * trips / 3600.0,
     }
     return parts if day_of.idle_wh is None else {**parts, "idle": day_of.idle_wh.central}
 
@@ -143,8 +140,7 @@ def ways(plant: _core.Plant, point: Point, prices: Prices) -> dict[str, Way]:
     fleet, heads = written["fleet"], len(written["site"]["radio_heads"])
     common = {
         "currency": prices.currency,
-        "grid_g_per_kwh": _ends(prices.ranges["grid_g_per_kwh"]),
-        "electricity_per_kwh": _ends(prices.ranges["electricity_per_kwh"]),
+        **{key: prices.ranges[key] for key in ("grid_g_per_kwh", "electricity_per_kwh")},
         "fleet": {
             **fleet,
             "infrastructure_hours_per_day": fleet["hours_per_day"],
@@ -153,9 +149,9 @@ def ways(plant: _core.Plant, point: Point, prices: Prices) -> dict[str, Way]:
     }
     computer = _item(prices, "computer", embodied="computer_embodied_kg")
     if point.idle_w is not None:
-        computer["power_w"] = _ends(Range.read(point.idle_w))
+        computer["power_w"] = point.idle_w
     receiver = _item(prices, "receiver", embodied="receiver_embodied_kg")
-    ours = {"onboard": [receiver], "energy_j_per_trip": _ends(trip_j(point))}
+    ours = {"onboard": [receiver], "energy_j_per_trip": trip_j(point)}
     lidar = _item(prices, "lidar", power="lidar_power_w", embodied="lidar_embodied_kg")
     roadside = _item(
         prices,
@@ -175,7 +171,7 @@ def ways(plant: _core.Plant, point: Point, prices: Prices) -> dict[str, Way]:
                 _item(
                     prices,
                     "uwb_anchor",
-                    units=_ends(anchors(prices, road_m[-1] - road_m[0])),
+                    units=anchors(prices, road_m[-1] - road_m[0]),
                     power="uwb_anchor_power_w",
                     embodied="uwb_anchor_embodied_kg",
                 )
@@ -199,28 +195,15 @@ def total_kg(way: Way, years: float) -> Range:
     return way.embodied_kg.plus(way.use_kg_per_year.scaled(years))
 
 
-def _ends(values: Range) -> dict[str, float]:
-    return {"low": values.low, "central": values.central, "high": values.high}
-
-
 def _item(
     prices: Prices,
     name: str,
     *,
-    units: int | dict[str, float] = 1,
+    units: int | Range = 1,
     yearly: str = "",
     power: str = "",
     embodied: str = "",
 ) -> dict[str, Any]:
-    def range_of(key: str) -> Any:
-        return _ends(prices.ranges[key]) if key else 0.0
-
-    return {
-        "name": name,
-        "units": units,
-        "price": range_of(name),
-        "yearly": range_of(yearly),
-        "power_w": range_of(power),
-        "embodied_kg": range_of(embodied),
-        "source": prices.sources[name],
-    }
+    keys = {"price": name, "yearly": yearly, "power_w": power, "embodied_kg": embodied}
+    ranges = {what: prices.ranges[key] if key else 0.0 for what, key in keys.items()}
+    return {"name": name, "units": units, **ranges, "source": prices.sources[name]}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from access_av.device.platform import Platform, PowerMode
+from access_av.economics.carbon import Range
 from access_av.run.runs import EXTENTS, Energy, Runs
 from access_av.settings import as_dict, platform_name, ssb_period_s
 from access_av.statistics.pareto import pareto_front
@@ -61,7 +62,7 @@ class Point:
     driven
         Runs in this mode or in another one of its group, see :func:`mode_groups`.
     energy
-        Energy of a trip by ``low``, ``value`` and ``high``.
+        Energy of a trip.
     idle_w
         Power of the idle board in this mode; ``None`` without a figure.
     error_m
@@ -77,8 +78,8 @@ class Point:
     operation: Operation
     mode: int
     mode_name: str
-    energy: Mapping[str, Energy]
-    idle_w: Mapping[str, float] | None
+    energy: Energy
+    idle_w: Range | None
     error_m: float
     judgement: Judgement
     ok_delta: tuple[float, float, float] | None
@@ -108,7 +109,7 @@ class Point:
     @property
     def energy_j(self) -> float:
         """Energy of a trip in joules, at the central values."""
-        return self.energy["value"].total_j
+        return self.energy.total_j.central
 
 
 def operations(scenario: _core.Scenario) -> list[Operation]:
@@ -223,16 +224,15 @@ def points(
     return found
 
 
-def idle_w(platform: Platform, number: int) -> dict[str, float] | None:
+def idle_w(platform: Platform, number: int) -> Range | None:
     """Returns the idle power of a board in watts, low to high; ``None`` if unknown."""
     written = as_dict(platform.core)
     [mode] = [mode for mode in written["modes"] if mode["mode"] == number]
     figure = mode.get("idle_power_w") or written.get("idle", {}).get("power_w")
     if figure is None:
         return None
-    value = float(figure["value"])
-    stated = {extent: figure.get(extent) for extent in EXTENTS}
-    return {extent: value if end is None else float(end) for extent, end in stated.items()}
+    stated = {extent: end for extent, end in figure.items() if end is not None}
+    return Range(*(float(stated.get(extent, figure["value"])) for extent in EXTENTS))
 
 
 def front(found: Sequence[Point]) -> list[int]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
+from access_av.run.runs import EXTENTS
 from access_av.settings import as_dict
 from access_av.statistics.percentiles import with_ends
 from access_av.study import economy
@@ -19,6 +20,7 @@ from access_av.verdicts import Judgement
 if TYPE_CHECKING:
     from access_av import _core
     from access_av.economics.balance import Way
+    from access_av.economics.carbon import Range
     from access_av.run.runs import Runs
     from access_av.run.simulation import Simulation
     from access_av.study.measures import Measure, Measures
@@ -219,14 +221,11 @@ class Study(Result):
                 "target_error_m": point.error_m,
                 "judgement": point.judgement.value,
                 **{
-                    f"{part}_{extent}_j": getattr(point.energy[extent], f"{part}_j")
+                    f"{part}_{extent}_j": joules
                     for part in ("estimates", "listening", "idle")
-                    for extent in ("low", "value", "high")
+                    for extent, joules in _extents(getattr(point.energy, f"{part}_j")).items()
                 },
-                **{
-                    f"idle_{extent}_w": None if point.idle_w is None else point.idle_w[extent]
-                    for extent in ("low", "value", "high")
-                },
+                **{f"idle_{extent}_w": watts for extent, watts in _extents(point.idle_w).items()},
                 "on_front": index in self.front,
                 "recommended": index == self.recommended,
             }
@@ -324,7 +323,7 @@ def _recommendation(study: Study) -> dict[str, Any]:
             **with_ends("ok_delta{}", point.ok_delta),
             "judged": point.judgement.value,
             "trip_j": vars(economy.trip_j(point)),
-            "idle_w": point.idle_w and dict(point.idle_w),
+            "idle_w": point.idle_w and _extents(point.idle_w),
             "best": study.points[study.recommendation.best or 0].name,
         },
         "rivals": [
@@ -347,6 +346,10 @@ def _recommendation(study: Study) -> dict[str, Any]:
             "composition_wh": economy.composition(point, day, fleet),
         },
     }
+
+
+def _extents(values: Range | None) -> dict[str, float | None]:
+    return dict(zip(EXTENTS, (None,) * 3 if values is None else values.ends, strict=True))
 
 
 def _figures(study: Study, driven: Runs) -> dict[str, Any]:
