@@ -115,15 +115,13 @@ def nees_band(
     return low, high
 
 
-def mean_nees(trajectories: pl.DataFrame, *, probability: float = 0.95) -> pl.DataFrame:
-    """Returns the mean NEES of the position over the runs and its band for each step.
+def mean_nees(trajectories: pl.DataFrame) -> pl.DataFrame:
+    """Returns the mean NEES of the position over the runs and its 95 % band for each step.
 
     Parameters
     ----------
     trajectories
         Columns ``trajectories`` of :mod:`access_av.columns`.
-    probability
-        Probability of the band, see :func:`nees_band`.
 
     Returns
     -------
@@ -146,7 +144,7 @@ def mean_nees(trajectories: pl.DataFrame, *, probability: float = 0.95) -> pl.Da
         .sort("time_s")
         .select("time_s", runs=pl.col("nees").list.len(), mean_nees=pl.col("nees").list.mean())
     )
-    bands = {runs: nees_band(runs, probability=probability) for runs in steps["runs"].unique()}
+    bands = {runs: nees_band(runs) for runs in steps["runs"].unique()}
     low, high = (
         pl.col("runs").replace_strict(
             {runs: band[end] for runs, band in bands.items()}, return_dtype=pl.Float64
