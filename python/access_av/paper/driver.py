@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
@@ -115,35 +115,8 @@ class Driver:
     def _drive(self, scenario: Scenario) -> Driven:
         found = self._simulate(scenario)
         assert found.errors_m is not None
-        drives = Drives.of_runs(
-            found.runs["aoa_estimates"].to_numpy().astype(np.float64),
-            found.errors_m,
-            resamples(self.runs, self.count),
-        )
-        # The original sample has double precision.
-        exact: dict[str, Any] = {}
-        for axis in "xy":
-            worst_m = getattr(drives, f"worst_{axis}_m").copy()
-            worst_m[0] = found.steps[f"mean_abs_error_{axis}_m"].max()
-            exact[f"worst_{axis}_m"] = worst_m
-        rms_m = drives.rms_error_m.copy()
-        rms_m[0] = found.rms_error_m
-        other_j = found.runs.select(
-            other_energy_j=(pl.col("energy_j") - pl.col("energy_aoa_estimates_j")).fill_null(0.0)
-        )["other_energy_j"]
-        assert drives.runs is not None
         return Driven(
-            replace(
-                drives,
-                **exact,
-                rms_error_m=rms_m,
-                longest_gap_s=float(found.runs.select(pl.col("longest_gap_s").max()).item()),
-                other_energy_j=float(other_j.to_numpy().mean()),
-                track_m=np.hypot(
-                    *(found.steps[f"mean_abs_error_{axis}_m"].to_numpy() for axis in "xy")
-                ),
-                runs=drives.runs.with_columns(other_j, found.runs["longest_gap_s"]),
-            ),
+            Drives.of(found, resamples(self.runs, self.count)),
             found.steps.select(STEPS),
             ErrorSamples(
                 errors_m=np.hypot(*np.moveaxis(found.errors_m[:, ::SPARSE], -1, 0)),

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from access_av.run.simulation import Simulation
+
 Numbers: TypeAlias = NDArray[np.float64]
 # Interval, in SSBs, of the stored errors over time of resamples. Maxima, and all figures of the
 # original sample, use every SSB.
@@ -92,38 +94,49 @@ class Drives:
         return found
 
     @classmethod
-    def of_runs(
-        cls, aoa_estimates: Numbers, errors_m: NDArray[np.float32], weights: Numbers
-    ) -> Drives:
-        """Returns the statistics of runs.
+    def of(cls, found: Simulation, weights: Numbers) -> Drives:
+        """Returns the statistics of runs with errors at every SSB.
 
         Parameters
         ----------
-        errors_m
-            Estimate minus truth in x and y at every SSB, of shape (runs, SSBs, 2).
         weights
-            One row per variant, of shape (variants, runs), each of sum 1.
+            One row per variant, of shape (variants, runs), each of sum 1; the first one is the
+            original sample.
         """
+        errors_m = found.errors_m
+        assert errors_m is not None
         size_x, size_y = (np.abs(np.ascontiguousarray(errors_m[:, :, it])) for it in (0, 1))
         light = weights.astype(np.float32)
         mean_x, mean_y = light @ size_x, light @ size_y
         square_m2 = np.square(errors_m, dtype=np.float64).sum(axis=2).mean(axis=1)
+        worst_x_m, worst_y_m = (it.max(axis=1).astype(np.float64) for it in (mean_x, mean_y))
+        rms_error_m = np.sqrt(weights @ square_m2)
+        # The original sample has double precision.
+        track = [found.steps[f"mean_abs_error_{axis}_m"].to_numpy() for axis in "xy"]
+        worst_x_m[0], worst_y_m[0] = (it.max() for it in track)
+        rms_error_m[0] = found.rms_error_m
+        aoa_estimates = found.runs["aoa_estimates"].to_numpy().astype(np.float64)
+        other_j = pl.col("energy_j") - pl.col("energy_aoa_estimates_j")
+        runs = found.runs.select(
+            run=np.arange(len(aoa_estimates)),
+            aoa_estimates=aoa_estimates,
+            rms_error_m=np.sqrt(square_m2),
+            max_error_x_m=size_x.max(axis=1).astype(np.float64),
+            max_error_y_m=size_y.max(axis=1).astype(np.float64),
+            other_energy_j=other_j.fill_null(0.0),
+            longest_gap_s="longest_gap_s",
+        )
         return cls(
             aoa_estimates=weights @ aoa_estimates,
-            worst_x_m=mean_x.max(axis=1).astype(np.float64),
-            worst_y_m=mean_y.max(axis=1).astype(np.float64),
-            rms_error_m=np.sqrt(weights @ square_m2),
+            worst_x_m=worst_x_m,
+            worst_y_m=worst_y_m,
+            rms_error_m=rms_error_m,
             horizontal_m=np.hypot(mean_x[:, ::EVERY], mean_y[:, ::EVERY]),
+            longest_gap_s=float(runs["longest_gap_s"].to_numpy().max()),
+            other_energy_j=float(runs["other_energy_j"].to_numpy().mean()),
             worst_of_runs_m=np.maximum(size_x.max(axis=1), size_y.max(axis=1)).astype(np.float64),
-            runs=pl.DataFrame(
-                {
-                    "run": np.arange(len(aoa_estimates)),
-                    "aoa_estimates": aoa_estimates,
-                    "rms_error_m": np.sqrt(square_m2),
-                    "max_error_x_m": size_x.max(axis=1).astype(np.float64),
-                    "max_error_y_m": size_y.max(axis=1).astype(np.float64),
-                }
-            ),
+            track_m=np.hypot(*track),
+            runs=runs,
         )
 
 
