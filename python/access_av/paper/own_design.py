@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
-from access_av.paper.findings import MissingFigureError, energy_j
 from access_av.paper.outcome import Drives, interval
 from access_av.run.error_bound import along_route
 
@@ -136,16 +135,13 @@ def compared_with_paper(
 ) -> Comparison:
     """Compares runs of the proposed method with the paper's adaptive point in a mode."""
     papers = evaluation.outcome.adaptive[mode]
-    papers_j: float | None = None
-    ours_j: float | None = None
-    try:
-        papers_j = float(energy_j(evaluation.outcome, mode, "music", adaptive=True)[0])
-        per_execution_j = evaluation.outcome.energy_per_execution_j[mode]["music"]
-        ours_j = (
-            float(np.atleast_1d(ours.aoa_estimates[0] * per_execution_j)[0]) + papers.other_energy_j
-        )
-    except MissingFigureError:
-        pass
+    per_execution_j = evaluation.outcome.energy_per_execution_j[mode].get("music")
+    papers_j, ours_j = (
+        None
+        if per_execution_j is None
+        else float(np.atleast_1d(it.aoa_estimates[0] * per_execution_j)[0]) + papers.other_energy_j
+        for it in (papers, ours)
+    )
     less_m = papers.rms_error_m - ours.rms_error_m
     less = papers.aoa_estimates - ours.aoa_estimates
     least_m, most_m = interval(less_m)

@@ -92,29 +92,22 @@ def resamples_of(evaluation: Evaluation) -> list[pl.DataFrame]:
     """
     tables = []
     for key, drives, _ in points_of(evaluation):
-        count = len(drives.rms_error_m)
-        shares: Mapping[str, Any] = {f"share_below_{method}": None for method in METHODS}
-        if key["adaptive"]:
-            fixed = evaluation.outcome.fixed
-            shares = {
-                f"share_below_{method}": drives.share_below(fixed[key["mode"], method])
-                for method in METHODS
-            }
+        count, fixed = len(drives.rms_error_m), evaluation.outcome.fixed
+        unknown = np.full(count, np.nan)
         values = {
-            "resample": np.arange(count),
             "aoa_estimates": drives.aoa_estimates,
             "worst_error_x_m": drives.worst_x_m,
             "worst_error_y_m": drives.worst_y_m,
             "rms_error_m": drives.rms_error_m,
             "late_to_early": drives.late_to_early,
-            **shares,
+            **{
+                f"share_below_{method}": drives.share_below(fixed[key["mode"], method])
+                if key["adaptive"]
+                else unknown
+                for method in METHODS
+            },
         }
-        schema = {name: pl.Float64 for name in values if name != "resample"}
-        columns = {
-            name: [None] * count if value is None else np.asarray(value)
-            for name, value in values.items()
-        }
-        table = pl.DataFrame(columns, schema_overrides=schema)
+        table = pl.DataFrame({"resample": np.arange(count), **values}).fill_nan(None)
         tables.append(table.select(*_key(key), pl.all()))
     return tables
 
