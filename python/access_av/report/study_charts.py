@@ -179,31 +179,16 @@ def signal_along_road(study: Study) -> Spec:
     """Returns the chart of dilution, and of the SNR of the strongest radio head, along the road."""
     rows = thinned(study.places.select("along_m", "along_road_error_per_degree_m", "best_snr_db"))
     x = alt.X("along_m:Q", title="along the road / m", scale=alt.Scale(nice=False))
-    dilution = (
-        alt.Chart(rows)
-        .mark_line(color=BLUE, strokeWidth=1.8)
-        .encode(
-            x=x,
-            y=alt.Y(
-                "along_road_error_per_degree_m:Q",
-                title="dilution / m per degree",
-                axis=alt.Axis(titleColor=BLUE),
-            ),
-        )
-    )
-    snr = (
-        alt.Chart(rows)
-        .mark_line(color=ORANGE, strokeWidth=1.8, strokeDash=[6, 3])
-        .encode(
-            x=x,
-            y=alt.Y(
-                "best_snr_db:Q",
-                title="SNR of the strongest / dB",
-                scale=alt.Scale(zero=False),
-                axis=alt.Axis(titleColor=ORANGE, orient="right", grid=False),
-            ),
-        )
-    )
+
+    def line(column: str, title: str, colour: str, scale: Any, dash: Any, **axis: Any) -> Any:
+        marks = alt.Chart(rows).mark_line(color=colour, strokeWidth=1.8, strokeDash=dash)
+        y_axis = alt.Axis(titleColor=colour, **axis)
+        return marks.encode(x=x, y=alt.Y(f"{column}:Q", title=title, scale=scale, axis=y_axis))
+
+    dilution_axis = ("along_road_error_per_degree_m", "dilution / m per degree")
+    dilution = line(*dilution_axis, BLUE, alt.Undefined, alt.Undefined)
+    snr_axis = ("best_snr_db", "SNR of the strongest / dB")
+    snr = line(*snr_axis, ORANGE, alt.Scale(zero=False), [6, 3], orient="right", grid=False)
     chart = alt.layer(dilution, snr).resolve_scale(y="independent")
     return finish(chart, height=220, description="Dilution and SNR along the road")
 

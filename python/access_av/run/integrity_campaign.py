@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 # Runs per part, which are lost by an interruption.
 PART_RUNS = 5
+# Columns of the trajectories that a part contains, by their names in the part.
+NUMBERS = {name: name for name in ("time_s", "error_x_m", "error_y_m")}
+NUMBERS["level_m"] = "protection_level_m"
 
 
 @dataclass(frozen=True)
@@ -254,10 +257,7 @@ def driven(scenario: str, first_run: int, runs: int, seed: int) -> dict[str, NDA
     state = steps["integrity"].cast(pl.Enum(STATES)).to_physical()
     return {
         "run": steps["run"].to_numpy().astype(np.int32),
-        "time_s": steps["time_s"].to_numpy().astype(np.float32),
-        "error_x_m": steps["error_x_m"].to_numpy().astype(np.float32),
-        "error_y_m": steps["error_y_m"].to_numpy().astype(np.float32),
-        "level_m": steps["protection_level_m"].to_numpy().astype(np.float32),
+        **{name: steps[column].to_numpy().astype(np.float32) for name, column in NUMBERS.items()},
         "state": state.to_numpy().astype(np.uint8),
     }
 
@@ -266,10 +266,7 @@ def _table(arrays: Mapping[str, NDArray[Any]]) -> pl.DataFrame:
     return pl.DataFrame(
         {
             "run": arrays["run"],
-            "time_s": arrays["time_s"].astype(np.float64),
-            "error_x_m": arrays["error_x_m"].astype(np.float64),
-            "error_y_m": arrays["error_y_m"].astype(np.float64),
-            "protection_level_m": arrays["level_m"].astype(np.float64),
+            **{column: arrays[name].astype(np.float64) for name, column in NUMBERS.items()},
             "integrity": np.asarray(STATES)[arrays["state"]],
         }
     )

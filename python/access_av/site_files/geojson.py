@@ -120,21 +120,18 @@ class Map:
         if self.is_in_metres or not self.shapes:
             return None
         transform = georeference.to_wgs84(self.system, str(self.path))
-        for shape in self.shapes:
-            for line in shape.lines:
-                for at in line:
-                    if transform is not None:
-                        at[:2] = transform(at)
-                    _check_degrees(self.path, shape.where, at, named=self.system)
+        places = [(it.where, at) for it in self.shapes for line in it.lines for at in line]
+        for where, at in places:
+            if transform is not None:
+                at[:2] = transform(at)
+            _check_degrees(self.path, where, at, named=self.system)
         first = self.first()
         if origin is None:
             origin = first[1], first[0]
         elif given:
             georeference.check_origin(origin, (first[0], first[1]), str(self.path))
-        for shape in self.shapes:
-            for line in shape.lines:
-                for at in line:
-                    at[:2] = georeference.to_plane(at[0], at[1], origin)
+        for _, at in places:
+            at[:2] = georeference.to_plane(at[0], at[1], origin)
         return origin
 
     def road(self) -> list[tuple[float, float]]:

@@ -55,17 +55,13 @@ class Prices:
         of_currencies = facts.pop("currency")
         currency = str(own.get("currency", of_currencies["name"]))
         rate = own.get("currency_per_usd") or of_currencies["per_usd"][currency]
-        per_usd, converted = (
-            Range.read(rate),
-            f"{rate['value']:g} {currency} per USD: {rate['source']}",
-        )
         ranges, sources = {}, {}
         for name, fact in facts.items():
             figure = own.get(name, fact)
             ranges[name], sources[name] = Range.read(figure), str(figure["source"])
             if name not in own and not name.endswith(NO_MONEY) and currency != "USD":
-                ranges[name] = ranges[name].times(per_usd)
-                sources[name] += f"; {converted}"
+                ranges[name] = ranges[name].times(Range.read(rate))
+                sources[name] += f"; {rate['value']:g} {currency} per USD: {rate['source']}"
         return cls(currency, ranges, sources, tuple(sorted(facts.keys() - own.keys())))
 
 

@@ -155,33 +155,31 @@ def _gain_chart(study: Study) -> Spec:
 def _front_chart(study: Study) -> Spec:
     shown = study.shown.interpretation.name
     rows = [
-        {"what": FIXED, "aoa_estimates": float(drives.aoa_estimates[0]),
-         "rms": float(drives.rms_error_m[0]), "name": f"{interval_ms:g} ms"}
+        (FIXED, float(drives.aoa_estimates[0]), float(drives.rms_error_m[0]), f"{interval_ms:g} ms")
         for interval_ms, drives in study.front
-    ]  # fmt: skip
-    for each in study.evaluations:
-        if (
-            each.outcome.every_ssb["music"].rms_error_m[0]
-            != (study.shown.outcome.every_ssb["music"].rms_error_m[0])
-        ):
-            continue  # in another environment
-        rows += [
-            {"what": INTERPRETATION, "aoa_estimates": float(drives.aoa_estimates[0]),
-             "rms": float(drives.rms_error_m[0]),
-             "name": f"{each.interpretation.title}, mode {mode}"}
-            for mode, drives in each.outcome.adaptive.items()
-        ]  # fmt: skip
+    ]
+    rms_m = study.shown.outcome.every_ssb["music"].rms_error_m[0]
     rows += [
-        {"what": CONSTANT, "aoa_estimates": each.constant_aoa_estimates, "rms": each.constant_rms_m,
-         "name": f"constant {each.constant_ms:.0f} ms in {each.interpretation}"}
+        (INTERPRETATION, float(drives.aoa_estimates[0]), float(drives.rms_error_m[0]),
+         f"{each.interpretation.title}, mode {mode}")
+        for each in study.evaluations
+        if each.outcome.every_ssb["music"].rms_error_m[0] == rms_m  # in the same environment
+        for mode, drives in each.outcome.adaptive.items()
+    ]  # fmt: skip
+    rows += [
+        (CONSTANT, each.constant_aoa_estimates, each.constant_rms_m,
+         f"constant {each.constant_ms:.0f} ms in {each.interpretation}")
         for each in study.ablations if each.interpretation == shown
     ]  # fmt: skip
     rows += [
-        {"what": OURS, "aoa_estimates": each.aoa_estimates, "rms": each.rms_error_m,
-         "name": f"proposed, mode {each.mode}" + ("" if each.map else ", road unknown")}
+        (OURS, each.aoa_estimates, each.rms_error_m,
+         f"proposed, mode {each.mode}" + ("" if each.map else ", road unknown"))
         for each in study.proposed_vs_paper
     ]  # fmt: skip
-    points = pl.DataFrame(rows).with_columns(pl.col(pl.Float64).round(4))
+    columns = ["what", "aoa_estimates", "rms", "name"]
+    points = pl.DataFrame(rows, schema=columns, orient="row").with_columns(
+        pl.col(pl.Float64).round(4)
+    )
     x = alt.X("aoa_estimates:Q", title="angle estimates in a trip", scale=alt.Scale(type="log"))
     y = alt.Y("rms:Q", title="RMS error / m", scale=alt.Scale(type="log"))
     legend = alt.Legend(title=None, orient="top")
