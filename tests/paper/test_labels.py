@@ -14,7 +14,7 @@ import pytest
 
 import layout
 import synthetic
-from access_av.report.labels import COINCIDENT_PX, HEIGHT_PX, WIDTHS_PX, domain, placed
+from access_av.report.labels import COINCIDENT_PX, HEIGHT_PX, WIDTHS_PX, Axis, placed
 from access_av.report.paper.evaluation import render
 from browser import Browser
 
@@ -33,8 +33,9 @@ def test_labels_of_random_points_cover_nothing(seed: int) -> None:
     x = np.concatenate([rng.uniform(0.0, 100.0, 7), rng.uniform(40.0, 60.0, 7)])
     y = np.concatenate([rng.uniform(0.0, 1.0, 7), rng.uniform(0.4, 0.6, 7)])
     rows = pl.DataFrame({"number": np.arange(1, 15), "x": x, "y": y})
-    ends_x, ends_y = domain(x.tolist()), domain(y.tolist())
-    found = placed(rows, "number", ("x", ends_x, False), ("y", ends_y, False), height_px)
+    axes = Axis("x", "x", x.tolist()), Axis("y", "y", y.tolist())
+    ends_x, ends_y = (it.domain for it in axes)
+    found = placed(rows, "number", *axes, height_px)
     named = [int(it) for text in found["label"] for it in layout.names(text)]
     assert sorted(named) == list(range(1, 15))
     for width_px in WIDTHS_PX:
@@ -56,7 +57,7 @@ def test_labels_of_random_points_cover_nothing(seed: int) -> None:
 
 def test_only_coincident_points_share_a_label() -> None:
     rows = pl.DataFrame({"n": [1, 2, 3], "x": [0.0, 0.001, 0.2], "y": [0.0, 0.0, 0.0]})
-    axes = ("x", (-1.0, 1.0), False), ("y", (-1.0, 1.0), False)
+    axes = Axis("x", "x", [-0.85, 0.85]), Axis("y", "y", [-0.85, 0.85])
     assert placed(rows, "n", *axes, 300.0)["label"].to_list() == ["1, 2", "", "3"]
     apart = rows.with_columns(x=pl.Series([0.0, 2.0 * COINCIDENT_PX / 1000.0 * 2.0, 0.5]))
     assert placed(apart, "n", *axes, 300.0)["label"].to_list() == ["1", "2", "3"]

@@ -173,9 +173,7 @@ def _energy_against_error(drawn: pl.DataFrame) -> Spec:
     if not front.is_empty():
         layers.append(layer(front, ORANGE, 1.0))
     number = pl.when(pl.int_range(pl.len()) < MOST_NAMES).then("design")
-    numbered = placed(
-        points.with_columns(number=number), "number", x_axis.place, y_axis.place, ENERGY_ERROR_PX
-    )
+    numbered = placed(points.with_columns(number=number), "number", x_axis, y_axis, ENERGY_ERROR_PX)
     labelled = numbered.filter(pl.col("label") != "")
     layers += labels(alt.Chart(labelled).encode(x=x, y=y))
     chart: Any = alt.layer(*layers)

@@ -30,25 +30,15 @@ LEADER_PX = 18.0
 MARGIN = 0.09
 
 
-def domain(values: Sequence[float], *, log: bool = False) -> list[float]:
-    """Returns the domain of an axis that contains values, with a margin at both ends.
+@dataclass(frozen=True)
+class Axis:
+    """Axis of a chart of labelled points: column, title, values that it contains, scale.
 
     Examples
     --------
-    >>> domain([0.0, 100.0])
+    >>> Axis("x", "x / m", [0.0, 100.0]).domain
     [-9.0, 109.0]
     """
-    low, high = min(values), max(values)
-    if log:
-        low, high = math.log(low), math.log(high)
-    margin = MARGIN * ((high - low) or abs(high) or 1.0)
-    ends = (low - margin, high + margin)
-    return [math.exp(it) if log else it for it in ends]
-
-
-@dataclass(frozen=True)
-class Axis:
-    """Axis of a chart of labelled points: column, title, values that it contains, scale."""
 
     column: str
     title: str
@@ -57,15 +47,27 @@ class Axis:
     axis: Any = alt.Undefined
 
     @property
-    def place(self) -> tuple[str, list[float], bool]:
-        """Axis of a chart: column, domain, and whether the scale is logarithmic."""
+    def domain(self) -> list[float]:
+        """Domain that contains the values, with a margin at both ends."""
         values = list(self.values) or [1.0 if self.log else 0.0]
-        return self.column, domain(values, log=self.log), self.log
+        low, high = min(values), max(values)
+        if self.log:
+            low, high = math.log(low), math.log(high)
+        margin = MARGIN * ((high - low) or abs(high) or 1.0)
+        ends = (low - margin, high + margin)
+        return [math.exp(it) if self.log else it for it in ends]
+
+    def share(self, points: pl.DataFrame) -> NDArray[np.float64]:
+        """Returns relative positions of points on the axis, from 0 to 1."""
+        values, ends = points[self.column].cast(pl.Float64).to_numpy(), np.array(self.domain)
+        if self.log:
+            values, ends = np.log(values), np.log(ends)
+        return np.asarray((values - ends[0]) / (ends[1] - ends[0]), dtype=np.float64)
 
     def of(self, channel: Any, column: str = "") -> Any:
         """Returns the axis as ``alt.X`` or ``alt.Y``, also of another column."""
         kind = {"type": "log"} if self.log else {"zero": False}
-        scale = alt.Scale(domain=self.place[1], nice=False, **kind)
+        scale = alt.Scale(domain=self.domain, nice=False, **kind)
         field = f"{column or self.column}:Q"
         return channel(field, title=self.title, scale=scale, axis=self.axis)
 
@@ -81,7 +83,7 @@ def labelled(
     **encodings: Any,
 ) -> tuple[alt.Chart, alt.Chart, alt.Chart]:
     """Returns the chart of points without marks, the lines to distant labels, and the labels."""
-    found = placed(points, name, x.place, y.place, height_px, group=group)
+    found = placed(points, name, x, y, height_px, group=group)
     base = alt.Chart(found).encode(x=x.of(alt.X), y=y.of(alt.Y), **encodings)
     return base, *layers(base)
 
@@ -89,8 +91,8 @@ def labelled(
 def placed(
     points: pl.DataFrame,
     name: str,
-    x: tuple[str, Sequence[float], bool],
-    y: tuple[str, Sequence[float], bool],
+    x: Axis,
+    y: Axis,
     height_px: float,
     *,
     group: str | None = None,
@@ -104,7 +106,7 @@ def placed(
     name
         Column of the names. A point without a name has no label, but no label covers it.
     x, y
-        Column, domain, and whether the scale is logarithmic.
+        Axes.
     height_px
         Height of the plot.
     group
@@ -113,11 +115,11 @@ def placed(
     Examples
     --------
     >>> rows = pl.DataFrame({"mode": [1, 2, 3], "x": [0.0, 0.0, 1.0], "y": [0.0, 0.0, 1.0]})
-    >>> axes = ("x", (-1.0, 2.0), False), ("y", (-1.0, 2.0), False)
+    >>> axes = Axis("x", "x", [0.0, 1.0]), Axis("y", "y", [0.0, 1.0])
     >>> placed(rows, "mode", *axes, 200.0)["label"].to_list()
     ['1, 2', '', '3']
     """
-    across, upward = _share(points, *x), _share(points, *y)
+    across, upward = x.share(points), y.share(points)
     # Shape (widths, points, 2), y downwards.
     at = np.stack([np.stack([w * across, height_px * (1.0 - upward)], 1) for w in WIDTHS_PX])
     groups = [""] * points.height if group is None else points[group].to_list()
@@ -177,17 +179,6 @@ def layers(base: alt.Chart) -> tuple[alt.Chart, alt.Chart]:
     )
     texts = base.mark_text(fontSize=11, dx=dx, dy=dy, baseline="middle").encode(text="label:N")
     return lines, texts
-
-
-def _share(
-    points: pl.DataFrame, column: str, ends: Sequence[float], log: bool
-) -> NDArray[np.float64]:
-    """Returns relative positions on an axis, from 0 to 1."""
-    values = points[column].cast(pl.Float64).to_numpy()
-    low, high = ends
-    if log:
-        values, low, high = np.log(values), math.log(low), math.log(high)
-    return np.asarray((values - low) / (high - low), dtype=np.float64)
 
 
 def _offsets(

@@ -88,7 +88,7 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
         log=True,
     )
     y = Axis("saving", "mean energy saving / %", [low, high, *table["saving"]])
-    field = {"worst": x.place[1][0], "right": bound_m, "saving": low, "high": high}
+    field = {"worst": x.domain[0], "right": bound_m, "saving": low, "high": high}
     promised = (
         alt.Chart(pl.DataFrame([field]))
         .mark_rect(opacity=0.18, color=GREEN)
