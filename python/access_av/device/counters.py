@@ -145,31 +145,44 @@ def _hwmon(sysfs: Path) -> Iterator[Rail]:
         name = _text(chip / "name")
         if name == "ina238":
             label = _text(chip / "in1_label") or _text(chip / "label") or "VIN"
-            yield _rail(chip, label, name, 1, "shunt_resistor", INA238)
+            ohm = _shunt_ohm(chip / "shunt_resistor")
+            yield _rail(label, name, _hwmon_files(chip, 1), INA238, ohm)
         elif name in ("ina3221", None):
             for file in sorted(chip.glob("in*_label")):
                 channel, rail = int(file.name[2:-6]), _text(file)
                 if channel <= 3 and rail not in (None, "NC", ""):
-                    shunt = f"shunt{channel}_resistor"
-                    yield _rail(chip, str(rail), "ina3221", channel, shunt, INA3221)
+                    ohm = _shunt_ohm(chip / f"shunt{channel}_resistor")
+                    yield _rail(str(rail), "ina3221", _hwmon_files(chip, channel), INA3221, ohm)
+
+
+def _hwmon_files(chip: Path, channel: int) -> list[Path]:
+    return [chip / f"{what}{channel}_input" for what in ("in", "curr", "power")]
+
+
+def _shunt_ohm(file: Path) -> float:
+    micro_ohm = _text(file)
+    return float(micro_ohm) * 1e-6 if micro_ohm and float(micro_ohm) > 0.0 else USUAL_SHUNT_OHM
 
 
 def _rail(
-    chip: Path, label: str, name: str, channel: int, shunt: str, steps: dict[str, float]
+    label: str,
+    chip: str,
+    files: list[Path],
+    steps: dict[str, float],
+    shunt_ohm: float = USUAL_SHUNT_OHM,
+    power_unit_w: float = 1e-6,
 ) -> Rail:
-    ohm = _text(chip / shunt)
-    shunt_ohm = float(ohm) * 1e-6 if ohm and float(ohm) > 0.0 else USUAL_SHUNT_OHM
-    period_ms = _text(chip / "update_interval")
-    voltage, current = chip / f"in{channel}_input", chip / f"curr{channel}_input"
-    power = chip / f"power{channel}_input"
+    """Returns a rail with its files of voltage, current and power."""
+    voltage, current, power = files
+    period_ms = _text(voltage.parent / "update_interval")
     both = voltage.is_file() and current.is_file()
     return Rail(
         label=label,
-        chip=name,
+        chip=chip,
         voltage=voltage if both or not power.is_file() else None,
         current=current if both or not power.is_file() else None,
         power=power if power.is_file() else None,
-        power_unit_w=1e-6,
+        power_unit_w=power_unit_w,
         bus_v=0.5 * steps["bus_v"] + 1e-3,
         current_a=0.5 * steps["shunt_v"] / shunt_ohm + 1e-3,
         period_s=float(period_ms) * 1e-3 if period_ms and float(period_ms) > 0.0 else None,
@@ -188,22 +201,8 @@ def _iio(sysfs: Path) -> Iterator[Rail]:
             number, label = file.name.removeprefix("rail_name_"), _text(file)
             if label in (None, "NC", ""):
                 continue
-            voltage, current = (
-                device / f"in_voltage{number}_input",
-                device / f"in_current{number}_input",
-            )
-            both = voltage.is_file() and current.is_file()
-            yield Rail(
-                label=str(label),
-                chip="ina3221",
-                voltage=voltage if both else None,
-                current=current if both else None,
-                power=device / f"in_power{number}_input",
-                power_unit_w=1e-3,
-                bus_v=0.5 * INA3221["bus_v"] + 1e-3,
-                current_a=0.5 * INA3221["shunt_v"] / USUAL_SHUNT_OHM + 1e-3,
-                period_s=None,
-            )
+            files = [device / f"in_{it}{number}_input" for it in ("voltage", "current", "power")]
+            yield _rail(str(label), "ina3221", files, INA3221, power_unit_w=1e-3)
 
 
 def _places(sysfs: Path, *patterns: str) -> list[Path]:

@@ -123,21 +123,15 @@ def sample(
         )
         for index in range(worlds)
     ]
-    found = campaign.run(tasks, progress)
+    parts = campaign.run(tasks, progress)
+    found = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     repeated = np.repeat(world_points, controllers, axis=0)
     return Sample(
         dimensions=(*world, *own),
         coordinates=np.hstack([repeated, own_points.reshape(-1, len(own))]),
         world=np.repeat(np.arange(worlds), controllers),
-        margins={
-            name: np.concatenate([part[name] for part in found])
-            for name in found[0]
-            if name in stated_claims()
-        },
-        **{
-            name: np.concatenate([part[name] for part in found])
-            for name in ("longest_gap_s", "aoa_estimates", "worst_error_m")
-        },
+        margins={name: found[name] for name in found if name in stated_claims()},
+        **{name: found[name] for name in ("longest_gap_s", "aoa_estimates", "worst_error_m")},
     )
 
 
