@@ -500,11 +500,22 @@ impl<'a> Search<'a> {
     }
 
     /// Returns the logarithm of the likelihood in multipath relative to that of a single path.
+    ///
+    /// The minimum noise is the largest deviation from the model of multipath. A single path has no
+    /// deviation beyond the noise of the receiver. Elements that deviate more are therefore evidence
+    /// for multipath: two strong paths that the band does not separate resemble a single one at the
+    /// minimum noise. The deviation is that of maximum likelihood.
     fn log_odds(&self, multi: &Moments, single: f64, single_variance: f64) -> f64 {
         let misfit = self.total - project(&self.elements, self.basis, single);
         let width = (std::f64::consts::TAU * self.excess * single_variance).sqrt();
         let odds = multi.log_evidence + misfit - width.max(f64::MIN_POSITIVE).ln();
-        odds.clamp(-50.0, 50.0)
+        let (misfit, dimensions) = (
+            self.excess * misfit,
+            (self.elements.len() * (GROUPS - 1)) as f64,
+        );
+        let noise = (misfit / dimensions).clamp(1.0, self.excess);
+        let deviation = misfit * (1.0 - 1.0 / noise) - dimensions * noise.ln();
+        (odds + deviation).clamp(-50.0, 50.0)
     }
 }
 

@@ -7,7 +7,7 @@ use nr_ssb::receiver::{ReceivedBeam, Receiver, ReceiverConfig};
 use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
 
 use crate::air;
-use crate::moving::{Echoes, Error, Moving, SsbErrors, summary};
+use crate::moving::{Echoes, Error, LIGHT_M_S, Moving, SsbErrors, summary};
 
 /// Number of SSBs of one run.
 const RUN: usize = 30;
@@ -130,6 +130,26 @@ fn a_first_path_is_found_in_multipath_or_reported_as_uncertain() {
         .iter()
         .filter(|it| it.multipath == Multipath::Uncertain);
     assert!(uncertain.count() * 10 > ssbs.len() * 9);
+}
+
+/// A reflection from the ground arrives a few nanoseconds later, with nearly the power of the first path.
+#[test]
+fn two_strong_paths_that_the_band_does_not_separate_are_not_a_single_path() {
+    let reflection = Echoes {
+        k_db: 2.0,
+        mean_delay_s: 3e-9,
+        count: 1,
+    };
+    let ssbs = received(&[40.0], 10, Some(reflection));
+    let is_late = |it: &&SsbErrors| it.delay.value.abs() * LIGHT_M_S > 0.15;
+    let late = ssbs.iter().filter(is_late);
+    let single = late
+        .clone()
+        .filter(|it| it.multipath == Multipath::NotDetected)
+        .count();
+    let late = late.count();
+    assert!(late * 5 > ssbs.len(), "{late} of {}", ssbs.len());
+    assert!(single * 50 < late, "{single} of {late}");
 }
 
 /// Observed SSB: beam, start and phase reference in input samples, phases of both antennas.
