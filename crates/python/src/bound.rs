@@ -8,12 +8,10 @@ use onboard::walls::Walls;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use simulate::bound::{Bound as CoreBound, BoundPoint};
+use simulate::bound::Bound as CoreBound;
 
 use crate::settings::{Scenario, settings_error};
-
-/// Name of a column, and its value in a row.
-type Column = (&'static str, fn(&BoundPoint) -> f64);
+use crate::table::Table;
 
 /// Posterior Cramér–Rao bound of the localization error in a scenario.
 #[pyclass(frozen, name = "Bound", module = "access_av._core")]
@@ -48,23 +46,17 @@ impl ErrorBound {
     /// Return the bound at each SSB of the drive, with every SSB used, as columns of equal length.
     fn along_route(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
         let points = py.detach(|| self.bound.along_route());
-        let table = PyDict::new(py);
-        let columns: [Column; 9] = [
-            ("time_s", |point| point.time_s),
-            ("along_m", |point| point.along_m),
-            ("x_m", |point| point.pose.x_m),
-            ("y_m", |point| point.pose.y_m),
-            ("bound_m", |point| point.position_rms_m),
-            ("along_std_m", |point| point.along_std_m),
-            ("across_std_m", |point| point.across_std_m),
-            ("heading_std_rad", |point| point.heading_std_rad),
-            ("odometer_scale_std", |point| point.scale_std),
-        ];
-        for (name, value) in columns {
-            let values = points.iter().map(value).collect();
-            table.set_item(name, PyArray1::from_vec(py, values))?;
-        }
-        Ok(table.unbind())
+        let table = Table::new(py, points.iter())
+            .column("time_s", |point| point.time_s)?
+            .column("along_m", |point| point.along_m)?
+            .column("x_m", |point| point.pose.x_m)?
+            .column("y_m", |point| point.pose.y_m)?
+            .column("bound_m", |point| point.position_rms_m)?
+            .column("along_std_m", |point| point.along_std_m)?
+            .column("across_std_m", |point| point.across_std_m)?
+            .column("heading_std_rad", |point| point.heading_std_rad)?
+            .column("odometer_scale_std", |point| point.scale_std)?;
+        Ok(table.finish())
     }
 
     /// Return the bound of the RMS position error in metres at each position for `looks`

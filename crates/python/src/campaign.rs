@@ -5,26 +5,26 @@ use std::sync::atomic::AtomicBool;
 
 use ::simulate::scenario::Scenario as CoreScenario;
 use ::simulate::{
-    Campaign, CampaignOptions, IntegritySummary, MeasurementTraces as CoreMeasurementTraces,
-    RunRecord, RunSummary, Simulation, SimulationError, Step, StepStatistics,
+    Campaign, CampaignOptions, Found, IntegritySummary, MeasurementTraces as CoreMeasurementTraces,
+    RunRecord, RunSummary, Simulation, SimulationError,
 };
-use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayMethods};
-use onboard::energy::EstimateCost;
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
+use onboard::energy::{Energy, EstimateCost};
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
 use onboard::settings::EstimatorMethod;
 use onboard::{AngleResult, BoxError, Custom};
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::PyDict;
 use toml::Value;
 
 use crate::message::brief;
-use crate::own_error::{covariance, level};
 use crate::plug_ins::{
     PythonEstimator, PythonLocalizer, PythonPolicy, estimate_cost, made_for_run,
 };
 use crate::settings::{Platform, Scenario, settings_error};
+use crate::table::{Table, covariance, level};
 use crate::threads::at_most_one_per_core;
 
 /// Maximum number of runs of a campaign; larger campaigns must be split.
@@ -325,78 +325,48 @@ impl PlugIns {
     }
 }
 
-/// Name of a column, and its value in a row.
-type Column<R> = (&'static str, fn(&R) -> f64);
-
-/// Creates a column from the rows of a table.
-fn column<R, T: Element>(
-    py: Python<'_>,
-    rows: impl IntoIterator<Item = R>,
-    value: impl Fn(R) -> T,
-) -> Bound<'_, PyArray1<T>> {
-    PyArray1::from_vec(py, rows.into_iter().map(value).collect())
-}
-
 fn steps(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
-    let table = PyDict::new(py);
-    table.set_item("time_s", column(py, &campaign.time_s, |time_s| *time_s))?;
-    let columns: [Column<StepStatistics>; 8] = [
-        ("mean_abs_error_x_m", |step| step.mean_abs_error_x_m),
-        ("mean_abs_error_y_m", |step| step.mean_abs_error_y_m),
-        ("rms_error_m", |step| step.rms_error_m),
-        ("rms_heading_error_rad", |step| step.rms_heading_error_rad),
-        ("mean_true_snr_db", |step| step.mean_snr_db),
-        ("p50_error_m", |step| step.p50_error_m),
-        ("p90_error_m", |step| step.p90_error_m),
-        ("p99_error_m", |step| step.p99_error_m),
-    ];
-    for (name, value) in columns {
-        table.set_item(name, column(py, &campaign.steps, value))?;
-    }
-    Ok(table.unbind())
+    let rows = campaign.time_s.iter().zip(&campaign.steps);
+    let table = Table::new(py, rows)
+        .column("time_s", |(time_s, _)| *time_s)?
+        .column("mean_abs_error_x_m", |(_, step)| step.mean_abs_error_x_m)?
+        .column("mean_abs_error_y_m", |(_, step)| step.mean_abs_error_y_m)?
+        .column("rms_error_m", |(_, step)| step.rms_error_m)?
+        .column("rms_heading_error_rad", |(_, step)| {
+            step.rms_heading_error_rad
+        })?
+        .column("mean_true_snr_db", |(_, step)| step.mean_snr_db)?
+        .column("p50_error_m", |(_, step)| step.p50_error_m)?
+        .column("p90_error_m", |(_, step)| step.p90_error_m)?
+        .column("p99_error_m", |(_, step)| step.p99_error_m)?;
+    Ok(table.finish())
 }
 
 /// Creates the table of runs. Energies are NaN if the platform has no figure for the method.
 fn run_table(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
-    let table = PyDict::new(py);
-    let runs = &campaign.runs;
-    table.set_item("run", column(py, runs, |run| run.run))?;
-    table.set_item(
-        "aoa_estimates",
-        column(py, runs, |run| run.aoa_estimates as u64),
-    )?;
-    table.set_item(
-        "bursts_received",
-        column(py, runs, |run| run.bursts_received as u64),
-    )?;
-    let columns: [Column<RunSummary>; 10] = [
-        ("longest_gap_s", |run| run.longest_gap_s),
-        ("energy_j", |run| {
-            run.energy.map_or(f64::NAN, |energy| energy.total_j())
-        }),
-        ("energy_aoa_estimates_j", |run| {
-            run.energy.map_or(f64::NAN, |energy| energy.aoa_estimates_j)
-        }),
-        ("energy_listening_j", |run| {
-            run.energy.map_or(f64::NAN, |energy| energy.listening_j)
-        }),
-        ("energy_idle_j", |run| {
-            run.energy.map_or(f64::NAN, |energy| energy.idle_j)
-        }),
-        ("rms_error_m", |run| run.rms_error_m),
-        ("max_error_m", |run| run.max_error_m),
-        ("final_error_m", |run| run.final_error_m),
-        ("found_s", |run| {
-            run.found.map_or(f64::NAN, |found| found.step.time_s)
-        }),
-        ("found_m", |run| {
-            run.found.map_or(f64::NAN, |found| found.driven_m)
-        }),
-    ];
-    for (name, value) in columns {
-        table.set_item(name, column(py, runs, value))?;
-    }
-    Ok(table.unbind())
+    let energy_j =
+        |run: &RunSummary, part: fn(&Energy) -> f64| run.energy.as_ref().map_or(f64::NAN, part);
+    let found =
+        |run: &RunSummary, value: fn(&Found) -> f64| run.found.as_ref().map_or(f64::NAN, value);
+    let table = Table::new(py, campaign.runs.iter())
+        .column("run", |run| run.run)?
+        .column("aoa_estimates", |run| run.aoa_estimates as u64)?
+        .column("bursts_received", |run| run.bursts_received as u64)?
+        .column("longest_gap_s", |run| run.longest_gap_s)?
+        .column("energy_j", |run| energy_j(run, Energy::total_j))?
+        .column("energy_aoa_estimates_j", |run| {
+            energy_j(run, |it| it.aoa_estimates_j)
+        })?
+        .column("energy_listening_j", |run| {
+            energy_j(run, |it| it.listening_j)
+        })?
+        .column("energy_idle_j", |run| energy_j(run, |it| it.idle_j))?
+        .column("rms_error_m", |run| run.rms_error_m)?
+        .column("max_error_m", |run| run.max_error_m)?
+        .column("final_error_m", |run| run.final_error_m)?
+        .column("found_s", |run| found(run, |it| it.step.time_s))?
+        .column("found_m", |run| found(run, |it| it.driven_m))?;
+    Ok(table.finish())
 }
 
 /// Creates the integrity table per run: epochs by state, degraded ones with a protection level above
@@ -406,136 +376,111 @@ fn integrity(py: Python<'_>, campaign: &Campaign) -> PyResult<Option<(Py<PyDict>
     if runs.is_empty() {
         return Ok(None);
     }
-    let table = PyDict::new(py);
-    let columns: [Column<IntegritySummary>; 5] = [
-        ("ok", |run| run.ok as f64),
-        ("degraded", |run| {
+    let table = Table::new(py, runs.iter())
+        .column("ok", |run| run.ok as f64)?
+        .column("degraded", |run| {
             (run.epochs - run.ok - run.unavailable) as f64
-        }),
-        ("unavailable", |run| run.unavailable as f64),
-        ("too_wide", |run| run.too_wide as f64),
-        ("beyond", |run| run.beyond as f64),
-    ];
-    for (name, value) in columns {
-        table.set_item(name, column(py, runs, value))?;
-    }
+        })?
+        .column("unavailable", |run| run.unavailable as f64)?
+        .column("too_wide", |run| run.too_wide as f64)?
+        .column("beyond", |run| run.beyond as f64)?;
     let median = IntegritySummary::sum(runs).median_ratio();
-    Ok(Some((table.unbind(), median)))
+    Ok(Some((table.finish(), median)))
 }
 
 /// Creates the table of poses. Covariances and protection levels are NaN and integrity states
 /// `None` if the localizer does not provide them.
 fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
-    let table = PyDict::new(py);
-    let rows = || records.iter().flat_map(|record| record.steps.iter());
-    let runs = records
+    let rows = records
         .iter()
-        .flat_map(|record| record.steps.iter().map(|_| record.run));
-    table.set_item("run", column(py, runs, |run| run))?;
-    let columns: [Column<Step>; 19] = [
-        ("time_s", |step| step.time_s),
-        ("x_m", |step| step.estimate.x_m),
-        ("y_m", |step| step.estimate.y_m),
-        ("heading_rad", |step| step.estimate.heading_rad),
-        ("true_x_m", |step| step.truth.x_m),
-        ("true_y_m", |step| step.truth.y_m),
-        ("true_heading_rad", |step| step.truth.heading_rad),
-        ("error_x_m", |step| step.estimate.x_m - step.truth.x_m),
-        ("error_y_m", |step| step.estimate.y_m - step.truth.y_m),
-        ("true_snr_db", |step| step.snr_db),
-        ("covariance_xx_m2", |step| covariance(step, 0, 0)),
-        ("covariance_yy_m2", |step| covariance(step, 1, 1)),
-        ("covariance_heading_rad2", |step| covariance(step, 2, 2)),
-        ("covariance_xy_m2", |step| covariance(step, 0, 1)),
-        ("covariance_x_heading_m_rad", |step| covariance(step, 0, 2)),
-        ("covariance_y_heading_m_rad", |step| covariance(step, 1, 2)),
-        ("protection_level_m", |step| {
-            level(step, |it| it.protection_level_m)
-        }),
-        ("protection_level_along_m", |step| {
-            level(step, |it| it.protection_level_along_m)
-        }),
-        ("protection_level_across_m", |step| {
-            level(step, |it| it.protection_level_across_m)
-        }),
-    ];
-    for (name, value) in columns {
-        table.set_item(name, column(py, rows(), value))?;
-    }
-    table.set_item("searching", column(py, rows(), |step| step.searching))?;
-    let states = rows().map(|step| step.integrity.map(|integrity| integrity.state.name()));
-    table.set_item("integrity", PyList::new(py, states.collect::<Vec<_>>())?)?;
-    let hypotheses = rows().map(|step| step.integrity.map(|it| it.hypothesis.name()));
-    let hypotheses = PyList::new(py, hypotheses.collect::<Vec<_>>())?;
-    table.set_item("selected_hypothesis", hypotheses)?;
-    Ok(table.unbind())
+        .flat_map(|it| it.steps.iter().map(|step| (it.run, step)));
+    let table = Table::new(py, rows)
+        .column("run", |(run, _)| run)?
+        .column("time_s", |(_, step)| step.time_s)?
+        .column("x_m", |(_, step)| step.estimate.x_m)?
+        .column("y_m", |(_, step)| step.estimate.y_m)?
+        .column("heading_rad", |(_, step)| step.estimate.heading_rad)?
+        .column("true_x_m", |(_, step)| step.truth.x_m)?
+        .column("true_y_m", |(_, step)| step.truth.y_m)?
+        .column("true_heading_rad", |(_, step)| step.truth.heading_rad)?
+        .column("error_x_m", |(_, step)| step.estimate.x_m - step.truth.x_m)?
+        .column("error_y_m", |(_, step)| step.estimate.y_m - step.truth.y_m)?
+        .column("true_snr_db", |(_, step)| step.snr_db)?
+        .column("covariance_xx_m2", |(_, it)| {
+            covariance(it.covariance, 0, 0)
+        })?
+        .column("covariance_yy_m2", |(_, it)| {
+            covariance(it.covariance, 1, 1)
+        })?
+        .column("covariance_heading_rad2", |(_, it)| {
+            covariance(it.covariance, 2, 2)
+        })?
+        .column("covariance_xy_m2", |(_, it)| {
+            covariance(it.covariance, 0, 1)
+        })?
+        .column("covariance_x_heading_m_rad", |(_, it)| {
+            covariance(it.covariance, 0, 2)
+        })?
+        .column("covariance_y_heading_m_rad", |(_, it)| {
+            covariance(it.covariance, 1, 2)
+        })?
+        .column("protection_level_m", |(_, step)| {
+            level(step.integrity, |it| it.protection_level_m)
+        })?
+        .column("protection_level_along_m", |(_, step)| {
+            level(step.integrity, |it| it.protection_level_along_m)
+        })?
+        .column("protection_level_across_m", |(_, step)| {
+            level(step.integrity, |it| it.protection_level_across_m)
+        })?
+        .column("searching", |(_, step)| step.searching)?
+        .list("integrity", |(_, step)| {
+            step.integrity.map(|it| it.state.name())
+        })?
+        .list("selected_hypothesis", |(_, step)| {
+            step.integrity.map(|it| it.hypothesis.name())
+        })?;
+    Ok(table.finish())
 }
 
 /// Creates the table of angle estimates. Angles are NaN if the estimator found none.
 fn aoa_estimates(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
-    let table = PyDict::new(py);
-    let rows = || {
-        records
-            .iter()
-            .flat_map(|record| record.aoa_estimates.iter())
-    };
-    let runs = records
-        .iter()
-        .flat_map(|record| record.aoa_estimates.iter().map(|_| record.run));
-    table.set_item("run", column(py, runs, |run| run))?;
-    table.set_item(
-        "time_s",
-        column(py, rows(), |angle_result| angle_result.ssb.time_s),
-    )?;
-    table.set_item(
-        "pci",
-        column(py, rows(), |angle_result| angle_result.ssb.pci),
-    )?;
-    table.set_item(
-        "ssb_index",
-        column(py, rows(), |angle_result| angle_result.ssb.ssb_index),
-    )?;
-    let columns: [Column<AngleResult>; 8] = [
-        ("snr_db", |angle_result| angle_result.ssb.snr_db),
-        ("phase_rad", |angle_result| {
-            measured(angle_result, |angle| angle.phase_rad)
-        }),
-        ("phase_sigma_rad", |angle_result| {
-            measured(angle_result, |angle| angle.phase_sigma_rad)
-        }),
-        ("angle_rad", |angle_result| {
-            measured(angle_result, |angle| angle.angle_rad)
-        }),
-        ("estimator_snr_db", |angle_result| {
-            measured(angle_result, |angle| angle.snr_db)
-        }),
-        ("mahalanobis_squared", |e| {
-            e.verdict.mahalanobis_squared.unwrap_or(f64::NAN)
-        }),
-        ("threshold", |angle_result| {
-            angle_result.verdict.threshold.unwrap_or(f64::NAN)
-        }),
-        ("wake_up_time_s", |angle_result| angle_result.wake_up_time_s),
-    ];
-    for (name, value) in columns {
-        table.set_item(name, column(py, rows(), value))?;
-    }
-    let resolved = |e: &AngleResult| e.measured.as_ref().is_some_and(|angle| angle.resolved);
-    table.set_item("resolved", column(py, rows(), resolved))?;
-    table.set_item(
-        "accepted",
-        column(py, rows(), |angle_result| angle_result.verdict.accepted),
-    )?;
-    let reasons = PyList::new(
-        py,
-        rows().map(|angle_result| angle_result.verdict.reason.name()),
-    )?;
-    table.set_item("reason", reasons)?;
-    Ok(table.unbind())
+    let rows = records.iter().flat_map(|record| {
+        let results = record.aoa_estimates.iter();
+        results.map(|it| (record.run, it))
+    });
+    let table = Table::new(py, rows)
+        .column("run", |(run, _)| run)?
+        .column("time_s", |(_, it)| it.ssb.time_s)?
+        .column("pci", |(_, it)| it.ssb.pci)?
+        .column("ssb_index", |(_, it)| it.ssb.ssb_index)?
+        .column("snr_db", |(_, it)| it.ssb.snr_db)?
+        .column("phase_rad", |(_, it)| measured(it, |angle| angle.phase_rad))?
+        .column("phase_sigma_rad", |(_, it)| {
+            measured(it, |angle| angle.phase_sigma_rad)
+        })?
+        .column("angle_rad", |(_, it)| measured(it, |angle| angle.angle_rad))?
+        .column("estimator_snr_db", |(_, it)| {
+            measured(it, |angle| angle.snr_db)
+        })?
+        .column("mahalanobis_squared", |(_, it)| {
+            it.verdict.mahalanobis_squared.unwrap_or(f64::NAN)
+        })?
+        .column("threshold", |(_, it)| {
+            it.verdict.threshold.unwrap_or(f64::NAN)
+        })?
+        .column("wake_up_time_s", |(_, it)| it.wake_up_time_s)?
+        .column("resolved", |(_, it)| {
+            it.measured.is_some_and(|angle| angle.resolved)
+        })?
+        .column("accepted", |(_, it)| it.verdict.accepted)?
+        .list("reason", |(_, it)| it.verdict.reason.name())?;
+    Ok(table.finish())
 }
 
-fn measured(angle_result: &AngleResult, value: fn(&AngleMeasurement) -> f64) -> f64 {
-    angle_result.measured.as_ref().map_or(f64::NAN, value)
+/// Returns a value of an estimated angle; NaN without one.
+pub fn measured(result: &AngleResult, value: fn(&AngleMeasurement) -> f64) -> f64 {
+    result.measured.as_ref().map_or(f64::NAN, value)
 }
 
 fn error_quantiles(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {

@@ -2,31 +2,16 @@
 
 use std::path::Path;
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use simulate::channel::Paths;
-use simulate::channel::tr38901::{Drop, Environment, LinkGeometry, draw_drops};
+use simulate::channel::tr38901::{Environment, LinkGeometry, draw_drops};
 use simulate::scenario::ChannelModel;
 
 use crate::settings::SettingsError;
-
-/// Name of a column, and its value in a row.
-type Column = (&'static str, fn(&Drop) -> f64);
-
-const COLUMNS: [Column; 8] = [
-    ("path_loss_db", |drop| drop.path_loss_db),
-    ("shadowing_db", |drop| drop.shadowing_db),
-    ("rician_k_db", |drop| drop.k_db),
-    ("delay_spread_s", |drop| drop.delay_spread_s),
-    ("azimuth_spread_deg", |drop| drop.azimuth_spread_deg),
-    ("zenith_spread_deg", |drop| drop.zenith_spread_deg),
-    ("paths_delay_spread_s", |drop| drop.paths_delay_spread_s),
-    ("paths_azimuth_spread_deg", |drop| {
-        drop.paths_azimuth_spread_deg
-    }),
-];
+use crate::table::Table;
 
 /// Draw one independent link of a TR 38.901 model at each horizontal distance, as columns of equal
 /// length. The default height of the radio head is the model's.
@@ -70,14 +55,19 @@ pub fn channel_drops(
         })
         .collect();
     let drops = py.detach(|| draw_drops(&environment, &places, seed));
-    let table = PyDict::new(py);
-    let clear = drops.iter().map(|drop| drop.line_of_sight).collect();
-    table.set_item("line_of_sight", PyArray1::from_vec(py, clear))?;
-    for (name, value) in COLUMNS {
-        let values = drops.iter().map(value).collect();
-        table.set_item(name, PyArray1::from_vec(py, values))?;
-    }
-    Ok(table.unbind())
+    let table = Table::new(py, drops.iter())
+        .column("line_of_sight", |drop| drop.line_of_sight)?
+        .column("path_loss_db", |drop| drop.path_loss_db)?
+        .column("shadowing_db", |drop| drop.shadowing_db)?
+        .column("rician_k_db", |drop| drop.k_db)?
+        .column("delay_spread_s", |drop| drop.delay_spread_s)?
+        .column("azimuth_spread_deg", |drop| drop.azimuth_spread_deg)?
+        .column("zenith_spread_deg", |drop| drop.zenith_spread_deg)?
+        .column("paths_delay_spread_s", |drop| drop.paths_delay_spread_s)?
+        .column("paths_azimuth_spread_deg", |drop| {
+            drop.paths_azimuth_spread_deg
+        })?;
+    Ok(table.finish())
 }
 
 /// Check that the simulator can use a file of ray-traced paths.

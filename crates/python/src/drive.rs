@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use numpy::{PyArray1, PyReadonlyArray1};
-use onboard::AngleResult;
+use numpy::PyReadonlyArray1;
 use onboard::geometry::Pose;
-use onboard::localize::AngleMeasurement;
+use onboard::localize::UpdateResult;
 use onboard::localize::ekf::EstimatedConstant;
 use onboard::settings::{Site as CoreSite, Vehicle as CoreVehicle};
 use pyo3::exceptions::PyValueError;
@@ -14,16 +13,17 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use recording::replay::{self, ReplayError, StartChoice};
 use recording::{
-    Datatype, LoggedAngle, LoggedRange, OdometryChoice, RangeLog, Recording, TimedPose,
-    angle_log_of_columns, is_prs_log, is_range_log, read_angle_log, read_odometry, read_prs_log,
-    read_range_log, write_drive_mcap, write_tum,
+    Datatype, OdometryChoice, RangeLog, Recording, TimedPose, angle_log_of_columns, is_prs_log,
+    is_range_log, read_angle_log, read_odometry, read_prs_log, read_range_log, write_drive_mcap,
+    write_tum,
 };
 use simulate::{SynthError, SynthSettings};
 
+use crate::campaign::measured;
 use crate::message::brief;
-use crate::own_error::{covariance, level};
 use crate::recording::{RecordingError, recording_error};
 use crate::settings::{Scenario, Site, Vehicle, settings_error};
+use crate::table::{Table, covariance, level};
 
 /// Simulate a recorded drive of a scenario.
 ///
@@ -138,15 +138,14 @@ pub fn log_angles(
 ///     A line is not eight numbers with a unit quaternion.
 #[pyfunction]
 #[allow(clippy::needless_pass_by_value)] // what extraction yields
-pub fn read_tum(py: Python<'_>, file: PathBuf) -> PyResult<Bound<'_, PyDict>> {
+pub fn read_tum(py: Python<'_>, file: PathBuf) -> PyResult<Py<PyDict>> {
     let poses = recording::read_tum(&file).map_err(recording_error)?;
-    let columns = PyDict::new(py);
-    let column = |value: fn(&TimedPose) -> f64| PyArray1::from_iter(py, poses.iter().map(value));
-    columns.set_item("time_s", column(|it| it.time_s))?;
-    columns.set_item("x_m", column(|it| it.pose.x_m))?;
-    columns.set_item("y_m", column(|it| it.pose.y_m))?;
-    columns.set_item("heading_rad", column(|it| it.pose.heading_rad))?;
-    Ok(columns)
+    let table = Table::new(py, poses.iter())
+        .column("time_s", |it| it.time_s)?
+        .column("x_m", |it| it.pose.x_m)?
+        .column("y_m", |it| it.pose.y_m)?
+        .column("heading_rad", |it| it.pose.heading_rad)?;
+    Ok(table.finish())
 }
 
 /// Locate a recorded drive.
@@ -346,11 +345,11 @@ fn ranges(site: &CoreSite, file: &Path) -> Result<Option<RangeLog>, recording::R
 #[pyfunction]
 #[allow(clippy::needless_pass_by_value)] // what extraction yields
 #[allow(clippy::type_complexity)] // described above
-pub fn read_ranges<'py>(
-    py: Python<'py>,
+pub fn read_ranges(
+    py: Python<'_>,
     site: &Site,
     file: PathBuf,
-) -> PyResult<(Bound<'py, PyDict>, bool, Option<f64>, Vec<String>)> {
+) -> PyResult<(Py<PyDict>, bool, Option<f64>, Vec<String>)> {
     let log = ranges(&site.0, &file).map_err(recording_error)?;
     let log = log.ok_or_else(|| {
         RecordingError::new_err(format!(
@@ -359,16 +358,13 @@ pub fn read_ranges<'py>(
             file.display()
         ))
     })?;
-    let columns = PyDict::new(py);
-    let all = || log.ranges.iter();
-    let column = |value: fn(&LoggedRange) -> f64| PyArray1::from_iter(py, all().map(value));
-    columns.set_item("time_s", column(|it| it.measured.time_s))?;
-    columns.set_item("pci", PyArray1::from_iter(py, all().map(|it| it.pci)))?;
-    let indices = all().map(|it| it.ssb_index);
-    columns.set_item("ssb_index", PyArray1::from_iter(py, indices))?;
-    columns.set_item("range_m", column(|it| it.measured.value))?;
+    let table = Table::new(py, log.ranges.iter())
+        .column("time_s", |it| it.measured.time_s)?
+        .column("pci", |it| it.pci)?
+        .column("ssb_index", |it| it.ssb_index)?
+        .column("range_m", |it| it.measured.value)?;
     let remarks = log.remarks.iter().map(|(_, text)| text.clone()).collect();
-    Ok((columns, log.has_delays, log.sample_m, remarks))
+    Ok((table.finish(), log.has_delays, log.sample_m, remarks))
 }
 
 fn is(path: &Path, extension: &str) -> bool {
@@ -405,13 +401,13 @@ fn is(path: &Path, extension: &str) -> bool {
 #[pyfunction]
 #[pyo3(signature = (site, vehicle, recording, *, start_time_s = 0.0))]
 #[allow(clippy::needless_pass_by_value)] // what extraction yields
-pub fn estimate_angles<'py>(
-    py: Python<'py>,
+pub fn estimate_angles(
+    py: Python<'_>,
     site: &Site,
     vehicle: &Vehicle,
     recording: PathBuf,
     start_time_s: f64,
-) -> PyResult<(Bound<'py, PyDict>, Vehicle, Vec<String>)> {
+) -> PyResult<(Py<PyDict>, Vehicle, Vec<String>)> {
     crate::arrays::look_up(py)?;
     let (found, warnings) = py
         .detach(|| {
@@ -421,26 +417,19 @@ pub fn estimate_angles<'py>(
             Ok((found, warnings))
         })
         .map_err(replay_error)?;
-    let columns = PyDict::new(py);
-    let angles = || found.angles.iter();
-    let column = |value: fn(&LoggedAngle) -> f64| PyArray1::from_iter(py, angles().map(value));
-    columns.set_item("time_s", column(|it| it.ssb.time_s))?;
-    columns.set_item(
-        "pci",
-        PyArray1::from_iter(py, angles().map(|it| it.ssb.pci)),
-    )?;
-    let indices = angles().map(|it| it.ssb.ssb_index);
-    columns.set_item("ssb_index", PyArray1::from_iter(py, indices))?;
-    columns.set_item("snr_db", column(|it| it.measured.snr_db))?;
-    columns.set_item("phase_rad", column(|it| it.measured.phase_rad))?;
-    columns.set_item("phase_sigma_rad", column(|it| it.measured.phase_sigma_rad))?;
-    let noise = PyArray1::from_slice(py, &found.noise_sigma_rad);
-    columns.set_item("phase_noise_sigma_rad", noise)?;
-    columns.set_item("angle_rad", column(|it| it.measured.angle_rad))?;
-    let resolved = angles().map(|it| u8::from(it.measured.resolved));
-    columns.set_item("resolved", PyArray1::from_iter(py, resolved))?;
+    let rows = found.angles.iter().zip(&found.noise_sigma_rad);
+    let table = Table::new(py, rows)
+        .column("time_s", |(it, _)| it.ssb.time_s)?
+        .column("pci", |(it, _)| it.ssb.pci)?
+        .column("ssb_index", |(it, _)| it.ssb.ssb_index)?
+        .column("snr_db", |(it, _)| it.measured.snr_db)?
+        .column("phase_rad", |(it, _)| it.measured.phase_rad)?
+        .column("phase_sigma_rad", |(it, _)| it.measured.phase_sigma_rad)?
+        .column("phase_noise_sigma_rad", |(_, sigma_rad)| *sigma_rad)?
+        .column("angle_rad", |(it, _)| it.measured.angle_rad)?
+        .column("resolved", |(it, _)| u8::from(it.measured.resolved))?;
     let vehicle = Vehicle(replay::all_of_error(&site.0, &vehicle.0));
-    Ok((columns, vehicle, warnings))
+    Ok((table.finish(), vehicle, warnings))
 }
 
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
@@ -471,7 +460,7 @@ impl LocatedDrive {
     /// `constant`, `constant_unit`, `stated_value`, `found_value` and `found_value_std`; empty if
     /// the localizer estimates none.
     #[getter]
-    fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn findings(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
         let rows: Vec<(&str, &str, EstimatedConstant)> =
             self.core.constants.map_or_else(Vec::new, |it| {
                 vec![
@@ -483,19 +472,13 @@ impl LocatedDrive {
                     ("receiver.angle_time_offset_s", "s", it.angle_time_offset_s),
                 ]
             });
-        let columns = PyDict::new(py);
-        columns.set_item("constant", rows.iter().map(|it| it.0).collect::<Vec<_>>())?;
-        columns.set_item(
-            "constant_unit",
-            rows.iter().map(|it| it.1).collect::<Vec<_>>(),
-        )?;
-        let column = |value: fn(&EstimatedConstant) -> f64| {
-            PyArray1::from_iter(py, rows.iter().map(|(.., finding)| value(finding)))
-        };
-        columns.set_item("stated_value", column(|it| it.stated))?;
-        columns.set_item("found_value", column(|it| it.found))?;
-        columns.set_item("found_value_std", column(|it| it.std))?;
-        Ok(columns)
+        let table = Table::new(py, rows.iter())
+            .list("constant", |(name, ..)| *name)?
+            .list("constant_unit", |(_, unit, _)| *unit)?
+            .column("stated_value", |(.., it)| it.stated)?
+            .column("found_value", |(.., it)| it.found)?
+            .column("found_value_std", |(.., it)| it.std)?;
+        Ok(table.finish())
     }
 
     /// Errors of the input as a whole, harmful or not.
@@ -532,88 +515,49 @@ impl LocatedDrive {
     /// name, or None if the vehicle is not monitored) and `searching` (whether the
     /// first pose is still unknown, so that the pose is the mean of the possible positions).
     #[getter]
-    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn poses(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
         pose_columns(py, &self.core.poses)
     }
 
     /// Smoothed poses with the columns of `poses`; empty unless requested.
     #[getter]
-    fn smoothed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn smoothed(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
         pose_columns(py, &self.core.smoothed)
     }
 
     /// Angles, one row each: columns `time_s`, `pci`, `ssb_index`, `snr_db`, `phase_rad`,
     /// `phase_sigma_rad`, `angle_rad`, `accepted`, `reason`, `mahalanobis_squared`, `threshold`.
     #[getter]
-    fn angles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let angles = &self.core.aoa_estimates;
-        let columns = PyDict::new(py);
-        let measured = |value: fn(&AngleMeasurement) -> f64| {
-            let of = move |it: &AngleResult| it.measured.as_ref().map_or(f64::NAN, value);
-            PyArray1::from_iter(py, angles.iter().map(of))
-        };
-        let each = || angles.iter();
-        columns.set_item(
-            "time_s",
-            PyArray1::from_iter(py, each().map(|it| it.ssb.time_s)),
-        )?;
-        columns.set_item("pci", PyArray1::from_iter(py, each().map(|it| it.ssb.pci)))?;
-        columns.set_item(
-            "ssb_index",
-            PyArray1::from_iter(py, each().map(|it| it.ssb.ssb_index)),
-        )?;
-        columns.set_item(
-            "snr_db",
-            PyArray1::from_iter(py, each().map(|it| it.ssb.snr_db)),
-        )?;
-        columns.set_item("phase_rad", measured(|it| it.phase_rad))?;
-        columns.set_item("phase_sigma_rad", measured(|it| it.phase_sigma_rad))?;
-        columns.set_item("angle_rad", measured(|it| it.angle_rad))?;
-        columns.set_item(
-            "accepted",
-            PyArray1::from_iter(py, each().map(|it| it.verdict.accepted)),
-        )?;
-        let reasons: Vec<&str> = each().map(|it| it.verdict.reason.name()).collect();
-        columns.set_item("reason", reasons)?;
-        let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
-        let distance = each().map(|it| or_nan(it.verdict.mahalanobis_squared));
-        columns.set_item("mahalanobis_squared", PyArray1::from_iter(py, distance))?;
-        let threshold = each().map(|it| or_nan(it.verdict.threshold));
-        columns.set_item("threshold", PyArray1::from_iter(py, threshold))?;
-        Ok(columns)
+    fn angles(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
+        let table = Table::new(py, self.core.aoa_estimates.iter())
+            .column("time_s", |it| it.ssb.time_s)?
+            .column("pci", |it| it.ssb.pci)?
+            .column("ssb_index", |it| it.ssb.ssb_index)?
+            .column("snr_db", |it| it.ssb.snr_db)?
+            .column("phase_rad", |it| measured(it, |angle| angle.phase_rad))?
+            .column("phase_sigma_rad", |it| {
+                measured(it, |angle| angle.phase_sigma_rad)
+            })?
+            .column("angle_rad", |it| measured(it, |angle| angle.angle_rad))?;
+        Ok(with_verdicts(table, |it| it.verdict)?.finish())
     }
 
     /// Ranges, one row each: columns `time_s`, `pci`, `ssb_index`, `range_m`, `range_sigma_m` (NaN
     /// if that of the vehicle applies), `accepted`, `reason`, `mahalanobis_squared`, `threshold`.
     #[getter]
-    fn ranges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let columns = PyDict::new(py);
+    fn ranges(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
         let is_range = |it: &&replay::LocatedRange| {
             it.range.measured.quantity == onboard::range::RangeQuantity::Range
         };
-        let each = || self.core.ranges.iter().filter(is_range);
-        let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
-        let column = |value: &dyn Fn(&replay::LocatedRange) -> f64| {
-            PyArray1::from_iter(py, each().map(value))
-        };
-        columns.set_item("time_s", column(&|it| it.range.measured.time_s))?;
-        columns.set_item(
-            "pci",
-            PyArray1::from_iter(py, each().map(|it| it.range.pci)),
-        )?;
-        let indices = each().map(|it| it.range.ssb_index);
-        columns.set_item("ssb_index", PyArray1::from_iter(py, indices))?;
-        columns.set_item("range_m", column(&|it| it.range.measured.value))?;
-        let sigma = column(&|it| or_nan(it.range.measured.sigma));
-        columns.set_item("range_sigma_m", sigma)?;
-        let accepted = each().map(|it| it.verdict.accepted);
-        columns.set_item("accepted", PyArray1::from_iter(py, accepted))?;
-        let reasons: Vec<&str> = each().map(|it| it.verdict.reason.name()).collect();
-        columns.set_item("reason", reasons)?;
-        let distance = column(&|it| or_nan(it.verdict.mahalanobis_squared));
-        columns.set_item("mahalanobis_squared", distance)?;
-        columns.set_item("threshold", column(&|it| or_nan(it.verdict.threshold)))?;
-        Ok(columns)
+        let table = Table::new(py, self.core.ranges.iter().filter(is_range))
+            .column("time_s", |it| it.range.measured.time_s)?
+            .column("pci", |it| it.range.pci)?
+            .column("ssb_index", |it| it.range.ssb_index)?
+            .column("range_m", |it| it.range.measured.value)?
+            .column("range_sigma_m", |it| {
+                it.range.measured.sigma.unwrap_or(f64::NAN)
+            })?;
+        Ok(with_verdicts(table, |it| it.verdict)?.finish())
     }
 
     /// Write poses, verdicts and diagnostics to an MCAP file (ROS 2).
@@ -644,36 +588,49 @@ fn write_poses(path: &Path, poses: &[replay::LocatedPose]) -> PyResult<()> {
     write_tum(path, &timed.collect::<Vec<_>>()).map_err(recording_error)
 }
 
-fn pose_columns<'py>(
-    py: Python<'py>,
-    poses: &[replay::LocatedPose],
-) -> PyResult<Bound<'py, PyDict>> {
-    let columns = PyDict::new(py);
-    let column =
-        |value: fn(&replay::LocatedPose) -> f64| PyArray1::from_iter(py, poses.iter().map(value));
-    columns.set_item("time_s", column(|it| it.estimate.time_s))?;
-    columns.set_item("x_m", column(|it| it.estimate.pose.x_m))?;
-    columns.set_item("y_m", column(|it| it.estimate.pose.y_m))?;
-    columns.set_item("heading_rad", column(|it| it.estimate.pose.heading_rad))?;
-    columns.set_item("speed_mps", column(|it| it.speed_mps))?;
-    columns.set_item("covariance_xx_m2", column(|it| covariance(it, 0, 0)))?;
-    columns.set_item("covariance_xy_m2", column(|it| covariance(it, 0, 1)))?;
-    columns.set_item("covariance_yy_m2", column(|it| covariance(it, 1, 1)))?;
-    columns.set_item("covariance_heading_rad2", column(|it| covariance(it, 2, 2)))?;
-    let along = |it: &replay::LocatedPose| level(it, |of| of.protection_level_along_m);
-    let across = |it: &replay::LocatedPose| level(it, |of| of.protection_level_across_m);
-    let horizontal = |it: &replay::LocatedPose| level(it, |of| of.protection_level_m);
-    columns.set_item("protection_level_m", column(horizontal))?;
-    columns.set_item("protection_level_along_m", column(along))?;
-    columns.set_item("protection_level_across_m", column(across))?;
-    let state = |it: &replay::LocatedPose| Some(it.estimate.integrity?.state.name());
-    columns.set_item("integrity", poses.iter().map(state).collect::<Vec<_>>())?;
-    let hypothesis = |it: &replay::LocatedPose| Some(it.estimate.integrity?.hypothesis.name());
-    let hypotheses = poses.iter().map(hypothesis).collect::<Vec<_>>();
-    columns.set_item("selected_hypothesis", hypotheses)?;
-    let searching = poses.iter().map(|it| it.searching.is_some());
-    columns.set_item("searching", PyArray1::from_iter(py, searching))?;
-    let lost = poses.iter().map(|it| it.is_lost);
-    columns.set_item("lost", PyArray1::from_iter(py, lost))?;
-    Ok(columns)
+/// Adds the verdicts of the localizer to a table of measurements.
+fn with_verdicts<R: Iterator + Clone>(
+    table: Table<'_, R>,
+    verdict: impl Fn(R::Item) -> UpdateResult,
+) -> PyResult<Table<'_, R>> {
+    let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    table
+        .column("accepted", |it| verdict(it).accepted)?
+        .list("reason", |it| verdict(it).reason.name())?
+        .column("mahalanobis_squared", |it| {
+            or_nan(verdict(it).mahalanobis_squared)
+        })?
+        .column("threshold", |it| or_nan(verdict(it).threshold))
+}
+
+fn pose_columns(py: Python<'_>, poses: &[replay::LocatedPose]) -> PyResult<Py<PyDict>> {
+    let covariance =
+        |it: &replay::LocatedPose, row, column| covariance(it.estimate.covariance, row, column);
+    let level = |it: &replay::LocatedPose, which| level(it.estimate.integrity, which);
+    let table = Table::new(py, poses.iter())
+        .column("time_s", |it| it.estimate.time_s)?
+        .column("x_m", |it| it.estimate.pose.x_m)?
+        .column("y_m", |it| it.estimate.pose.y_m)?
+        .column("heading_rad", |it| it.estimate.pose.heading_rad)?
+        .column("speed_mps", |it| it.speed_mps)?
+        .column("covariance_xx_m2", |it| covariance(it, 0, 0))?
+        .column("covariance_xy_m2", |it| covariance(it, 0, 1))?
+        .column("covariance_yy_m2", |it| covariance(it, 1, 1))?
+        .column("covariance_heading_rad2", |it| covariance(it, 2, 2))?
+        .column("protection_level_m", |it| {
+            level(it, |of| of.protection_level_m)
+        })?
+        .column("protection_level_along_m", |it| {
+            level(it, |of| of.protection_level_along_m)
+        })?
+        .column("protection_level_across_m", |it| {
+            level(it, |of| of.protection_level_across_m)
+        })?
+        .list("integrity", |it| Some(it.estimate.integrity?.state.name()))?
+        .list("selected_hypothesis", |it| {
+            Some(it.estimate.integrity?.hypothesis.name())
+        })?
+        .column("searching", |it| it.searching.is_some())?
+        .column("lost", |it| it.is_lost)?;
+    Ok(table.finish())
 }

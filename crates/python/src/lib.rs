@@ -9,11 +9,11 @@ mod interrupt;
 mod live;
 mod message;
 mod nr;
-mod own_error;
 mod plug_ins;
 mod recording;
 mod settings;
 mod survey;
+mod table;
 mod threads;
 
 use pyo3::pymodule;

@@ -253,6 +253,33 @@ impl Live {
     fn core(&self) -> MutexGuard<'_, Core> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
+
+    /// Calls the pipeline without the interpreter lock.
+    fn call<T: Send>(
+        &self,
+        py: Python<'_>,
+        call: impl FnOnce(&mut Core) -> Result<T, LiveError> + Send,
+    ) -> PyResult<T> {
+        py.detach(|| call(&mut self.core())).map_err(live_error)
+    }
+
+    /// Passes an input with its arrival time to the pipeline.
+    fn take<T: Send>(
+        &self,
+        py: Python<'_>,
+        arrival_s: Option<f64>,
+        take: impl FnOnce(&mut Core) -> Result<T, LiveError> + Send,
+    ) -> PyResult<T> {
+        if let Some(value) = arrival_s.filter(|it| !it.is_finite()) {
+            return Err(PyValueError::new_err(format!(
+                "arrival_s is {value}; it must be a finite number"
+            )));
+        }
+        self.call(py, |core| {
+            core.set_arrival(arrival_s);
+            take(core)
+        })
+    }
 }
 
 #[pymethods]
@@ -313,13 +340,8 @@ impl Live {
     ) -> PyResult<&'static str> {
         let samples = complex_samples(samples)?;
         let antennas = rows(&samples)?;
-        let arrival_s = finite_arrival(arrival_s)?;
-        let taken = py.detach(|| {
-            let mut core = self.core();
-            core.set_arrival(arrival_s);
-            core.samples(time_s, &antennas)
-        });
-        Ok(match taken.map_err(live_error)? {
+        let taken = self.take(py, arrival_s, |core| core.samples(time_s, &antennas))?;
+        Ok(match taken {
             Continuity::First => "first",
             Continuity::Contiguous => "contiguous",
             Continuity::Gap { .. } => "gap",
@@ -363,7 +385,6 @@ impl Live {
         yaw_rate_radps: Option<f64>,
         arrival_s: Option<f64>,
     ) -> PyResult<bool> {
-        let arrival_s = finite_arrival(arrival_s)?;
         if distance_m.is_some_and(|it| !it.is_finite()) {
             return Err(PyValueError::new_err("distance_m is not a finite number"));
         }
@@ -371,13 +392,9 @@ impl Live {
             distance_m: distance_m.unwrap_or(f64::NAN),
             ..OdometrySample::of_speed(time_s, speed_mps, yaw_rate_radps)
         };
-        let verdict = py.detach(|| {
-            let mut core = self.core();
-            core.set_arrival(arrival_s);
-            core.odometry(&sample)
-        });
+        let verdict = self.take(py, arrival_s, |core| core.odometry(&sample))?;
         Ok(!matches!(
-            verdict.map_err(live_error)?,
+            verdict,
             OdometryResult::DistanceJump { .. } | OdometryResult::YawRateRefused { .. }
         ))
     }
@@ -420,7 +437,6 @@ impl Live {
         at_head: bool,
         arrival_s: Option<f64>,
     ) -> PyResult<()> {
-        let arrival_s = finite_arrival(arrival_s)?;
         let angle = AngleObservation {
             kind: MeasurementKind::of_angle(at_head),
             pci,
@@ -431,12 +447,7 @@ impl Live {
             snr_db,
             resolved,
         };
-        py.detach(|| {
-            let mut core = self.core();
-            core.set_arrival(arrival_s);
-            core.angle(&angle)
-        })
-        .map_err(live_error)
+        self.take(py, arrival_s, |core| core.angle(&angle))
     }
 
     /// Add a two-way range or one-way delay to a radio head that was measured elsewhere. The vehicle
@@ -479,7 +490,6 @@ impl Live {
                 return Err(PyValueError::new_err(text));
             }
         };
-        let arrival_s = finite_arrival(arrival_s)?;
         let range = RangeObservation {
             pci,
             ssb_index,
@@ -487,12 +497,8 @@ impl Live {
             value,
             sigma,
         };
-        let verdict = py.detach(|| {
-            let mut core = self.core();
-            core.set_arrival(arrival_s);
-            core.range(&range)
-        });
-        Ok(verdict.map_err(live_error)?.reason.name())
+        let verdict = self.take(py, arrival_s, |core| core.range(&range))?;
+        Ok(verdict.reason.name())
     }
 
     /// Return the clock step of the odometry in seconds that was detected since the last call; the
@@ -509,7 +515,7 @@ impl Live {
 
     /// Process the received part of a burst without waiting for the rest.
     fn flush(&self, py: Python<'_>) -> PyResult<()> {
-        py.detach(|| self.core().flush()).map_err(live_error)
+        self.call(py, Core::flush)
     }
 
     /// Return the results of the angles since the last call, oldest first, at most 256.
@@ -530,14 +536,13 @@ impl Live {
         covariance: Option<[[f64; 3]; 3]>,
     ) -> PyResult<()> {
         let pose = self::pose(pose);
-        let set = py.detach(|| self.core().set_pose(time_s, pose, covariance));
-        set.map_err(live_error)
+        self.call(py, |core| core.set_pose(time_s, pose, covariance))
     }
 
     /// Reset pose, odometry and estimated constants, and search for the pose. Earlier times are
     /// allowed afterwards.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
-        py.detach(|| self.core().reset()).map_err(live_error)
+        self.call(py, Core::reset)
     }
 
     /// Exclude a cell.
@@ -552,8 +557,8 @@ impl Live {
 
     /// Return the status at a time.
     fn status(&self, py: Python<'_>, now_s: f64) -> PyResult<LiveStatus> {
-        let status = py.detach(|| self.core().status(now_s));
-        status.map(LiveStatus::from).map_err(live_error)
+        self.call(py, |core| core.status(now_s))
+            .map(LiveStatus::from)
     }
 
     /// Return the reception of each radio head that the vehicle uses.
@@ -563,16 +568,14 @@ impl Live {
 
     /// Whether the burst at a time is required according to the current state.
     fn listens(&self, py: Python<'_>, time_s: f64) -> PyResult<bool> {
-        py.detach(|| self.core().listens(time_s))
-            .map_err(live_error)
+        self.call(py, |core| core.listens(time_s))
     }
 
     /// Return the time at which the receiver must be on next. This is the next required burst, or
     /// `now_s` while no SSB is tracked or the pose is searched for. If no burst is required within
     /// a second, it is the time of the next query.
     fn next_wake_up_s(&self, py: Python<'_>, now_s: f64) -> PyResult<f64> {
-        let next_s = py.detach(|| self.core().next_wake_up_s(now_s));
-        next_s.map_err(live_error)
+        self.call(py, |core| core.next_wake_up_s(now_s))
     }
 
     /// Return the activity since the start or the last reset, and its energy.
@@ -593,14 +596,5 @@ const fn pose((x_m, y_m, heading_rad): (f64, f64, f64)) -> Pose {
         x_m,
         y_m,
         heading_rad,
-    }
-}
-
-fn finite_arrival(arrival_s: Option<f64>) -> PyResult<Option<f64>> {
-    match arrival_s {
-        Some(value) if !value.is_finite() => Err(PyValueError::new_err(format!(
-            "arrival_s is {value}; it must be a finite number"
-        ))),
-        other => Ok(other),
     }
 }
