@@ -86,6 +86,20 @@ impl VisibilityModel {
         Ok(())
     }
 
+    /// Returns a radio head that can be used.
+    ///
+    /// # Errors
+    /// [`UpdateReason::Excluded`], [`UpdateReason::UnknownRadioHead`].
+    fn head(&self, pci: u16, ssb_index: u8) -> Result<&RadioHead, UpdateReason> {
+        let sends = |head: &&RadioHead| head.sends(pci, ssb_index);
+        let is_excluded = self.excluded.iter().any(|head| sends(&head));
+        (self.heads.iter().find(sends)).ok_or(if is_excluded {
+            UpdateReason::Excluded
+        } else {
+            UpdateReason::UnknownRadioHead
+        })
+    }
+
     fn at<'a>(
         &'a self,
         time_s: f64,
@@ -417,7 +431,7 @@ impl Pipeline {
             let are_right = |monitors: &Monitors| !monitors.faults().withholds_angles();
             if self.monitors.as_deref().is_none_or(are_right) {
                 self.localizer.update(&mut self.burst)?;
-                self.localizer.update_ranges(&mut self.ranges)?;
+                self.localizer.update(&mut self.ranges)?;
                 for update in &self.burst {
                     if let Some(angle_result) = self.aoa_estimates.get_mut(update.number) {
                         angle_result.verdict = update.verdict;
@@ -456,19 +470,10 @@ impl Pipeline {
         ssb_index: u8,
         measured: &RangeMeasurement,
     ) -> Result<UpdateResult, BoxError> {
-        let VisibilityModel {
-            heads, excluded, ..
-        } = &self.visibility_model;
-        let sends = |head: &&RadioHead| head.sends(pci, ssb_index);
-        let Some(head) = heads.iter().find(sends) else {
-            let reason = if excluded.iter().any(|head| sends(&head)) {
-                UpdateReason::Excluded
-            } else {
-                UpdateReason::UnknownRadioHead
-            };
-            return Ok(UpdateResult::unused(reason));
-        };
-        self.localizer.update_range(head, measured)
+        match self.visibility_model.head(pci, ssb_index) {
+            Ok(head) => self.localizer.update_range(head, measured),
+            Err(reason) => Ok(UpdateResult::unused(reason)),
+        }
     }
 
     /// Requests every burst until angles have confirmed the pose again.
@@ -596,8 +601,7 @@ impl Pipeline {
             return;
         };
         let ssb = observation.ssb;
-        let sends = |head: &&RadioHead| head.sends(ssb.pci, ssb.ssb_index);
-        let Some(&head) = self.visibility_model.heads.iter().find(sends) else {
+        let Ok(&head) = self.visibility_model.head(ssb.pci, ssb.ssb_index) else {
             return;
         };
         let time_s = ssb.time_s - self.angle_time_offset_s;
@@ -623,6 +627,7 @@ impl Pipeline {
         });
         for measured in [rate, delay, phase].into_iter().flatten() {
             self.ranges.push(RangeUpdate {
+                number: self.ranges.len(),
                 head,
                 measured,
                 verdict: UpdateResult::unused(UpdateReason::Unusable),
@@ -636,18 +641,10 @@ impl Pipeline {
             time_s: measured.time_s - self.angle_time_offset_s,
             ..measured
         });
-        let VisibilityModel {
-            heads, excluded, ..
-        } = &self.visibility_model;
-        let sends = |head: &&RadioHead| head.sends(ssb.pci, ssb.ssb_index);
-        let head = heads.iter().find(sends);
-        let reason = match head {
-            Some(_) => UpdateReason::Unusable,
-            None if excluded.iter().any(|head| sends(&head)) => UpdateReason::Excluded,
-            None => UpdateReason::UnknownRadioHead,
-        };
+        let head = self.visibility_model.head(ssb.pci, ssb.ssb_index);
+        let reason = head.err().unwrap_or(UpdateReason::Unusable);
         let verdict = UpdateResult::unused(reason);
-        if let (Some(&head), Some(measured)) = (head, measured) {
+        if let (Ok(&head), Some(measured)) = (head, measured) {
             self.burst.push(AngleUpdate {
                 number: self.aoa_estimates.len(),
                 head,

@@ -23,7 +23,9 @@ pub use dead_reckoning::DeadReckoning;
 pub use ekf::Ekf;
 pub use localizer::{Localizer, Recovered, copy_into};
 pub use modes::AngleEvidence;
-pub use out_of_sequence::{AngleUpdate, HISTORY_S, OutOfSequenceBuffer, RangeUpdate};
+pub use out_of_sequence::{
+    AngleUpdate, HISTORY_S, Measurement, OutOfSequenceBuffer, RangeUpdate, Update,
+};
 pub use output::{
     InitialPose, Integrity, IntegrityState, OdometryResult, PoseEstimate, SelectedHypothesis,
     UpdateReason, UpdateResult,

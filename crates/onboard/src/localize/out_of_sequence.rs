@@ -47,81 +47,78 @@ pub struct OutOfSequenceBuffer {
     newest_s: f64,
 }
 
-/// Angle and the result of its update.
+/// Measurement of a radio head, and the result of its update.
 #[derive(Debug, Clone, Copy)]
-pub struct AngleUpdate {
-    /// Identifier set by the caller.
+pub struct Update<M> {
+    /// Index of the measurement in the results of its burst.
     pub number: usize,
-    /// Radio head of the angle.
-    pub head: RadioHead,
-    /// Measured angle.
-    pub measured: AngleMeasurement,
-    /// Result of the update.
-    pub verdict: UpdateResult,
-}
-
-/// Range, range rate or carrier phase, and the result of its update.
-#[derive(Debug, Clone, Copy)]
-pub struct RangeUpdate {
     /// Radio head of the measurement.
     pub head: RadioHead,
     /// Measured value.
-    pub measured: RangeMeasurement,
+    pub measured: M,
     /// Result of the update.
     pub verdict: UpdateResult,
 }
 
-/// Measurement with a result, of a burst.
-trait Update {
-    fn time_s(&self) -> f64;
+/// Angle, and the result of its update.
+pub type AngleUpdate = Update<AngleMeasurement>;
+
+/// Range, range rate or carrier phase, and the result of its update.
+pub type RangeUpdate = Update<RangeMeasurement>;
+
+/// Measurement of a radio head.
+#[derive(Debug, Clone, Copy)]
+pub enum Measurement {
+    /// Angle.
+    Angle(AngleMeasurement),
+    /// Range, range rate or carrier phase.
+    Range(RangeMeasurement),
+}
+
+impl From<AngleMeasurement> for Measurement {
+    fn from(measured: AngleMeasurement) -> Self {
+        Self::Angle(measured)
+    }
+}
+
+impl From<RangeMeasurement> for Measurement {
+    fn from(measured: RangeMeasurement) -> Self {
+        Self::Range(measured)
+    }
+}
+
+impl Measurement {
+    const fn time_s(&self) -> f64 {
+        match self {
+            Self::Angle(measured) => measured.time_s,
+            Self::Range(measured) => measured.time_s,
+        }
+    }
+}
+
+impl<M: Copy + Into<Measurement>> Update<M> {
+    fn time_s(&self) -> f64 {
+        self.measured.into().time_s()
+    }
+
     /// Returns the input, with its index in its burst while the burst is processed.
-    fn event(&self, number: Option<usize>) -> Event;
-    fn set(&mut self, verdict: UpdateResult);
-}
-
-impl Update for AngleUpdate {
-    fn time_s(&self) -> f64 {
-        self.measured.time_s
-    }
-
     fn event(&self, number: Option<usize>) -> Event {
-        Event::Angle(self.head, self.measured, number)
-    }
-
-    fn set(&mut self, verdict: UpdateResult) {
-        self.verdict = verdict;
-    }
-}
-
-impl Update for RangeUpdate {
-    fn time_s(&self) -> f64 {
-        self.measured.time_s
-    }
-
-    fn event(&self, number: Option<usize>) -> Event {
-        Event::Range(self.head, self.measured, number)
-    }
-
-    fn set(&mut self, verdict: UpdateResult) {
-        self.verdict = verdict;
+        Event::Measurement(self.head, self.measured.into(), number)
     }
 }
 
 #[derive(Clone, Copy)]
 enum Event {
     Odometry(OdometrySample),
-    /// Angle, and its index in its burst while the burst is processed.
-    Angle(RadioHead, AngleMeasurement, Option<usize>),
-    /// Range, and its index in its burst while the burst is processed.
-    Range(RadioHead, RangeMeasurement, Option<usize>),
+    /// Measurement, and its index in its burst while the burst is processed.
+    Measurement(RadioHead, Measurement, Option<usize>),
 }
 
 impl Event {
     const fn time_s(&self) -> f64 {
         match self {
             Self::Odometry(sample) => sample.time_s,
-            Self::Angle(_, measured, _) => measured.time_s,
-            Self::Range(_, measured, _) => measured.time_s,
+            Self::Measurement(_, measured, _) => measured.time_s(),
         }
     }
 }
@@ -171,23 +168,14 @@ impl OutOfSequenceBuffer {
         Ok(verdict)
     }
 
-    /// Updates with the angles of a burst at their own times, and stores the result of each.
+    /// Updates with the measurements of a burst at their own times, and stores the result of each.
     ///
     /// # Errors
     /// Errors of the localizer.
-    pub fn update(&mut self, burst: &mut [AngleUpdate]) -> Result<(), BoxError> {
-        self.update_each(burst)
-    }
-
-    /// Updates with the ranges of a burst at their own times, and stores the result of each.
-    ///
-    /// # Errors
-    /// Errors of the localizer.
-    pub fn update_ranges(&mut self, burst: &mut [RangeUpdate]) -> Result<(), BoxError> {
-        self.update_each(burst)
-    }
-
-    fn update_each<T: Update>(&mut self, burst: &mut [T]) -> Result<(), BoxError> {
+    pub fn update<M: Copy + Into<Measurement>>(
+        &mut self,
+        burst: &mut [Update<M>],
+    ) -> Result<(), BoxError> {
         for number in 0..burst.len() {
             let (_, rest) = burst.split_at_mut(number);
             let Some(update) = rest.first_mut() else {
@@ -201,7 +189,7 @@ impl OutOfSequenceBuffer {
             }
             let event = update.event(None);
             if let Some(verdict) = self.process(&event)? {
-                update.set(verdict);
+                update.verdict = verdict;
             }
             self.store_event(event);
         }
@@ -218,12 +206,13 @@ impl OutOfSequenceBuffer {
         measured: &RangeMeasurement,
     ) -> Result<UpdateResult, BoxError> {
         let mut update = [RangeUpdate {
+            number: 0,
             head: *head,
             measured: *measured,
             verdict: UpdateResult::unused(UpdateReason::Unusable),
         }];
         if measured.time_s.is_finite() {
-            self.update_ranges(&mut update)?;
+            self.update(&mut update)?;
         }
         let [RangeUpdate { verdict, .. }] = update;
         Ok(verdict)
@@ -233,25 +222,30 @@ impl OutOfSequenceBuffer {
     fn process(&mut self, event: &Event) -> Result<Option<UpdateResult>, BoxError> {
         match event {
             Event::Odometry(sample) => self.localizer.odometry(sample).map(|_| None),
-            Event::Angle(head, measured, _) => self.localizer.update(head, measured).map(Some),
-            Event::Range(head, measured, _) => {
+            Event::Measurement(head, Measurement::Angle(measured), _) => {
+                self.localizer.update(head, measured).map(Some)
+            }
+            Event::Measurement(head, Measurement::Range(measured), _) => {
                 self.localizer.update_range(head, measured).map(Some)
             }
         }
     }
 
-    fn update_late<T: Update>(&mut self, burst: &mut [T]) -> Result<(), BoxError> {
+    fn update_late<M: Copy + Into<Measurement>>(
+        &mut self,
+        burst: &mut [Update<M>],
+    ) -> Result<(), BoxError> {
         for update in &mut *burst {
             let reason = if update.time_s().is_nan() {
                 UpdateReason::Unusable
             } else {
                 UpdateReason::TooLate
             };
-            update.set(UpdateResult::unused(reason));
+            update.verdict = UpdateResult::unused(reason);
         }
         let copies = self.kept.iter().take(self.copies);
         let oldest_s = (copies.clone().next()).map_or(f64::INFINITY, |copy| copy.time_s);
-        let in_memory = |update: &&T| update.time_s() >= oldest_s;
+        let in_memory = |update: &&Update<M>| update.time_s() >= oldest_s;
         let times_s = burst.iter().filter(in_memory).map(Update::time_s);
         let first_s = times_s.fold(f64::INFINITY, f64::min);
         let from = copies.take_while(|copy| copy.time_s <= first_s).count();
@@ -280,7 +274,7 @@ impl OutOfSequenceBuffer {
                 break;
             };
             let waits = match event {
-                Event::Angle(_, _, number) | Event::Range(_, _, number) => number.take(),
+                Event::Measurement(_, _, number) => number.take(),
                 Event::Odometry(_) => None,
             };
             let event = *event;
@@ -290,7 +284,7 @@ impl OutOfSequenceBuffer {
             }
             let update = waits.and_then(|number| burst.get_mut(number));
             if let (Some(update), Some(verdict)) = (update, verdict) {
-                update.set(verdict);
+                update.verdict = verdict;
             }
         }
         self.forget();
