@@ -9,7 +9,7 @@ use super::localizer::Localizer;
 use super::output::InitialPose;
 use crate::geometry::Pose;
 use crate::radio_head::RadioHead;
-use crate::settings::{LocalizerSettings, SettingsError, Site, Vehicle};
+use crate::settings::{IntegritySettings, LocalizerSettings, SettingsError, Site, Vehicle};
 
 /// Returns the localizer of a vehicle at a site: at `start`, or with a search along the road if the
 /// settings specify an unknown start.
@@ -34,6 +34,7 @@ pub fn built_in(
     let config = EkfConfig::new(site, vehicle);
     let heads = RadioHead::received_by(site, vehicle);
     let integrity = vehicle.integrity_monitor();
+    let integrity = integrity.unwrap_or_else(IntegritySettings::off);
     let road = site.build_road()?.filter(|_| vehicle.follows_road());
     if !vehicle.start.known {
         let either = vehicle.start.either_direction;
@@ -47,6 +48,6 @@ pub fn built_in(
     };
     let ekf = Ekf::new(config, road.clone().map(Arc::new), &heads, &start);
     Ok(Box::new(Relocalizer::tracking(
-        ekf, road, &heads, integrity,
+        &ekf, road, &heads, integrity,
     )))
 }

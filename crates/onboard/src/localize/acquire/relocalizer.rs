@@ -63,135 +63,8 @@ const START_STD_M: f64 = 1.0;
 struct DriveConfig {
     road: Option<Road>,
     heads: Vec<RadioHead>,
-    integrity: Option<IntegritySettings>,
+    integrity: IntegritySettings,
     quantile: RadialQuantile,
-}
-
-/// One filter, or a monitored bank of filters.
-#[derive(Debug)]
-enum Solution {
-    Bare(Box<Ekf>),
-    Monitored(Box<IntegrityMonitor>),
-}
-
-impl Clone for Solution {
-    fn clone(&self) -> Self {
-        match self {
-            Self::Bare(ekf) => Self::Bare(ekf.clone()),
-            Self::Monitored(monitor) => Self::Monitored(monitor.clone()),
-        }
-    }
-
-    fn clone_from(&mut self, source: &Self) {
-        match (self, source) {
-            (Self::Bare(mine), Self::Bare(theirs)) => (**mine).clone_from(theirs),
-            (Self::Monitored(mine), Self::Monitored(theirs)) => (**mine).clone_from(theirs),
-            (mine, theirs) => *mine = theirs.clone(),
-        }
-    }
-}
-
-impl Solution {
-    /// Creates the solution of a filter whose position was given, or found at `found_s`.
-    fn new(ekf: Ekf, drive_config: &DriveConfig, found_s: Option<f64>) -> Self {
-        match drive_config.integrity {
-            Some(settings) => Self::Monitored(Box::new(IntegrityMonitor::new(
-                &ekf,
-                &drive_config.heads,
-                settings,
-                found_s,
-            ))),
-            None => Self::Bare(Box::new(ekf)),
-        }
-    }
-
-    const fn monitor(&self) -> Option<&IntegrityMonitor> {
-        match self {
-            Self::Bare(_) => None,
-            Self::Monitored(monitor) => Some(monitor),
-        }
-    }
-
-    /// Returns the filter that uses every fault-free source.
-    fn ekf(&self) -> &Ekf {
-        match self {
-            Self::Bare(ekf) => ekf,
-            Self::Monitored(monitor) => monitor.ekf(),
-        }
-    }
-
-    /// Returns the filter without a fault.
-    fn nominal(&self) -> &Ekf {
-        match self {
-            Self::Bare(ekf) => ekf,
-            Self::Monitored(monitor) => monitor.bank().nominal(),
-        }
-    }
-
-    /// Returns the time of the solution's last restart (s).
-    fn begun_s(&self) -> f64 {
-        (self.monitor()).map_or(f64::NEG_INFINITY, IntegrityMonitor::begun_s)
-    }
-
-    /// Whether the selected hypothesis explains contradicting angles without a lost vehicle.
-    fn may_explain_contradictions(&self) -> bool {
-        (self.monitor()).is_some_and(|it| it.bank().may_explain_contradictions())
-    }
-
-    /// Returns the ratio of the angles' measured variance to the specified one, if it is estimated.
-    fn noise_scale(&self) -> f64 {
-        (self.monitor()).map_or(1.0, |it| it.bank().noise_scale())
-    }
-
-    fn odometry(&mut self, sample: &OdometrySample) -> OdometryResult {
-        match self {
-            Self::Bare(ekf) => ekf.odometry(sample),
-            Self::Monitored(monitor) => monitor.odometry(sample),
-        }
-    }
-
-    fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateResult {
-        match self {
-            Self::Bare(ekf) => ekf.update(head, measured),
-            Self::Monitored(monitor) => monitor.update(head, measured),
-        }
-    }
-
-    fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
-        match self {
-            Self::Bare(ekf) => ekf.update_range(head, measured),
-            Self::Monitored(monitor) => monitor.update_range(head, measured),
-        }
-    }
-
-    /// Whether a bank of filters contradicts the measurements.
-    fn is_contradicted(&self) -> bool {
-        (self.monitor()).is_some_and(|it| it.bank().is_lost())
-    }
-
-    fn pose(&self, time_s: f64) -> PoseEstimate {
-        self.pose_among(time_s, std::iter::empty())
-    }
-
-    /// Returns the pose, with a protection level that includes other positions, each with its
-    /// probability.
-    fn pose_among(
-        &self,
-        time_s: f64,
-        others: impl Iterator<Item = (f64, PoseEstimate)>,
-    ) -> PoseEstimate {
-        match self {
-            Self::Bare(ekf) => ekf.pose(time_s),
-            Self::Monitored(monitor) => monitor.pose(time_s, others),
-        }
-    }
-
-    /// Keeps a journal if there is no bank; the filters of a bank replace each other.
-    fn keep_journal(&mut self) {
-        if let Self::Bare(ekf) = self {
-            ekf.keep_journal();
-        }
-    }
 }
 
 clone_in_place! {
@@ -203,7 +76,7 @@ clone_in_place! {
         /// Search for the initial pose; `None` once the pose is known.
         search: Option<GaussianSum>,
         /// Solution; `None` during the search for the initial pose.
-        solution: Option<Solution>,
+        solution: Option<Box<IntegrityMonitor>>,
         consistency: ConsistencyMonitor,
         /// Test between the solution and a search in parallel, while it runs.
         test: Option<RelocalizationTest>,
@@ -226,10 +99,10 @@ impl Relocalizer {
     /// Creates a localizer that tracks with a filter of these radio heads; `road` is the region of
     /// a search if the vehicle is lost.
     pub fn tracking(
-        ekf: Ekf,
+        ekf: &Ekf,
         road: Option<Road>,
         heads: &[RadioHead],
-        integrity: Option<IntegritySettings>,
+        integrity: IntegritySettings,
     ) -> Self {
         let phase = if road.is_none() {
             Phase::Given
@@ -237,10 +110,11 @@ impl Relocalizer {
             Phase::Tracking
         };
         let mut made = Self::new(phase, road, heads, integrity);
-        made.wrong_start =
-            (integrity.unwrap_or_default().fault_probability).of_radio_head(ekf.is_with_bias());
-        made.heading = HeadingSearch::new(&ekf, heads, START_STD_M);
-        made.solution = Some(Solution::new(ekf, &made.drive_config, None));
+        made.wrong_start = integrity
+            .fault_probability
+            .of_radio_head(ekf.is_with_bias());
+        made.heading = HeadingSearch::new(ekf, heads, START_STD_M);
+        made.solution = Some(made.solution_of(ekf, None));
         made
     }
 
@@ -248,7 +122,7 @@ impl Relocalizer {
     pub fn searching(
         search: GaussianSum,
         road: Option<Road>,
-        integrity: Option<IntegritySettings>,
+        integrity: IntegritySettings,
     ) -> Self {
         let mut made = Self::new(Phase::Searching, road, search.heads(), integrity);
         made.search = Some(search);
@@ -259,7 +133,7 @@ impl Relocalizer {
         phase: Phase,
         road: Option<Road>,
         heads: &[RadioHead],
-        integrity: Option<IntegritySettings>,
+        integrity: IntegritySettings,
     ) -> Self {
         Self {
             phase,
@@ -278,7 +152,7 @@ impl Relocalizer {
                 road,
                 heads: heads.to_vec(),
                 integrity,
-                quantile: RadialQuantile::new(integrity.unwrap_or_default().risk_per_epoch()),
+                quantile: RadialQuantile::new(integrity.risk_per_epoch()),
             }),
         }
     }
@@ -299,19 +173,25 @@ impl Relocalizer {
     }
 
     fn change_motion(&mut self, change: impl Fn(&mut Ekf)) {
-        match &mut self.solution {
-            Some(Solution::Bare(ekf)) => change(ekf),
-            Some(Solution::Monitored(monitor)) => monitor.change_motion(change),
-            None => {}
+        if let Some(solution) = &mut self.solution {
+            solution.change_motion(change);
         }
         self.end_search();
         self.heading = None;
         self.consistency.reset();
     }
 
+    /// Creates the solution of a filter whose position was given, or found at `found_s`.
+    fn solution_of(&self, ekf: &Ekf, found_s: Option<f64>) -> Box<IntegrityMonitor> {
+        let DriveConfig {
+            heads, integrity, ..
+        } = &*self.drive_config;
+        Box::new(IntegrityMonitor::new(ekf, heads, *integrity, found_s))
+    }
+
     /// Tracks with the result of a search at time `now_s`.
-    fn track(&mut self, found: Ekf, now_s: f64) {
-        let mut solution = Solution::new(found, &self.drive_config, Some(now_s));
+    fn track(&mut self, found: &Ekf, now_s: f64) {
+        let mut solution = self.solution_of(found, Some(now_s));
         if self.keeps_journal {
             solution.keep_journal();
         }
@@ -321,7 +201,7 @@ impl Relocalizer {
     }
 
     /// Replaces the solution with the pose `from` by the result of a search at time `now_s`.
-    fn take_over(&mut self, found: Ekf, from: Pose, now_s: f64) {
+    fn take_over(&mut self, found: &Ekf, from: Pose, now_s: f64) {
         let [x_m, y_m, turned_rad] = from.offset_of(found.pose(now_s).pose);
         self.recovered = Some(Recovered {
             time_s: now_s,
@@ -338,7 +218,7 @@ impl Relocalizer {
         };
         let ekf = solution.ekf();
         let Some(search) = &self.heading else {
-            let is_contradicted = solution.is_contradicted() && !self.has_angles;
+            let is_contradicted = solution.bank().is_lost() && !self.has_angles;
             if is_contradicted && now_s >= self.rests_until_s {
                 self.heading = HeadingSearch::new(ekf, &self.drive_config.heads, NEARBY_M);
                 self.rests_until_s = now_s + REST_S;
@@ -346,8 +226,8 @@ impl Relocalizer {
             return;
         };
         if let Some(found) = search.found().cloned() {
-            let from = solution.pose(now_s).pose;
-            self.take_over(found, from, now_s);
+            let from = solution.pose(now_s, std::iter::empty()).pose;
+            self.take_over(&found, from, now_s);
             self.heading = None;
         } else if search.is_over(ekf) {
             self.heading = None;
@@ -372,11 +252,7 @@ impl Relocalizer {
         let given = solution.ekf();
         let mut search = GaussianSum::as_stated(given.config(), road.cloned(), heads);
         search.resume(given);
-        let risk = self
-            .drive_config
-            .integrity
-            .unwrap_or_default()
-            .risk_per_epoch();
+        let risk = self.drive_config.integrity.risk_per_epoch();
         self.test = Some(RelocalizationTest::of_start(
             search,
             given,
@@ -405,7 +281,7 @@ impl Relocalizer {
         let is_wide = phase == Phase::Relocalizing { wide: true };
         let test = (self.solution.as_ref()).and_then(|solution| {
             let search = self.search_about(solution, now_s, is_wide)?;
-            let may_explain_contradictions = solution.may_explain_contradictions();
+            let may_explain_contradictions = solution.bank().may_explain_contradictions();
             Some(RelocalizationTest::new(
                 search,
                 solution.ekf(),
@@ -422,11 +298,16 @@ impl Relocalizer {
 
     /// Returns a nearby search, or one in the area of the radio heads. It is wide immediately if
     /// both regions are equal.
-    fn search_about(&self, solution: &Solution, now_s: f64, is_wide: bool) -> Option<GaussianSum> {
+    fn search_about(
+        &self,
+        solution: &IntegrityMonitor,
+        now_s: f64,
+        is_wide: bool,
+    ) -> Option<GaussianSum> {
         let (ekf, heads) = (solution.ekf(), self.drive_config.heads.as_slice());
         let mut config = *ekf.config();
         if config.measured_noise_scale.is_some() {
-            config.set_noise_scale(Some(solution.noise_scale()));
+            config.set_noise_scale(Some(solution.bank().noise_scale()));
         }
         let road = self.drive_config.road.as_ref();
         let mut search = match road {
@@ -436,7 +317,7 @@ impl Relocalizer {
                 GaussianSum::new(config, None, true, heads)
             }
             None => {
-                let here = solution.pose(now_s);
+                let here = solution.pose(now_s, std::iter::empty());
                 let three_m = 3.0 * here.principal_variances()[0].sqrt();
                 let nearby_m = NEARBY_M + three_m.min(MAX_NEARBY_M);
                 let area = Area::around(here.pose.point(), nearby_m);
@@ -447,7 +328,7 @@ impl Relocalizer {
         Some(search)
     }
 
-    fn evidence(&self, solution: &Solution, now_s: f64) -> Evidence {
+    fn evidence(&self, solution: &IntegrityMonitor, now_s: f64) -> Evidence {
         let odometry_s = solution.ekf().time_s();
         let is = |what: &dyn Fn(&RelocalizationTest) -> bool| self.test.as_ref().is_some_and(what);
         let compared = |it: &RelocalizationTest| it.compare(self.phase == Phase::Confirming);
@@ -456,14 +337,16 @@ impl Relocalizer {
         Evidence {
             is_lost: self.consistency.is_lost(),
             is_consistent: self.consistency.is_consistent(),
-            may_explain_contradictions: solution.may_explain_contradictions(),
+            may_explain_contradictions: solution.bank().may_explain_contradictions(),
             pause_has_elapsed: now_s >= self.rests_until_s,
             search,
             is_found: is(&|it| it.search.found().is_some()),
             is_of_start,
             is_merged: is(&RelocalizationTest::is_merged),
             other_start_is_likelier: self.other_start_is_likelier(),
-            agrees: is(&|it| it.agrees_with(solution.ekf()) && it.agrees_with(solution.nominal())),
+            agrees: is(&|it| {
+                it.agrees_with(solution.ekf()) && it.agrees_with(solution.bank().nominal())
+            }),
             is_just_reported: is(&|it| it.reported_s == odometry_s),
             has_moved: is(&|it| it.driven_m >= it.min_driven_m()),
             has_moved_far: is(&|it| it.driven_m > LONG_DISTANCE_M),
@@ -495,8 +378,8 @@ impl Relocalizer {
             }
             Transition::TakeOver => {
                 if let Some(found) = self.test.as_ref().and_then(|it| it.search.found()) {
-                    let from = solution.pose(now_s).pose;
-                    self.take_over(found, from, now_s);
+                    let from = solution.pose(now_s, std::iter::empty()).pose;
+                    self.take_over(&found, from, now_s);
                 }
             }
             Transition::End { rests } => {
@@ -542,7 +425,7 @@ impl Localizer for Relocalizer {
             }
             let verdict = search.update(head, measured);
             if let Some(found) = search.found() {
-                self.track(found, now_s);
+                self.track(&found, now_s);
             }
             return Ok(verdict);
         }
@@ -567,7 +450,8 @@ impl Localizer for Relocalizer {
         }
         let begun_s = solution.begun_s();
         let verdict = solution.update(head, measured);
-        let (has_restarted, noise_scale) = (solution.begun_s() > begun_s, solution.noise_scale());
+        let (has_restarted, noise_scale) =
+            (solution.begun_s() > begun_s, solution.bank().noise_scale());
         if has_restarted && self.is_lost() && !self.is_of_start() {
             // The filter that was lost has been replaced.
             self.end_search();
@@ -600,14 +484,14 @@ impl Localizer for Relocalizer {
         let Some(solution) = &self.solution else {
             let mut estimate = self.search.as_ref().ok_or("no search")?.pose(time_s);
             let level_m = quantile.radius(estimate.principal_variances());
-            estimate.integrity =
-                (self.drive_config.integrity).map(|_| Integrity::unavailable(level_m));
+            let is_monitored = self.drive_config.integrity.enabled;
+            estimate.integrity = is_monitored.then(|| Integrity::unavailable(level_m));
             return Ok(estimate);
         };
         let of_start = self.test.as_ref().filter(|it| it.is_of_start());
         let mut estimate = match of_start {
-            Some(test) if !self.is_lost() => solution.pose_among(time_s, test.other_starts(time_s)),
-            _ => solution.pose(time_s),
+            Some(test) if !self.is_lost() => solution.pose(time_s, test.other_starts(time_s)),
+            _ => solution.pose(time_s, std::iter::empty()),
         };
         if let (true, Some(test)) = (self.is_lost(), &self.test) {
             let searched = test.search.pose(time_s);
@@ -654,13 +538,11 @@ impl Localizer for Relocalizer {
     }
 
     fn ekf(&self) -> Option<&Ekf> {
-        self.solution.as_ref().map(Solution::ekf)
+        self.solution.as_ref().map(|it| it.ekf())
     }
 
     fn worst_case(&self) -> Option<&Ekf> {
-        let solution = self.solution.as_ref()?;
-        let monitor = solution.monitor().map(IntegrityMonitor::worst_case);
-        Some(monitor.unwrap_or_else(|| solution.ekf()))
+        self.solution.as_ref().map(|it| it.worst_case())
     }
 
     fn keep_journal(&mut self) {

@@ -70,7 +70,7 @@ impl Handover {
 }
 
 clone_in_place! {
-    /// Bank of filters and its monitoring.
+    /// Bank of filters and its monitoring. Without monitoring, the bank has one filter.
     #[derive(Debug)]
     pub struct IntegrityMonitor {
         settings: IntegritySettings,
@@ -104,21 +104,25 @@ clone_in_place! {
 }
 
 impl IntegrityMonitor {
-    /// Creates the monitor of a filter of these radio heads. A filter from a search, in contrast to
-    /// a given one, must be confirmed.
+    /// Creates the monitor of a filter of these radio heads. If monitoring is enabled, a filter from
+    /// a search, in contrast to a given one, must be confirmed.
     pub fn new(
         ekf: &Ekf,
         heads: &[RadioHead],
         settings: IntegritySettings,
         found_s: Option<f64>,
     ) -> Self {
-        let is_found = found_s.is_some();
+        let is_found = settings.enabled && found_s.is_some();
         let found_s = found_s.unwrap_or(f64::NEG_INFINITY);
         Self {
             level: LevelEquation::new(settings.risk_per_epoch()),
             hypotheses: RefCell::default(),
             trusted_m: ekf.driven_m(),
-            bank: Bank::new(ekf, heads, &settings, found_s),
+            bank: if settings.enabled {
+                Bank::new(ekf, heads, &settings, found_s)
+            } else {
+                Bank::of_one(ekf, &settings)
+            },
             restarted: None,
             handover: None,
             is_found,
@@ -138,7 +142,7 @@ impl IntegrityMonitor {
     /// of the hypothesis with the largest contribution; otherwise the selected one.
     pub fn worst_case(&self) -> &Ekf {
         let (bank, now_s) = (&self.bank, self.ekf().time_s());
-        if self.is_near(bank, now_s) {
+        if !self.settings.enabled || self.is_near(bank, now_s) {
             return bank.leader();
         }
         let beyond = |(clean, hypothesis)| {
@@ -167,6 +171,14 @@ impl IntegrityMonitor {
         self.trusted_m = self.bank.nominal().driven_m();
     }
 
+    /// Keeps a journal for smoothing if there is one filter; the filters of a monitored bank replace
+    /// each other.
+    pub fn keep_journal(&mut self) {
+        if !self.settings.enabled {
+            self.bank.keep_journal();
+        }
+    }
+
     /// Predicts every filter.
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryResult {
         if let Some(restarted) = &mut self.restarted {
@@ -192,6 +204,9 @@ impl IntegrityMonitor {
         time_s: f64,
         update: impl Fn(&mut Bank) -> UpdateResult,
     ) -> UpdateResult {
+        if !self.settings.enabled {
+            return update(&mut self.bank);
+        }
         self.now_s = self.now_s.max(time_s);
         let odometry_s = self.ekf().time_s();
         let (solution_id, before) = (self.solution_id(), self.ekf().pose(odometry_s));
@@ -275,6 +290,9 @@ impl IntegrityMonitor {
         others: impl Iterator<Item = (f64, PoseEstimate)>,
     ) -> PoseEstimate {
         let mut pose = self.bank.leader().pose(time_s);
+        if !self.settings.enabled {
+            return pose;
+        }
         let mixture = self.bank.mixture();
         pose.mix(mixture.map(|(probability, right)| (probability, right.pose(time_s))));
         pose.integrity = Some(self.integrity(time_s, others));

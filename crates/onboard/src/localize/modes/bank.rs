@@ -177,6 +177,11 @@ impl Bank {
         Self::with(given, heads, settings, modes, now_s)
     }
 
+    /// Creates a bank of one filter, without hypotheses and tests of radio heads.
+    pub fn of_one(given: &Ekf, settings: &IntegritySettings) -> Self {
+        Self::with(given, &[], settings, Vec::new(), f64::NEG_INFINITY)
+    }
+
     fn with(
         given: &Ekf,
         heads: &[RadioHead],
@@ -206,6 +211,11 @@ impl Bank {
     /// Returns the filter of all fault-free radio heads with the nominal model.
     pub const fn nominal(&self) -> &Ekf {
         &self.nominal
+    }
+
+    /// Keeps a journal of the nominal filter for smoothing.
+    pub fn keep_journal(&mut self) {
+        self.nominal.keep_journal();
     }
 
     /// Returns a bank that restarts at time `now_s` with the nominal model, from an uncertain pose
