@@ -3,18 +3,8 @@
 use thiserror::Error;
 
 use super::course::{Gap, Piece, Road};
+use super::segment::Segment;
 use crate::geometry::{Point, Pose, wrap_angle};
-
-/// Description of a line or arc: length and heading change.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Segment {
-    /// Length in metres.
-    pub length_m: f64,
-    /// Heading change over this length in radians; positive to the left, zero for a line.
-    pub turn_rad: f64,
-    /// Whether the position was surveyed; otherwise it is a guess, which must be straight.
-    pub surveyed: bool,
-}
 
 /// Maximum length of a road (m). Exchanged latitude and longitude produce longer ones.
 const LONGEST_M: f64 = 1e6;

@@ -386,7 +386,7 @@ mod tests {
 
     /// Creates a left bend of 20 m radius between straights, sampled at a spacing.
     fn bend(spacing_m: f64) -> (Road, Road) {
-        let segment = |length_m: f64, turn_rad: f64| super::super::build::Segment {
+        let segment = |length_m: f64, turn_rad: f64| super::super::Segment {
             length_m,
             turn_rad,
             surveyed: true,

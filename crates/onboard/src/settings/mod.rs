@@ -47,7 +47,7 @@ pub use radio::{HeadArraySettings, RadioHeadSettings, SsbSettings};
 pub use ranging::{RangingKind, RangingSettings};
 pub use read::{from_table, parse};
 pub use receiver::{EstimatorMethod, EstimatorSettings, Pilots, ReceiverSettings};
-pub use road::{RoadSettings, SegmentSettings};
+pub use road::RoadSettings;
 pub use shipped::Shipped;
 pub use site::{SPEED_OF_LIGHT_MPS, Site};
 pub use start::StartSettings;

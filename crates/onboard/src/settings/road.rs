@@ -1,6 +1,6 @@
 //! Road of a site.
 
-use schemars::{JsonSchema, Schema, SchemaGenerator};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
@@ -29,7 +29,7 @@ pub struct RoadSettings {
     pub start: Pose,
     /// Straight lines and arcs, joined with a continuous heading.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub segments: Option<Vec<SegmentSettings>>,
+    pub segments: Option<Vec<Segment>>,
     /// Surveyed points `[x, y]` in metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(inner(range(min = -1e7, max = 1e7))))]
@@ -41,80 +41,8 @@ pub struct RoadSettings {
     pub file: Option<String>,
 }
 
-/// Straight line or arc.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "WrittenSegment")]
-pub struct SegmentSettings {
-    /// Length in metres.
-    pub length_m: f64,
-    /// Heading change over this length in radians; positive to the left.
-    pub turn_rad: f64,
-    /// Whether the position of this segment is known.
-    pub surveyed: bool,
-}
-
-/// Segment in the file format: an arc has a length or a radius.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(rename = "SegmentSettings")]
-struct WrittenSegment {
-    /// Length in metres; an arc may have `radius_m` instead.
-    #[schemars(range(min = 1e-6, max = 1e5))]
-    length_m: Option<f64>,
-    /// Radius of an arc in metres.
-    #[schemars(range(min = 0.01, max = 1e5))]
-    radius_m: Option<f64>,
-    /// Heading change over this length in radians; positive to the left.
-    #[schemars(range(min = -100.0, max = 100.0))]
-    turn_rad: Option<f64>,
-    /// Whether the segment was surveyed [true]. The geometry of an unsurveyed segment is a guess,
-    /// such as the chord between surveyed segments, and must be straight. The tracker does not use
-    /// it as a constraint; a simulated vehicle follows it.
-    #[serde(default = "surveyed")]
-    surveyed: bool,
-}
-
-impl TryFrom<WrittenSegment> for SegmentSettings {
-    type Error = &'static str;
-
-    fn try_from(written: WrittenSegment) -> Result<Self, &'static str> {
-        let turn_rad = written.turn_rad.unwrap_or(0.0);
-        let length_m = match (written.length_m, written.radius_m) {
-            (Some(length_m), None) => length_m,
-            (None, Some(radius_m)) if radius_m >= 0.01 && turn_rad != 0.0 => {
-                radius_m * turn_rad.abs()
-            }
-            (None, Some(_)) => {
-                return Err(
-                    "a bend needs a `radius_m` of 0.01 m or more and a `turn_rad` that is not 0",
-                );
-            }
-            _ => return Err("one of `length_m` and, of a bend, `radius_m` is needed"),
-        };
-        Ok(Self {
-            length_m,
-            turn_rad,
-            surveyed: written.surveyed,
-        })
-    }
-}
-
-impl JsonSchema for SegmentSettings {
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        WrittenSegment::schema_name()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        WrittenSegment::json_schema(generator)
-    }
-}
-
 /// Standard deviation of drawn points, if none is specified (m).
 const DRAWN_STD_M: f64 = 0.02;
-
-const fn surveyed() -> bool {
-    true
-}
 
 impl Default for RoadSettings {
     fn default() -> Self {
@@ -173,15 +101,7 @@ impl RoadSettings {
     pub fn build(&self, key: &str, check: Check<'_>) -> Result<Road, SettingsError> {
         let (shape, road) = match (&self.segments, &self.polyline_m) {
             (Some(segments), None) => {
-                let segments: Vec<Segment> = segments
-                    .iter()
-                    .map(|it| Segment {
-                        length_m: it.length_m,
-                        turn_rad: it.turn_rad,
-                        surveyed: it.surveyed,
-                    })
-                    .collect();
-                let road = Road::from_segments(self.start, &segments, self.width_m);
+                let road = Road::from_segments(self.start, segments, self.width_m);
                 ("segments", road)
             }
             (None, Some(polyline)) => {
@@ -217,30 +137,5 @@ impl RoadSettings {
             };
             check.error(&format!("{key}.{shape}{at}"), value, &error.to_string())
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn read(text: &str) -> Result<SegmentSettings, String> {
-        toml::from_str(text).map_err(|error| error.to_string())
-    }
-
-    #[test]
-    fn a_bend_is_given_by_radius_and_angle_or_by_its_length() {
-        let bend = read("radius_m = 25.0\nturn_rad = -1.0471975511965976").unwrap();
-        let same = read("length_m = 26.179938779914945\nturn_rad = -1.0471975511965976").unwrap();
-        assert!((bend.length_m - same.length_m).abs() < 1e-12);
-        assert!((bend.turn_rad - same.turn_rad).abs() < 1e-12);
-        for wrong in [
-            "turn_rad = 1.0",
-            "radius_m = 25.0",
-            "radius_m = -25.0\nturn_rad = 1.0",
-            "radius_m = 25.0\nlength_m = 3.0",
-        ] {
-            assert!(read(wrong).unwrap_err().contains('`'), "{wrong}");
-        }
     }
 }
