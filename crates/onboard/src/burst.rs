@@ -5,6 +5,9 @@ use crate::localize::AngleMeasurement;
 use crate::observation::{BURST_S, SsbDetection, SsbObservation};
 use crate::pipeline::{SsbInput, SsbSource};
 
+/// SNR that is assumed for an angle without one, in dB. It suffices for every wake-up policy.
+pub const UNSTATED_SNR_DB: f64 = 20.0;
+
 /// Item that contains one SSB.
 pub trait HasSsb {
     /// Returns the SSB.
@@ -23,13 +26,22 @@ impl HasSsb for SsbObservation {
     }
 }
 
-impl HasSsb for (SsbDetection, AngleMeasurement) {
+/// Angle that was estimated elsewhere, with its SSB.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoggedAngle {
+    /// Cell, SSB index, time and SNR.
+    pub ssb: SsbDetection,
+    /// The angle.
+    pub measured: AngleMeasurement,
+}
+
+impl HasSsb for LoggedAngle {
     fn ssb(&self) -> &SsbDetection {
-        &self.0
+        &self.ssb
     }
 
     fn observed(&self) -> SsbInput<'_> {
-        SsbInput::Angle(self.1)
+        SsbInput::Angle(self.measured)
     }
 }
 

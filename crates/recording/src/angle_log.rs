@@ -19,9 +19,8 @@ use std::path::Path;
 use crate::error::RecordingError;
 use crate::file as files;
 use crate::table::Table;
-use onboard::SsbInput;
-use onboard::burst::HasSsb;
-use onboard::live::AngleObservation;
+pub use onboard::burst::LoggedAngle;
+use onboard::burst::UNSTATED_SNR_DB;
 use onboard::localize::{AngleMeasurement, MeasurementKind};
 use onboard::observation::{BURST_S, SsbDetection};
 use onboard::time_unit::TimeUnit;
@@ -63,44 +62,6 @@ const DEVIATIONS: &str = "# phase_sigma_rad: total modelled error: receiver nois
 
 /// Standard deviation of a uniformly distributed angle, π/√3 (rad).
 const MAX_SIGMA_RAD: f64 = 1.813_799_364_234_217_8;
-
-/// Default SNR (dB) of an angle, sufficient for any policy.
-const UNSTATED_SNR_DB: f64 = 20.0;
-
-/// Angle with its SSB.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LoggedAngle {
-    /// Cell, SSB index, time and SNR.
-    pub ssb: SsbDetection,
-    /// The angle.
-    pub measured: AngleMeasurement,
-}
-
-impl From<&LoggedAngle> for AngleObservation {
-    fn from(logged: &LoggedAngle) -> Self {
-        let LoggedAngle { ssb, measured } = logged;
-        Self {
-            kind: measured.kind,
-            pci: ssb.pci,
-            ssb_index: ssb.ssb_index,
-            time_s: ssb.time_s,
-            phase_rad: measured.phase_rad,
-            sigma_rad: measured.phase_sigma_rad,
-            snr_db: Some(ssb.snr_db),
-            resolved: measured.resolved,
-        }
-    }
-}
-
-impl HasSsb for LoggedAngle {
-    fn ssb(&self) -> &SsbDetection {
-        &self.ssb
-    }
-
-    fn observed(&self) -> SsbInput<'_> {
-        SsbInput::Angle(self.measured)
-    }
-}
 
 /// Usable angles of a file in order of time, and remarks on single lines.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use onboard::settings::Check;
 use recording::replay::{all_of_error, scatter_sigma_rad};
-use recording::{LoggedAngle, RecordingError, TimedPose};
+use recording::{RecordingError, TimedPose};
 use recording::{write_angle_log, write_odometry_csv, write_tum};
 
 use crate::measurement_trace::MeasurementTrace;
@@ -47,10 +47,10 @@ pub fn log_angles(
     let scatter_rad = scatter_sigma_rad(&scenario.site, &scenario.vehicle);
     let angles: Vec<_> = trace
         .angles_of(0)
-        .filter(|(ssb, _)| ssb.time_s <= end_s)
-        .map(|(ssb, mut measured)| {
-            measured.phase_sigma_rad = measured.phase_sigma_rad.hypot(scatter_rad);
-            LoggedAngle { ssb, measured }
+        .filter(|it| it.ssb.time_s <= end_s)
+        .map(|mut it| {
+            it.measured.phase_sigma_rad = it.measured.phase_sigma_rad.hypot(scatter_rad);
+            it
         })
         .collect();
     let mut vehicle = all_of_error(&scenario.site, &scenario.vehicle);

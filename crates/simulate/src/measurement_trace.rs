@@ -6,6 +6,7 @@
 //! selects among these angles gets the same record as in its own drive, bit by bit, in a small
 //! fraction of the computing time.
 
+use onboard::burst::LoggedAngle;
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
 use onboard::observation::{OdometrySample, SsbDetection, SsbObservation};
@@ -115,13 +116,15 @@ impl MeasurementTraces {
 
 impl MeasurementTrace {
     /// Returns the SSBs and angles of a method in order of time.
-    pub fn angles_of(
-        &self,
-        method: usize,
-    ) -> impl Iterator<Item = (SsbDetection, AngleMeasurement)> {
+    pub fn angles_of(&self, method: usize) -> impl Iterator<Item = LoggedAngle> {
         let angles = self.angles.get(method).into_iter().flatten();
         let received = self.sensed.iter().zip(angles);
-        received.filter_map(|(&ssb, angle)| Some((ssb, (*angle)?)))
+        received.filter_map(|(&ssb, angle)| {
+            Some(LoggedAngle {
+                ssb,
+                measured: (*angle)?,
+            })
+        })
     }
 
     /// Returns the times of the bursts and the true poses.

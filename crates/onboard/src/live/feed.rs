@@ -20,7 +20,7 @@ use super::stream_clock::Continuity;
 use super::time_base::ClockStep;
 use super::time_check::TimeCheck;
 use crate::BoxError;
-use crate::burst::{Burst, HasSsb};
+use crate::burst::{Burst, HasSsb, LoggedAngle, UNSTATED_SNR_DB};
 use crate::energy::{Energy, EnergyModel};
 use crate::expected_angle::ExpectedAngle;
 use crate::geometry::{Pose, wrap_angle};
@@ -37,9 +37,6 @@ const OUTCOMES: usize = 256;
 
 /// Maximum number of angles of a burst.
 const ANGLES: usize = 64;
-
-/// SNR that is assumed for an angle without one, in dB. It suffices for every wake-up policy.
-const UNSTATED_SNR_DB: f64 = 20.0;
 
 /// Angle that was estimated elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,6 +58,22 @@ pub struct AngleObservation {
     pub snr_db: Option<f64>,
     /// Whether the error is Gaussian with this standard deviation, according to the estimator.
     pub resolved: bool,
+}
+
+impl From<&LoggedAngle> for AngleObservation {
+    fn from(logged: &LoggedAngle) -> Self {
+        let LoggedAngle { ssb, measured } = logged;
+        Self {
+            kind: measured.kind,
+            pci: ssb.pci,
+            ssb_index: ssb.ssb_index,
+            time_s: ssb.time_s,
+            phase_rad: measured.phase_rad,
+            sigma_rad: measured.phase_sigma_rad,
+            snr_db: Some(ssb.snr_db),
+            resolved: measured.resolved,
+        }
+    }
 }
 
 /// Activity since the start, and its energy.
@@ -89,7 +102,7 @@ pub struct Live {
     expected_angle: ExpectedAngle,
     stream: Option<SampleStream>,
     /// Angles of an incomplete burst.
-    angles: Vec<(SsbDetection, AngleMeasurement)>,
+    angles: Vec<LoggedAngle>,
     outcomes: VecDeque<AngleRecord>,
     heads: Vec<HeadStatus>,
     /// Clocks of the sources. All other times are those of the pipeline, except those of `heads`,
@@ -278,8 +291,8 @@ impl Live {
             self.odometry_step = Some(step);
             self.resumed(&step);
         }
-        if let Some((first, _)) = self.angles.first()
-            && first.time_s + BURST_S <= sample.time_s
+        if let Some(first) = self.angles.first()
+            && first.ssb.time_s + BURST_S <= sample.time_s
         {
             self.process_angles()?;
         }
@@ -353,8 +366,8 @@ impl Live {
         if self.is_repeated(angle, time_s) {
             return Err(LiveError::AngleRepeated { pci: angle.pci });
         }
-        if let Some((first, _)) = self.angles.first()
-            && ((time_s - first.time_s).abs() >= BURST_S || self.angles.len() == ANGLES)
+        if let Some(first) = self.angles.first()
+            && ((time_s - first.ssb.time_s).abs() >= BURST_S || self.angles.len() == ANGLES)
         {
             self.process_angles()?;
         }
@@ -379,14 +392,14 @@ impl Live {
             snr_db,
             resolved: angle.resolved,
         };
-        self.angles.push((ssb, measured));
+        self.angles.push(LoggedAngle { ssb, measured });
         Ok(())
     }
 
     /// Whether an angle is a copy of the last one of its radio head; `time_s` is its time in the
     /// pipeline.
     fn is_repeated(&self, angle: &AngleObservation, time_s: f64) -> bool {
-        let is_same = |(ssb, measured): &(SsbDetection, AngleMeasurement)| {
+        let is_same = |LoggedAngle { ssb, measured }: &LoggedAngle| {
             (ssb.pci, ssb.ssb_index, ssb.time_s) == (angle.pci, angle.ssb_index, time_s)
                 && measured.phase_rad == angle.phase_rad
         };
