@@ -9,7 +9,7 @@ mod encode;
 mod leaf;
 mod list;
 #[cfg(test)]
-mod oracle;
+mod list_tests;
 mod tree;
 
 pub use code::{K, N};
