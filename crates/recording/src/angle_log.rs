@@ -18,12 +18,11 @@ use std::path::Path;
 
 use crate::error::RecordingError;
 use crate::file as files;
-use crate::table::Table;
+use crate::table::{Table, drive_time_s, finite, needed, radio_head};
 pub use onboard::burst::LoggedAngle;
 use onboard::burst::UNSTATED_SNR_DB;
 use onboard::localize::{AngleMeasurement, MeasurementKind};
 use onboard::observation::{BURST_S, SsbDetection};
-use onboard::time_unit::TimeUnit;
 
 const COLUMNS: [&str; 9] = [
     "time_s",
@@ -264,20 +263,7 @@ pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     else {
         return Err("too few columns".to_owned());
     };
-    let finite = |value: Option<f64>, name: &str| match value {
-        Some(value) if !value.is_finite() => Err(format!("{name} is not finite")),
-        value => Ok(value),
-    };
-    let needed = |value: Option<f64>, name: &str| {
-        finite(value, name)?.ok_or_else(|| format!("{name} is missing"))
-    };
-    let (time_s, pci) = (needed(time_s, "time_s")?, needed(pci, "pci")?);
-    if let Some(unit) = TimeUnit::of_epoch(time_s) {
-        return Err(format!(
-            "time_s {time_s} is not a time of a drive and probably in {unit}; it must be seconds"
-        ));
-    }
-    let ssb_index = finite(ssb_index, "ssb_index")?.unwrap_or(0.0);
+    let time_s = drive_time_s(time_s)?;
     let snr_db = finite(snr_db, "snr_db")?.unwrap_or(UNSTATED_SNR_DB);
     let angle_rad = finite(angle_rad, "angle_rad")?;
     let flag = |value: Option<f64>, name: &str, default: bool| match value {
@@ -303,16 +289,7 @@ pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
         (None, None) => return Err("phase_rad and angle_rad are both missing".to_owned()),
     };
     let angle_rad = angle_rad.unwrap_or(f64::NAN);
-    let whole = |value: f64, most: f64| value.fract() == 0.0 && (0.0..=most).contains(&value);
-    if !whole(pci, 1007.0) {
-        return Err(format!("pci {pci} is not an integer from 0 to 1007"));
-    }
-    if !whole(ssb_index, 63.0) {
-        return Err(format!(
-            "ssb_index {ssb_index} is not an integer from 0 to 63"
-        ));
-    }
-    let (pci, ssb_index) = (pci as u16, ssb_index as u8);
+    let (pci, ssb_index) = radio_head(pci, ssb_index)?;
     Ok(LoggedAngle {
         ssb: SsbDetection {
             pci,

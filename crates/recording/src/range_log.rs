@@ -10,10 +10,9 @@ use std::path::Path;
 
 use onboard::range::{METRES_PER_NS, RangeMeasurement};
 use onboard::settings::SPEED_OF_LIGHT_MPS;
-use onboard::time_unit::TimeUnit;
 
 use crate::error::RecordingError;
-use crate::table::Table;
+use crate::table::{Table, drive_time_s, needed, radio_head};
 
 const REQUIRED: [&str; 2] = ["time_s", "pci"];
 const OPTIONAL: [&str; 7] = [
@@ -170,26 +169,8 @@ fn range(values: &[Option<f64>], kind: &str) -> Result<(LoggedRange, f64), Strin
     else {
         return Err("too few columns".to_owned());
     };
-    let needed = |value: Option<f64>, name: &str| match value {
-        None => Err(format!("{name} is missing")),
-        Some(value) if !value.is_finite() => Err(format!("{name} is not finite")),
-        Some(value) => Ok(value),
-    };
-    let time_s = needed(time_s, "time_s")?;
-    if let Some(unit) = TimeUnit::of_epoch(time_s) {
-        return Err(format!(
-            "time_s {time_s} is not a time of a drive and probably in {unit}; it must be seconds"
-        ));
-    }
-    let whole = |value: f64, name: &str, most: f64| {
-        if value.fract() == 0.0 && (0.0..=most).contains(&value) {
-            Ok(value)
-        } else {
-            Err(format!("{name} {value} is not an integer from 0 to {most}"))
-        }
-    };
-    let pci = whole(needed(pci, "pci")?, "pci", 1007.0)? as u16;
-    let ssb_index = whole(ssb_index.unwrap_or(0.0), "ssb_index", 63.0)? as u8;
+    let time_s = drive_time_s(time_s)?;
+    let (pci, ssb_index) = radio_head(pci, ssb_index)?;
     let ns = METRES_PER_NS;
     let (value, metres, sigma, sigma_metres, sigma_name) = match kind {
         "range_m" => (range_m, 1.0, sigma_m, 1.0, "sigma_m"),

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
+use onboard::time_unit::TimeUnit;
 
 use crate::error::RecordingError;
 use crate::file as files;
@@ -247,4 +248,41 @@ fn values(
         Ok(Some(number))
     };
     wanted.iter().map(value).collect()
+}
+
+/// Returns a value that is not given, or finite.
+pub fn finite(value: Option<f64>, name: &str) -> Result<Option<f64>, String> {
+    match value {
+        Some(value) if !value.is_finite() => Err(format!("{name} is not finite")),
+        value => Ok(value),
+    }
+}
+
+/// Returns a finite value.
+pub fn needed(value: Option<f64>, name: &str) -> Result<f64, String> {
+    finite(value, name)?.ok_or_else(|| format!("{name} is missing"))
+}
+
+/// Returns a time of a drive in seconds.
+pub fn drive_time_s(value: Option<f64>) -> Result<f64, String> {
+    let time_s = needed(value, "time_s")?;
+    TimeUnit::of_epoch(time_s).map_or(Ok(time_s), |unit| {
+        Err(format!(
+            "time_s {time_s} is not a time of a drive and probably in {unit}; it must be seconds"
+        ))
+    })
+}
+
+/// Returns PCI and SSB index of a radio head; the index is 0 by default.
+pub fn radio_head(pci: Option<f64>, ssb_index: Option<f64>) -> Result<(u16, u8), String> {
+    let whole = |value: f64, name: &str, most: f64| {
+        if value.fract() == 0.0 && (0.0..=most).contains(&value) {
+            Ok(value)
+        } else {
+            Err(format!("{name} {value} is not an integer from 0 to {most}"))
+        }
+    };
+    let ssb_index = finite(ssb_index, "ssb_index")?.unwrap_or(0.0);
+    let pci = whole(needed(pci, "pci")?, "pci", 1007.0)?;
+    Ok((pci as u16, whole(ssb_index, "ssb_index", 63.0)? as u8))
 }

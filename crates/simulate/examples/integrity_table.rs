@@ -8,12 +8,15 @@
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
 mod common;
+#[path = "../tests/all/statistics.rs"]
+mod statistics;
 
+use simulate::IntegritySummary;
 use simulate::scenario::{FaultKind, FaultSettings, Scenario};
-use simulate::{IntegritySummary, bootstrap_interval};
 use toml::{Table, Value};
 
 use common::{Result, arguments, campaign, changed, fixed};
+use statistics::bootstrap_interval;
 
 fn main() -> Result<()> {
     let (runs, seeds) = arguments(40, 1)?;

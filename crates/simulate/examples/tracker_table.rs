@@ -7,12 +7,15 @@
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
 mod common;
+#[path = "../tests/all/statistics.rs"]
+mod statistics;
 
+use simulate::Campaign;
 use simulate::bound::{Bound, BoundPoint};
-use simulate::{Campaign, Consistency};
 use toml::Value;
 
 use common::{Result, arguments, changed, fixed};
+use statistics::{CampaignStatistics, Consistency};
 
 /// Number of initial SSBs that are excluded from the comparison with the covariance, because an
 /// exact start has a singular covariance. The errors of the perfect filter are drawn at the same

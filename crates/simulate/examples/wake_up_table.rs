@@ -5,11 +5,14 @@
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
 mod common;
+#[path = "../tests/all/statistics.rs"]
+mod statistics;
 
 use onboard::settings::WakeUpSettings;
 use simulate::scenario::Scenario;
 
 use common::{Result, arguments, campaign, changed, fixed};
+use statistics::CampaignStatistics;
 
 /// One policy with one outcome per seed.
 struct Policy {

@@ -4,12 +4,10 @@
 //! deviations of the truth. Only [`truth`] derives the truth from the nominal models.
 
 mod angle_drive;
-mod bootstrap;
 pub mod bound;
 mod campaign;
 pub mod channel;
 mod cholesky;
-mod consistency;
 mod error;
 mod histogram;
 mod ideal_campaign;
@@ -28,9 +26,7 @@ pub mod truth;
 pub mod world;
 
 pub use angle_drive::log_angles;
-pub use bootstrap::bootstrap_interval;
 pub use campaign::{Campaign, CampaignOptions, RunSummary, StepStatistics};
-pub use consistency::Consistency;
 pub use error::SimulationError;
 pub use histogram::ErrorHistogram;
 pub use integrity_summary::IntegritySummary;

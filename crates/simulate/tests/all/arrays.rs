@@ -4,7 +4,6 @@ use num_complex::Complex64;
 use onboard::geometry::wrap_angle;
 use onboard::settings::{ArraySettings, ArrayShape};
 use onboard::thermal::ThermalNoise;
-use simulate::Consistency;
 use simulate::bound::Bound;
 use simulate::random::Streams;
 use simulate::scenario::Scenario;
@@ -12,6 +11,7 @@ use simulate::truth::World;
 use toml::Value;
 
 use crate::common::{campaign, changed, run, value};
+use crate::statistics::{CampaignStatistics, Consistency};
 
 /// Circular array of five elements with adjacent elements half a wavelength apart.
 const CIRCLE: [(&str, &str); 2] = [

@@ -1,6 +1,7 @@
 //! Custom localizers, policies, estimators and channels, and arrays of other sizes.
 
 use crate::common;
+use crate::statistics::CampaignStatistics;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 

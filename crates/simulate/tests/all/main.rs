@@ -30,6 +30,7 @@ mod simulated_drives;
 mod smoother;
 mod space;
 mod start;
+mod statistics;
 mod tr38901;
 mod tracker;
 mod truth;

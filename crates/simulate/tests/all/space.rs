@@ -1,11 +1,11 @@
 //! Elevated radio heads and an array with a lever arm: the tracker models their geometry.
 
 use onboard::settings::{Shipped, TomlFile};
-use simulate::Consistency;
 use simulate::scenario::Scenario;
 use toml::Value;
 
 use crate::common::{campaign, changed, unguarded, value};
+use crate::statistics::{CampaignStatistics, Consistency};
 
 /// Returns a scenario with radio heads at a height of 8 m, and an array 1.2 m above and 0.8 m in
 /// front of the odometer's reference point.

@@ -4,10 +4,11 @@ use onboard::settings::{ArraySettings, GyroscopeSettings};
 use simulate::bound::Bound;
 use simulate::random::Streams;
 use simulate::truth::World;
-use simulate::{Campaign, Consistency, RunRecord, Simulation, Step};
+use simulate::{Campaign, RunRecord, Simulation, Step};
 use toml::Value;
 
 use crate::common::{NONE, campaign, changed, drives, simulation, unguarded, value};
+use crate::statistics::{CampaignStatistics, Consistency};
 
 const SEED: u64 = 11;
 
