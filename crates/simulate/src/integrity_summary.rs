@@ -30,8 +30,6 @@ pub struct IntegritySummary {
     /// Number of alarms while the error and the protection level were within the alert limit. Such
     /// an alarm is caused by a suspected source, and is a false alarm in a fault-free run.
     pub suspicions: usize,
-    /// Number of times at which the error began to exceed the alert limit.
-    pub excursions: usize,
     /// Longest time in seconds for which the error exceeded the alert limit while the state was
     /// `ok`.
     pub longest_silence_s: f64,
@@ -68,7 +66,6 @@ impl IntegritySummary {
             summary.suspicions += usize::from(early && within_limit);
             summary.worst_m = summary.worst_m.max(error_m);
             if exceeds {
-                summary.excursions += usize::from(exceeded_since_s.is_none());
                 let since_s = *exceeded_since_s.get_or_insert(step.time_s);
                 if ok {
                     summary.longest_silence_s =
@@ -97,7 +94,6 @@ impl IntegritySummary {
             total.alarms += run.alarms;
             total.early_alarms += run.early_alarms;
             total.suspicions += run.suspicions;
-            total.excursions += run.excursions;
             total.longest_silence_s = total.longest_silence_s.max(run.longest_silence_s);
             total.worst_m = total.worst_m.max(run.worst_m);
             total.duration_s += run.duration_s;
@@ -161,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_alarms_excursions_and_exceeded_levels() {
+    fn counts_alarms_and_exceeded_levels() {
         use IntegrityState::{Degraded, Ok};
         let record = record(&[
             (0.1, 0.8, Ok),
@@ -178,13 +174,12 @@ mod tests {
         assert_eq!((summary.epochs, summary.ok, summary.beyond), (9, 6, 1));
         assert_eq!((summary.alarms, summary.early_alarms), (3, 1));
         assert_eq!(summary.suspicions, 1);
-        assert_eq!(summary.excursions, 2);
         assert_eq!((summary.longest_silence_s, summary.worst_m), (3.0, 2.0));
         let median = summary.median_ratio();
         // The width of a histogram bin is 6 %.
         assert!((median / 4.5 - 1.0).abs() < 0.06, "{median}");
         let twice = IntegritySummary::sum([&summary, &summary]);
-        assert_eq!((twice.beyond, twice.excursions), (2, 4));
+        assert_eq!(twice.beyond, 2);
         assert!((twice.risk() - summary.risk()).abs() < 1e-15);
         assert!((twice.per_h(twice.early_alarms) - 450.0).abs() < 1e-9);
     }
