@@ -54,10 +54,10 @@ impl Handover {
         })
     }
 
-    /// Returns the current pose of the previous solution; `None` after `patience_s`.
-    pub fn previous_pose(&self, estimate: &PoseEstimate, patience_s: f64) -> Option<PoseEstimate> {
+    /// Returns the current pose of the previous solution; `None` after [`RECOVERY_S`].
+    pub fn previous_pose(&self, estimate: &PoseEstimate) -> Option<PoseEstimate> {
         let [x_m, y_m, heading_rad] = self.apart;
-        (estimate.time_s - self.since_s <= patience_s).then_some(PoseEstimate {
+        (estimate.time_s - self.since_s <= RECOVERY_S).then_some(PoseEstimate {
             pose: Pose {
                 x_m: estimate.pose.x_m + x_m,
                 y_m: estimate.pose.y_m + y_m,
@@ -248,7 +248,7 @@ impl IntegrityMonitor {
     /// contradicts it. Until then, or until the first bank is free of contradictions, the state is
     /// not `ok`. The result of a search with possibly faulty angles is confirmed in the same way.
     fn recover(&mut self) {
-        let (now_s, patience_s) = (self.now_s, RECOVERY_S);
+        let now_s = self.now_s;
         let lost = self.bank.is_lost();
         let Some(restarted) = &self.restarted else {
             if lost || self.is_found {
@@ -258,12 +258,12 @@ impl IntegrityMonitor {
             }
             return;
         };
-        let aged = now_s - restarted.since_s > patience_s;
-        if !lost && !self.is_found && self.bank.quiet_s(now_s) > patience_s {
+        let aged = now_s - restarted.since_s > RECOVERY_S;
+        if !lost && !self.is_found && self.bank.quiet_s(now_s) > RECOVERY_S {
             self.restarted = None;
         } else if aged && restarted.bank.is_lost() {
             self.restart();
-        } else if restarted.bank.quiet_s(now_s) > patience_s
+        } else if restarted.bank.quiet_s(now_s) > RECOVERY_S
             && self.is_near(&restarted.bank, now_s)
             && let Some(restarted) = self.restarted.take()
         {
@@ -297,7 +297,7 @@ impl IntegrityMonitor {
         pose.mix(mixture.map(|(probability, right)| (probability, right.pose(time_s))));
         pose.integrity = Some(self.integrity(time_s, others));
         let handover = self.handover.as_ref();
-        if let Some(handover) = handover.and_then(|it| it.previous_pose(&pose, RECOVERY_S)) {
+        if let Some(handover) = handover.and_then(|it| it.previous_pose(&pose)) {
             pose.cover(&handover);
         }
         let restarted = self.restarted.iter().map(|it| it.bank.nominal());
