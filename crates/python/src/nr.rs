@@ -13,7 +13,8 @@ pub use searcher::Searcher;
 
 use std::f64::consts::FRAC_PI_2;
 
-use channel::{Blocks, Channel, Covariance};
+use channel::{Covariance, Values};
+use nr_ssb::grid::SUBCARRIERS;
 use nr_ssb::receiver::TrackedSsb;
 use nr_ssb::search::DetectedSsb;
 use nr_ssb::{Lmax, SubcarrierSpacing};
@@ -125,9 +126,9 @@ pub struct Cell {
     verdict: Option<String>,
     doubt: Option<String>,
     p_value: Option<f64>,
-    channel: Channel,
+    channel: Values<Complex32>,
     channel_covariance: Covariance,
-    blocks: Blocks,
+    blocks: Values<Complex64>,
     noise_variance: Vec<f64>,
     observables: Option<Observables>,
 }
@@ -180,9 +181,9 @@ impl Cell {
             sample_count: SSB_SAMPLES as f64 * samples_per_base,
             ssb_freq_hz,
             scs_khz: spacing.khz(),
-            channel: Channel(ssb.channel.clone()),
+            channel: channel(&ssb.channel),
             channel_covariance: Covariance(Some(ssb.channel_covariance.clone())),
-            blocks: Blocks(view.map_or_else(Vec::new, |view| view.blocks)),
+            blocks: blocks(&view.map_or_else(Vec::new, |view| view.blocks)),
             noise_variance: ssb.noise_variance.clone(),
             observables: Observables::of(ssb),
         );
@@ -223,14 +224,27 @@ impl From<&ScannedSsb> for Cell {
             sample_count: found.sample_count,
             ssb_freq_hz: found.ssb_freq_hz,
             scs_khz: found.spacing.khz(),
-            channel: Channel(found.channel.clone()),
+            channel: channel(&found.channel),
             channel_covariance: Covariance(found.channel_covariance.clone()),
-            blocks: Blocks(found.blocks.clone()),
+            blocks: blocks(&found.blocks),
             noise_variance: found.noise_variance.clone(),
             observables: None,
         );
         cell.with_angle(found.angle.as_ref())
     }
+}
+
+/// Returns the channel on the subcarriers of each antenna, with the shape `(antennas, 240)`.
+fn channel(antennas: &[[Complex32; SUBCARRIERS]]) -> Values<Complex32> {
+    let values = antennas.as_flattened().iter().copied();
+    Values::new(values, &[antennas.len(), SUBCARRIERS])
+}
+
+/// Returns the responses of the antennas per symbol, with the shape `(antennas, symbols)`.
+fn blocks(symbols: &[Vec<Complex64>]) -> Values<Complex64> {
+    let antennas = symbols.first().map_or(0, Vec::len);
+    let by_antenna = (0..antennas).flat_map(|n| symbols.iter().map(move |block| block[n]));
+    Values::new(by_antenna, &[antennas, symbols.len()])
 }
 
 /// Creates the array from the user's arguments.

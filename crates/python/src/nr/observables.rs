@@ -2,8 +2,9 @@
 
 use nr_ssb::receiver::TrackedSsb;
 use num_complex::Complex64;
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+
+use super::channel::Values;
 
 /// Delay, carrier phase, range rate and power of one SSB.
 ///
@@ -88,51 +89,9 @@ pub struct Observables {
     rsrp_sigma_db: f64,
     first_path_dbfs: f64,
     first_path_sigma_db: f64,
-    amplitudes: Amplitudes,
-    amplitude_variance: Variances,
-    covariance: Square,
-}
-
-/// Amplitude per antenna; in Python complex128 of shape `(antennas,)`.
-#[derive(Clone)]
-pub struct Amplitudes(Vec<Complex64>);
-
-/// Variance per antenna; in Python float64 of shape `(antennas,)`.
-#[derive(Clone)]
-pub struct Variances(Vec<f64>);
-
-/// Covariance; in Python float64 of shape `(3, 3)`.
-#[derive(Clone)]
-pub struct Square([[f64; 3]; 3]);
-
-impl<'py> IntoPyObject<'py> for &Amplitudes {
-    type Target = PyArray1<Complex64>;
-    type Output = Bound<'py, Self::Target>;
-    type Error = PyErr;
-
-    fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
-        Ok(PyArray1::from_slice(py, &self.0))
-    }
-}
-
-impl<'py> IntoPyObject<'py> for &Variances {
-    type Target = PyArray1<f64>;
-    type Output = Bound<'py, Self::Target>;
-    type Error = PyErr;
-
-    fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
-        Ok(PyArray1::from_slice(py, &self.0))
-    }
-}
-
-impl<'py> IntoPyObject<'py> for &Square {
-    type Target = PyArray2<f64>;
-    type Output = Bound<'py, Self::Target>;
-    type Error = PyErr;
-
-    fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
-        PyArray1::from_slice(py, self.0.as_flattened()).reshape([3, 3])
-    }
+    amplitudes: Values<Complex64>,
+    amplitude_variance: Values<f64>,
+    covariance: Values<f64>,
 }
 
 impl Observables {
@@ -163,9 +122,12 @@ impl Observables {
             rsrp_sigma_db: seen.power.ss_rsrp_sigma_db,
             first_path_dbfs: seen.power.first_path_dbfs,
             first_path_sigma_db: seen.power.first_path_sigma_db,
-            amplitudes: Amplitudes(ssb.amplitudes.clone()),
-            amplitude_variance: Variances(ssb.amplitude_variance.clone()),
-            covariance: Square(seen.covariance),
+            amplitudes: Values::new(ssb.amplitudes.clone(), &[ssb.amplitudes.len()]),
+            amplitude_variance: Values::new(
+                ssb.amplitude_variance.clone(),
+                &[ssb.amplitude_variance.len()],
+            ),
+            covariance: Values::new(seen.covariance.into_iter().flatten(), &[3, 3]),
         })
     }
 }
