@@ -229,28 +229,25 @@ impl Live {
         while let Some(stream) = &mut self.stream {
             let burst = stream.burst();
             let number = burst.len();
-            let Some(first_s) = burst.first().map(|first| first.ssb().time_s) else {
+            let first_s = burst.first().map(|first| first.ssb.time_s);
+            let Some(first_s) = first_s.filter(|first_s| *first_s < time_s) else {
                 break;
             };
-            if first_s >= time_s {
-                break;
-            }
             let newest = self.onboard.newest_odometry();
-            let refused = match self.clocks.accept_burst("SSBs", first_s, newest) {
+            match self.clocks.accept_burst("SSBs", first_s, newest) {
                 Ok(inside_s) => {
-                    stream.shift(number, inside_s - first_s);
-                    None
+                    for observation in &mut *burst {
+                        observation.ssb.time_s += inside_s - first_s;
+                    }
+                    let result = process(&mut self.onboard, burst);
+                    stream.forget(number);
+                    self.record_results(result)?;
                 }
-                Err(error) => Some(error),
-            };
-            if let Some(error) = refused {
-                stream.forget(number);
-                self.refused_burst = Some(error);
-                continue;
+                Err(error) => {
+                    self.refused_burst = Some(error);
+                    stream.forget(number);
+                }
             }
-            let result = process(&mut self.onboard, stream.first(number));
-            stream.forget(number);
-            self.record_results(result)?;
         }
         Ok(())
     }

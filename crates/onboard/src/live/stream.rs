@@ -247,30 +247,19 @@ impl SampleStream {
         Ok(gap.map_err(ReceiveError::from)?)
     }
 
-    /// Returns the SSBs of the first burst, if it is complete.
-    pub fn burst(&self) -> &[SsbObservation] {
-        let held = self.bursts.observations.get(..self.bursts.held);
+    /// Returns the SSBs of the first burst; none unless it is complete.
+    pub fn burst(&mut self) -> &mut [SsbObservation] {
+        let bursts = &mut self.bursts;
+        let held = bursts.observations.get_mut(..bursts.held);
         let held = held.unwrap_or_default();
-        match held.first() {
-            Some(first) if first.ssb.time_s + BURST_S <= self.bursts.passed_until_s => {
-                held.get(..first_burst(held)).unwrap_or_default()
-            }
-            _ => &[],
-        }
-    }
-
-    /// Returns the first SSBs.
-    pub fn first(&self, number: usize) -> &[SsbObservation] {
-        let number = number.min(self.bursts.held);
-        self.bursts.observations.get(..number).unwrap_or_default()
-    }
-
-    /// Adds `by_s` seconds to the times of the first SSBs.
-    pub fn shift(&mut self, number: usize, by_s: f64) {
-        let number = number.min(self.bursts.held);
-        for observation in self.bursts.observations.iter_mut().take(number) {
-            observation.ssb.time_s += by_s;
-        }
+        let is_complete =
+            |first: &SsbObservation| first.ssb.time_s + BURST_S <= bursts.passed_until_s;
+        let number = if held.first().is_some_and(is_complete) {
+            first_burst(held)
+        } else {
+            0
+        };
+        held.get_mut(..number).unwrap_or_default()
     }
 
     /// Removes the first SSBs.

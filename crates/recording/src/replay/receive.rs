@@ -66,11 +66,13 @@ pub fn receive_recording(
     let mut raw = Vec::new();
     let (mut gaps, mut unreported_gap_s) = (Vec::new(), 0.0);
     let mut pass_bursts = |stream: &mut SampleStream| {
-        while let Some(first) = stream.burst().first() {
-            let before_s = first.ssb.time_s;
+        loop {
             let burst = stream.burst();
-            take(burst)?;
             let number = burst.len();
+            let Some(before_s) = burst.first().map(|first| first.ssb.time_s) else {
+                break;
+            };
+            take(burst)?;
             stream.forget(number);
             let lost_s = stream.counts().unreported_gap_s - unreported_gap_s;
             if lost_s > 0.0 {
