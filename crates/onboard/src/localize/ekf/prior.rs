@@ -111,7 +111,7 @@ impl Ekf {
         self.range_noise = other.range_noise;
         self.clock_noise = other.clock_noise;
         for (mine, theirs) in self.heads.iter_mut().zip(&other.heads) {
-            mine.blocked = theirs.blocked;
+            (mine.blocked, mine.late) = (theirs.blocked, theirs.late);
         }
     }
 
