@@ -373,6 +373,8 @@ def _unreliable(drive: Drive) -> str:
         )
     elif drive.jumps_repeatedly:
         happened = f"the position jumped {drive.jumps} times by more than {JUMP_M} m. "
+    elif drive.rejects_its_ranges:
+        happened = "too many ranges contradict the position. "
     else:
         happened = ""
     if drive.suspicions:

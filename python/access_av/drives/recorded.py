@@ -44,6 +44,10 @@ JUMP_SPACING_M = 20.0
 # first correction that was ambiguous.
 PERMITTED_JUMPS = 2
 
+# Maximum rejected share of the ranges of a reliable drive. A fifth of blocked paths causes 0.22;
+# yaw rates in degrees and exchanged coordinates cause 0.45.
+MAX_REJECTED_RANGES = 0.4
+
 # Distance driven since the previous odometry sample, in metres.
 STEP_M = pl.col("speed_mps").abs() * pl.col("time_s").diff()
 
@@ -262,15 +266,23 @@ class Drive:
         return self.jumps > max(PERMITTED_JUMPS, permitted)
 
     @property
+    def rejects_its_ranges(self) -> bool:
+        """Returns whether more than two fifths of the ranges were rejected, without angles."""
+        if not self.has_ranges_only:
+            return False
+        return 1.0 - float(self.ranges["accepted"].mean()) > MAX_REJECTED_RANGES  # type: ignore[arg-type]
+
+    @property
     def is_reliable(self) -> bool:
         """Returns whether the drive is reliable.
 
         The vehicle was found, its position was available for four fifths of the time and at the
         end, no reported fault of the input displaced it by more than 0.5 m, and ranges without
-        angles did not move it in jumps.
+        angles did not move it in jumps and were mostly accepted.
         """
         is_lost = self._core.is_lost_for_long or self.unavailable_share > MAX_UNAVAILABLE
-        return not (is_lost or self.jumps_repeatedly or self.suspicions)
+        contradicts = self.jumps_repeatedly or self.rejects_its_ranges
+        return not (is_lost or contradicts or self.suspicions)
 
     def write_mcap(self, path: str | Path) -> None:
         """Writes poses, verdicts and diagnostics as MCAP (ROS 2); no poses while searching."""

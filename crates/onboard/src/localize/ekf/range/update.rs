@@ -59,12 +59,14 @@ impl Ekf {
         if has_angles || is_one_way || predicted.quantity != RangeQuantity::Range {
             return None;
         }
+        // Ranges of other radio heads that are too short contradict the position or the odometry instead.
+        let is_contradicted = self.heads.iter().any(|it| it.rejected_ranges > 0);
         let head = self.heads.get_mut(predicted.index)?;
         // An offset beyond its specified standard deviation is no blocked path.
         let was_clear = head.last_range_m.is_finite();
         let changed = path_changed(head, predicted);
         head.late.update(&predicted.innovation, changed);
-        if !(was_clear && head.late.is_blocked()) {
+        if is_contradicted || !(was_clear && head.late.is_blocked()) {
             return None;
         }
         self.note_range(predicted);
