@@ -201,8 +201,8 @@ fn inconsistent(site: &Site, drive: &LocatedDrive) -> Vec<String> {
         if count >= MIN_RANGES && rejected as f64 > MANY_REJECTED * count as f64 {
             texts.push(format!(
                 "{rejected} of {count} ranges of pci {} ssb_index {} contradict the drive: \
-                 its path is often blocked, or check position_m of the radio head, and ranging.offset_std_m (and clock_offset_std_ns \
-                 of the radio head), which may be too small for its offset",
+                 its path is often blocked, or check position_m of the radio head, and \
+                 ranging.offset_std_m (and clock_offset_std_ns of the radio head), which may be too small for its offset",
                 head.pci, head.ssb_index
             ));
         }

@@ -351,18 +351,45 @@ fn ranges_of_a_late_clock_are_shifted() {
     }
 }
 
+fn anchor(pci: usize, [x_m, y_m]: [f64; 2]) -> String {
+    format!("[[radio_heads]]\npci = {pci}\nposition_m = [{x_m:?}, {y_m:?}, 0.0]\n")
+}
+
+/// Returns a site of anchors with the numbers 0, 1, 2, ...
+fn hall(anchors: &[[f64; 2]]) -> String {
+    let heads = anchors.iter().enumerate();
+    let heads: String = heads.map(|(pci, at)| anchor(pci, *at)).collect();
+    format!("name = \"hall\"\n{heads}")
+}
+
+/// Locates a drive from the texts of its files.
+fn located_in(
+    name: &str,
+    plant: &str,
+    odometry: &str,
+    ranges: &str,
+    sensors: &str,
+) -> LocatedDrive {
+    let file = common::scratch(name).join("odometry.csv");
+    fs::write(&file, odometry).unwrap();
+    let carrier = vehicle(&format!(
+        "{VEHICLE}[odometer]\nscale_std = 0.02\nnoise_m_per_sqrt_m = 0.05\n{sensors}"
+    ));
+    locate_ranges(
+        &site(plant),
+        &carrier,
+        StartChoice::AsSet,
+        &read_odometry_csv(&file).unwrap(),
+        &log_of(&format!("{name}-log"), ranges).unwrap(),
+    )
+    .unwrap()
+}
+
 /// Locates a drive past three anchors, of which the second has a cable of 20 m and `settings`.
 fn drive_with_a_long_cable(name: &str, settings: &str) -> LocatedDrive {
     let heads = [[-20.0, 12.0], [20.0, -10.0], [60.0, 14.0]];
-    let mut plant = "name = \"hall\"\n".to_owned();
-    for (pci, [x_m, y_m]) in heads.iter().enumerate() {
-        writeln!(
-            plant,
-            "[[radio_heads]]\npci = {pci}\nposition_m = [{x_m:?}, {y_m:?}, 0.0]"
-        )
-        .unwrap();
-        plant += if pci == 1 { settings } else { "" };
-    }
+    let mut plant = hall(&heads[..2]) + settings;
+    plant += &anchor(2, heads[2]);
     let mut odometry = "time_s,distance_m,yaw_rate_radps\n".to_owned();
     let mut ranges = "time_s,pci,range_m\n".to_owned();
     for step in 0..300_usize {
@@ -375,20 +402,8 @@ fn drive_with_a_long_cable(name: &str, settings: &str) -> LocatedDrive {
         let range_m = (x_m - head_x_m).hypot(head_y_m) + cable_m;
         writeln!(ranges, "{time_s:.3},{pci},{range_m:.4}").unwrap();
     }
-    let file = common::scratch(name).join("odometry.csv");
-    fs::write(&file, odometry).unwrap();
-    let carrier = vehicle(&format!(
-        "{VEHICLE}[odometer]\nscale_std = 0.02\nnoise_m_per_sqrt_m = 0.05\n\
-         [ranging]\nsigma_m = 0.1\nscale_std = 0.0\noffset_std_m = 0.0\n"
-    ));
-    let located = locate_ranges(
-        &site(&plant),
-        &carrier,
-        StartChoice::AsSet,
-        &read_odometry_csv(&file).unwrap(),
-        &log_of(&format!("{name}-log"), &ranges).unwrap(),
-    )
-    .unwrap();
+    let sensors = "[ranging]\nsigma_m = 0.1\nscale_std = 0.0\noffset_std_m = 0.0\n";
+    let located = located_in(name, &plant, &odometry, &ranges, sensors);
     let last = located.poses.last().unwrap().estimate.pose;
     assert!(last.x_m > 44.0 && last.x_m < 45.7, "{last:?}");
     located
@@ -451,30 +466,10 @@ fn rms_with_blocked_paths_m(seed: u64, late: bool) -> f64 {
         let range_m = (x_m - heads[number][0]).hypot(y_m - heads[number][1]) + late_m + noise(0.3);
         writeln!(ranges, "{time_s:.3},{number},{range_m:.4}").unwrap();
     }
-    let mut plant = "name = \"hall\"\n".to_owned();
-    for (pci, [x_m, y_m]) in heads.iter().enumerate() {
-        writeln!(
-            plant,
-            "[[radio_heads]]\npci = {pci}\nposition_m = [{x_m:?}, {y_m:?}, 0.0]"
-        )
-        .unwrap();
-    }
     let name = format!("blocked-{seed}-{late}");
-    let file = common::scratch(&name).join("odometry.csv");
-    fs::write(&file, odometry).unwrap();
-    let carrier = vehicle(&format!(
-        "{VEHICLE}[odometer]\nscale_std = 0.02\nnoise_m_per_sqrt_m = 0.05\n\
-         [gyroscope]\nnoise_rad_per_sqrt_s = 0.003\n\
-         [ranging]\nsigma_m = 0.3\nscale_std = 0.0\noffset_std_m = 0.5\nposition_m = [0.0, 0.0, 0.0]\n"
-    ));
-    let located = locate_ranges(
-        &site(&plant),
-        &carrier,
-        StartChoice::AsSet,
-        &read_odometry_csv(&file).unwrap(),
-        &log_of(&format!("{name}-log"), &ranges).unwrap(),
-    )
-    .unwrap();
+    let sensors = "[gyroscope]\nnoise_rad_per_sqrt_s = 0.003\n[ranging]\nsigma_m = 0.3\nscale_std = 0.0\n\
+                   offset_std_m = 0.5\nposition_m = [0.0, 0.0, 0.0]\n";
+    let located = located_in(&name, &hall(&heads), &odometry, &ranges, sensors);
     let squares = located.poses.iter().map(|it| {
         let [x_m, y_m] = position(it.estimate.time_s);
         (it.estimate.pose.x_m - x_m).powi(2) + (it.estimate.pose.y_m - y_m).powi(2)
@@ -483,7 +478,7 @@ fn rms_with_blocked_paths_m(seed: u64, late: bool) -> f64 {
 }
 
 /// A fifth of the ranges are not available, and their absence is known only after some ranges: the error may increase by
-/// half. If offsets follow the late ranges, it is several times larger.
+/// half. If offsets follow the late ranges, it is almost doubled (seed 1).
 #[test]
 fn ranges_of_blocked_paths_do_not_displace_the_vehicle() {
     for seed in 1..4 {

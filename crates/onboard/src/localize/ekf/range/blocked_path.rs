@@ -11,7 +11,7 @@ const WITH_LINE_OF_SIGHT: f64 = 0.05;
 
 /// Mean and standard deviation of the additional distance (m): those of the delays in UMi whose angles have a large bias
 /// (notes/experiments.md).
-const LATE_M: f64 = 6.0;
+pub(super) const LATE_M: f64 = 6.0;
 
 /// Standard deviation of the error of a range rate (m/s): fading of a reflection turns the carrier phase. An
 /// assumption; 5 and 10 m/s give equal errors (notes/experiments.md).

@@ -2,12 +2,13 @@
 //!
 //! The ranges of a blocked path are late, for seconds or minutes. A hidden Markov model has the states *clear* and
 //! *blocked*; the state changes with the distance driven. The innovation of a clear path is Gaussian. With a blocked path, it
-//! also contains a positive, exponentially distributed distance, so that it is an exponentially modified Gaussian
-//! (Grushka 1972). A filter without this model takes the late ranges for a jump of the radio head's offset, and estimates
+//! also contains the exponentially distributed additional distance of a [`super::blocked_path`], so that it is an
+//! exponentially modified Gaussian (Grushka 1972). An additional distance of 6 or 15 m gives equal errors. A filter without this model takes the late ranges for a jump of the radio head's offset, and estimates
 //! the offset again at both ends of each blockage (notes/experiments.md).
 
-use std::f64::consts::{FRAC_1_SQRT_2, PI};
+use std::f64::consts::FRAC_1_SQRT_2;
 
+use super::blocked_path::LATE_M;
 use crate::gaussian::Innovation;
 
 /// Prior probability of a blocked path. An assumption; the ranges of a few metres outweigh it.
@@ -15,9 +16,6 @@ const PRIOR: f64 = 0.05;
 
 /// Maximum probability before a range, so that a path that is clear again is found at standstill, too.
 const MAX_PRIOR: f64 = 0.99;
-
-/// Mean additional distance (m). An assumption: 6 and 15 m give equal errors (notes/experiments.md).
-const LATE_M: f64 = 6.0;
 
 /// First path that is blocked with a probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +58,7 @@ fn densities(innovation: &Innovation) -> (f64, f64) {
         residual, variance, ..
     } = *innovation;
     let sigma_m = variance.sqrt();
-    let clear = (-0.5 * residual * residual / variance).exp() / (sigma_m * (2.0 * PI).sqrt());
+    let clear = innovation.density();
     // The additional distance is small compared to the innovation, and the exponential would overflow.
     if sigma_m > 10.0 * LATE_M {
         return (clear, clear);
