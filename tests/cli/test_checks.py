@@ -477,6 +477,18 @@ def test_every_command_prints_warnings_first(
     assert "asked first: 0 doubtful" in done.err
 
 
+def test_radio_heads_with_the_same_fault_have_one_warning(
+    access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
+    """Every radio head is named, with its value, and the reason and the remedy once."""
+    file = tmp_path / "plant.toml"
+    file.write_text(PLANT.replace("8.0]", "8000.0]"), encoding="utf-8")
+    text = " ".join(access_av("file", "check", str(file)).err.split())
+    assert text.count("above sea level") == 1
+    for number in range(3):
+        assert f"`radio_heads[{number}].position_m[2]` is 8000" in text
+
+
 def test_only_the_options_module_loads_settings_files() -> None:
     """`options` reads the inputs of every command and warns of doubtful settings."""
     for file in (ROOT / "python" / "access_av" / "cli").glob("*.py"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -180,6 +181,10 @@ def look_for_underlay(site: Site) -> None:
 
 
 def announce(name: str, warnings: Iterable[SettingsWarning]) -> None:
-    """Prints plausibility warnings with the suggested values."""
+    """Prints plausibility warnings with the suggested values, one for each key of a list."""
+    alike: dict[str, list[SettingsWarning]] = {}
     for warning in warnings:
-        show_warning(f"{name}: {warning}")
+        alike.setdefault(re.sub(r"\[\d+\]", "[]", warning.key), []).append(warning)
+    for first, *others in alike.values():
+        also = ", ".join(f"`{other.key}` is {other.value}" for other in others)
+        show_warning(f"{name}: {first}" + (f"; also {also}" if also else ""))
