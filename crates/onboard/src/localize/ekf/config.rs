@@ -244,6 +244,9 @@ impl EkfConfig {
         // true one.
         let track_share = |width_m| odometer.track_width_std_m / width_m;
         let track_share = odometer.track_width_m.map_or(0.0, track_share);
+        let track_width_m = odometer.track_width_m.filter(|_| wheels);
+        let spin_radps =
+            track_width_m.map_or(0.0, |width_m| 2.0 * vehicle.top_speed_mps() / width_m);
         let mounting_is_unstated = array.mounting_std_rad.is_none() && !wheels;
         let phase_is_unstated = array.phase_std_rad.is_none() && array.shape.is_row();
         let unstated = [
@@ -309,9 +312,11 @@ impl EkfConfig {
             slip_acceleration_mps2: 10.0 * vehicle.acceleration_mps2,
             may_slip: false,
             speed_noise_mps: odometer.speed_noise_mps,
-            // A fast oscillation of the lane keeping can exceed the usual maximum.
+            // A fast oscillation of the lane keeping can exceed the usual maximum, and so can a small robot that turns on the
+            // spot.
             top_yaw_rate_radps: TOP_YAW_RATE_RADPS
-                .max(SIGMAS_OF_SWING * keeping.pull_per_m() * vehicle.top_speed_mps()),
+                .max(SIGMAS_OF_SWING * keeping.pull_per_m() * vehicle.top_speed_mps())
+                .max(spin_radps),
             angle_time_offset_std_s: receiver
                 .angle_time_offset_std_s
                 .unwrap_or(usual.angle_time_offset_std_s),
@@ -416,5 +421,26 @@ impl EkfConfig {
     pub fn coasting_variance(&self, duration_s: f64) -> f64 {
         let error_m = 0.5 * self.acceleration_mps2 * duration_s * duration_s;
         error_m * error_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::{Shipped, TomlFile as _};
+
+    /// With one wheel forwards and the other one backwards at the top speed `v`, the yaw rate is `2 v / track width`.
+    #[test]
+    fn a_small_robot_turns_on_the_spot_faster_than_a_carrier() {
+        let site = Site::from_library("yard", &Shipped).unwrap();
+        let top = |track_width_m: f64| {
+            let text = format!(
+                "name = \"robot\"\ndrive = \"differential\"\ntop_speed_kmh = 3.6\n\
+                 odometer = {{ track_width_m = {track_width_m:?} }}"
+            );
+            let vehicle = Vehicle::from_toml(&text, "robot.toml", &Shipped).unwrap();
+            EkfConfig::new(&site, &vehicle).top_yaw_rate_radps
+        };
+        assert_eq!([top(0.16), top(0.8)], [12.5, TOP_YAW_RATE_RADPS]);
     }
 }
