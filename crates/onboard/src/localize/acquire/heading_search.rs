@@ -98,13 +98,19 @@ impl HeadingSearch {
         if predicted.is_new_sequence {
             return;
         }
-        self.solution += range_density(&predicted).ln();
+        // All filters have the path of the solution: a filter far from the position would expect a blocked path, and ranges
+        // would be no evidence against it.
+        let outliers = solution.late_probability(&predicted);
+        let is_late = solution.is_late(&predicted);
+        self.solution += range_density(&predicted, outliers).ln();
         for it in &mut self.filters {
             let predicted = it.ekf.predict_range(head, measured);
             if let Ok(predicted) = &predicted {
-                it.log_likelihood += range_density(predicted).ln();
+                it.log_likelihood += range_density(predicted, outliers).ln();
             }
-            it.ekf.update_predicted_range(predicted);
+            if !is_late {
+                it.ekf.update_predicted_range(predicted);
+            }
         }
     }
 

@@ -218,9 +218,11 @@ impl MultipathBias {
         }
     }
 
-    /// Adds `variance` to the variance of a range state, because its value jumped by an unknown
-    /// amount.
-    pub fn add_jump(&mut self, number: usize, variance: f64) {
+    /// Adds a jump with this mean and variance to a range state.
+    pub fn add_jump(&mut self, number: usize, mean: f64, variance: f64) {
+        if let Some(it) = self.heads.get_mut(self.biases + number) {
+            it.mean_rad += mean;
+        }
         self.add_to(number, number, variance);
     }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::config::EkfConfig;
 use super::odometer::{SampleInterval, SpeedJumps};
-use super::range::{BlockedPath, LatePath, RangeNoise};
+use super::range::{BlockedPath, ClockStepTest, LatePath, RangeNoise};
 use super::state::{
     ANGLE_TIME_OFFSET, Belief, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
@@ -50,9 +50,13 @@ pub(super) struct Head {
     pub blocked: BlockedPath,
     /// First path according to the ranges, if there are no angles.
     pub late: LatePath,
+    /// First path before the delay that was used in the newest test of a clock step.
+    pub late_before_step: LatePath,
+    /// Time of that delay (s).
+    pub clock_test_s: f64,
     /// Distance driven at the last range (m) that was used, or late because of a blocked path.
     pub last_range_m: f64,
-    /// Number of successive rejected ranges.
+    /// Number of successive rejected ranges; without angles, of those that are too short.
     pub rejected_ranges: u16,
 }
 
@@ -70,6 +74,8 @@ impl Head {
             last_error: None,
             blocked: BlockedPath::NEVER,
             late: LatePath::PRIOR,
+            late_before_step: LatePath::PRIOR,
+            clock_test_s: f64::NEG_INFINITY,
             last_range_m: f64::NEG_INFINITY,
             rejected_ranges: 0,
         }
@@ -111,6 +117,8 @@ clone_in_place! {
         pub(super) clock_noise: RangeNoise,
         /// Time of the last used delay, which determined the vehicle's clock (s).
         pub(super) last_delay_s: f64,
+        /// Test of a clock step, while it runs.
+        pub(super) clock_test: Option<ClockStepTest>,
         /// Whether a carrier phase has determined the common phase offset since the newest odometry.
         pub(super) knows_common_phase: bool,
     }
@@ -144,6 +152,7 @@ impl Ekf {
             range_noise: RangeNoise::STATED,
             clock_noise: RangeNoise::STATED,
             last_delay_s: f64::NEG_INFINITY,
+            clock_test: None,
             knows_common_phase: false,
         };
         ekf.update_off_map();

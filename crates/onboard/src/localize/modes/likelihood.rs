@@ -53,7 +53,7 @@ impl Ekf {
     pub fn range_log_likelihood(&self, head: &RadioHead, measured: &RangeMeasurement) -> f64 {
         let predicted = self.predict_range(head, measured);
         predicted.map_or(0.0, |it| {
-            outlier_or_gaussian(&it, self.late_probability(&it)).ln()
+            range_density(&it, self.late_probability(&it)).ln()
         })
     }
 }
@@ -134,7 +134,8 @@ impl LikelihoodRatio {
             && !(predicted.excluded || by_nominal.excluded)
             && !(predicted.is_new_sequence || by_nominal.is_new_sequence)
         {
-            let ratio = range_density(predicted) / range_density(by_nominal);
+            let [mine, nominal] = [predicted, by_nominal].map(|it| range_density(it, OUTLIERS));
+            let ratio = mine / nominal;
             let share = (predicted.information_fraction).min(by_nominal.information_fraction);
             self.0 = (self.0 + share * ratio.ln()).max(-CERTAIN);
         }
@@ -206,15 +207,12 @@ pub(in crate::localize) fn log_likelihood_as_stated(
 /// Width of the uniform distribution of outliers of a range (m).
 const OUTLIER_SPAN_M: f64 = 100.0;
 
-/// Returns the probability density of a range (1/m): Gaussian, or a uniformly distributed outlier.
-pub(in crate::localize) fn range_density(predicted: &PredictedRange) -> f64 {
-    outlier_or_gaussian(predicted, OUTLIERS)
-}
-
-/// Returns the probability density of a range (1/m) with this fraction of outliers. The density of an outlier is uniform:
+/// Returns the probability density of a range (1/m) with this fraction of outliers, or the usual one if it is larger. The density
+/// of an outlier is uniform:
 /// the ranges of a blocked path are late by nearly the same distance, so that with another density, each of them would be
 /// evidence for a position.
-fn outlier_or_gaussian(predicted: &PredictedRange, outliers: f64) -> f64 {
+pub(in crate::localize) fn range_density(predicted: &PredictedRange, outliers: f64) -> f64 {
+    let outliers = outliers.max(OUTLIERS);
     outliers / OUTLIER_SPAN_M + (1.0 - outliers) * predicted.innovation.density()
 }
 

@@ -81,7 +81,7 @@ const LATELY: u64 = 32;
 const MIN_MONITORED: usize = 4;
 
 /// Minimum number of radio heads for filters without two of them: with two radio heads, the faulty one cannot be
-/// identified. Filters that estimate the bias of each radio head bound two faults by that bias.
+/// identified.
 const MIN_FOR_PAIRS: usize = 3;
 
 clone_in_place! {
@@ -209,11 +209,7 @@ impl Subsets {
         }
         let ones = self.iter().filter(|it| it.is_of_one()).count();
         self.begin([head; 2], (head, heads.get(head)), nominal);
-        let pairs = if heads.len() < MIN_FOR_PAIRS || nominal.is_with_bias() {
-            0
-        } else {
-            ones
-        };
+        let pairs = if heads.len() < MIN_FOR_PAIRS { 0 } else { ones };
         // The first filters are those without one radio head, in order, without the new one.
         for number in 0..pairs {
             if let Some([other, _]) = self.filters.get(number).map(|it| it.without) {

@@ -38,17 +38,24 @@ impl LatePath {
         kept + changed * (PRIOR - kept)
     }
 
-    /// Updates with the innovation of a range with a clear path.
-    pub fn update(&mut self, innovation: &Innovation, changed: f64) {
+    /// Returns the path after a range with this innovation of a clear path.
+    pub fn after(self, innovation: &Innovation, changed: f64) -> Self {
         let prior = self.before(changed);
-        let (late, clear) = densities(innovation);
-        let evidence = prior * late + (1.0 - prior) * clear;
+        let evidence = self.density(innovation, changed);
         // Both densities are 0 for an innovation that is early beyond any noise.
-        self.probability = if evidence > 0.0 {
-            prior * late / evidence
+        let probability = if evidence > 0.0 {
+            prior * densities(innovation).0 / evidence
         } else {
             prior
         };
+        Self { probability }
+    }
+
+    /// Returns the probability density (1/m) of the innovation of a clear path.
+    pub fn density(self, innovation: &Innovation, changed: f64) -> f64 {
+        let prior = self.before(changed);
+        let (late, clear) = densities(innovation);
+        prior * late + (1.0 - prior) * clear
     }
 }
 
@@ -129,7 +136,7 @@ mod tests {
                 let is_blocked = (100..200).contains(&number);
                 let noise_m: f64 = random.sample(StandardNormal);
                 let residual = noise_m + if is_blocked { late_m } else { 0.0 };
-                path.update(&innovation(residual, 1.0), 0.05);
+                path = path.after(&innovation(residual, 1.0), 0.05);
                 if number % 100 > 3 {
                     count += 1.0;
                     wrong += f64::from(path.is_blocked() != is_blocked);
@@ -143,11 +150,11 @@ mod tests {
     fn early_and_extreme_ranges_do_not_block_a_path() {
         for residual in [-1e9, -100.0, -3.0, 0.0] {
             let mut path = LatePath::PRIOR;
-            path.update(&innovation(residual, 1.0), 0.05);
+            path = path.after(&innovation(residual, 1.0), 0.05);
             assert!(!path.is_blocked(), "{residual}");
         }
         let mut path = LatePath::PRIOR;
-        path.update(&innovation(1e9, 1.0), 0.05);
+        path = path.after(&innovation(1e9, 1.0), 0.05);
         assert!(path.probability.is_finite());
     }
 }

@@ -3,6 +3,7 @@
 
 mod blocked_path;
 mod carrier_phase;
+mod clock_step;
 mod distance;
 mod late_path;
 mod noise;
@@ -11,6 +12,7 @@ mod range_rate;
 mod update;
 
 pub(super) use blocked_path::BlockedPath;
+pub(super) use clock_step::ClockStepTest;
 pub(super) use late_path::LatePath;
 pub(super) use noise::RangeNoise;
 pub(in crate::localize) use pseudorange::PredictedRange;

@@ -1,15 +1,15 @@
 //! Update with a range, range rate or carrier phase: gate, jumps, Kalman update.
 
 use super::distance::SHARED_M;
+use super::late_path::LatePath;
 use super::pseudorange::PredictedRange;
-use crate::localize::bias::{CLOCK, DRIFT, HeadState, RANGE_SCALE, independent};
+use crate::localize::bias::{HeadState, RANGE_SCALE, independent};
 use crate::localize::ekf::filter::{Ekf, Head};
 use crate::localize::output::{UpdateReason, UpdateResult};
 use crate::radio_head::RadioHead;
 use crate::range::{RangeMeasurement, RangeQuantity};
 
-/// Number of successive rejected ranges of a radio head that are a jump of its offset or of the
-/// vehicle clock, not outliers.
+/// Number of successive rejected ranges of a radio head that are a jump of its offset, not outliers.
 const JUMP_RANGES: u16 = 8;
 
 /// Estimated range states, each with its standard deviation.
@@ -39,34 +39,48 @@ impl Ekf {
 
     /// Updates state and range states with a range, range rate or carrier phase.
     pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
-        let predicted = self.predict_range(head, measured);
+        let mut predicted = self.predict_range(head, measured);
+        if let Some(step) = self.clock_step(&predicted) {
+            self.step_clock(step);
+            predicted = self.predict_range(head, measured);
+        }
         if let Some(late) = self.reject_late_range(&predicted) {
             return late;
         }
         self.update_predicted_range(predicted)
     }
 
-    /// Updates the path of a radio head with a predicted two-way range. Returns the verdict if the path is probably blocked,
-    /// so that the range must not be used. There is no verdict with angles, which are the better evidence for a blocked path,
-    /// nor with delays: if the vehicle's clock is late, all of them are.
+    /// Returns the path of a predicted range's radio head after the range. `None` for other measurements, and with angles,
+    /// which are the better evidence for a blocked path.
+    fn path_after(&self, predicted: &PredictedRange) -> Option<LatePath> {
+        let head = self.heads.get(predicted.index)?;
+        let changed = path_changed(head, predicted);
+        (!self.has_angles() && predicted.quantity == RangeQuantity::Range)
+            .then(|| head.late.after(&predicted.innovation, changed))
+    }
+
+    /// Whether a predicted range is late because the path is probably blocked, so that it must not be used.
+    pub(in crate::localize) fn is_late(&self, predicted: &PredictedRange) -> bool {
+        let is_one_way = self.config.ranging.is_some_and(|model| model.is_one_way);
+        // Ranges of other radio heads that are too short contradict the position or the odometry instead. Delays that are too
+        // short also follow from a clock that was estimated with late ones.
+        let is_contradicted = !is_one_way && self.heads.iter().any(|it| it.rejected_ranges > 0);
+        // An offset beyond its specified standard deviation is no blocked path.
+        let was_clear =
+            (self.heads.get(predicted.index)).is_some_and(|it| it.last_range_m.is_finite());
+        let path = self.path_after(predicted);
+        !is_contradicted && was_clear && path.is_some_and(LatePath::is_blocked)
+    }
+
+    /// Updates the path of a radio head with a predicted range. Returns the verdict if the range is late.
     pub(in crate::localize) fn reject_late_range(
         &mut self,
         predicted: &Result<PredictedRange, UpdateReason>,
     ) -> Option<UpdateResult> {
         let predicted = predicted.as_ref().ok()?;
-        let has_angles = self.heads.iter().any(|it| it.last_update_s.is_finite());
-        let is_one_way = self.config.ranging.is_some_and(|model| model.is_one_way);
-        if has_angles || is_one_way || predicted.quantity != RangeQuantity::Range {
-            return None;
-        }
-        // Ranges of other radio heads that are too short contradict the position or the odometry instead.
-        let is_contradicted = self.heads.iter().any(|it| it.rejected_ranges > 0);
-        let head = self.heads.get_mut(predicted.index)?;
-        // An offset beyond its specified standard deviation is no blocked path.
-        let was_clear = head.last_range_m.is_finite();
-        let changed = path_changed(head, predicted);
-        head.late.update(&predicted.innovation, changed);
-        if is_contradicted || !(was_clear && head.late.is_blocked()) {
+        let (is_late, path) = (self.is_late(predicted), self.path_after(predicted)?);
+        self.heads.get_mut(predicted.index)?.late = path;
+        if !is_late {
             return None;
         }
         self.note_range(predicted);
@@ -76,10 +90,15 @@ impl Ekf {
         ))
     }
 
-    /// Returns the probability that the first path of a predicted range is blocked, according to the ranges before it.
+    /// Returns the probability that the first path of a predicted range is blocked, according to the ranges before it; 0 for
+    /// other measurements.
     pub(in crate::localize) fn late_probability(&self, predicted: &PredictedRange) -> f64 {
-        let head = self.heads.get(predicted.index);
-        head.map_or(0.0, |head| head.late.before(path_changed(head, predicted)))
+        match self.heads.get(predicted.index) {
+            Some(head) if predicted.quantity == RangeQuantity::Range => {
+                head.late.before(path_changed(head, predicted))
+            }
+            _ => 0.0,
+        }
     }
 
     /// Returns the variance ratio due to ranges that are late, but not late enough to be detected: with a fraction f of blocked
@@ -163,35 +182,29 @@ impl Ekf {
         }
     }
 
-    /// Counts a rejected range. After several successive ones, the offset of the radio head has
-    /// jumped (first path blocked, hardware restarted), or the vehicle's clock if the ranges of the
-    /// other radio heads are rejected too. The variance of the state then includes the jump.
+    /// Counts a rejected range. After several successive ones, the offset of the radio head has jumped, and its variance then
+    /// includes the jump: its hardware was restarted, or the offset was estimated with a blocked path. Without angles, ranges
+    /// that are too long are those of a blocked path.
     fn reject_range(&mut self, predicted: &PredictedRange) {
-        let Some(model) = self.config.ranging else {
-            return;
-        };
-        let count = self.heads.len();
-        let Some(head) = self.heads.get_mut(predicted.index) else {
+        let residual = predicted.innovation.residual;
+        let (count, has_angles) = (self.heads.len(), self.has_angles());
+        let head = self.heads.get_mut(predicted.index);
+        let Some(head) = head.filter(|_| has_angles || residual < 0.0) else {
             return;
         };
         head.rejected_ranges += 1;
-        if head.rejected_ranges < JUMP_RANGES {
-            return;
+        if let Some(model) = &self.config.ranging
+            && head.rejected_ranges >= JUMP_RANGES
+        {
+            head.rejected_ranges = 0;
+            let offset = HeadState::Offset.number(predicted.index, count, model);
+            self.bias.add_jump(offset, 0.0, residual.powi(2));
         }
-        head.rejected_ranges = 0;
-        let rejected = self.heads.iter().filter(|it| it.rejected_ranges > 1);
-        let rejected = 1 + rejected.count();
-        let jump_variance = predicted.innovation.residual.powi(2);
-        if model.is_one_way && count > 1 && 2 * rejected > count {
-            self.bias.add_jump(CLOCK, jump_variance);
-            self.bias.add_jump(DRIFT, model.drift_std_mps.powi(2));
-            for head in &mut self.heads {
-                head.rejected_ranges = 0;
-            }
-        } else {
-            let offset = HeadState::Offset.number(predicted.index, count, &model);
-            self.bias.add_jump(offset, jump_variance);
-        }
+    }
+
+    /// Whether an angle was used.
+    fn has_angles(&self) -> bool {
+        self.heads.iter().any(|it| it.last_update_s.is_finite())
     }
 
     /// Predicts the range states with an odometry sample.
@@ -218,6 +231,11 @@ impl Ekf {
         Some(self.range_state(number))
     }
 
+    /// Whether a range was used, so that the vehicle's clock is known relative to those of the radio heads.
+    pub(in crate::localize) const fn knows_clock(&self) -> bool {
+        self.last_delay_s.is_finite()
+    }
+
     fn range_state(&self, number: usize) -> RangeState {
         let [mean, variance] = self.bias.range_state(number);
         let std = variance.max(0.0).sqrt();
@@ -226,6 +244,6 @@ impl Ekf {
 }
 
 /// Returns the probability that a path has another state since the previous range of its radio head.
-fn path_changed(head: &Head, predicted: &PredictedRange) -> f64 {
+pub(super) fn path_changed(head: &Head, predicted: &PredictedRange) -> f64 {
     independent((predicted.place_m - head.last_range_m).abs(), SHARED_M)
 }
