@@ -322,7 +322,8 @@ impl IntegrityMonitor {
         };
         hypotheses.extend(others.filter_map(other));
         let levels = self.level.solve(&hypotheses);
-        let state = if self.bank.most_heads_are_suspect() {
+        let most_are_blocked = self.bank.nominal().most_paths_are_blocked();
+        let state = if self.bank.most_heads_are_suspect() || most_are_blocked {
             IntegrityState::Unavailable
         } else if self.has_departed
             || self.restarted.is_some()

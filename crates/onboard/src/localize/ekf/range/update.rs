@@ -101,6 +101,15 @@ impl Ekf {
         }
     }
 
+    /// Whether at least half of the paths are blocked, of several radio heads with ranges within the last 20 m. The
+    /// protection level assumes fewer.
+    pub(in crate::localize) fn most_paths_are_blocked(&self) -> bool {
+        let recent = |it: &&Head| self.driven_m - it.last_range_m < SHARED_M;
+        let paths = || self.heads.iter().filter(recent).map(|it| it.late);
+        let blocked = paths().filter(|it| it.is_blocked()).count();
+        blocked > 1 && 2 * blocked >= paths().count()
+    }
+
     /// Returns the variance ratio due to ranges that are late, but not late enough to be detected: with a fraction f of blocked
     /// paths, standard deviations are divided by 1 - f. An assumption; NEES in notes/experiments.md.
     pub(super) fn late_variance_ratio(&self) -> f64 {
