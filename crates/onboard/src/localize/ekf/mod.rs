@@ -28,6 +28,6 @@ pub(in crate::localize) use forecast::ExcludedInnovation;
 pub(crate) use free_motion::FreeMotion;
 pub use motion::{MotionNoise, PathBend};
 pub(in crate::localize) use predict::MAX_SLIP;
-pub(in crate::localize) use range::PredictedRange;
 pub use range::RangeState;
+pub(in crate::localize) use range::{OUTLIERS, PredictedRange, with_range_outliers};
 pub(in crate::localize) use update::PredictedMeasurement;

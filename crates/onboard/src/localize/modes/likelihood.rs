@@ -4,7 +4,9 @@ use std::f64::consts::TAU;
 
 use crate::gaussian::{Innovation, with_outliers};
 use crate::localize::bias::share;
-use crate::localize::ekf::{Ekf, PredictedMeasurement, PredictedRange};
+use crate::localize::ekf::{
+    Ekf, OUTLIERS, PredictedMeasurement, PredictedRange, with_range_outliers,
+};
 use crate::localize::output::UpdateReason;
 use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
@@ -57,10 +59,6 @@ impl Ekf {
         })
     }
 }
-
-/// Fraction of angles that are outliers with a uniformly distributed direction, unless scatter
-/// causes more.
-const OUTLIERS: f64 = 2e-3;
 
 /// Minimum posterior odds, against the nominal mode or, for a fault, all other modes, for the selection of a mode. The
 /// protection level covers every hypothesis, whether selected or not. With lower odds, the position alternates
@@ -204,16 +202,12 @@ pub(in crate::localize) fn log_likelihood_as_stated(
     }
 }
 
-/// Width of the uniform distribution of outliers of a range (m).
-const OUTLIER_SPAN_M: f64 = 100.0;
-
 /// Returns the probability density of a range (1/m) with this fraction of outliers, or the usual one if it is larger. The density
 /// of an outlier is uniform:
 /// the ranges of a blocked path are late by nearly the same distance, so that with another density, each of them would be
 /// evidence for a position.
 pub(in crate::localize) fn range_density(predicted: &PredictedRange, outliers: f64) -> f64 {
-    let outliers = outliers.max(OUTLIERS);
-    outliers / OUTLIER_SPAN_M + (1.0 - outliers) * predicted.innovation.density()
+    with_range_outliers(predicted.innovation.density(), outliers.max(OUTLIERS))
 }
 
 /// Returns the variance (rad²) of an angle without the state covariance, for the first angle of a

@@ -28,13 +28,11 @@ impl Bank {
     /// would be evidence for it. A filter far from the position would expect a blocked path, and ranges would be no evidence
     /// against it.
     pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
-        let mut predicted = self.nominal.predict_range(head, measured);
-        if let Some(step) = self.nominal.clock_step(&predicted) {
-            self.nominal.step_clock(step);
-            for it in &mut self.modes {
+        let (predicted, step) = self.nominal.predict_with_clock_step(head, measured);
+        for it in &mut self.modes {
+            if let Some(step) = step {
                 it.ekf.step_clock(step);
             }
-            predicted = self.nominal.predict_range(head, measured);
         }
         if let Some(late) = self.nominal.reject_late_range(&predicted) {
             return late;

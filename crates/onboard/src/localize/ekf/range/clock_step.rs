@@ -5,6 +5,7 @@
 //! head: the clock has stepped by the amount of the outlier, or not. The first delay of each radio head counts only, because
 //! the additional distance of a blocked path repeats (sequential probability ratio test, Wald 1945).
 
+use super::distance::{OUTLIER_SPAN_M, OUTLIERS, with_range_outliers};
 use super::late_path::LatePath;
 use super::noise::RangeNoise;
 use super::pseudorange::PredictedRange;
@@ -13,22 +14,17 @@ use crate::gaussian::Innovation;
 use crate::localize::bias::CLOCK;
 use crate::localize::ekf::filter::Ekf;
 use crate::localize::output::UpdateReason;
-use crate::range::RangeQuantity;
+use crate::radio_head::RadioHead;
+use crate::range::{RangeMeasurement, RangeQuantity};
 
 /// Logarithm of the prior probability of a step before an outlier. An assumption: one step in an hour of 25 delays per second.
 const PRIOR: f64 = -11.5;
 
-/// Log odds above which the clock has stepped: 10 to 1.
+/// Log odds above which the clock has stepped: 10 to 1. An assumption.
 const STEPPED: f64 = 2.3;
 
 /// Maximum duration of a test (s): several periods of SSBs.
 const MAX_DURATION_S: f64 = 1.0;
-
-/// Probability density (1/m) of a step, and of the error of an outlier.
-const STEP_DENSITY: f64 = 1e-2;
-
-/// Fraction of delays that are outliers.
-const OUTLIERS: f64 = 2e-3;
 
 /// Test whether the clock has stepped.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,7 +57,8 @@ impl ClockStepTest {
                 mean_m: innovation.residual,
                 variance: innovation.variance,
             },
-            log_odds: PRIOR + (STEP_DENSITY / density(innovation, path, changed)).ln(),
+            // A step has the uniform density of an outlier.
+            log_odds: PRIOR - (OUTLIER_SPAN_M * density(innovation, path, changed)).ln(),
             begun_s: now_s,
             noise,
         }
@@ -86,12 +83,28 @@ impl ClockStepTest {
 
 /// Returns the probability density of a delay (1/m): clear, blocked, or an outlier.
 fn density(innovation: &Innovation, path: LatePath, changed: f64) -> f64 {
-    OUTLIERS * STEP_DENSITY + (1.0 - OUTLIERS) * path.density(innovation, changed)
+    with_range_outliers(path.density(innovation, changed), OUTLIERS)
 }
 
 impl Ekf {
+    /// Predicts a range, range rate or carrier phase. If it shows that the vehicle's clock has stepped, the clock is changed
+    /// before, and the step is returned for other filters of the vehicle.
+    pub(in crate::localize) fn predict_with_clock_step(
+        &mut self,
+        head: &RadioHead,
+        measured: &RangeMeasurement,
+    ) -> (Result<PredictedRange, UpdateReason>, Option<ClockStep>) {
+        let predicted = self.predict_range(head, measured);
+        let step = self.clock_step(&predicted);
+        let Some(known) = step else {
+            return (predicted, None);
+        };
+        self.step_clock(known);
+        (self.predict_range(head, measured), step)
+    }
+
     /// Tests with a predicted delay whether the vehicle's clock has stepped. Returns the step once it is certain.
-    pub(in crate::localize) fn clock_step(
+    fn clock_step(
         &mut self,
         predicted: &Result<PredictedRange, UpdateReason>,
     ) -> Option<ClockStep> {
@@ -114,11 +127,12 @@ impl Ekf {
         }
         let is_outlier = innovation.mahalanobis2() > self.config.gate;
         let begins = !path.is_blocked() && path.after(innovation, changed).is_blocked();
-        let other = ClockStepTest::new(innovation, path, changed, now_s, noise);
-        let is_likelier = |it: ClockStepTest| other.log_odds > it.log_odds;
-        if (is_outlier || begins) && self.clock_test.is_none_or(is_likelier) {
-            self.clock_test = Some(other);
-            (head.clock_test_s, head.late_before_step) = (now_s, path);
+        if is_outlier || begins {
+            let other = ClockStepTest::new(innovation, path, changed, now_s, noise);
+            if (self.clock_test).is_none_or(|it| other.log_odds > it.log_odds) {
+                self.clock_test = Some(other);
+                (head.clock_test_s, head.late_before_step) = (now_s, path);
+            }
         }
         let test = self.clock_test.filter(|it| it.log_odds > STEPPED)?;
         self.clock_test = None;

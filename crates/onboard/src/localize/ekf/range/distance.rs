@@ -13,6 +13,18 @@ use crate::range::RangeMeasurement;
 /// for tens of metres.
 pub(super) const SHARED_M: f64 = 20.0;
 
+/// Fraction of measurements that are outliers with a uniform distribution, unless scatter causes more.
+pub(in crate::localize) const OUTLIERS: f64 = 2e-3;
+
+/// Width of the uniform distribution of outliers of a range (m).
+pub(super) const OUTLIER_SPAN_M: f64 = 100.0;
+
+/// Returns the density (1/m) of a range that has the given density or, with probability `outliers`, is uniformly
+/// distributed.
+pub(in crate::localize) fn with_range_outliers(density: f64, outliers: f64) -> f64 {
+    outliers / OUTLIER_SPAN_M + (1.0 - outliers) * density
+}
+
 /// Minimum independent fraction of multipath. At standstill there is no new information, but the variance
 /// must remain finite.
 const MIN_FRACTION: f64 = 1e-5;

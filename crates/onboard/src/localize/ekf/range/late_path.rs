@@ -40,22 +40,26 @@ impl LatePath {
 
     /// Returns the path after a range with this innovation of a clear path.
     pub fn after(self, innovation: &Innovation, changed: f64) -> Self {
-        let prior = self.before(changed);
-        let evidence = self.density(innovation, changed);
+        let [late, clear] = self.joint_densities(innovation, changed);
         // Both densities are 0 for an innovation that is early beyond any noise.
-        let probability = if evidence > 0.0 {
-            prior * densities(innovation).0 / evidence
+        let probability = if late + clear > 0.0 {
+            late / (late + clear)
         } else {
-            prior
+            self.before(changed)
         };
         Self { probability }
     }
 
-    /// Returns the probability density (1/m) of the innovation of a clear path.
+    /// Returns the probability density (1/m) of an innovation of a clear path.
     pub fn density(self, innovation: &Innovation, changed: f64) -> f64 {
+        self.joint_densities(innovation, changed).iter().sum()
+    }
+
+    /// Returns the joint densities (1/m) of an innovation with a blocked and with a clear path.
+    fn joint_densities(self, innovation: &Innovation, changed: f64) -> [f64; 2] {
         let prior = self.before(changed);
         let (late, clear) = densities(innovation);
-        prior * late + (1.0 - prior) * clear
+        [prior * late, (1.0 - prior) * clear]
     }
 }
 

@@ -13,6 +13,7 @@ mod update;
 
 pub(super) use blocked_path::BlockedPath;
 pub(super) use clock_step::ClockStepTest;
+pub(in crate::localize) use distance::{OUTLIERS, with_range_outliers};
 pub(super) use late_path::LatePath;
 pub(super) use noise::RangeNoise;
 pub(in crate::localize) use pseudorange::PredictedRange;

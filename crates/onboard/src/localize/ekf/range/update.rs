@@ -39,11 +39,7 @@ impl Ekf {
 
     /// Updates state and range states with a range, range rate or carrier phase.
     pub fn update_range(&mut self, head: &RadioHead, measured: &RangeMeasurement) -> UpdateResult {
-        let mut predicted = self.predict_range(head, measured);
-        if let Some(step) = self.clock_step(&predicted) {
-            self.step_clock(step);
-            predicted = self.predict_range(head, measured);
-        }
+        let (predicted, _) = self.predict_with_clock_step(head, measured);
         if let Some(late) = self.reject_late_range(&predicted) {
             return late;
         }
@@ -61,6 +57,11 @@ impl Ekf {
 
     /// Whether a predicted range is late because the path is probably blocked, so that it must not be used.
     pub(in crate::localize) fn is_late(&self, predicted: &PredictedRange) -> bool {
+        (self.path_after(predicted)).is_some_and(|path| self.is_late_with(predicted, path))
+    }
+
+    /// Whether a predicted range is late, given the path after it.
+    fn is_late_with(&self, predicted: &PredictedRange, path: LatePath) -> bool {
         let is_one_way = self.config.ranging.is_some_and(|model| model.is_one_way);
         // Ranges of other radio heads that are too short contradict the position or the odometry instead. Delays that are too
         // short also follow from a clock that was estimated with late ones.
@@ -68,8 +69,7 @@ impl Ekf {
         // An offset beyond its specified standard deviation is no blocked path.
         let was_clear =
             (self.heads.get(predicted.index)).is_some_and(|it| it.last_range_m.is_finite());
-        let path = self.path_after(predicted);
-        !is_contradicted && was_clear && path.is_some_and(LatePath::is_blocked)
+        !is_contradicted && was_clear && path.is_blocked()
     }
 
     /// Updates the path of a radio head with a predicted range. Returns the verdict if the range is late.
@@ -78,7 +78,8 @@ impl Ekf {
         predicted: &Result<PredictedRange, UpdateReason>,
     ) -> Option<UpdateResult> {
         let predicted = predicted.as_ref().ok()?;
-        let (is_late, path) = (self.is_late(predicted), self.path_after(predicted)?);
+        let path = self.path_after(predicted)?;
+        let is_late = self.is_late_with(predicted, path);
         self.heads.get_mut(predicted.index)?.late = path;
         if !is_late {
             return None;
