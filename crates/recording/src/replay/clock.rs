@@ -60,6 +60,10 @@ const PARTS: usize = 64;
 /// (notes/experiments.md).
 const CONSISTENT: f64 = 2.4;
 
+/// Minimum log-likelihood ratio of a time offset per range: the variance of the innovations then decreases by 2 %. The
+/// estimated noise of two filters differs by as much where the offset is not observable.
+const MIN_GAIN: f64 = 0.01;
+
 /// Duration from the first angle that is evaluated (s); it is limited because clocks drift.
 const SPAN_S: f64 = 300.0;
 
@@ -162,9 +166,9 @@ pub fn range_time_offset(
     odometry: &OdometryLog,
     ranges: &[LoggedRange],
 ) -> Result<Option<f64>, ReplayError> {
-    let mut vehicle = vehicle.clone();
-    doubt(site, &mut vehicle);
-    let heads = RadioHead::received_by(site, &vehicle);
+    let mut doubted = vehicle.clone();
+    doubt(site, &mut doubted);
+    let heads = RadioHead::received_by(site, vehicle);
     let first_s = ranges.first().map_or(0.0, |it| it.measured.time_s);
     // All offsets are compared by the same ranges.
     let is_compared = |it: &&LoggedRange| {
@@ -176,8 +180,8 @@ pub fn range_time_offset(
     let ranges: Vec<LoggedRange> = ranges.iter().filter(is_compared).copied().collect();
     let last_s = ranges.last().map_or(first_s, |it| it.measured.time_s);
     let part_s = (last_s - first_s) / PARTS as f64;
-    let of = |late_s: f64| -> Result<([f64; PARTS], bool), ReplayError> {
-        let mut ekf = plain_filter(site, &vehicle)?;
+    let of = |vehicle: &Vehicle, late_s: f64| -> Result<([f64; PARTS], bool), ReplayError> {
+        let mut ekf = plain_filter(site, vehicle)?;
         let mut samples = odometry.samples.iter().peekable();
         let (mut log_likelihood, mut rejected) = ([0.0; PARTS], 0);
         for logged in &ranges {
@@ -198,20 +202,23 @@ pub fn range_time_offset(
         let is_understood = (rejected as f64) < MAX_REJECTED_FRACTION * ranges.len() as f64;
         Ok((log_likelihood, is_understood))
     };
-    let mut likelihood = |late_s: f64| Ok(of(late_s)?.0.iter().sum());
+    let mut likelihood = |late_s: f64| Ok(of(&doubted, late_s)?.0.iter().sum());
     let Some((found_s, _)) = most_probable(&mut likelihood)? else {
         return Ok(None);
     };
-    let ((at_best, is_understood), (in_time, _)) = (of(found_s)?, of(0.0)?);
-    let ratios = at_best
-        .iter()
-        .zip(in_time)
-        .map(|(best, other)| best - other);
-    let (sum, squares) = ratios.fold((0.0, 0.0_f64), |(sum, squares), it| {
-        (sum + it, squares + it * it)
-    });
-    let is_significant = sum > CORRECTION_LOG_ODDS.max(CONSISTENT * squares.sqrt());
-    Ok((is_understood && is_significant).then_some(found_s))
+    let least = CORRECTION_LOG_ODDS.max(MIN_GAIN * ranges.len() as f64);
+    // A filter with an uncertain start is far from linear at first, and its likelihood without an offset can be too small.
+    for vehicle in [&doubted, vehicle] {
+        let ((at_best, is_understood), (in_time, _)) = (of(vehicle, found_s)?, of(vehicle, 0.0)?);
+        let ratios = (at_best.iter().zip(in_time)).map(|(best, other)| best - other);
+        let (sum, squares) = ratios.fold((0.0, 0.0_f64), |(sum, squares), it| {
+            (sum + it, squares + it * it)
+        });
+        if !is_understood || sum <= least.max(CONSISTENT * squares.sqrt()) {
+            return Ok(None);
+        }
+    }
+    Ok(Some(found_s))
 }
 
 /// Increases the standard deviations of start and odometer scale, which are estimated together with
