@@ -345,7 +345,9 @@ fn ranges_of_a_late_clock_are_shifted() {
         for remark in &drive.remarks {
             println!("{}", remark.text);
         }
-        assert_eq!(reports_time_offset(&drive), late_s != 0.0, "{late_s}");
+        // At 2 m/s, 0.2 s are 0.4 m: the error is not larger than with the correction.
+        let is_relevant = late_s.abs() > 0.2;
+        assert_eq!(reports_time_offset(&drive), is_relevant, "{late_s}");
         assert!(it.rms_m() < 0.5);
         assert!(it.beyond < 1e-2 * it.count);
     }
@@ -535,14 +537,16 @@ fn late_ranges_and_clock_steps_do_not_displace_the_vehicle() {
     }
 }
 
-/// The protection level assumes that few radio heads are faulty.
+/// The vehicle's clock may follow the delays of blocked paths. Two-way ranges contain no clock.
 #[test]
-fn a_position_is_unavailable_while_most_paths_are_blocked() {
+fn most_paths_may_be_blocked_for_ranges_but_not_for_delays() {
     for one_way in [false, true] {
         let blocked = Blocked::Most;
         let (rms_m, ok) = drive_in_circle(1, InCircle { blocked, one_way });
         println!("one-way {one_way}: {rms_m:.3} m, ok {ok:.3}");
-        assert!(ok > 0.6 && ok < 0.76, "one-way {one_way}: {ok}");
+        let usual = if one_way { 0.6..0.76 } else { 0.8..1.0 };
+        assert!(usual.contains(&ok), "one-way {one_way}: {ok}");
+        assert!(rms_m < 0.3, "one-way {one_way}: {rms_m}");
     }
 }
 

@@ -100,16 +100,16 @@ impl HeadingSearch {
         }
         // All filters have the path of the solution: a filter far from the position would expect a blocked path, and ranges
         // would be no evidence against it.
-        let outliers = solution.late_probability(&predicted);
-        let is_late = solution.is_late(&predicted);
+        let (outliers, is_late) = (predicted.late_probability(), predicted.is_late());
         self.solution += range_density(&predicted, outliers).ln();
         for it in &mut self.filters {
+            it.ekf.copy_paths(solution);
             let predicted = it.ekf.predict_range(head, measured);
             if let Ok(predicted) = &predicted {
                 it.log_likelihood += range_density(predicted, outliers).ln();
             }
             if !is_late {
-                it.ekf.update_predicted_range(predicted);
+                it.ekf.update_predicted_range(&predicted);
             }
         }
     }

@@ -242,7 +242,8 @@ impl MultipathBias {
     }
 
     /// Updates state, biases and range states with a range: the Kalman update of the whole
-    /// Gaussian.
+    /// Gaussian. With the probability 1 − `weight`, the range has another cause and contains no information; mean and
+    /// covariance are then those of the mixture (probabilistic data association, Bar-Shalom and Tse 1975).
     pub fn update_with_range(
         &mut self,
         belief: &mut Belief,
@@ -250,6 +251,7 @@ impl MultipathBias {
         terms: &RangeTerms,
         residual: f64,
         variance: f64,
+        weight: f64,
     ) {
         // Covariance of each state with the predicted range.
         let mut cross = belief.cross(row);
@@ -277,18 +279,21 @@ impl MultipathBias {
         if total <= 0.0 {
             return; // state and range are exact
         }
+        let shift = weight * residual / total;
+        let spread = (1.0 - weight) * residual * residual / total;
+        let reduction = weight * (1.0 - spread) / total;
         for i in 0..STATES {
-            belief.mean[i] += cross[i] / total * residual;
+            belief.mean[i] += cross[i] * shift;
             for j in i..STATES {
-                belief.covariance[i][j] -= cross[i] * cross[j] / total;
+                belief.covariance[i][j] -= cross[i] * cross[j] * reduction;
                 belief.covariance[j][i] = belief.covariance[i][j];
             }
         }
         for state in &mut self.heads {
-            let gain = state.cross_with_angle[0] / total;
-            state.mean_rad += gain * residual;
+            let with_range = state.cross_with_angle[0];
+            state.mean_rad += with_range * shift;
             for (value, by) in state.state_covariance.iter_mut().zip(cross) {
-                *value -= gain * by;
+                *value -= reduction * with_range * by;
             }
         }
         let heads = &self.heads;
@@ -296,7 +301,75 @@ impl MultipathBias {
             (heads.iter()).map(|other| one.cross_with_angle[0] * other.cross_with_angle[0])
         });
         for (value, product) in self.among.iter_mut().zip(pairs) {
-            *value -= product / total;
+            *value -= reduction * product;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    use super::*;
+    use crate::localize::modes::trip::trip;
+    use crate::settings::{ArraySettings, RangingSettings};
+
+    /// The update equals the moments of 200,000 draws: of the posterior given the range with the probability `weight`, otherwise
+    /// of the prior. The standard deviation of a mean is 0.002 of that of a draw, and that of a variance about 0.5 %.
+    #[test]
+    fn a_weighted_range_gives_the_moments_of_the_mixture() {
+        const DRAWS: u32 = 200_000;
+        let settings = RangingSettings::default();
+        let model = RangeModel::new(&settings, &ArraySettings::default(), 0.08);
+        let heads = trip().0;
+        let mut row = [0.0; STATES];
+        row[0] = 1.0;
+        let terms = [
+            (FIRST_OFFSET, 1.0),
+            (CLOCK, 0.0),
+            (DRIFT, 0.0),
+            (RANGE_SCALE, 0.0),
+        ];
+        let (residual, variance) = (6.0, 1.0);
+        let updated = |weight: f64| {
+            let mut sigma = [0.0; STATES];
+            sigma[0] = 2.0;
+            let mut belief = Belief::independent([0.0; STATES], sigma);
+            let mut bias = MultipathBias::new(0, 0.0);
+            bias.add_ranges(&model, &heads);
+            bias.update_with_range(&mut belief, &row, &terms, residual, variance, weight);
+            let [offset_m, offset_variance] = bias.range_state(FIRST_OFFSET);
+            (
+                [belief.mean[0], offset_m],
+                [belief.covariance[0][0], offset_variance],
+            )
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        for weight in [0.0, 0.3, 1.0] {
+            let (given_range, prior) = (updated(1.0), updated(0.0));
+            let found = updated(weight);
+            for state in 0..2 {
+                let (mut sum, mut square) = (0.0, 0.0);
+                for _ in 0..DRAWS {
+                    let (mean, variance) = if random.random::<f64>() < weight {
+                        (given_range.0[state], given_range.1[state])
+                    } else {
+                        (prior.0[state], prior.1[state])
+                    };
+                    let normal: f64 = random.sample(StandardNormal);
+                    let value = mean + variance.sqrt() * normal;
+                    sum += value / f64::from(DRAWS);
+                    square += value * value / f64::from(DRAWS);
+                }
+                assert!((found.0[state] - sum).abs() < 0.05, "{weight}: {sum}");
+                let spread = square - sum * sum;
+                assert!(
+                    (found.1[state] / spread - 1.0).abs() < 0.02,
+                    "{weight}: {spread}"
+                );
+            }
         }
     }
 }

@@ -115,6 +115,8 @@ clone_in_place! {
         pub(super) range_noise: RangeNoise,
         /// Random walk of the clocks relative to the specified one.
         pub(super) clock_noise: RangeNoise,
+        /// Average fraction of blocked paths over the last ten independent ones, according to the ranges.
+        pub(super) blocked_fraction: f64,
         /// Time of the last used delay, which determined the vehicle's clock (s).
         pub(super) last_delay_s: f64,
         /// Test of a clock step, while it runs.
@@ -151,6 +153,7 @@ impl Ekf {
             error_correlation: ErrorCorrelation::PRIOR,
             range_noise: RangeNoise::STATED,
             clock_noise: RangeNoise::STATED,
+            blocked_fraction: 0.0,
             last_delay_s: f64::NEG_INFINITY,
             clock_test: None,
             knows_common_phase: false,

@@ -110,6 +110,12 @@ impl Ekf {
     pub(in crate::localize) fn copy_range_noise(&mut self, other: &Self) {
         self.range_noise = other.range_noise;
         self.clock_noise = other.clock_noise;
+        self.copy_paths(other);
+    }
+
+    /// Sets the probabilities of blocked first paths to those of another filter of the same radio heads.
+    pub(in crate::localize) fn copy_paths(&mut self, other: &Self) {
+        self.blocked_fraction = other.blocked_fraction;
         for (mine, theirs) in self.heads.iter_mut().zip(&other.heads) {
             (mine.blocked, mine.late) = (theirs.blocked, theirs.late);
         }

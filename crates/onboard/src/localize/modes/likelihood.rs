@@ -54,9 +54,7 @@ impl Ekf {
     /// Returns the log-likelihood of a range in metres; 0 if the range is unusable.
     pub fn range_log_likelihood(&self, head: &RadioHead, measured: &RangeMeasurement) -> f64 {
         let predicted = self.predict_range(head, measured);
-        predicted.map_or(0.0, |it| {
-            range_density(&it, self.late_probability(&it)).ln()
-        })
+        predicted.map_or(0.0, |it| range_density(&it, it.late_probability()).ln())
     }
 }
 

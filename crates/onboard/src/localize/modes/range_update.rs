@@ -18,7 +18,7 @@ impl ModeFilter {
     ) {
         let predicted = self.ekf.predict_range(head, measured);
         self.ratio.update_range(&predicted, by_nominal);
-        self.ekf.update_predicted_range(predicted);
+        self.ekf.update_predicted_range(&predicted);
     }
 }
 
@@ -71,7 +71,7 @@ impl Bank {
         for it in &mut self.modes {
             it.ratio.limit_by(most);
         }
-        self.nominal.update_predicted_range(predicted)
+        self.nominal.update_predicted_range(&predicted)
     }
 }
 

@@ -5,13 +5,11 @@
 //! bias has with a line of sight. The additional distance of a blocked path has an exponential distribution. Mean and
 //! variance of the resulting mixture are exact.
 
+use super::late_path::{LATE_M, LatePath};
+
 /// Probability of a large bias with a line of sight, because the level may have changed since the last angles. Without it,
 /// delays in a site with lines of sight have little weight (notes/experiments.md).
 const WITH_LINE_OF_SIGHT: f64 = 0.05;
-
-/// Mean and standard deviation of the additional distance (m): those of the delays in UMi whose angles have a large bias
-/// (notes/experiments.md).
-pub(super) const LATE_M: f64 = 6.0;
 
 /// Standard deviation of the error of a range rate (m/s): fading of a reflection turns the carrier phase. An
 /// assumption; 5 and 10 m/s give equal errors (notes/experiments.md).
@@ -21,28 +19,49 @@ const RATE_STD_MPS: f64 = 5.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::localize::ekf) struct BlockedPath {
     probability: f64,
+    /// Mean and standard deviation of the additional distance of a blocked path (m).
+    late_m: f64,
 }
 
 impl BlockedPath {
     /// First path that is certainly not blocked.
-    pub const NEVER: Self = Self { probability: 0.0 };
+    pub const NEVER: Self = Self {
+        probability: 0.0,
+        late_m: LATE_M,
+    };
 
     /// Creates the path of a radio head whose angles have a large bias with this probability.
     pub fn new(large_bias_probability: f64) -> Self {
         let beyond = (large_bias_probability - WITH_LINE_OF_SIGHT) / (1.0 - WITH_LINE_OF_SIGHT);
         Self {
             probability: beyond.max(0.0),
+            late_m: LATE_M,
+        }
+    }
+
+    /// Creates the path of a radio head without angles, given the noise of its ranges (m). Additional distances above
+    /// the noise are found by the ranges themselves, and the path is then blocked; smaller ones are not. Where no path was
+    /// blocked lately, none is assumed to be.
+    pub fn unnoticed(path: LatePath, blocked_fraction: f64, noise_m: f64) -> Self {
+        let probability = if path.is_blocked() {
+            0.0
+        } else {
+            path.probability() * (blocked_fraction / LatePath::PRIOR.probability()).min(1.0)
+        };
+        Self {
+            probability,
+            late_m: LATE_M.min(noise_m),
         }
     }
 
     /// Returns the expected additional distance (m).
     pub fn late_m(self) -> f64 {
-        self.probability * LATE_M
+        self.probability * self.late_m
     }
 
     /// Returns the variance of the additional distance (m²).
     pub fn variance(self) -> f64 {
-        self.probability * (2.0 - self.probability) * LATE_M * LATE_M
+        self.probability * (2.0 - self.probability) * self.late_m * self.late_m
     }
 
     /// Returns the variance of the error of a range rate (m²/s²).
@@ -81,7 +100,10 @@ mod tests {
                 sum += late_m / f64::from(DRAWS);
                 square += late_m * late_m / f64::from(DRAWS);
             }
-            let blocked = BlockedPath { probability };
+            let blocked = BlockedPath {
+                probability,
+                late_m: LATE_M,
+            };
             let within = 0.06 * LATE_M * LATE_M;
             assert!((blocked.late_m() - sum).abs() < 0.06 * LATE_M, "{sum}");
             assert!((blocked.variance() + sum * sum - square).abs() < within);

@@ -104,6 +104,7 @@ impl Ekf {
             &predicted.terms,
             0.0,
             predicted.innovation.measurement_variance,
+            1.0,
         );
     }
 }

@@ -5,9 +5,9 @@
 //! head: the clock has stepped by the amount of the outlier, or not. The first delay of each radio head counts only, because
 //! the additional distance of a blocked path repeats (sequential probability ratio test, Wald 1945).
 
-use super::distance::{OUTLIER_SPAN_M, OUTLIERS, with_range_outliers};
 use super::late_path::LatePath;
 use super::noise::RangeNoise;
+use super::outliers::{OUTLIER_SPAN_M, OUTLIERS, with_range_outliers};
 use super::pseudorange::PredictedRange;
 use super::update::path_changed;
 use crate::gaussian::Innovation;
@@ -45,35 +45,29 @@ pub(in crate::localize) struct ClockStep {
 
 impl ClockStepTest {
     /// Starts with an outlier, and with the path of its radio head.
-    fn new(
-        innovation: &Innovation,
-        path: LatePath,
-        changed: f64,
-        now_s: f64,
-        noise: [RangeNoise; 2],
-    ) -> Self {
+    fn new(innovation: &Innovation, path: LatePath, now_s: f64, noise: [RangeNoise; 2]) -> Self {
         Self {
             step: ClockStep {
                 mean_m: innovation.residual,
                 variance: innovation.variance,
             },
             // A step has the uniform density of an outlier.
-            log_odds: PRIOR - (OUTLIER_SPAN_M * density(innovation, path, changed)).ln(),
+            log_odds: PRIOR - (OUTLIER_SPAN_M * density(innovation, path)).ln(),
             begun_s: now_s,
             noise,
         }
     }
 
     /// Updates with the delay of a radio head that was not in the test yet, and with its path.
-    fn update(&mut self, innovation: &Innovation, path: LatePath, changed: f64) {
+    fn update(&mut self, innovation: &Innovation, path: LatePath) {
         let after_step = Innovation {
             residual: innovation.residual - self.step.mean_m,
             variance: innovation.variance + self.step.variance,
             ..*innovation
         };
-        let stepped = density(&after_step, path, changed);
-        self.log_odds += (stepped / density(innovation, path, changed)).ln();
-        if !path.after(&after_step, changed).is_blocked() {
+        let stepped = density(&after_step, path);
+        self.log_odds += (stepped / density(innovation, path)).ln();
+        if !path.after(&after_step).is_blocked() {
             let gain = self.step.variance / after_step.variance;
             self.step.mean_m += gain * after_step.residual;
             self.step.variance *= 1.0 - gain;
@@ -82,8 +76,8 @@ impl ClockStepTest {
 }
 
 /// Returns the probability density of a delay (1/m): clear, blocked, or an outlier.
-fn density(innovation: &Innovation, path: LatePath, changed: f64) -> f64 {
-    with_range_outliers(path.density(innovation, changed), OUTLIERS)
+fn density(innovation: &Innovation, path: LatePath) -> f64 {
+    with_range_outliers(path.density(innovation), OUTLIERS)
 }
 
 impl Ekf {
@@ -113,25 +107,26 @@ impl Ekf {
         if !is_one_way || predicted.excluded || predicted.quantity != RangeQuantity::Range {
             return None;
         }
-        let (now_s, innovation) = (predicted.time_s, &predicted.innovation);
+        let (now_s, innovation) = (predicted.time_s, &predicted.clear_innovation());
         let noise = [self.range_noise, self.clock_noise];
         let head = self.heads.get_mut(predicted.index)?;
-        let (path, changed) = (head.late, path_changed(head, predicted));
+        let before = head.late;
+        let path = before.before(path_changed(head, predicted));
         let running = self.clock_test.take();
         self.clock_test = running.filter(|it| now_s - it.begun_s <= MAX_DURATION_S);
         if let Some(test) = &mut self.clock_test
             && head.clock_test_s < test.begun_s
         {
-            test.update(innovation, path, changed);
-            (head.clock_test_s, head.late_before_step) = (now_s, path);
+            test.update(innovation, path);
+            (head.clock_test_s, head.late_before_step) = (now_s, before);
         }
         let is_outlier = innovation.mahalanobis2() > self.config.gate;
-        let begins = !path.is_blocked() && path.after(innovation, changed).is_blocked();
+        let begins = !path.is_blocked() && path.after(innovation).is_blocked();
         if is_outlier || begins {
-            let other = ClockStepTest::new(innovation, path, changed, now_s, noise);
+            let other = ClockStepTest::new(innovation, path, now_s, noise);
             if (self.clock_test).is_none_or(|it| other.log_odds > it.log_odds) {
                 self.clock_test = Some(other);
-                (head.clock_test_s, head.late_before_step) = (now_s, path);
+                (head.clock_test_s, head.late_before_step) = (now_s, before);
             }
         }
         let test = self.clock_test.filter(|it| it.log_odds > STEPPED)?;
@@ -169,7 +164,7 @@ mod tests {
             measurement_variance: 1.0,
         };
         let noise = [RangeNoise::STATED; 2];
-        let mut test = ClockStepTest::new(&innovation(20.0), LatePath::PRIOR, 0.05, 0.0, noise);
+        let mut test = ClockStepTest::new(&innovation(20.0), LatePath::PRIOR, 0.0, noise);
         for _ in 0..5 {
             let noise_m: f64 = random.sample(StandardNormal);
             let late_m: f64 = 5.0 + 10.0 * random.sample::<f64, _>(Exp1);
@@ -178,11 +173,7 @@ mod tests {
             } else {
                 0.0
             };
-            test.update(
-                &innovation(step_m + late_m + noise_m),
-                LatePath::PRIOR,
-                0.05,
-            );
+            test.update(&innovation(step_m + late_m + noise_m), LatePath::PRIOR);
         }
         test.log_odds
     }

@@ -1,6 +1,7 @@
 //! Range or one-way delay: `(1 + s) R + c + b` with the distance R to the radio head, the scale
 //! error s, the vehicle clock c (one-way delays only) and the offset b of the radio head.
 
+use super::blocked_path::BlockedPath;
 use super::pseudorange::PredictedRange;
 use crate::localize::bias::{CLOCK, DRIFT, HeadState, RANGE_SCALE, independent};
 use crate::localize::ekf::filter::Ekf;
@@ -12,18 +13,6 @@ use crate::range::RangeMeasurement;
 /// decorrelates within a metre, but the delays of the reflections and a blocked line of sight remain
 /// for tens of metres.
 pub(super) const SHARED_M: f64 = 20.0;
-
-/// Fraction of measurements that are outliers with a uniform distribution, unless scatter causes more.
-pub(in crate::localize) const OUTLIERS: f64 = 2e-3;
-
-/// Width of the uniform distribution of outliers of a range (m).
-pub(super) const OUTLIER_SPAN_M: f64 = 100.0;
-
-/// Returns the density (1/m) of a range that has the given density or, with probability `outliers`, is uniformly
-/// distributed.
-pub(in crate::localize) fn with_range_outliers(density: f64, outliers: f64) -> f64 {
-    outliers / OUTLIER_SPAN_M + (1.0 - outliers) * density
-}
 
 /// Minimum independent fraction of multipath. At standstill there is no new information, but the variance
 /// must remain finite.
@@ -47,26 +36,30 @@ impl Ekf {
             (DRIFT, seen.lag_s),
             (offset, 1.0),
         ];
+        let (ratio, noise) = (self.range_noise.ratio(), sigma_m * sigma_m);
+        let path = self.path_before(&seen);
+        let unnoticed = BlockedPath::unnoticed(path, self.blocked_fraction, sigma_m * ratio.sqrt());
         // Noise is independent from one range to the next, multipath is not.
-        let noise = sigma_m * sigma_m * self.late_variance_ratio();
         let scatter = measured.scatter_m * measured.scatter_m + seen.blocked.variance();
-        let variance = noise + scatter;
+        let own_variance = ratio * (noise + scatter) + unnoticed.variance();
         let independent_fraction = independent(seen.travelled_m, SHARED_M).max(MIN_FRACTION);
-        let shift_m =
-            seen.blocked.late_m() + state_m(CLOCK) + seen.lag_s * state_m(DRIFT) + state_m(offset);
+        let shared_variance = (ratio * scatter + unnoticed.variance()) / independent_fraction;
+        let late_m = seen.blocked.late_m() + unnoticed.late_m();
+        let shift_m = late_m + state_m(CLOCK) + seen.lag_s * state_m(DRIFT) + state_m(offset);
         let mut predicted = self.predicted(
             &seen,
             measured.quantity,
             measured.value - (distance.range_m + shift_m),
             distance.row,
             terms,
-            variance,
+            noise + scatter,
             [
-                self.range_noise.ratio(),
-                distance.variance + seen.clock_variance(),
+                ratio,
+                unnoticed.variance() + distance.variance + seen.clock_variance(),
             ],
         );
-        predicted.information_fraction = variance / (noise + scatter / independent_fraction);
+        (predicted.path, predicted.unnoticed) = (path, unnoticed);
+        predicted.information_fraction = own_variance / (ratio * noise + shared_variance);
         Ok(predicted)
     }
 }

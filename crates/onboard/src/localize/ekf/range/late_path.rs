@@ -8,14 +8,18 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use super::blocked_path::LATE_M;
+use super::outliers::{OUTLIERS, outlier_density};
 use crate::gaussian::Innovation;
+
+/// Mean and standard deviation of the additional distance (m): those of the delays in UMi whose angles have a large bias
+/// (notes/experiments.md).
+pub(super) const LATE_M: f64 = 6.0;
 
 /// Prior probability of a blocked path. An assumption; the ranges of a few metres outweigh it.
 const PRIOR: f64 = 0.05;
 
-/// Maximum probability before a range, so that a path that is clear again is found at standstill, too.
-const MAX_PRIOR: f64 = 0.99;
+/// Minimum and maximum probability before a range, so that a path that has changed is found at standstill, too.
+const BEFORE: [f64; 2] = [0.01, 0.99];
 
 /// First path that is blocked with a probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,39 +31,55 @@ impl LatePath {
     /// Path of a radio head without ranges.
     pub const PRIOR: Self = Self { probability: PRIOR };
 
+    /// Path that is certainly clear.
+    pub const CLEAR: Self = Self { probability: 0.0 };
+
+    /// Returns the probability that the path is blocked.
+    pub const fn probability(self) -> f64 {
+        self.probability
+    }
+
     /// Whether the path is probably blocked.
     pub fn is_blocked(self) -> bool {
         self.probability > 0.5
     }
 
-    /// Returns the probability before a range, if a new state since the previous range has the probability `changed`.
-    pub fn before(self, changed: f64) -> f64 {
-        let kept = self.probability.clamp(PRIOR, MAX_PRIOR);
-        kept + changed * (PRIOR - kept)
+    /// Returns the path before a range, if a new state since the previous range has the probability `changed`.
+    pub fn before(self, changed: f64) -> Self {
+        let kept = self.probability.clamp(BEFORE[0], BEFORE[1]);
+        Self {
+            probability: kept + changed * (PRIOR - kept),
+        }
     }
 
-    /// Returns the path after a range with this innovation of a clear path.
-    pub fn after(self, innovation: &Innovation, changed: f64) -> Self {
-        let [late, clear] = self.joint_densities(innovation, changed);
-        // Both densities are 0 for an innovation that is early beyond any noise.
-        let probability = if late + clear > 0.0 {
-            late / (late + clear)
-        } else {
-            self.before(changed)
-        };
-        Self { probability }
+    /// Returns the path after a range with this innovation of a clear path. An outlier is no evidence for either state.
+    pub fn after(self, innovation: &Innovation) -> Self {
+        let [late, clear, outlier] = self.joint_densities(innovation);
+        Self {
+            probability: (late + self.probability * outlier) / (late + clear + outlier),
+        }
     }
 
-    /// Returns the probability density (1/m) of an innovation of a clear path.
-    pub fn density(self, innovation: &Innovation, changed: f64) -> f64 {
-        self.joint_densities(innovation, changed).iter().sum()
+    /// Returns the probability that a range with this innovation has a clear path and is no outlier.
+    pub fn clear_probability(self, innovation: &Innovation) -> f64 {
+        let [late, clear, outlier] = self.joint_densities(innovation);
+        clear / (late + clear + outlier)
     }
 
-    /// Returns the joint densities (1/m) of an innovation with a blocked and with a clear path.
-    fn joint_densities(self, innovation: &Innovation, changed: f64) -> [f64; 2] {
-        let prior = self.before(changed);
+    /// Returns the probability density (1/m) of an innovation of a clear path, if it is no outlier.
+    pub fn density(self, innovation: &Innovation) -> f64 {
         let (late, clear) = densities(innovation);
-        [prior * late, (1.0 - prior) * clear]
+        self.probability * late + (1.0 - self.probability) * clear
+    }
+
+    /// Returns the joint densities (1/m) of an innovation with a blocked path, with a clear path, and as an outlier.
+    fn joint_densities(self, innovation: &Innovation) -> [f64; 3] {
+        let (late, clear) = densities(innovation);
+        [
+            (1.0 - OUTLIERS) * self.probability * late,
+            (1.0 - OUTLIERS) * (1.0 - self.probability) * clear,
+            OUTLIERS * outlier_density(innovation),
+        ]
     }
 }
 
@@ -140,7 +160,7 @@ mod tests {
                 let is_blocked = (100..200).contains(&number);
                 let noise_m: f64 = random.sample(StandardNormal);
                 let residual = noise_m + if is_blocked { late_m } else { 0.0 };
-                path = path.after(&innovation(residual, 1.0), 0.05);
+                path = path.before(0.05).after(&innovation(residual, 1.0));
                 if number % 100 > 3 {
                     count += 1.0;
                     wrong += f64::from(path.is_blocked() != is_blocked);
@@ -154,11 +174,11 @@ mod tests {
     fn early_and_extreme_ranges_do_not_block_a_path() {
         for residual in [-1e9, -100.0, -3.0, 0.0] {
             let mut path = LatePath::PRIOR;
-            path = path.after(&innovation(residual, 1.0), 0.05);
+            path = path.before(0.05).after(&innovation(residual, 1.0));
             assert!(!path.is_blocked(), "{residual}");
         }
         let mut path = LatePath::PRIOR;
-        path = path.after(&innovation(1e9, 1.0), 0.05);
+        path = path.before(0.05).after(&innovation(1e9, 1.0));
         assert!(path.probability.is_finite());
     }
 }

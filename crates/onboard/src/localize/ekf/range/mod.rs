@@ -7,14 +7,15 @@ mod clock_step;
 mod distance;
 mod late_path;
 mod noise;
+mod outliers;
 mod pseudorange;
 mod range_rate;
 mod update;
 
 pub(super) use blocked_path::BlockedPath;
 pub(super) use clock_step::ClockStepTest;
-pub(in crate::localize) use distance::{OUTLIERS, with_range_outliers};
 pub(super) use late_path::LatePath;
 pub(super) use noise::RangeNoise;
+pub(in crate::localize) use outliers::{OUTLIERS, with_range_outliers};
 pub(in crate::localize) use pseudorange::PredictedRange;
 pub use update::RangeState;

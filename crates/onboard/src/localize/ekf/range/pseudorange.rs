@@ -2,6 +2,7 @@
 //! the measurement, and the distance with its second-order terms.
 
 use super::blocked_path::BlockedPath;
+use super::late_path::LatePath;
 use crate::gaussian::Innovation;
 use crate::geometry::Pose;
 use crate::localize::bias::{HeadState, RangeTerms};
@@ -36,6 +37,10 @@ pub(in crate::localize) struct PredictedRange {
     pub(super) phase_state: usize,
     /// Innovation in metres; of a range rate in m/s.
     pub innovation: Innovation,
+    /// First path before a range, according to the ranges before it.
+    pub(super) path: LatePath,
+    /// Additional distance of a blocked path that the ranges do not show.
+    pub(super) unnoticed: BlockedPath,
 }
 
 /// Line of sight to a radio head at the time of a measurement.
@@ -186,11 +191,38 @@ impl Ekf {
                 variance: known.max(0.0) + measurement_variance,
                 measurement_variance,
             },
+            path: LatePath::CLEAR,
+            unnoticed: BlockedPath::NEVER,
         }
     }
 }
 
 impl PredictedRange {
+    /// Returns the innovation of a path that is certainly clear.
+    pub fn clear_innovation(&self) -> Innovation {
+        let unnoticed_variance = self.unnoticed.variance();
+        Innovation {
+            residual: self.innovation.residual + self.unnoticed.late_m(),
+            variance: self.innovation.variance - unnoticed_variance,
+            measurement_variance: self.innovation.measurement_variance - unnoticed_variance,
+        }
+    }
+
+    /// Returns the probability that a range is late, according to the ranges before it; at least the prior one, because late
+    /// ranges of a path that was clear are no evidence about the position. 0 for other measurements.
+    pub fn late_probability(&self) -> f64 {
+        if self.quantity == RangeQuantity::Range {
+            self.path.probability().max(LatePath::PRIOR.probability())
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether a range is probably late because its path is blocked, so that it must not be used.
+    pub fn is_late(&self) -> bool {
+        self.path.after(&self.clear_innovation()).is_blocked()
+    }
+
     /// Returns the innovation with the variance of the independent part of the measurement.
     pub fn independent_innovation(&self) -> Innovation {
         let Innovation {

@@ -2,7 +2,7 @@
 
 use super::distance::SHARED_M;
 use super::late_path::LatePath;
-use super::pseudorange::PredictedRange;
+use super::pseudorange::{PredictedRange, Sighted};
 use crate::localize::bias::{HeadState, RANGE_SCALE, independent};
 use crate::localize::ekf::filter::{Ekf, Head};
 use crate::localize::output::{UpdateReason, UpdateResult};
@@ -11,6 +11,9 @@ use crate::range::{RangeMeasurement, RangeQuantity};
 
 /// Number of successive rejected ranges of a radio head that are a jump of its offset, not outliers.
 const JUMP_RANGES: u16 = 8;
+
+/// Number of independent paths over which blocked ones are averaged.
+const PATHS: f64 = 10.0;
 
 /// Estimated range states, each with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,47 +46,32 @@ impl Ekf {
         if let Some(late) = self.reject_late_range(&predicted) {
             return late;
         }
-        self.update_predicted_range(predicted)
+        self.update_predicted_range(&predicted)
     }
 
-    /// Returns the path of a predicted range's radio head after the range. `None` for other measurements, and with angles,
-    /// which are the better evidence for a blocked path.
-    fn path_after(&self, predicted: &PredictedRange) -> Option<LatePath> {
-        let head = self.heads.get(predicted.index)?;
-        let changed = path_changed(head, predicted);
-        (!self.has_angles() && predicted.quantity == RangeQuantity::Range)
-            .then(|| head.late.after(&predicted.innovation, changed))
+    /// Returns the first path of a radio head before a range. It is clear if the ranges are no evidence for a blocked path:
+    /// with angles, which are the better evidence; before the first used range, because an offset beyond its standard
+    /// deviation is no blocked path; and while two-way ranges of other radio heads are too short, because the position or the
+    /// odometry is then wrong. Delays that are too short also follow from a clock that was estimated with late ones.
+    pub(super) fn path_before(&self, seen: &Sighted<'_>) -> LatePath {
+        let is_contradicted = || self.heads.iter().any(|it| it.rejected_ranges > 0);
+        if self.has_angles()
+            || !seen.travelled_m.is_finite()
+            || (!seen.model.is_one_way && is_contradicted())
+        {
+            return LatePath::CLEAR;
+        }
+        let changed = independent(seen.travelled_m, SHARED_M);
+        (self.heads.get(seen.index)).map_or(LatePath::CLEAR, |head| head.late.before(changed))
     }
 
-    /// Whether a predicted range is late because the path is probably blocked, so that it must not be used.
-    pub(in crate::localize) fn is_late(&self, predicted: &PredictedRange) -> bool {
-        (self.path_after(predicted)).is_some_and(|path| self.is_late_with(predicted, path))
-    }
-
-    /// Whether a predicted range is late, given the path after it.
-    fn is_late_with(&self, predicted: &PredictedRange, path: LatePath) -> bool {
-        let is_one_way = self.config.ranging.is_some_and(|model| model.is_one_way);
-        // Ranges of other radio heads that are too short contradict the position or the odometry instead. Delays that are too
-        // short also follow from a clock that was estimated with late ones.
-        let is_contradicted = !is_one_way && self.heads.iter().any(|it| it.rejected_ranges > 0);
-        // An offset beyond its specified standard deviation is no blocked path.
-        let was_clear =
-            (self.heads.get(predicted.index)).is_some_and(|it| it.last_range_m.is_finite());
-        !is_contradicted && was_clear && path.is_blocked()
-    }
-
-    /// Updates the path of a radio head with a predicted range. Returns the verdict if the range is late.
+    /// Returns the verdict of a predicted range that is late because its path is probably blocked.
     pub(in crate::localize) fn reject_late_range(
         &mut self,
         predicted: &Result<PredictedRange, UpdateReason>,
     ) -> Option<UpdateResult> {
-        let predicted = predicted.as_ref().ok()?;
-        let path = self.path_after(predicted)?;
-        let is_late = self.is_late_with(predicted, path);
-        self.heads.get_mut(predicted.index)?.late = path;
-        if !is_late {
-            return None;
-        }
+        let predicted = predicted.as_ref().ok().filter(|it| it.is_late())?;
+        self.note_path(predicted);
         self.note_range(predicted);
         Some(self.verdict(
             UpdateReason::Outlier,
@@ -91,70 +79,69 @@ impl Ekf {
         ))
     }
 
-    /// Returns the probability that the first path of a predicted range is blocked, according to the ranges before it; 0 for
-    /// other measurements.
-    pub(in crate::localize) fn late_probability(&self, predicted: &PredictedRange) -> f64 {
-        match self.heads.get(predicted.index) {
-            Some(head) if predicted.quantity == RangeQuantity::Range => {
-                head.late.before(path_changed(head, predicted))
-            }
-            _ => 0.0,
+    /// Stores the first path after a range.
+    fn note_path(&mut self, predicted: &PredictedRange) {
+        if predicted.path != LatePath::CLEAR
+            && let Some(head) = self.heads.get_mut(predicted.index)
+        {
+            let share = path_changed(head, predicted) / PATHS;
+            head.late = predicted.path.after(&predicted.clear_innovation());
+            let is_blocked = f64::from(head.late.is_blocked());
+            self.blocked_fraction += share * (is_blocked - self.blocked_fraction);
         }
     }
 
-    /// Whether at least half of the paths are blocked, of several radio heads with ranges within the last 20 m. The
-    /// protection level assumes fewer.
+    /// Whether at least half of the paths are blocked, of several radio heads with one-way delays within the last 20 m. The
+    /// vehicle's clock may then follow the late delays, so that the other ones seem early.
     pub(in crate::localize) fn most_paths_are_blocked(&self) -> bool {
+        if !self.config.ranging.is_some_and(|model| model.is_one_way) {
+            return false;
+        }
         let recent = |it: &&Head| self.driven_m - it.last_range_m < SHARED_M;
         let paths = || self.heads.iter().filter(recent).map(|it| it.late);
         let blocked = paths().filter(|it| it.is_blocked()).count();
         blocked > 1 && 2 * blocked >= paths().count()
     }
 
-    /// Returns the variance ratio due to ranges that are late, but not late enough to be detected: with a fraction f of blocked
-    /// paths, standard deviations are divided by 1 - f. An assumption; NEES in notes/experiments.md.
-    pub(super) fn late_variance_ratio(&self) -> f64 {
-        let blocked = (self.heads.iter())
-            .filter(|it| it.late.is_blocked())
-            .count();
-        let clear = (self.heads.len() - blocked).max(1) as f64 / self.heads.len() as f64;
-        1.0 / (clear * clear)
-    }
-
     /// Updates with a predicted measurement.
     pub(in crate::localize) fn update_predicted_range(
         &mut self,
-        predicted: Result<PredictedRange, UpdateReason>,
+        predicted: &Result<PredictedRange, UpdateReason>,
     ) -> UpdateResult {
         let predicted = match predicted {
             Ok(predicted) if predicted.excluded => {
                 return self.verdict(UpdateReason::Excluded, None);
             }
             Ok(predicted) => predicted,
-            Err(reason) => return self.verdict(reason, None),
+            Err(reason) => return self.verdict(*reason, None),
         };
         if predicted.is_new_sequence {
-            self.begin_sequence(&predicted, predicted.phase_state);
+            self.begin_sequence(predicted, predicted.phase_state);
             return self.verdict(UpdateReason::Consistent, None);
         }
         let seen = predicted.innovation;
         let mahalanobis2 = seen.mahalanobis2();
-        let is_outlier = mahalanobis2 > self.config.gate;
+        let mut is_outlier = mahalanobis2 > self.config.gate;
+        let mut weight = if is_outlier { 0.0 } else { 1.0 };
         match predicted.quantity {
-            RangeQuantity::Range => self.monitor_range(&predicted, is_outlier),
+            RangeQuantity::Range => {
+                weight = (predicted.path).clear_probability(&predicted.clear_innovation());
+                self.note_path(predicted);
+                self.monitor_range(predicted, is_outlier);
+                is_outlier = weight < 0.5;
+            }
             // A cycle slip: the phase continues with another number of wavelengths.
             RangeQuantity::CarrierPhase if is_outlier => {
-                self.begin_sequence(&predicted, predicted.phase_state);
+                self.begin_sequence(predicted, predicted.phase_state);
             }
             RangeQuantity::CarrierPhase => self.knows_common_phase = true,
             RangeQuantity::RangeRate { .. } => {}
         }
-        if is_outlier {
-            return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
-        }
-        self.note_range(&predicted);
-        if predicted.quantity == RangeQuantity::Range {
-            self.last_delay_s = predicted.time_s;
+        if !is_outlier {
+            self.note_range(predicted);
+            if predicted.quantity == RangeQuantity::Range {
+                self.last_delay_s = predicted.time_s;
+            }
         }
         self.bias.update_with_range(
             &mut self.belief,
@@ -162,9 +149,15 @@ impl Ekf {
             &predicted.terms,
             seen.residual,
             predicted.independent_innovation().measurement_variance,
+            weight,
         );
         self.keep_bounds();
-        self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+        let reason = if is_outlier {
+            UpdateReason::Outlier
+        } else {
+            UpdateReason::Consistent
+        };
+        self.verdict(reason, Some(mahalanobis2))
     }
 
     /// Stores where a range was received that contains multipath.
@@ -213,7 +206,7 @@ impl Ekf {
     }
 
     /// Whether an angle was used.
-    fn has_angles(&self) -> bool {
+    pub(super) fn has_angles(&self) -> bool {
         self.heads.iter().any(|it| it.last_update_s.is_finite())
     }
 
