@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import fcntl
+import importlib.util
 import os
 import shutil
 import sys
@@ -90,6 +91,16 @@ def access_av(
         return Finished(int(stopped.value.code or 0), *capsys.readouterr())
 
     return run
+
+
+def benchmark(name: str) -> Any:
+    """Returns the module of a benchmark."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / f"benches/{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def made_once(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,7 @@ import polars as pl
 import pytest
 
 from access_av import drives
-from conftest import ROOT
+from conftest import benchmark
 from robot import HEADS_M, Robot, robot
 
 if TYPE_CHECKING:
@@ -117,12 +116,7 @@ def test_a_flag_that_is_neither_0_nor_1_is_left_out_with_its_line(tmp_path: Path
 
 @pytest.fixture(scope="module")
 def bench() -> Any:
-    spec = importlib.util.spec_from_file_location("heads", ROOT / "benches/angles_at_heads.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return benchmark("angles_at_heads")
 
 
 def test_a_real_robot_is_located_by_four_access_points(

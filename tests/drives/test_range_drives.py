@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import re
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from conftest import ROOT
+from conftest import benchmark
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,12 +17,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture(scope="module")
 def bench() -> Any:
-    spec = importlib.util.spec_from_file_location("bench", ROOT / "benches/range_drives.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return benchmark("range_drives")
 
 
 def converted(bench: Any, folder: Path, measured: list[str], truth: list[str]) -> Path:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
-from conftest import ROOT
+from conftest import benchmark
 from robot import HEADS_M, RATE_HZ, robot
 
 if TYPE_CHECKING:
@@ -24,12 +23,7 @@ VIEW_RAD = 0.6
 
 @pytest.fixture(scope="module")
 def bench() -> Any:
-    spec = importlib.util.spec_from_file_location("bench", ROOT / "benches/real_drives.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return benchmark("real_drives")
 
 
 @pytest.fixture(scope="module")
