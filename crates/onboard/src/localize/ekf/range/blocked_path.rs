@@ -3,7 +3,7 @@
 //! One SSB does not show that its first path is blocked, but successive angles do: without a line of sight, their bias is
 //! large. The probability of a large bias is therefore the probability of a blocked first path, less the part that a large
 //! bias has with a line of sight. The additional distance of a blocked path has an exponential distribution. Mean and
-//! variance of the resulting mixture are exact.
+//! variance of the resulting mixture are exact. Without angles, the ranges show all but the small additional distances.
 
 use super::late_path::{LATE_M, LatePath};
 
@@ -20,14 +20,14 @@ const RATE_STD_MPS: f64 = 5.0;
 pub(in crate::localize::ekf) struct BlockedPath {
     probability: f64,
     /// Mean and standard deviation of the additional distance of a blocked path (m).
-    late_m: f64,
+    mean_m: f64,
 }
 
 impl BlockedPath {
     /// First path that is certainly not blocked.
     pub const NEVER: Self = Self {
         probability: 0.0,
-        late_m: LATE_M,
+        mean_m: LATE_M,
     };
 
     /// Creates the path of a radio head whose angles have a large bias with this probability.
@@ -35,7 +35,7 @@ impl BlockedPath {
         let beyond = (large_bias_probability - WITH_LINE_OF_SIGHT) / (1.0 - WITH_LINE_OF_SIGHT);
         Self {
             probability: beyond.max(0.0),
-            late_m: LATE_M,
+            mean_m: LATE_M,
         }
     }
 
@@ -50,18 +50,18 @@ impl BlockedPath {
         };
         Self {
             probability,
-            late_m: LATE_M.min(noise_m),
+            mean_m: LATE_M.min(noise_m),
         }
     }
 
     /// Returns the expected additional distance (m).
     pub fn late_m(self) -> f64 {
-        self.probability * self.late_m
+        self.probability * self.mean_m
     }
 
     /// Returns the variance of the additional distance (m²).
     pub fn variance(self) -> f64 {
-        self.probability * (2.0 - self.probability) * self.late_m * self.late_m
+        self.probability * (2.0 - self.probability) * self.mean_m * self.mean_m
     }
 
     /// Returns the variance of the error of a range rate (m²/s²).
@@ -102,7 +102,7 @@ mod tests {
             }
             let blocked = BlockedPath {
                 probability,
-                late_m: LATE_M,
+                mean_m: LATE_M,
             };
             let within = 0.06 * LATE_M * LATE_M;
             assert!((blocked.late_m() - sum).abs() < 0.06 * LATE_M, "{sum}");

@@ -103,8 +103,10 @@ impl Ekf {
         predicted: &Result<PredictedRange, UpdateReason>,
     ) -> Option<ClockStep> {
         let predicted = predicted.as_ref().ok()?;
-        let is_one_way = self.config.ranging.is_some_and(|model| model.is_one_way);
-        if !is_one_way || predicted.excluded || predicted.quantity != RangeQuantity::Range {
+        if !self.has_one_way_delays()
+            || predicted.excluded
+            || predicted.quantity != RangeQuantity::Range
+        {
             return None;
         }
         let (now_s, innovation) = (predicted.time_s, &predicted.clear_innovation());

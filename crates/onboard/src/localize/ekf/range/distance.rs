@@ -37,12 +37,13 @@ impl Ekf {
             (offset, 1.0),
         ];
         let (ratio, noise) = (self.range_noise.ratio(), sigma_m * sigma_m);
-        let path = self.path_before(&seen);
+        let changed = independent(seen.travelled_m, SHARED_M);
+        let path = self.path_before(&seen, changed);
         let unnoticed = BlockedPath::unnoticed(path, self.blocked_fraction, sigma_m * ratio.sqrt());
         // Noise is independent from one range to the next, multipath is not.
         let scatter = measured.scatter_m * measured.scatter_m + seen.blocked.variance();
         let own_variance = ratio * (noise + scatter) + unnoticed.variance();
-        let independent_fraction = independent(seen.travelled_m, SHARED_M).max(MIN_FRACTION);
+        let independent_fraction = changed.max(MIN_FRACTION);
         let shared_variance = (ratio * scatter + unnoticed.variance()) / independent_fraction;
         let late_m = seen.blocked.late_m() + unnoticed.late_m();
         let shift_m = late_m + state_m(CLOCK) + seen.lag_s * state_m(DRIFT) + state_m(offset);
@@ -59,6 +60,8 @@ impl Ekf {
             ],
         );
         (predicted.path, predicted.unnoticed) = (path, unnoticed);
+        (predicted.path_after, predicted.clear_probability) =
+            path.update(&predicted.clear_innovation());
         predicted.information_fraction = own_variance / (ratio * noise + shared_variance);
         Ok(predicted)
     }

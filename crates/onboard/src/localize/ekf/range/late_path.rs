@@ -3,8 +3,9 @@
 //! The ranges of a blocked path are late, for seconds or minutes. A hidden Markov model has the states *clear* and
 //! *blocked*; the state changes with the distance driven. The innovation of a clear path is Gaussian. With a blocked path, it
 //! also contains the exponentially distributed additional distance of a [`super::blocked_path`], so that it is an
-//! exponentially modified Gaussian (Grushka 1972). An additional distance of 6 or 15 m gives equal errors. A filter without this model takes the late ranges for a jump of the radio head's offset, and estimates
-//! the offset again at both ends of each blockage (notes/experiments.md).
+//! exponentially modified Gaussian (Grushka 1972). An additional distance of 6 or 15 m gives equal errors. A filter without
+//! this model takes the late ranges for a jump of the radio head's offset, and estimates the offset again at both ends of
+//! each blockage (notes/experiments.md).
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -18,7 +19,8 @@ pub(super) const LATE_M: f64 = 6.0;
 /// Prior probability of a blocked path. An assumption; the ranges of a few metres outweigh it.
 const PRIOR: f64 = 0.05;
 
-/// Minimum and maximum probability before a range, so that a path that has changed is found at standstill, too.
+/// Minimum and maximum probability before a range, so that a path that has changed is found at standstill, too. An
+/// assumption.
 const BEFORE: [f64; 2] = [0.01, 0.99];
 
 /// First path that is blocked with a probability.
@@ -52,34 +54,27 @@ impl LatePath {
         }
     }
 
-    /// Returns the path after a range with this innovation of a clear path. An outlier is no evidence for either state.
-    pub fn after(self, innovation: &Innovation) -> Self {
-        let [late, clear, outlier] = self.joint_densities(innovation);
-        Self {
-            probability: (late + self.probability * outlier) / (late + clear + outlier),
-        }
+    /// Returns the path after a range with this innovation of a clear path, and the probability that the range has a clear
+    /// path and is no outlier. An outlier is no evidence for either state.
+    pub fn update(self, innovation: &Innovation) -> (Self, f64) {
+        let (late, clear) = densities(innovation);
+        let late = (1.0 - OUTLIERS) * self.probability * late;
+        let clear = (1.0 - OUTLIERS) * (1.0 - self.probability) * clear;
+        let outlier = OUTLIERS * outlier_density(innovation);
+        let total = late + clear + outlier;
+        let probability = (late + self.probability * outlier) / total;
+        (Self { probability }, clear / total)
     }
 
-    /// Returns the probability that a range with this innovation has a clear path and is no outlier.
-    pub fn clear_probability(self, innovation: &Innovation) -> f64 {
-        let [late, clear, outlier] = self.joint_densities(innovation);
-        clear / (late + clear + outlier)
+    /// Returns the path after a range.
+    pub fn after(self, innovation: &Innovation) -> Self {
+        self.update(innovation).0
     }
 
     /// Returns the probability density (1/m) of an innovation of a clear path, if it is no outlier.
     pub fn density(self, innovation: &Innovation) -> f64 {
         let (late, clear) = densities(innovation);
         self.probability * late + (1.0 - self.probability) * clear
-    }
-
-    /// Returns the joint densities (1/m) of an innovation with a blocked path, with a clear path, and as an outlier.
-    fn joint_densities(self, innovation: &Innovation) -> [f64; 3] {
-        let (late, clear) = densities(innovation);
-        [
-            (1.0 - OUTLIERS) * self.probability * late,
-            (1.0 - OUTLIERS) * (1.0 - self.probability) * clear,
-            OUTLIERS * outlier_density(innovation),
-        ]
     }
 }
 

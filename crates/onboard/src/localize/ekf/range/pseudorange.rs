@@ -39,6 +39,9 @@ pub(in crate::localize) struct PredictedRange {
     pub innovation: Innovation,
     /// First path before a range, according to the ranges before it.
     pub(super) path: LatePath,
+    /// First path after a range, and probability that the range has a clear path and is no outlier.
+    pub(super) path_after: LatePath,
+    pub(super) clear_probability: f64,
     /// Additional distance of a blocked path that the ranges do not show.
     pub(super) unnoticed: BlockedPath,
 }
@@ -192,6 +195,8 @@ impl Ekf {
                 measurement_variance,
             },
             path: LatePath::CLEAR,
+            path_after: LatePath::CLEAR,
+            clear_probability: 1.0,
             unnoticed: BlockedPath::NEVER,
         }
     }
@@ -220,7 +225,7 @@ impl PredictedRange {
 
     /// Whether a range is probably late because its path is blocked, so that it must not be used.
     pub fn is_late(&self) -> bool {
-        self.path.after(&self.clear_innovation()).is_blocked()
+        self.path_after.is_blocked()
     }
 
     /// Returns the innovation with the variance of the independent part of the measurement.

@@ -9,10 +9,10 @@ use crate::localize::output::{UpdateReason, UpdateResult};
 use crate::radio_head::RadioHead;
 use crate::range::{RangeMeasurement, RangeQuantity};
 
-/// Number of successive rejected ranges of a radio head that are a jump of its offset, not outliers.
+/// Number of successive ranges of a radio head beyond the gate that are a jump of its offset, not outliers.
 const JUMP_RANGES: u16 = 8;
 
-/// Number of independent paths over which blocked ones are averaged.
+/// Number of independent paths over which blocked ones are averaged. An assumption.
 const PATHS: f64 = 10.0;
 
 /// Estimated range states, each with its standard deviation.
@@ -49,11 +49,12 @@ impl Ekf {
         self.update_predicted_range(&predicted)
     }
 
-    /// Returns the first path of a radio head before a range. It is clear if the ranges are no evidence for a blocked path:
+    /// Returns the first path of a radio head before a range, if a new state since the previous one has the probability
+    /// `changed`. It is clear if the ranges are no evidence for a blocked path:
     /// with angles, which are the better evidence; before the first used range, because an offset beyond its standard
     /// deviation is no blocked path; and while two-way ranges of other radio heads are too short, because the position or the
     /// odometry is then wrong. Delays that are too short also follow from a clock that was estimated with late ones.
-    pub(super) fn path_before(&self, seen: &Sighted<'_>) -> LatePath {
+    pub(super) fn path_before(&self, seen: &Sighted<'_>, changed: f64) -> LatePath {
         let is_contradicted = || self.heads.iter().any(|it| it.rejected_ranges > 0);
         if self.has_angles()
             || !seen.travelled_m.is_finite()
@@ -61,7 +62,6 @@ impl Ekf {
         {
             return LatePath::CLEAR;
         }
-        let changed = independent(seen.travelled_m, SHARED_M);
         (self.heads.get(seen.index)).map_or(LatePath::CLEAR, |head| head.late.before(changed))
     }
 
@@ -85,7 +85,7 @@ impl Ekf {
             && let Some(head) = self.heads.get_mut(predicted.index)
         {
             let share = path_changed(head, predicted) / PATHS;
-            head.late = predicted.path.after(&predicted.clear_innovation());
+            head.late = predicted.path_after;
             let is_blocked = f64::from(head.late.is_blocked());
             self.blocked_fraction += share * (is_blocked - self.blocked_fraction);
         }
@@ -94,7 +94,7 @@ impl Ekf {
     /// Whether at least half of the paths are blocked, of several radio heads with one-way delays within the last 20 m. The
     /// vehicle's clock may then follow the late delays, so that the other ones seem early.
     pub(in crate::localize) fn most_paths_are_blocked(&self) -> bool {
-        if !self.config.ranging.is_some_and(|model| model.is_one_way) {
+        if !self.has_one_way_delays() {
             return false;
         }
         let recent = |it: &&Head| self.driven_m - it.last_range_m < SHARED_M;
@@ -121,14 +121,16 @@ impl Ekf {
         }
         let seen = predicted.innovation;
         let mahalanobis2 = seen.mahalanobis2();
-        let mut is_outlier = mahalanobis2 > self.config.gate;
-        let mut weight = if is_outlier { 0.0 } else { 1.0 };
+        let is_beyond_gate = mahalanobis2 > self.config.gate;
+        let weight = match predicted.quantity {
+            RangeQuantity::Range => predicted.clear_probability,
+            _ => f64::from(!is_beyond_gate),
+        };
+        let is_outlier = weight < 0.5;
         match predicted.quantity {
             RangeQuantity::Range => {
-                weight = (predicted.path).clear_probability(&predicted.clear_innovation());
                 self.note_path(predicted);
-                self.monitor_range(predicted, is_outlier);
-                is_outlier = weight < 0.5;
+                self.monitor_range(predicted, is_beyond_gate);
             }
             // A cycle slip: the phase continues with another number of wavelengths.
             RangeQuantity::CarrierPhase if is_outlier => {
@@ -169,8 +171,8 @@ impl Ekf {
         }
     }
 
-    /// Estimates the noise of the ranges with an innovation, and counts successive outliers.
-    fn monitor_range(&mut self, predicted: &PredictedRange, is_outlier: bool) {
+    /// Estimates the noise of the ranges with an innovation, and counts successive ranges beyond the gate.
+    fn monitor_range(&mut self, predicted: &PredictedRange, is_beyond_gate: bool) {
         self.range_noise
             .see(&predicted.innovation, predicted.stated_variance);
         let model = self.config.ranging.as_ref();
@@ -178,14 +180,14 @@ impl Ekf {
         let since_s = (predicted.time_s - self.last_delay_s).max(0.0);
         self.clock_noise
             .see(&predicted.innovation, wander * wander * since_s);
-        if is_outlier {
+        if is_beyond_gate {
             self.reject_range(predicted);
         } else if let Some(head) = self.heads.get_mut(predicted.index) {
             head.rejected_ranges = 0;
         }
     }
 
-    /// Counts a rejected range. After several successive ones, the offset of the radio head has jumped, and its variance then
+    /// Counts a range beyond the gate. After several successive ones, the offset of the radio head has jumped, and its variance then
     /// includes the jump: its hardware was restarted, or the offset was estimated with a blocked path. Without angles, ranges
     /// that are too long are those of a blocked path.
     fn reject_range(&mut self, predicted: &PredictedRange) {
@@ -203,6 +205,11 @@ impl Ekf {
             let offset = HeadState::Offset.number(predicted.index, count, model);
             self.bias.add_jump(offset, 0.0, residual.powi(2));
         }
+    }
+
+    /// Whether the ranges contain the vehicle's clock.
+    pub(super) fn has_one_way_delays(&self) -> bool {
+        self.config.ranging.is_some_and(|model| model.is_one_way)
     }
 
     /// Whether an angle was used.
